@@ -2,6 +2,9 @@
 
 A file may be damaged or malicious: 200 KB of brackets cause a RecursionError, and 1e999 is read as infinity. All of
 this becomes ValueError here, which callers turn into a message about their kind of file.
+
+The project's own documents (calibrations, maps, backups of settings) end in a CRC-32 of their content: a flipped bit
+turns a gain of 3850691 into 7850691, which is a number like any other.
 """
 
 from __future__ import annotations
@@ -10,9 +13,13 @@ import json
 import math
 import re
 import sys
+import zlib
 from collections.abc import Callable
+from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from .errors import InputError, taken
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,6 +42,96 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 _DOTS_MAX = 3
+
+FORMAT = "format"
+CRC32 = "crc32"
+EDITED = "edited"  # in place of the CRC-32
+
+#: How something was made, for people to read: any keys, any JSON values. Nothing is computed from it.
+Provenance = dict[str, Any]
+
+Read = TypeVar("Read")
+
+
+# ---- our own documents -------------------------------------------------------------------------
+
+
+def sealed(document: dict[str, Any]) -> dict[str, Any]:
+    """The document with the CRC-32 of its content as its last member."""
+    return {**document, CRC32: _crc32(document)}
+
+
+def unsealed(document: Any, format_name: str) -> dict[str, Any]:
+    """The document without its CRC-32, which is checked.
+
+    Raises ValueError for another format, and for content that is not what was written; the member says "edited" where
+    that is on purpose. It may not just be left out, as damage to its name would then pass.
+    """
+    if not isinstance(document, dict) or document.get(FORMAT) != format_name:
+        seen = document.get(FORMAT) if isinstance(document, dict) else None
+        raise ValueError(f'it has "{FORMAT}": {json.dumps(seen)}, expected "{format_name}"')
+    content = {key: value for key, value in document.items() if key != CRC32}
+    seen, computed = document.get(CRC32), _crc32(content)
+    if seen not in (computed, EDITED):
+        raise ValueError(
+            f'it has "{CRC32}": {json.dumps(seen)}, but its content has "{computed}": it is damaged; take an intact '
+            f'copy, or, if you edited it, write "{CRC32}": "{EDITED}"'
+        )
+    return content
+
+
+def _crc32(content: dict[str, Any]) -> str:
+    # of one spelling, after a round trip that makes numbered members named ones: spaces and order do not matter
+    text = json.dumps(json.loads(json.dumps(content)), sort_keys=True, separators=(",", ":"))
+    return f"{zlib.crc32(text.encode('ascii')):08x}"
+
+
+def read_document(path: Path, format_name: str, parse: Callable[[dict[str, Any]], Read], cure: str) -> Read:
+    """What ``parse`` makes of the content of one of our JSON files, its CRC-32 checked.
+
+    Raises InputError that says what is wrong, also where ``parse`` raises what wrong content makes it raise, and ends
+    with ``cure``.
+    """
+    return _parsed(lambda: read_json(path), str(path), format_name, parse, cure)
+
+
+def parse_document(text: str, where: str, format_name: str, parse: Callable[[dict[str, Any]], Read], cure: str) -> Read:
+    """read_document() of a text from ``where``."""
+    return _parsed(lambda: parse_json(text), where, format_name, parse, cure)
+
+
+def _parsed(
+    load: Callable[[], Any], where: str, format_name: str, parse: Callable[[dict[str, Any]], Read], cure: str
+) -> Read:
+    try:
+        return parse(unsealed(load(), format_name))
+    except OSError as error:
+        raise InputError(f"{where} cannot be read ({error.strerror}); {cure}") from error
+    except KeyError as error:
+        raise InputError(f"{where} is not usable: {error} is missing; {cure}") from error
+    except (InputError, ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise InputError(f"{where} is not usable: {str(error) or type(error).__name__}; {cure}") from error
+
+
+def write_new(path: Path, text: str, *, overwrite: bool = False) -> None:
+    """Write a text file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
+    try:
+        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise taken(path) from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+
+
+def made_text(made_s: int) -> str:
+    """When something was made, in seconds since 1970 UTC, as text for people; 0: unknown."""
+    if made_s == 0:
+        return "made at an unknown time"
+    return f"made {datetime.fromtimestamp(made_s, timezone.utc):%Y-%m-%d %H:%M} UTC"
+
+
+# ---- anybody's ---------------------------------------------------------------------------------
 
 
 def read_json(path: Path) -> Any:

@@ -22,45 +22,46 @@ from record_all import record_all
 
 import biotac
 from biotac import documents
+from biotac.calibrate.population import population_map
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.mcap_file import read_mcap
 from biotac.calibrate.reference.mounting import LIN, from_json, read_mounting
-from biotac.calibrate.wrench import fitted, provenance
 from biotac.cli.recordings.recompute import read_settings
 from biotac.errors import BiotacError
 from biotac.flash import read_backup
 from biotac.flash.backup import FORMAT as BACKUP
-from biotac.keep import calibration_file, map_file
+from biotac.keep import calibration_file
 from biotac.keep.calibration import Calibration
+from biotac.map import columns
+from biotac.map import file as map_file
+from biotac.map.fitted import WrenchMap
+from biotac.map.population import shipped
 from biotac.sim import physics
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 
 MORE_BYTES = 500 << 20
 
-CALIBRATION = json.loads(
-    calibration_file.dumps(Calibration(wire.PocWeights.COMPRESS_N2, (1, 2, 3), (4, 5), 0, "BT1", 1_763_731_310))
-)
+CALIBRATION = calibration_file.to_dict(Calibration(wire.PocWeights.COMPRESS_N2, (1, 2, 3), (4, 5), 0, "BT1", 1_763_731))
 MAP = map_file.to_dict(make_map(1))
-WIDTH = fitted.features.width(with_pdc=False)
-WRENCH = {
-    "format": fitted.FORMAT, "model": "all", "axes": ["Fx", "Fy", "Fz"], "tare_counts": [2000.0] * 19,
-    "window_rows": 5, "lag_rows": [1, 1, 1], "blocks": fitted._block_names(with_pdc=False),
-    "coefficients": [[0.5] * 3] * (WIDTH + 1), "provenance": None,
-}  # fmt: skip
+COEFFICIENTS = np.full((columns.width(with_pdc=False) + 1, 3), 0.5)
+FITTED = json.loads(
+    map_file.dumps_fitted(WrenchMap("all", columns.AXES[:3], np.full(19, 2e3), 5, (1, 1, 1), COEFFICIENTS))
+)
 SETTINGS = {"settings": {"poc_weights": 2}}
 KEPT = {
     "format": BACKUP, "settings": [{"id": 1, "value": 2}], "calibrations": {"0": CALIBRATION}, "maps": {"0": MAP},
 }  # fmt: skip
+EDITED = {documents.CRC32: documents.EDITED}  # so that more than the sum is asked
 MOUNTING = {"rotation": [[0, 1, 0], [1, 0, 0], [0, 0, -1]], "offset_mm": [1.0, 0.0, 2.0], "reads": "force on finger"}
 
 JSON: dict[str, tuple[Callable[[Path], Any], Any]] = {
-    "calibration": (calibration_file.load, CALIBRATION),
-    "map": (map_file.load, MAP),
-    "wrench map": (fitted.load, WRENCH),
-    "provenance": (provenance.read, WRENCH),
+    "calibration": (calibration_file.load, CALIBRATION | EDITED),
+    "map": (map_file.load, MAP | EDITED),
+    "fitted map": (map_file.load_fitted, FITTED | EDITED),
+    "provenance": (map_file.read_provenance, FITTED | EDITED),
     "settings": (read_settings, SETTINGS),
-    "backup": (read_backup, KEPT),
+    "backup": (read_backup, KEPT | EDITED),
     "mounting": (lambda path: from_json(path.read_text(errors="replace"), "here"), MOUNTING),
 }
 STRANGE: list[Any] = [
@@ -133,6 +134,33 @@ def test_damaged_json_is_refused_in_a_line_or_read(tmp_path: Path, kind: str) ->
         path.write_bytes(damaged(data, draw))
         refused += refused_or_read(read, path)
     assert refused > 30
+
+
+SEALED: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "calibration": (calibration_file.load, json.dumps(documents.sealed(CALIBRATION), indent=2)),
+    "map": (map_file.load, json.dumps(documents.sealed(MAP), indent=2)),
+    "fitted map": (lambda path: repr(map_file.load_fitted(path)), json.dumps(FITTED)),
+    "backup": (read_backup, json.dumps(documents.sealed(KEPT), indent=1)),
+    "population map": (lambda path: repr(population_map.load(path)), shipped()),
+}
+
+
+@pytest.mark.parametrize("flips", [150, pytest.param(10_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("kind", SEALED)
+def test_a_flipped_bit_is_never_read_as_another_value(tmp_path: Path, kind: str, flips: int) -> None:
+    read, text = SEALED[kind]
+    path, draw, data = tmp_path / "file.json", random.Random(4), text.encode()
+    path.write_bytes(data)
+    good, refused = read(path), 0
+    for _ in range(flips):
+        spoilt = bytearray(data)
+        spoilt[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+        path.write_bytes(spoilt)
+        try:
+            assert read(path) == good  # white space, or 1e5 for 1E5
+        except BiotacError:
+            refused += 1
+    assert refused > 0.5 * flips
 
 
 @pytest.mark.parametrize("text", ["[" * 200_000, '{"a":' * 200_000, "1e999", "9" * 100_000, "", "\0", "\ufeff{}"])

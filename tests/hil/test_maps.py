@@ -17,7 +17,7 @@ import biotac
 from biotac import CalibrationState
 from biotac.cli.main import main
 from biotac.errors import CommandRefusedError
-from biotac.keep.map_blob import PART_BYTES, for_any_sensor, part
+from biotac.map.board_map import PART_BYTES, for_any_sensor, part
 from biotac.recording import Recording
 from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire

@@ -14,7 +14,7 @@ from restarts import Restarts
 from rig import Rig
 
 from biotac import FaultFlags, FrameFlags, Setting, TareReason
-from biotac.keep.map_blob import PART_BYTES, part
+from biotac.map.board_map import PART_BYTES, part
 from biotac.wire import messages_gen as wire
 
 pytestmark = pytest.mark.long

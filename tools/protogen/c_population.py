@@ -11,7 +11,7 @@ from typing import Any
 from .c_map import BLOCK_BYTES, HEADER_BYTES
 from .schema import c_header
 
-SOURCE = "host/biotac/core/population.json"
+SOURCE = "host/biotac/map/population.json"
 FORCE_PER_N = 1e4
 WORDS_A_LINE = 8
 

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from ..core import geometry as surface
 from ..core.geometry import Floats
-from ..core.map_columns import ELECTRODES
 from ..documents import read_json
 from ..errors import InputError
+from ..map.columns import ELECTRODES
 
 FORMAT = "biotac-normal/1"
 RIDGES = (0.01, 0.1, 1.0)  # of each input's variance

@@ -1,6 +1,6 @@
 """Point of contact, force and torque of whole recordings, in float64.
 
-The formulas are those of core.compiled.reference_q4 and core.population, in C: host/binding/blocks.c,
+The formulas are those of core.compiled.reference_q4 and map.population, in C: host/binding/blocks.c,
 population_float64.c.
 """
 
@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..map.board_map import BoardMap, opened
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
 from ..wire.native import ffi, lib
-from .board_map import BoardMap
 from .compiled import FORCE_GAINS, TORQUE_GAINS, default_settings, formula_settings
-from .map_versions import opened
 
 #: poc_mm, force_n and torque_nmm of one frame; names, units and axes are as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
@@ -74,7 +73,7 @@ def compute(
     if tare is None:
         counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
     if wrench_map is not None:
-        from .map_float64 import by_map  # here: everybody would wait for it at `import biotac`
+        from ..map.float64 import by_map  # here: everybody would wait for it at `import biotac`
 
         plain = compute(counts, tare, settings)
         shape = plain.shape
@@ -182,7 +181,7 @@ def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
 
 
 def _population(settings: Mapping[wire.Setting, int]) -> Any:
-    from . import population  # here: everybody would wait for it at `import biotac`
+    from ..map import population  # here: everybody would wait for it at `import biotac`
 
     return population.compiled_coefficients() if population.in_force(settings) else ffi.NULL
 

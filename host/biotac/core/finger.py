@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CommandRefusedError
+from ..map.board_map import BoardMap, opened
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire import slots
@@ -20,10 +21,8 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
-from .board_map import BoardMap
 from .compiled import Settings, board_settings, check_words, default_settings
 from .events import EVENT_DTYPE
-from .map_versions import opened
 
 ROUND_US = 10_000
 _EVENTS_A_ROUND = 24  # more than there can be: a touch and a lift in every other slot

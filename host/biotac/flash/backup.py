@@ -9,18 +9,19 @@ import json
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
-from ..documents import read_json
+from ..documents import read_document, sealed, write_new
 from ..errors import CommandRefusedError, InputError
 from ..hand.compatibility import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..hand.hand import Hand
-from ..keep import Calibration, map_file
+from ..keep import Calibration
 from ..keep.calibration_file import from_dict, to_dict
-from ..keep.map_blob import as_blob
+from ..map import file as map_file
 from ..wire import messages_gen as wire
 from ..wire.identity import board_text, serial_text, version_text
 
-FORMAT = "biotac settings 1"
+FORMAT = "biotac-settings/1"
 LAST_ID = 255
 
 
@@ -72,47 +73,35 @@ def save(hand: Hand, path: Path | None) -> Backup:
     Raises InputError when the file exists or cannot be written.
     """
     hello = hand.info
-    its = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), _maps(hand))
+    backup = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), hand.maps())
     facts = {
         "format": FORMAT,
         "board": board_text(hello.board),
         "serial_number": serial_text(hello),
         "firmware": version_text(hello),
         "boot_id": hello.boot_id,
-        "settings": [{"id": key, "name": setting_name(key), "value": value} for key, value in its.values.items()],
-        "calibrations": {finger: to_dict(calibration) for finger, calibration in its.calibrations.items()},
-        "maps": {finger: map_file.to_dict(blob) for finger, blob in its.maps.items()},
+        "settings": [{"id": key, "name": setting_name(key), "value": value} for key, value in backup.values.items()],
+        "calibrations": {finger: to_dict(calibration) for finger, calibration in backup.calibrations.items()},
+        "maps": {finger: map_file.to_dict(blob) for finger, blob in backup.maps.items()},
     }
     try:
-        with its.path.open("x", encoding="utf-8") as file:
-            file.write(json.dumps(facts, indent=1) + "\n")
-    except FileExistsError as error:
-        raise InputError(f"{its.path} exists and may hold other settings; choose another --backup") from error
-    except OSError as error:
-        raise InputError(f"{its.path} cannot be written ({error.strerror}); choose another --backup") from error
-    return its
-
-
-def _maps(hand: Hand) -> dict[int, bytes]:
-    """Maps by finger in the current format, which the new firmware takes; older ones are converted."""
-    return {finger: as_blob(blob) for finger, blob in hand.maps().items()}
+        write_new(backup.path, json.dumps(sealed(facts), indent=1) + "\n")
+    except InputError as error:
+        raise InputError(f"{error}; choose another --backup") from error
+    return backup
 
 
 def read_backup(path: Path) -> Backup:
     """Read a file that save() wrote. Raises InputError when it cannot be read or is not such a file."""
-    try:
-        facts = read_json(path)
-        if facts["format"] != FORMAT:
-            raise ValueError(f"its format is {facts['format']!r}")
-        values = {int(one["id"]): int(one["value"]) for one in facts["settings"]}
-        calibrations = {int(finger): from_dict(its) for finger, its in facts.get("calibrations", {}).items()}
-        maps = {int(finger): map_file.from_dict(its) for finger, its in facts.get("maps", {}).items()}
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read ({error.strerror}); expected a file written by biotac flash"
-        ) from error
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise InputError(f"{path} holds no settings ({error}); expected a file written by biotac flash") from error
+    return read_document(
+        path, FORMAT, lambda content: _backup(path, content), "expected a file written by biotac flash"
+    )
+
+
+def _backup(path: Path, content: dict[str, Any]) -> Backup:
+    values = {int(one["id"]): int(one["value"]) for one in content["settings"]}
+    calibrations = {int(finger): from_dict(tree) for finger, tree in content.get("calibrations", {}).items()}
+    maps = {int(finger): map_file.from_dict(tree) for finger, tree in content.get("maps", {}).items()}
     return Backup(path.resolve(), values, calibrations, maps)
 
 

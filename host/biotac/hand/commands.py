@@ -9,10 +9,10 @@ from typing import Any, SupportsIndex, TypeAlias
 
 import numpy as np
 
-from ..core.board_map import BoardMap
 from ..errors import CommandRefusedError, DeviceLostError, WireVersionError
-from ..keep import map_blob as maps
 from ..keep.calibration import Calibration, own_settings
+from ..map import board_map as maps
+from ..map.board_map import BoardMap
 from ..wire import messages_gen as wire
 from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS

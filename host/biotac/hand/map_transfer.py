@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 
 from ..errors import CommandRefusedError, PortError
-from ..keep.map_blob import PART_BYTES, part
+from ..map.board_map import PART_BYTES, part
 from ..wire import messages_gen as wire
 from .board import Board
 
@@ -46,26 +46,26 @@ def info(board: Board, finger: int) -> wire.MapInfo:
 
 def restore(board: Board, finger: int, blob: bytes) -> None:
     """Upload this map to the finger unless it has it already."""
-    told = info(board, finger)
-    if (told.size_bytes, told.crc32) != (len(blob), zlib.crc32(blob)):
+    held = info(board, finger)
+    if (held.size_bytes, held.crc32) != (len(blob), zlib.crc32(blob)):
         write(board, finger, blob)
 
 
 def read(board: Board, finger: int) -> bytes | None:
     """A finger's map, in force or not; None without one. Raises PortError when it does not arrive intact."""
     for _ in range(TRIES):  # the map may be replaced meanwhile
-        told = info(board, finger)
-        if told.state == wire.CalibrationState.NONE:
+        held = info(board, finger)
+        if held.state == wire.CalibrationState.NONE:
             return None
-        offsets = range(0, told.size_bytes, PART_BYTES)
+        offsets = range(0, held.size_bytes, PART_BYTES)
         try:
             parts = [bytes(board.ask(wire.ReadMap(0, finger, offset), wire.MapData).data) for offset in offsets]
         except CommandRefusedError as refused:
             if refused.error != wire.Error.OUT_OF_RANGE:
                 raise
             continue
-        blob = b"".join(parts)[: told.size_bytes]
-        if zlib.crc32(blob) == told.crc32:
+        blob = b"".join(parts)[: held.size_bytes]
+        if zlib.crc32(blob) == held.crc32:
             return blob
     raise PortError(
         f"the map of finger {finger} did not arrive intact in {TRIES} tries; close other programs and try again"

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import json
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from ..documents import JSON_BYTES, parse_json, read_text
-from ..errors import InputError, taken
+from ..documents import Provenance, parse_document, read_document, sealed, write_new
 from ..wire import messages_gen as wire
 from .calibration import Calibration
 
-FORMAT = "biotac-calibration"
-VERSION = 2  # version 1 had no pressure_gain_nn
-
-#: How a calibration was made, for people to read: any keys, any JSON values. Nothing is computed from it.
-Provenance = dict[str, Any]
+FORMAT = "biotac-calibration/1"
+_CURE = "expected a calibration, as `biotac calibration get` writes it"
 
 
 def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> dict[str, Any]:
-    """The contents of a file, its keys in order."""
+    """The content of a file, its keys in order."""
     return {
         "format": FORMAT,
-        "version": VERSION,
         "serial": calibration.serial,
         "made_s": calibration.made_s,
         "poc_weights": wire.PocWeights(calibration.poc_weights).name,
@@ -42,12 +36,6 @@ def from_dict(tree: Any) -> Calibration:
     """Inverse of to_dict, without the provenance. Raises ValueError that says which key is wrong, and why."""
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise ValueError(f'it has no "format": "{FORMAT}"')
-    if type(tree.get("version")) is not int or not 1 <= tree["version"] <= VERSION:
-        raise ValueError(
-            f"its version is {tree.get('version')!r}, expected 1 to {VERSION}; a newer biotac-gateway may read it"
-        )
-    if tree["version"] == 1:
-        tree = {"pressure_gain_nn": 0, **tree}
     for key in tree:
         if key not in KEYS:
             raise ValueError(f"key {key!r} is unknown; expected {', '.join(KEYS)}")
@@ -80,52 +68,21 @@ def _axes(tree: dict[str, Any], key: str, axes: str) -> list[Any]:
 
 def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str:
     """The text of a file."""
-    return json.dumps(to_dict(calibration, provenance), indent=2) + "\n"
+    return json.dumps(sealed(to_dict(calibration, provenance)), indent=2) + "\n"
 
 
 def loads(text: str, where: str) -> Calibration:
     """The calibration in a file's text. Raises InputError that begins with ``where`` and says what is wrong."""
-    try:
-        return from_dict(parse_json(text))
-    except ValueError as error:
-        raise InputError(
-            f"{where} is not a usable calibration: {error}; `biotac calibration get` writes one"
-        ) from error
+    return parse_document(text, where, FORMAT, from_dict, _CURE)
 
 
 def load(path: Path) -> Calibration:
     """The calibration in a file. Raises InputError when it cannot be read or used."""
-    try:
-        text = read_text(path, JSON_BYTES)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not text; expected JSON written by `biotac calibration get`") from error
-    except ValueError as error:
-        raise InputError(f"{path} is not a calibration: {error}; `biotac calibration get` writes one") from error
-    return loads(text, str(path))
+    return read_document(path, FORMAT, from_dict, _CURE)
 
 
 def save(
     path: Path, calibration: Calibration, provenance: Provenance | None = None, *, overwrite: bool = False
 ) -> None:
     """Write a file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
-    write(path, dumps(calibration, provenance), overwrite=overwrite)
-
-
-def write(path: Path, text: str, *, overwrite: bool) -> None:
-    """Write the text of a calibration's or a map's file; raises as save() does."""
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise taken(path) from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
-
-
-def when(made_s: int) -> str:
-    """``made_s`` as text for people."""
-    if made_s == 0:
-        return "made at an unknown time"
-    return f"made {datetime.fromtimestamp(made_s, timezone.utc):%Y-%m-%d %H:%M} UTC"
+    write_new(path, dumps(calibration, provenance), overwrite=overwrite)

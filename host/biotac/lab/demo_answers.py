@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.wrench import board, models
-from ..calibrate.wrench.fitted import WrenchMap
+from ..calibrate.wrench import models
 from ..calibrate.wrench.moments import air_sums, smoothed, strip_sums
 from ..calibrate.wrench.run import run_of
-from ..core.board_map import BoardMap
-from ..core.board_map import on_board_q4 as mapped_q4
 from ..core.compiled import FORCE_GAINS, Settings, on_board_q4
-from ..core.population import in_force
+from ..map.board_map import BoardMap
+from ..map.board_map import on_board_q4 as mapped_q4
+from ..map.fitted import WrenchMap
+from ..map.population import in_force
 from ..sim.physics import Finger
 from ..sim.scenario import FLAT_MM
 from ..sim.source import Source
@@ -75,4 +75,4 @@ def own_map(finger: Finger) -> BoardMap:
     assert air is not None
     coefficients = models.pulled(sums.plus(air), [models.JOINED.family])[0][0]
     lag_rows = (0,) * len(run.axes)
-    return board.quantise(WrenchMap(models.JOINED.name, run.axes, run.tare, 1, lag_rows, coefficients))
+    return WrenchMap(models.JOINED.name, run.axes, run.tare, 1, lag_rows, coefficients).on_board()

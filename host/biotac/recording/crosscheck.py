@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import population
-from ..core.board_map import BoardMap, pdc_above_rest_q4
 from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, reference_q4
-from ..core.map_bound import bound_of
-from ..core.map_columns import Signals, tared
-from ..core.map_float64 import exact, replace_gains, result_units, tared_chunks
-from ..core.map_versions import opened
+from ..map import population
+from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
+from ..map.bound import bound_of, error_bound
+from ..map.columns import Signals, tared
+from ..map.float64 import exact, replace_gains
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, UM_PER_MM, StructArray, electrode_signals, to_units
@@ -218,8 +217,7 @@ def _by_map(
     and 0 for a map without torsion.
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    wrench = exact(its, *frames)
-    off = np.concatenate([bound_of(its, None, s) for s in tared_chunks(its, *frames)]) / result_units(its.axes)
+    wrench, off = exact(its, *frames), error_bound(its, None, *frames)
     torsion = np.empty((len(messages), 1))
     replace_gains(its, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)

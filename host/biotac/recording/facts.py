@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import InputError
 from ..keep import Calibration
 from ..keep.calibration_file import from_dict, to_dict
-from ..keep.map_blob import as_blob
+from ..map.board_map import as_blob
 from ..version import __version__
 from ..wire import messages_gen as wire
 from ..wire.identity import NO_IMAGE, version_text

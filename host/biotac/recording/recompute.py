@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import board_map
-from ..core.board_map import BoardMap
 from ..core.compiled import on_board_q4, pressure_force_100un
-from ..core.map_versions import opened
 from ..errors import InputError
 from ..hand.subscription import RESULTS
 from ..keep.calibration import own_settings
+from ..map import board_map
+from ..map.board_map import BoardMap, opened
 from ..version import __version__
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.board_map import BoardMap
 from ..core.finger import FINGER_DTYPE, ROUND_US, Finger
 from ..errors import CommandRefusedError
+from ..map.board_map import BoardMap
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibrate.wrench import fitted, provenance, upload
+from biotac.calibrate.wrench import upload
 from biotac.calibrate.wrench.sources import load
 from biotac.cli.main import main
-from biotac.core.board_map import from_blob
 from biotac.errors import PortError
+from biotac.map.board_map import from_blob
+from biotac.map.file import load_fitted, read_provenance
 
 pytestmark = pytest.mark.nightly  # a minute and a half of procedure and fits
 
@@ -38,14 +39,13 @@ def fit_again(calibrated: Path, *words: str) -> list[str]:
 def test_it_leaves_recording_reference_report_picture_and_map(calibrated: Path) -> None:
     names = sorted(path.name for path in calibrated.iterdir())
     assert names == [f"{SERIAL}.{end}" for end in ("csv", "mcap", "md", "png", "wrench.json")]
-    its = provenance.read(calibrated / f"{SERIAL}.wrench.json")
-    assert its is not None
-    assert (its.serial, its.files) == (SERIAL, (f"{SERIAL}.mcap", f"{SERIAL}.csv"))
-    assert its.software.startswith("biotac-gateway ")
-    assert its.alignment is not None and its.alignment["clear"] > 5.0
+    its = read_provenance(calibrated / f"{SERIAL}.wrench.json")
+    assert (its["serial"], its["files"]) == (SERIAL, [f"{SERIAL}.mcap", f"{SERIAL}.csv"])
+    assert its["software"].startswith("biotac-gateway ")
+    assert its["alignment"]["clear"] > 5.0
     page = (calibrated / f"{SERIAL}.md").read_text(encoding="utf-8")
-    assert its.data_sha256 in page and SERIAL in page
-    assert fitted.load(calibrated / f"{SERIAL}.wrench.json").axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
+    assert its["data_sha256"] in page and SERIAL in page
+    assert load_fitted(calibrated / f"{SERIAL}.wrench.json").axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 
 
 def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
@@ -61,8 +61,8 @@ def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
     assert facts["serial"] == SERIAL
     # better than Lin's scales on every force, or the procedure recorded the wrong things
     assert min(facts["better_than_lin"][:3]) > 1.0
-    again = provenance.read(calibrated / f"{SERIAL}.wrench.json")
-    assert again is not None and facts["data_sha256"] == again.data_sha256
+    again = read_provenance(calibrated / f"{SERIAL}.wrench.json")
+    assert facts["data_sha256"] == again["data_sha256"]
 
 
 def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,7 +76,7 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
 
     reference = calibrated / f"{SERIAL}.csv"
     loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))
-    its = fitted.load(calibrated / f"{SERIAL}.wrench.json")
+    its = load_fitted(calibrated / f"{SERIAL}.wrench.json")
     with biotac.open("sim:calibrate.toml") as hand:
         real = hand.get_map
 
@@ -89,4 +89,4 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
 
         monkeypatch.setattr(hand, "get_map", spoilt)
         with pytest.raises(PortError, match=r"the board accepted the map of \d+ bytes, but has another of \d+ bytes"):
-            upload.upload(hand, 0, its, loaded.run, serial=SERIAL, made_s=1)
+            upload.upload(hand, 0, its, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from biotac.calibrate.wrench.provenance import check_serial
 
 import biotac
 from biotac.calibrate.reference.alignment import align
@@ -14,7 +15,6 @@ from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
-from biotac.calibrate.wrench.provenance import check_serial
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.recording import Recording

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import held_out_error, map_file, training
+from biotac.calibrate.population import held_out_error, population_map, training
 from biotac.calibrate.population.fewshot import Scale, pulled, scale_of
-from biotac.calibrate.wrench import board, features, moments
+from biotac.calibrate.population.population_map import Population, Trained
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.cli.main import main
 from biotac.core import geometry as surface
-from biotac.core.map_columns import Signals
 from biotac.errors import InputError
+from biotac.map import columns
+from biotac.map.bound import summary
+from biotac.map.columns import Signals
 
 SHARED = Path(__file__).parents[4] / "shared/data/syntouchcontact"
 
@@ -40,7 +42,7 @@ def fingers(runs: list[Run]) -> list[training.FingerSums]:
 
 
 @pytest.fixture(scope="module")
-def its(fingers: list[training.FingerSums]) -> training.Population:
+def its(fingers: list[training.FingerSums]) -> Population:
     return training.train(fingers[:2])
 
 
@@ -50,7 +52,7 @@ def test_an_electrodes_mirror_image_lies_across_and_is_mirrored_back() -> None:
     assert np.array_equal(training.MIRROR[training.MIRROR], np.arange(19))
 
 
-def test_rest_is_no_force_on_any_finger(its: training.Population, runs: list[Run]) -> None:
+def test_rest_is_no_force_on_any_finger(its: Population, runs: list[Run]) -> None:
     for run in runs:
         assert np.array_equal(its.force(run.tare[None], run.tare), np.zeros((1, 3)))
 
@@ -64,9 +66,7 @@ def test_a_symmetric_map_says_the_mirrored_force_of_a_mirrored_finger(
     assert np.allclose(there, its.force(runs[2].counts, runs[2].tare) * [1.0, -1.0, 1.0], atol=1e-6)
 
 
-def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(
-    its: training.Population, runs: list[Run]
-) -> None:
+def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(its: Population, runs: list[Run]) -> None:
     def lin(run: Run) -> np.ndarray:
         return (run.counts - run.tare) @ surface.ELECTRODE_NORMAL
 
@@ -79,11 +79,11 @@ def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(
     assert (found.rmse_n < 0.75 * lins).all()
 
 
-def test_the_map_is_one_for_a_board(its: training.Population, runs: list[Run]) -> None:
+def test_the_map_is_one_for_a_board(its: Population, runs: list[Run]) -> None:
     new = runs[2]
     of_board = its.wrench_map(new.tare)
     assert np.allclose(of_board.predict(new.counts), its.force(new.counts, new.tare), atol=1e-9)
-    assert board.summary(of_board, new)["outside"] == 0
+    assert summary(of_board, new.counts)["outside"] == 0
 
 
 def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
@@ -99,7 +99,7 @@ def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
     assert np.allclose(Scale(1.2, 0.1).applied(said), np.column_stack([np.zeros(20), np.zeros(20), np.full(20, 48.0)]))
 
 
-def test_a_scale_on_the_map_is_the_scale_on_its_forces(its: training.Population, runs: list[Run]) -> None:
+def test_a_scale_on_the_map_is_the_scale_on_its_forces(its: Population, runs: list[Run]) -> None:
     scale, new = Scale(1.1, -0.07), runs[2]
     there = scale.on(its).force(new.counts, new.tare)
     assert np.allclose(there, scale.applied(its.force(new.counts, new.tare)), atol=1e-9)
@@ -112,7 +112,7 @@ def test_presses_that_say_nothing_are_refused(said_z: list[float], shown: list[f
         scale_of(said, np.array(shown, dtype=np.float64))
 
 
-def test_a_minute_moves_the_map_and_no_time_does_not(its: training.Population, runs: list[Run]) -> None:
+def test_a_minute_moves_the_map_and_no_time_does_not(its: Population, runs: list[Run]) -> None:
     new = runs[2]
     sums = training.sums(new)
     assert np.array_equal(pulled(its, sums, 0.0).coefficients, its.coefficients)
@@ -143,10 +143,10 @@ def test_the_command_trains_judges_and_keeps(
         assert len(facts[field]) == 3
     assert facts["rmse_60s_n"] is None  # a recording of 50 s has no minute and something to judge it by
     assert 0.0 < facts["coverage"][0] < facts["coverage"][1] <= 1.0
-    kept = map_file.load(out)
-    assert kept.provenance["source"] == "made up"
-    assert list(kept.provenance["files"]) == ["1.npz", "2.npz"]
-    assert map_file.dumps(map_file.loads(map_file.dumps(kept), "again")) == out.read_text(encoding="utf-8")
+    trained = population_map.load(out)
+    assert trained.provenance["source"] == "made up"
+    assert list(trained.provenance["files"]) == ["1.npz", "2.npz"]
+    assert population_map.dumps(trained) == out.read_text(encoding="utf-8")
     assert main([*arguments, "--out", str(out)]) != 0
     assert "exists" in capsys.readouterr().err
     assert main(["calibrate", "population", str(files[0]), "--test", str(files[0])]) != 0
@@ -154,29 +154,28 @@ def test_the_command_trains_judges_and_keeps(
 
 
 @pytest.mark.parametrize("damage", [("biotac-population-map/1", "/2"), ("[[", "["), ("COMPRESSION", "BULGE")])
-def test_a_damaged_file_is_refused_in_words(its: training.Population, damage: tuple[str, str]) -> None:
-    text = map_file.dumps(map_file.Kept(its, np.ones(3), np.ones(3), {}))
-    with pytest.raises(InputError, match="biotac calibrate population --out"):
-        map_file.loads(text.replace(*damage), "x.json")
+def test_a_damaged_file_is_refused_in_words(its: Population, damage: tuple[str, str], tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    path.write_text(population_map.dumps(Trained(its, np.ones(3), np.ones(3), {})).replace(*damage))
+    with pytest.raises(InputError, match="biotac-lab population --out"):
+        population_map.load(path)
 
 
 def test_the_packages_own_names_what_it_is_made_of() -> None:
-    kept = map_file.load(None)
+    trained = population_map.load(None)
     for word in ("MiaoLi/syntouchcontact", "d58862d13f1325d8e0e70921b449a1df9649d483", "no licence stated"):
-        assert word in kept.provenance["source"]
-    assert all(len(sha256) == 64 for sha256 in kept.provenance["files"].values())
+        assert word in trained.provenance["source"]
+    assert all(len(sha256) == 64 for sha256 in trained.provenance["files"].values())
 
 
-def test_a_finger_is_pulled_to_others_and_not_to_itself(
-    its: training.Population, runs: list[Run], files: list[Path]
-) -> None:
-    kept = map_file.Kept(its, np.ones(3), np.ones(3), map_file.provenance_of(files[:2], "", symmetric=False))
-    others, note = map_file.others_than(kept, [files[2]])
+def test_a_finger_is_pulled_to_others_and_not_to_itself(its: Population, runs: list[Run], files: list[Path]) -> None:
+    trained = Trained(its, np.ones(3), np.ones(3), population_map.provenance_of(files[:2], "", symmetric=False))
+    others, note = trained.others_than([files[2]])
     assert others is not None and note == "regularized towards the population map of 1.npz, 2.npz"
     e = runs[2].counts[:50] - runs[2].tare
-    z = moments.with_one(features.columns(Signals(e, runs[2].tare)))
+    z = columns.with_one(columns.columns(Signals(e, runs[2].tare)))
     assert z @ others == pytest.approx(its.force(runs[2].counts[:50], runs[2].tare), abs=1e-9)
-    others, note = map_file.others_than(kept, [files[0]])
+    others, note = trained.others_than([files[0]])
     assert others is None and note.startswith(
         "not regularized towards the population map of 1.npz, 2.npz, which was made"
     )

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.calibrate.population import map_file
+from biotac.calibrate.population import population_map
 from biotac.calibrate.population.fewshot import scaled
+from biotac.calibrate.population.population_map import Population
 from biotac.calibrate.population.presses import Held, found
-from biotac.calibrate.population.training import Population
-from biotac.calibrate.wrench import fitted
 from biotac.cli.main import main
 from biotac.errors import InputError
+from biotac.map.file import load_fitted
 
 TARE = np.full(19, 2800.0)
 
@@ -33,7 +33,7 @@ def held(its: Population, gain: float, balance: float) -> tuple[Held, Population
 @pytest.fixture
 def firm() -> Population:
     """A map that says 10 to 100 N to such patterns, so that a press says more than what is known of fingers."""
-    its = map_file.load(None).its
+    its = population_map.load(None).population
     coefficients = np.zeros_like(its.coefficients)
     coefficients[:38, 2] = -5.0  # compressions and bulges
     return Population(coefficients, its.variance)
@@ -74,7 +74,7 @@ def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFi
     assert "press 1 of 3: push the pad" in said.err and "biotac: " not in said.err  # prompts are no errors
     facts = json.loads(said.out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]
-    assert fitted.load(out).axes == ("Fx", "Fy", "Fz")
+    assert load_fitted(out).axes == ("Fx", "Fy", "Fz")
     # the emulated finger is poked by a point and no flat: nothing for a map of flat plates
     assert facts["why_not"] and "board" not in facts
     assert main([*words, "--force"]) == 0
@@ -103,4 +103,4 @@ def test_too_few_presses_are_refused(capsys: pytest.CaptureFixture[str]) -> None
     assert main(["calibrate", "scale", "sim:fingers.toml", "--finger", "0", "--presses", "2"]) != 0
     assert "expected 3 or more" in capsys.readouterr().err
     with pytest.raises(InputError):
-        map_file.load(Path("nowhere.json"))
+        population_map.load(Path("nowhere.json"))

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import fewshot, map_file, training, weights
+from biotac.calibrate.population import fewshot, population_map, training, weights
+from biotac.calibrate.population.population_map import Population
 from biotac.calibrate.population.presses import Held, found
-from biotac.calibrate.wrench import fitted
 from biotac.calibrate.wrench.run import load_run
 from biotac.cli.main import main
 from biotac.core.geometry import RADIUS_MM
 from biotac.errors import InputError
+from biotac.map.file import load_fitted
 from biotac.sim.loading import load_source
 from biotac.sim.physics import Finger, States
 
@@ -31,7 +32,9 @@ def others(tmp_path_factory: pytest.TempPathFactory) -> Path:
     some = [replace(run, counts=run.counts[::4], truth=run.truth[::4]) for run in runs]
     its = training.train([training.sums_of(run) for run in some])
     place = folder / "population.json"
-    place.write_text(map_file.dumps(map_file.Kept(its, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8")
+    place.write_text(
+        population_map.dumps(population_map.Trained(its, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8"
+    )
     return place
 
 
@@ -92,8 +95,8 @@ def test_weights_mend_the_map_of_other_fingers(
     assert facts["presses"] == 10 and not facts["why_not"]
     assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0
     counts, rest, truth = between()
-    before = rms(map_file.load(others).its.force(counts, rest) - truth)
-    own = fitted.load(out)
+    before = rms(population_map.load(others).population.force(counts, rest) - truth)
+    own = load_fitted(out)
     after = rms(own.predict(counts - rest + own.tare) - truth)
     assert np.linalg.norm(after) < 0.9 * np.linalg.norm(before)
     assert after[2] < 0.7 * before[2]
@@ -133,8 +136,8 @@ def test_a_recording_says_the_same_and_goes_to_no_board(
 
 def test_axes_that_are_mixed_are_told_apart() -> None:
     """What nine numbers can say: a finger that answers with its axes turned and stretched."""
-    its = map_file.load(None).its
-    firm = training.Population(100.0 * its.coefficients, its.variance)  # so that the prior says little
+    its = population_map.load(None).population
+    firm = Population(100.0 * its.coefficients, its.variance)  # so that the prior says little
     rng = np.random.default_rng(7)
     counts = 2800.0 - np.abs(rng.normal(200.0, 80.0, (12, 19)))
     tare = np.full(19, 2800.0)

@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.wrench import features, figures, fitted, models, moments
+from biotac.calibrate.wrench import figures, models, moments
 from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
 from biotac.calibrate.wrench.run import MIN_ROWS, Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
 from biotac.cli.main import main
 from biotac.core import geometry as surface
-from biotac.core.map_columns import SIGNAL_COUNTS, Signals
 from biotac.errors import InputError, RecordingError
+from biotac.map import columns, file
+from biotac.map.columns import SIGNAL_COUNTS, Signals
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +125,7 @@ def test_strips_add_up_to_the_rows_and_axes_keep_their_lags(finger: Path) -> Non
     kept = blocks.kept_from([4, 5])
     rows = np.concatenate([blocks.strips[k] for k in np.flatnonzero(kept)])
     some = strips.of(kept).axes([1])
-    z = moments.with_one(moments.linear_columns(moments.at(signals, rows)))
+    z = columns.with_one(moments.linear_columns(moments.at(signals, rows)))
     np.testing.assert_allclose(some.gram, z.T @ z, rtol=1e-9)
     np.testing.assert_allclose(some.cross[:, 0], z.T @ run.truth[np.minimum(rows + 3, 4999), 1], rtol=1e-9, atol=1e-6)
 
@@ -147,7 +148,7 @@ def test_ridge_shrinks_toward_lins_geometry(model: models.Model, finger: Path, m
     found = models.pulled(sums, [model.family])[0][0]
     # a small signal through the map: proportional to the electrodes' normals, per axis
     small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare)
-    response = moments.with_one(features.columns(small)) @ found
+    response = columns.with_one(columns.columns(small)) @ found
     slope = response[1:] - response[0]
     for axis in range(3):
         normal = surface.ELECTRODE_NORMAL[:, axis]
@@ -159,7 +160,7 @@ def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch
     """What is known of others is the force of a whole map, offset and all; torque stays Lin's."""
     run = load_run(finger)
     monkeypatch.setattr(models, "OTHERS_LAMBDAS", (1e12,))
-    others = np.random.default_rng(3).normal(size=(features.width(with_pdc=False) + 1, 3))
+    others = np.random.default_rng(3).normal(size=(columns.width(with_pdc=False) + 1, 3))
     rows = np.arange(500)
     for pdc in (None, np.zeros(500)):
         signals = Signals((run.counts - run.tare)[rows], run.tare, pdc)
@@ -176,7 +177,7 @@ def test_a_column_that_never_moved_in_training_goes_nowhere_when_it_does() -> No
     x = rng.normal(0.0, 0.5, (3000, 19))
     x[:, 4] = 1e-9 * rng.normal(size=3000)
     truth = x @ rng.normal(size=(19, 3))
-    z = moments.with_one(x)
+    z = columns.with_one(x)
     sums = moments.Sums(z.T @ z, z.T @ truth, (truth**2).sum(axis=0))
     for lam in models.LAMBDAS:
         assert np.abs(models.solve(sums, lam)[4]).max() < 1e-6
@@ -221,7 +222,7 @@ def test_idle_noise_has_no_direction(tmp_path: Path) -> None:
 def test_training_with_drift_is_what_withstands_it(validation: Validation, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = validation.run.truth
     trained = [figures.rmse(p, truth) for p in validation.predicted]
-    monkeypatch.setattr(moments.moments, "__defaults__", (features.columns, moments.NO_DRIFT))
+    monkeypatch.setattr(moments.strip_sums, "__defaults__", (columns.columns, moments.NO_DRIFT))
     without = validate(validation.run)
     bare = [figures.rmse(p, truth) for p in without.predicted]
     gain = np.max(bare[1:], axis=0) / np.max(trained[1:], axis=0)
@@ -255,10 +256,10 @@ def test_a_synthetic_finger(validation: Validation) -> None:
 
 def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tmp_path: Path) -> None:
     run, final = validation.run, validation.final
-    its = fitted.of(validation)
+    its = validation.wrench_map
     place = tmp_path / "map.json"
-    place.write_text(fitted.dumps(its), encoding="utf-8")
-    again = fitted.load(place)
+    place.write_text(file.dumps_fitted(its), encoding="utf-8")
+    again = file.load_fitted(place)
     frames = again.predict(run.counts)
     np.testing.assert_array_equal(frames, its.predict(run.counts))
     # a map sees one frame; who reads takes the mean of the counts
@@ -270,7 +271,6 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
     assert np.isnan(again.predict(np.full((1, 19), np.nan))).all()
     facts = json.loads(place.read_text())
     for change in (
-        {"format": "other"},
         {"tare_counts": [1.0]},
         {"coefficients": [[1.0, 2.0, 3.0]]},
         {"axes": None},
@@ -278,9 +278,9 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
         {"lag_rows": [1]},
         {"lag_rows": 1},
     ):
-        place.write_text(json.dumps(facts | change))
-        with pytest.raises(InputError, match="expected a biotac-wrench-map/3"):
-            fitted.load(place)
+        place.write_text(json.dumps(facts | {"fit": facts["fit"] | change, "crc32": "edited"}))
+        with pytest.raises(InputError, match=r"map.json is not a usable wrench map"):
+            file.load_fitted(place)
 
 
 @pytest.mark.nightly
@@ -296,7 +296,7 @@ def test_torque_and_pressure_are_used_where_recorded(tmp_path: Path) -> None:
     assert "Mx cannot be measured" in facts["notes"][-1]
     # pressure follows the normal force: the quadratic model has it, the affine one has not
     assert facts["models"]["quadratic"][2] < 0.7 * facts["models"]["affine"][2]
-    its = fitted.of(validation)
+    its = validation.wrench_map
     assert its.with_pdc
     with pytest.raises(InputError, match="trained with PDC"):
         its.predict(run.counts)
@@ -473,7 +473,7 @@ def test_calibrate_writes_report_picture_and_map(
     for title in ("## Models", "## Weak places", "## Confusion of axes"):
         assert title in page
     assert (out / "finger.png").read_bytes().startswith(b"\x89PNG")
-    assert fitted.load(out / "finger.wrench.json").model == facts["model"]
+    assert file.load_fitted(out / "finger.wrench.json").model == facts["model"]
     # a second time it would overwrite, and says so before it works
     assert main(words) == 2
     assert "already exists" in capsys.readouterr().err

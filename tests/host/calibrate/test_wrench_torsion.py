@@ -11,17 +11,19 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.wrench import contact, features, figures, models, moments, template
+from biotac.calibrate.wrench import contact, figures, models, moments
 from biotac.calibrate.wrench.crossvalidation import AIR_SHARES, validate
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, Blocks
 from biotac.core import geometry as surface
-from biotac.core.map_columns import Signals
 from biotac.errors import RecordingError
 from biotac.lab.experiments import random_loads, shear_torsion
 from biotac.lab.experiments.outcome import Options
+from biotac.map import columns
+from biotac.map.columns import Signals
 from biotac.picture import picture
 from biotac.sim.physics import Finger
+from biotac.wire.map_gen import KINDS
 
 FRAMES = 4000
 
@@ -219,7 +221,7 @@ def test_ridge_shrinks_toward_lins_geometry_on_all_axes(
 ) -> None:
     found = pulled_only(run, model, monkeypatch, 1e12)
     small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
-    response = moments.with_one(features.columns(small)) @ found
+    response = columns.with_one(columns.columns(small)) @ found
     slope = response[1:] - response[0]
     arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
     # about the middle of the pad, where the outward normal is -z
@@ -229,7 +231,7 @@ def test_ridge_shrinks_toward_lins_geometry_on_all_axes(
         assert likeness > 0.999, f"axis {axis}"
     # pressure says nothing until a run says so
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
-    said = moments.with_one(features.columns(pressed)) @ found
+    said = columns.with_one(columns.columns(pressed)) @ found
     np.testing.assert_allclose(said[1], said[0], atol=1e-6)
 
 
@@ -239,50 +241,8 @@ def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(
     still = replace(run, pdc=np.full(FRAMES, 1e-9))
     found = pulled_only(still, models.JOINED, monkeypatch, models.LAMBDAS[0])
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
-    said = moments.with_one(features.columns(pressed)) @ found
+    said = columns.with_one(columns.columns(pressed)) @ found
     assert np.abs(said[1] - said[0]).max() < 1e-3
-
-
-# ---- template ----------------------------------------------------------------------------------
-
-
-def test_a_signal_made_of_the_shapes_gives_their_sizes_back() -> None:
-    tare = np.full(19, 3000.0)
-    # a light press over E18, so that the point of contact does not move with what is added
-    point = surface.project(surface.ELECTRODE_MM[[17]])
-    normal = surface.normals_at(point)
-    shapes = template._shapes(point, normal, *surface.tangents_at(normal))[0]
-    sizes = np.array([0.3, 0.02, 0.01, -0.02, 0.005])
-    found = template.solve(Signals(counts_of(shapes @ sizes, tare) - tare, tare))
-    # it looks where the compression's centre is, which is not quite where it was made
-    np.testing.assert_allclose(found.size[0], sizes, atol=0.02)
-    assert np.linalg.norm(found.point_mm - point) < 1.0
-    assert found.size[0, template.PRESS] == pytest.approx(0.3, rel=0.1)
-
-
-def counts_of(log_conductance: np.ndarray, tare: np.ndarray) -> np.ndarray:
-    """Counts (1, 19) whose conductance over that at rest has this logarithm."""
-    conductance = tare / (4095.0 - tare) * np.exp(log_conductance)
-    return (4095.0 * conductance / (1.0 + conductance))[None]
-
-
-def test_a_touch_turned_and_pushed_the_other_way_changes_signs(run: Run) -> None:
-    for change, which in (("shear_n", template.ACROSS), ("torsion_nmm", template.TURN)):
-        loads = random_loads.states(2, 1)[0]
-        contact_mm = surface.on_surface(np.array([[-6.0, 0.0]] * 2))
-        push = {"shear_n": np.zeros((2, 3)), "torsion_nmm": np.zeros(2)}
-        push[change] = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]) if change == "shear_n" else np.array([4.0, -4.0])
-        its = replace(loads, contact_mm=contact_mm, force_n=np.full(2, 5.0), tip_radius_mm=np.full(2, 1.8), **push)
-        finger = Finger(2)
-        tare = finger.rest_counts(np.zeros(1))[0]
-        size = template.solve(Signals(finger.counts(its) - tare, tare)).size
-        assert size[0, which] > 0.0 > size[1, which]
-
-
-def test_the_template_knows_more_than_the_papers_formulas_and_less_than_a_map(result: shear_torsion.Result) -> None:
-    by_model = {name: errors[0] for name, errors in result.validation.by_model.items()}
-    for axis in (1, 2, 6):
-        assert by_model["pooled"][axis] < by_model["template"][axis] < by_model["lin-scales"][axis]
 
 
 # ---- blocks of columns -------------------------------------------------------------------------
@@ -291,20 +251,20 @@ def test_the_template_knows_more_than_the_papers_formulas_and_less_than_a_map(re
 def test_a_block_is_its_kind_times_its_gate(run: Run) -> None:
     assert run.pdc is not None
     signals = Signals(run.counts[:50] - run.tare, run.tare, run.pdc[:50])
-    found = features.columns(signals)
-    assert found.shape == (50, features.width(with_pdc=True))
+    found = columns.columns(signals)
+    assert found.shape == (50, columns.width(with_pdc=True))
     at = 0
     plain: dict[Any, np.ndarray] = {}
     weights = np.maximum(-signals.e, 0.0) + 5.0
     centre = weights @ surface.ELECTRODE_MM / weights.sum(axis=1, keepdims=True)
     x, y = centre[:, 0] / 8.0, centre[:, 1] / 4.0
     factor = {"ONE": x**0, "X": x, "Y": y, "XX": x**2, "XY": x * y, "YY": y**2}
-    for block in features.blocks(with_pdc=True):
-        columns = found[:, at : at + block.width]
-        plain.setdefault(block.kind, columns)
-        np.testing.assert_allclose(columns, plain[block.kind] * factor[block.gate.name][:, None], rtol=1e-12)
-        at += block.width
+    for kind, gate in columns.blocks(with_pdc=True):
+        part = found[:, at : at + KINDS[kind].columns]
+        plain.setdefault(kind, part)
+        np.testing.assert_allclose(part, plain[kind] * factor[gate.name][:, None], rtol=1e-12)
+        at += KINDS[kind].columns
     assert at == found.shape[1]
     # without PDC the columns are the first of them
-    dry = features.columns(Signals(signals.e, run.tare))
+    dry = columns.columns(Signals(signals.e, run.tare))
     np.testing.assert_array_equal(dry, found[:, : dry.shape[1]])

@@ -22,8 +22,9 @@ from maps import make_map
 import biotac
 from biotac import errors
 from biotac.cli.main import VERBS, main
-from biotac.keep import map_file
+from biotac.documents import sealed
 from biotac.link.serial_port import SerialLink
+from biotac.map import file as map_file
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
@@ -66,7 +67,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "settings.json": '{"format": "another"}',
         "counts.json": '{"format": "another"}',
         "other.json": json.dumps(calibration("BT999")),
-        "map.json": json.dumps(map_file.to_dict(make_map(1, serial="BT999"))),
+        "map.json": json.dumps(sealed(map_file.to_dict(make_map(1, serial="BT999")))),
     }.items():
         names[name] = folder / name
         names[name].write_text(text)

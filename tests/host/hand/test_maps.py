@@ -13,7 +13,8 @@ from pathlib import Path
 import fake_spidev
 import numpy as np
 import pytest
-from kept_board import boot, serial_of
+from kept_board import boot
+from kept_board import serial_of as port_serial
 from live_board import Clock, point
 from maps import BIG, make_map
 from mcap.reader import make_reader
@@ -21,13 +22,12 @@ from mcap.reader import make_reader
 import biotac
 from biotac import CalibrationState
 from biotac.cli.main import main
-from biotac.core.board_map import BoardBlock, BoardMap, from_blob
 from biotac.export.columns import tables
 from biotac.hand.hand import Hand
-from biotac.keep import map_file
-from biotac.keep.map_blob import PART_BYTES, for_any_sensor, made_s, serial
 from biotac.link import spidev as spidev_link
 from biotac.link.serial_port import SerialLink
+from biotac.map import file as map_file
+from biotac.map.board_map import PART_BYTES, BoardBlock, BoardMap, for_any_sensor, from_blob, made_s_of, serial_of
 from biotac.recording import Recording
 from biotac.recording.facts import Facts
 from biotac.recording.recompute import recompute
@@ -44,7 +44,7 @@ from biotac.wire.framing import encode
 def test_the_header_is_read_as_the_boards_own_code_reads_it() -> None:
     blob = make_map(1_763_731_310, serial="BT123")
     its = from_blob(blob)
-    assert (serial(blob), made_s(blob)) == (its.serial, its.made_s) == ("BT123", 1_763_731_310)
+    assert (serial_of(blob), made_s_of(blob)) == (its.serial, its.made_s) == ("BT123", 1_763_731_310)
     assert from_blob(for_any_sensor(blob)).serial == ""
     assert from_blob(for_any_sensor(blob)).blob == replace(its, serial="").blob
 
@@ -69,7 +69,7 @@ def test_another_sensors_is_refused_in_words() -> None:
         with pytest.raises(biotac.CommandRefusedError, match=r"EndMap: OTHER_SENSOR .*no serial number to force it"):
             hand.set_map(0, make_map(1, serial="BTOTHER"))
         hand.set_map(0, make_map(1, serial="BTOTHER"), force=True)
-        assert serial(hand.get_map(0) or b"") == ""
+        assert serial_of(hand.get_map(0) or b"") == ""
 
 
 # ---- over bad links --------------------------------------------------------------------------------
@@ -205,7 +205,7 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
 def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
-        mine, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
+        mine, anyones = make_map(1, serial=port_serial(hand, 0), blocks=BIG), make_map(2)
         hand.set_map(0, mine)
         hand.set_map(1, anyones)
         hand.save_settings()
@@ -241,7 +241,7 @@ def test_a_computer_with_sensors_of_its_own_keeps_maps_until_it_is_closed(tmp_pa
     monkeypatch.setitem(sys.modules, "spidev", bus.module())
     monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
     with biotac.open("spidev:0.0,0.1") as hand:
-        maps = {f: make_map(f, serial=serial_of(hand, f), blocks=BIG) for f in range(2)}
+        maps = {f: make_map(f, serial=port_serial(hand, f), blocks=BIG) for f in range(2)}
         for finger, blob in maps.items():
             hand.set_map(finger, blob)
         hand.set_map(1, maps[1])
@@ -255,7 +255,7 @@ def recorded(tmp_path: Path) -> Path:
     """A recording of two fingers, the second with a map."""
     path = tmp_path / "two.mcap"
     with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
-        hand.set_map(1, make_map(5, serial=serial_of(hand, 1), blocks=BIG))
+        hand.set_map(1, make_map(5, serial=port_serial(hand, 1), blocks=BIG))
         hand.record(path)
         hand.read(0.5)
     return path
@@ -312,20 +312,26 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
     tree = json.loads(path.read_text())
     assert (tree["serial"], tree["made_s"], tree["provenance"]) == ("BT7", 7, {"rmse_n": 0.2})
     worse = bytes([9]) + blob[1:]
+    edited = {key: value for key, value in tree.items() if key != "crc32"} | {"crc32": "edited"}
     wrong = {
-        "serial is 'BT8', but the map says 'BT7'": tree | {"serial": "BT8"},
-        "the file was edited or cut off": tree | {"map": base64.b64encode(blob[:-3]).decode()},
-        r"would refuse this wrench map of \d+ bytes \(OUT_OF_RANGE\)": map_file.to_dict(worse),
-        "its map is not base64": tree | {"map": "?"},
-        "its version is 2": tree | {"version": 2},
-        'no "format"': [],
+        '"crc32": .* it is damaged; take an intact copy, or, if you edited it, write "crc32": "edited"': [
+            tree | {"serial": "BT8"},
+            tree | {"map": "A" + tree["map"][1:]},
+            {key: value for key, value in tree.items() if key != "crc32"},
+        ],
+        "serial is 'BT8', but the map says 'BT7'": [edited | {"serial": "BT8"}],
+        "the file was edited or cut off": [edited | {"map": base64.b64encode(blob[:-3]).decode()}],
+        r"would refuse this wrench map of \d+ bytes \(OUT_OF_RANGE\)": [map_file.to_dict(worse) | {"crc32": "edited"}],
+        "its map is not base64": [edited | {"map": "?"}],
+        'expected "biotac-wrench-map/1"': [[], tree | {"format": "biotac-wrench-map/2"}],
     }
-    for words, changed in wrong.items():
-        path.write_text(json.dumps(changed))
-        with pytest.raises(
-            biotac.InputError, match=f"is not a board's wrench map, as `biotac map get` writes it: .*{words}"
-        ):
-            map_file.load(path)
+    for words, every in wrong.items():
+        for changed in every:
+            path.write_text(json.dumps(changed))
+            with pytest.raises(biotac.InputError, match=words):
+                map_file.load(path)
+    path.write_text(json.dumps(edited | {"provenance": {"note": "mine"}}))
+    assert map_file.load(path) == blob
 
 
 @pytest.fixture
@@ -348,7 +354,7 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     assert shown[0] == "finger 0: none, the board's settings apply"
     assert shown[1].startswith("finger 1: in force; force and torque") and "made 2025-11-21" in shown[1]
     assert main(["map", "get", port, str(back), "--finger", "1", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["crc32"] == f"{zlib.crc32(blob):08x}"
+    assert json.loads(capsys.readouterr().out)["map_crc32"] == f"{zlib.crc32(blob):08x}"
     assert map_file.load(back) == blob
     assert main(["map", "clear", port, "--finger", "1"]) == 0
     assert "the board's settings apply, until the next reboot" in capsys.readouterr().out

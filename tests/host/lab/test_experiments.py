@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.calibrate.wrench import contact, features
-from biotac.calibrate.wrench.features import Signals
-from biotac.calibrate.wrench.fitted import WrenchMap
+from biotac.calibrate.wrench import contact
 from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
@@ -20,6 +18,9 @@ from biotac.lab.experiments import catalogue, estimates, laboratory, plate_norma
 from biotac.lab.experiments.estimates import Estimate
 from biotac.lab.experiments.outcome import Options
 from biotac.lab.experiments.trial import MIRROR, Trial
+from biotac.map import columns
+from biotac.map.columns import Signals
+from biotac.map.fitted import WrenchMap
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as _sensor
 
@@ -243,7 +244,7 @@ def test_region_two_is_pure_torsion_and_the_others_mirror_each_other(figure10: T
 def test_a_map_is_given_the_board_s_tare_and_pressure(figure10: Trial) -> None:
     """And not its own, or a finger that has drifted since its calibration would be off by that."""
     axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-    rows = features.columns(Signals(figure10.signal, figure10.tare, figure10.pressure))
+    rows = columns.columns(Signals(figure10.signal, figure10.tare, figure10.pressure))
     coefficients = np.random.default_rng(1).normal(0.0, 1.0, (rows.shape[1] + 1, 6))
     its = WrenchMap("any", axes, np.full(19, 123.0), 1, (0,) * len(axes), coefficients)
     found = estimates.by_map(figure10, its, "any")

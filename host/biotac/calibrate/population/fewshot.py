@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...errors import InputError
-from .training import Population, Sums
+from .population_map import Population, Sums
 
 # How much fingers differ in the two numbers, and the map's error in one press: from F1 and F2, each by the other's map.
 GAIN_SPREAD = 0.04
@@ -36,18 +36,18 @@ class Scale:
         x = force[:, 0] - self.balance * force[:, 2]
         return np.column_stack([x, force[:, 1], self.gain * force[:, 2]])
 
-    def on(self, its: Population) -> Population:
+    def on(self, population: Population) -> Population:
         """The map with the correction in its coefficients."""
-        return replace(its, coefficients=self.applied(its.coefficients))
+        return replace(population, coefficients=self.applied(population.coefficients))
 
 
-def scale_of(said: Floats, shown_n: Floats) -> Scale:
-    """The correction from presses straight down, by the map's force ``said`` (k, 3) and the scale's (k,), both in N.
+def scale_of(felt_n: Floats, shown_n: Floats) -> Scale:
+    """The correction from presses straight down, by the map's force ``felt_n`` (k, 3) and the scale's (k,), both in N.
 
     Both numbers are pulled towards their defaults, the more the larger the map's error in one press is against their
     spread over fingers. Raises InputError for a force that is not above 0.
     """
-    z = said[:, 2]
+    z = felt_n[:, 2]
     if not np.isfinite(z).all() or (shown_n <= 0.0).any() or (z <= 0.0).any():
         felt, read = (np.array2string(values, precision=1) for values in (z, shown_n))
         raise InputError(
@@ -56,33 +56,33 @@ def scale_of(said: Floats, shown_n: Floats) -> Scale:
         )
     size = float(z @ z)
     gain = 1.0 + float(z @ (shown_n - z)) / (size + (PRESS_ERROR_N[2] / GAIN_SPREAD) ** 2)
-    balance = float(z @ said[:, 0]) / (size + (PRESS_ERROR_N[0] / BALANCE_SPREAD) ** 2)
+    balance = float(z @ felt_n[:, 0]) / (size + (PRESS_ERROR_N[0] / BALANCE_SPREAD) ** 2)
     return Scale(gain, balance)
 
 
-def scaled(its: Population, columns: Floats, force_n: Floats) -> Population:
+def scaled(population: Population, columns: Floats, force_n: Floats) -> Population:
     """The map corrected by scale_of() presses: mean ``columns`` (k, 323) of each and its force (k, 3) in N, along z."""
-    return scale_of(columns @ its.coefficients, force_n[:, 2]).on(its)
+    return scale_of(columns @ population.coefficients, force_n[:, 2]).on(population)
 
 
-def weighed(its: Population, columns: Floats, force_n: Floats) -> Population:
+def weighed(population: Population, columns: Floats, force_n: Floats) -> Population:
     """The map fitted to weights: mean ``columns`` (k, 323) while each lay still, and its force (k, 3) in N.
 
     A mixing of the axes, nine numbers, is fitted first; what it leaves then changes the columns' coefficients.
     """
-    said = columns @ its.coefficients
+    felt_n = columns @ population.coefficients
     mixing = np.eye(len(PRESS_ERROR_N))
     for axis, error_n in enumerate(PRESS_ERROR_N):
         pull = (error_n / MIXING_SPREAD) ** 2 * np.eye(len(mixing))
-        mixing[:, axis] += np.linalg.solve(said.T @ said + pull, said.T @ (force_n - said)[:, axis])
-    mixed = replace(its, coefficients=its.coefficients @ mixing)
+        mixing[:, axis] += np.linalg.solve(felt_n.T @ felt_n + pull, felt_n.T @ (force_n - felt_n)[:, axis])
+    mixed = replace(population, coefficients=population.coefficients @ mixing)
     k = len(columns)
     mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))
     return pulled(mixed, mean, WEIGHT_S * k)
 
 
-def pulled(its: Population, new: Sums, seconds: float) -> Population:
+def pulled(population: Population, new: Sums, seconds: float) -> Population:
     """The map pulled towards a finger's own ``new`` sums, weighted as ``seconds`` of recording on a force plate."""
-    pull = PULL * np.diag(its.variance)
-    change = np.linalg.solve(seconds * new.gram + pull, seconds * (new.cross - new.gram @ its.coefficients))
-    return replace(its, coefficients=its.coefficients + change)
+    pull = PULL * np.diag(population.variance)
+    change = np.linalg.solve(seconds * new.gram + pull, seconds * (new.cross - new.gram @ population.coefficients))
+    return replace(population, coefficients=population.coefficients + change)

@@ -11,7 +11,8 @@ import numpy as np
 from ...core.geometry import Floats
 from ..wrench.run import Run
 from .fewshot import Scale, pulled, scale_of
-from .training import FingerSums, Population, mirrored, sums, train
+from .population_map import Population
+from .training import FingerSums, mirrored, sums, train
 
 ROWS_PER_S = 100  # taken for all recordings: they need not have times
 PRESSES = 5

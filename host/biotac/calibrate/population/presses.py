@@ -20,8 +20,7 @@ from ..pressure.force_source import Truth
 from ..pressure.from_recording import recorded_rows
 from ..pressure.guided import Face, ask_forces, drive
 from ..pressure.presses import Press, Procedure, Step
-from ..wrench.run import Run
-from .training import Population, by_columns
+from .population_map import Population, by_columns
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
@@ -50,12 +49,6 @@ class Held:
         """The map's columns (k, 323), a mean over each press."""
         every = by_columns(self.counts, self.tare, lambda z: z)
         return np.array([every[self.press == k].mean(axis=0) for k in range(len(self.force_n))])
-
-    def run(self, name: str) -> Run:
-        """The frames as a run with a force of 0, for comparing fixed point with float."""
-        rows = len(self.counts)
-        nothing = np.zeros((rows, 3))
-        return Run(name, self.counts, self.tare, nothing, None, np.ones(19), np.zeros(rows, np.bool_), ())
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...documents import Provenance
 from ...errors import CommandRefusedError
 from ...keep import Calibration
-from ...keep.calibration_file import Provenance
 from ...version import __version__
 from .fit import Fit, Verification
 

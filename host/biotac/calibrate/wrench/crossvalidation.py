@@ -17,14 +17,14 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from ...core.geometry import Floats
-from ...core.map_columns import Signals
-from . import features, models
+from ...map.columns import Signals, columns, with_one
+from ...map.fitted import WrenchMap
+from . import models
 from .lag import Lags
-from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE, Model
-from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums, with_one
+from .models import GATED, LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
+from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums
 from .run import Run
 from .splits import BLOCKS, Blocks
-from .template import Template
 
 INNER_FOLDS = 5
 FIRST_OF_POOL = len(MODELS) - len(POOL)
@@ -45,7 +45,7 @@ Strips = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Fit:
-    """One training. ``by_model`` has each model's coefficients (p + 1, axes) of features.columns, the offset last.
+    """One training. ``by_model`` has each model's coefficients (p + 1, axes) of map.columns, the offset last.
 
     ``lag_rows`` are for each axis. ``weights`` (axes, m) are those of POOL's models with both LAMBDAS, and, if a map of
     other fingers is given, again with both OTHERS_LAMBDAS. ``air_share`` is the weight of the frames in free air as a
@@ -70,8 +70,8 @@ class Validation:
     """Held-out results, and the final training.
 
     ``predicted`` (3, n, axes) is at SHIFTS_COUNTS, for each row by the fold that holds it out. ``by_model`` gives by
-    name the RMSE (3, axes) of each model with its own nested lambda, and TEMPLATE's. ``less`` (2, axes) is the RMSE
-    with LESS of the blocks. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
+    name the RMSE (3, axes) of each model with its own nested lambda. ``less`` (2, axes) is the RMSE with LESS of the
+    blocks. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
     the lag common to all axes over the whole run, before any correction; ``affine_r2`` is the affine model's held-out
     R2 at that lag.
     """
@@ -86,12 +86,18 @@ class Validation:
     lag_rows: int
     affine_r2: float
 
+    @property
+    def wrench_map(self) -> WrenchMap:
+        """The map trained on the whole run."""
+        run, final = self.run, self.final
+        return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best)
+
 
 @dataclass(frozen=True)
 class _Training:
-    """What is trained on: inner folds over the blocks ``of``, and lags and window chosen on ``strips`` alone."""
+    """What is trained on: inner folds over the ``blocks``, and lags and window chosen on ``strips`` alone."""
 
-    of: list[int]
+    blocks: list[int]
     strips: Strips
     lag_rows: tuple[int, ...]
     window_rows: int
@@ -134,11 +140,10 @@ def _validate(
     trainings = []
     for block in [*every, None]:
         strips = blocks.own(every) if block is None else blocks.kept_from([block])
-        of = [other for other in every if other != block]
-        its = lags.of_axes(strips) if align else (0,) * axes
-        trainings.append(_Training(of, strips, its, timing.window(its, of, strips)))
+        kept = [other for other in every if other != block]
+        late = lags.of_axes(strips) if align else (0,) * axes
+        trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
     trainer = _Trainer(run, blocks, trainings, others, pool)
-    template = Template(run)
     predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
     errors: dict[str, Floats] = {}
     less = np.zeros((len(LESS), axes))
@@ -151,16 +156,12 @@ def _validate(
             show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
         rows = blocks.rows(block)
         # all at once: computing the columns costs more than the products
-        said = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
-        truth = run.truth[rows]
-        predicted[:, rows] = said[:, :, list(fit.by_model).index(POOLED)]
-        error = ((said - truth[:, None]) ** 2).sum(axis=1)
+        by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
+        predicted[:, rows] = by_each[:, :, list(fit.by_model).index(POOLED)]
+        error = ((by_each - run.truth[rows][:, None]) ** 2).sum(axis=1)
         for k, name in enumerate(fit.by_model):
             errors[name] = errors.get(name, 0.0) + error[:, k]
         less += error[0, len(fit.by_model) :]
-        trained = np.concatenate([blocks.strips[k] for k in np.flatnonzero(trainings[block].strips)])
-        guess = template.held_out(fit.window_rows, fit.lag_rows, trained, rows, SHIFTS_COUNTS)
-        errors[TEMPLATE] = errors.get(TEMPLATE, 0.0) + ((guess - truth) ** 2).sum(axis=1)
     n = len(run.truth)
     by_model, less = {name: np.sqrt(total / n) for name, total in errors.items()}, np.sqrt(less / n)
     return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
@@ -170,23 +171,23 @@ def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> F
     """Wrenches (3, n, m, axes) at SHIFTS_COUNTS for the run's ``rows`` (n,), by each of m ``coefficients``."""
     axes = len(fit.lag_rows)
     late = np.clip(rows[:, None] + np.array(fit.lag_rows), 0, len(run.counts) - 1)
-    needed, place = np.unique(late, return_inverse=True)
-    place = place.reshape(late.shape)
+    needed, index = np.unique(late, return_inverse=True)
+    index = index.reshape(late.shape)
     signals = at(smoothed(run, fit.window_rows), needed)
     every = np.concatenate(coefficients, axis=1)
     found = np.empty((len(SHIFTS_COUNTS), len(rows), len(coefficients), axes))
     for shift, counts in zip(found, SHIFTS_COUNTS, strict=True):
-        said = with_one(features.columns(signals.drifted(counts * run.drift))) @ every
+        wrench = with_one(columns(signals.drifted(counts * run.drift))) @ every
         for axis in range(axes):
-            shift[:, :, axis] = said[place[:, axis], axis::axes]
+            shift[:, :, axis] = wrench[index[:, axis], axis::axes]
     return found
 
 
-def _folds(blocks: Blocks, of: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
+def _folds(blocks: Blocks, numbers: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
     """For each inner fold, the strips to train on and those to test on."""
     result = []
     for fold in range(INNER_FOLDS):
-        out = of[fold::INNER_FOLDS]
+        out = numbers[fold::INNER_FOLDS]
         result.append((strips & blocks.kept_from(out), strips & blocks.own(out)))
     return result
 
@@ -199,18 +200,18 @@ class _Timing:
         self._run, self._blocks, self._windows = run, blocks, windows if run.contact is None else windows[:1]
         self._sums: dict[tuple[int, tuple[int, ...]], Sums] = {}
 
-    def window(self, lag_rows: tuple[int, ...], of: list[int], strips: Strips) -> int:
+    def window(self, lag_rows: tuple[int, ...], numbers: list[int], strips: Strips) -> int:
         """The window in rows with the least inner error for a training."""
         error = {}
         for window in self._windows if len(self._windows) > 1 else ():
-            sums = self._of(window, lag_rows)
+            sums = self._sums_of(window, lag_rows)
             total = np.zeros(len(lag_rows))
-            for kept, out in _folds(self._blocks, of, strips):
+            for kept, out in _folds(self._blocks, numbers, strips):
                 total += sums.of(out).errors(models.solve(sums.of(kept), LAMBDAS[0]))
             error[window] = float((total / np.maximum(sums.of(strips).variance(), 1e-12)).mean())
         return min(error, key=lambda window: error[window], default=self._windows[0])
 
-    def _of(self, window: int, lag_rows: tuple[int, ...]) -> Sums:
+    def _sums_of(self, window: int, lag_rows: tuple[int, ...]) -> Sums:
         key = (window, lag_rows)
         if key not in self._sums:
             run = self._run
@@ -238,26 +239,26 @@ class _Trainer:
         pool: ThreadPoolExecutor,
     ) -> None:
         self._blocks, self._others = blocks, others
-        self._late = sorted({late for its in trainings for late in enumerate(its.lag_rows)})
+        self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})
         truth = _late(run, self._late)
         self._sums: dict[int, Sums] = {}
         self._air: dict[int, Sums | None] = {}
-        for window in sorted({its.window_rows for its in trainings}):
+        for window in sorted({training.window_rows for training in trainings}):
             signals = smoothed(run, window)
 
-            def of(rows: Rows, signals: Signals = signals) -> Sums:
+            def sums_of(rows: Rows, signals: Signals = signals) -> Sums:
                 return strip_sums(at(signals, rows), truth[rows], run.drift)
 
-            self._sums[window] = stacked(pool.map(of, blocks.strips))
+            self._sums[window] = stacked(pool.map(sums_of, blocks.strips))
             self._air[window] = air_sums(run, window)
 
-    def train(self, its: _Training) -> Fit:
-        every, air = self._sums[its.window_rows], self._air[its.window_rows]
-        every = every.axes([self._late.index(late) for late in enumerate(its.lag_rows)])
-        folds = _folds(self._blocks, its.of, its.strips)
+    def train(self, training: _Training) -> Fit:
+        every, air = self._sums[training.window_rows], self._air[training.window_rows]
+        every = every.axes([self._late.index(late) for late in enumerate(training.lag_rows)])
+        folds = _folds(self._blocks, training.blocks, training.strips)
         tested = [every.of(out) for _, out in folds]
         kept = [every.of(strips) for strips, _ in folds]
-        total = every.of(its.strips)
+        total = every.of(training.strips)
         share = 0.0
         if air is not None:
             # it is a separate recording: part of every training and of no test
@@ -276,21 +277,21 @@ class _Trainer:
         by_model[POOLED] = _mean(weights, alone[FIRST_OF_POOL:])
         less = []
         for part in LESS:
-            sums = every.of(its.strips & self._blocks.own(its.of[:: round(1 / part)]))
+            sums = every.of(training.strips & self._blocks.own(training.blocks[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
             less.append(_mean(weights, self._pulled(sums, POOL)))
-        return Fit(its.lag_rows, its.window_rows, share, by_model, weights, tuple(less))
+        return Fit(training.lag_rows, training.window_rows, share, by_model, weights, tuple(less))
 
-    def _pulled(self, sums: Sums, of: Sequence[Model]) -> list[Floats]:
-        """Coefficients of the models ``of`` pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
-        found = models.pulled(sums, [model.family for model in of])
+    def _pulled(self, sums: Sums, chosen: Sequence[Model]) -> list[Floats]:
+        """Coefficients of the ``chosen`` models pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
+        found = models.pulled(sums, [model.family for model in chosen])
         if self._others is not None:
             found += models.pulled_to_others(sums, [model.family for model in POOL], self._others)
         return found
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:
         """The weight of the free-air frames, chosen with a cheap model that bends as the pool does."""
-        index = features.GATED.index(len(air.gram) - 1)
+        index = GATED.index(len(air.gram) - 1)
         air = air.part(index)
 
         def error(share: float) -> Floats:
@@ -317,9 +318,9 @@ def _weights(inner: Floats, tested: list[Sums], rows: float) -> Floats:
     """
     axes = inner.shape[3]
     product = np.zeros((axes, inner.shape[1], inner.shape[1]))
-    for of, out in zip(inner, tested, strict=True):
+    for members, out in zip(inner, tested, strict=True):
         for axis in range(axes):
-            its = of[:, :, axis]
-            cross = its @ out.cross[:, axis]
-            product[axis] += its @ out.gram @ its.T - cross[:, None] - cross + out.square[axis]
-    return np.array([models.weights(its) for its in product / rows])
+            coefficients = members[:, :, axis]
+            cross = coefficients @ out.cross[:, axis]
+            product[axis] += coefficients @ out.gram @ coefficients.T - cross[:, None] - cross + out.square[axis]
+    return np.array([models.weights(errors) for errors in product / rows])

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from ...core.geometry import Floats
-from ...core.map_columns import Signals, centroid_mm
+from ...map.columns import Signals, centroid_mm, columns, with_one
 from .crossvalidation import LESS, SHIFTS_COUNTS, Validation
-from .features import columns
 from .models import LAMBDAS, LIN, POOL, POOLED
-from .moments import moved, with_one
+from .moments import moved
 from .splits import BLOCKS
 
 ROWS_PER_S = 100  # taken for all runs, which have no times
@@ -71,9 +70,9 @@ def regions(validation: Validation) -> list[dict[str, Any]]:
     result = []
     for thirds in product(range(3), repeat=2):
         here, bounds = touched.copy(), []
-        for values, its, k in zip(centre.T, edges, thirds, strict=False):
-            here &= (values >= its[k]) & ((values <= its[k + 1]) if k == 2 else (values < its[k + 1]))
-            bounds.append((float(its[k]), float(its[k + 1])))
+        for values, edge, k in zip(centre.T, edges, thirds, strict=False):
+            here &= (values >= edge[k]) & ((values <= edge[k + 1]) if k == 2 else (values < edge[k + 1]))
+            bounds.append((float(edge[k]), float(edge[k + 1])))
         if here.sum() >= 0.01 * touched.sum():
             rmse_n = float(np.sqrt(error[here].mean()))
             result.append({"x_mm": bounds[0], "y_mm": bounds[1], "rows": int(here.sum()), "rmse_n": rmse_n})
@@ -108,7 +107,7 @@ def weights(validation: Validation) -> list[dict[str, float]]:
     """For each axis, each model's weight in the pool, a mean over the folds; pulled to others or not."""
     mean = np.mean([fit.weights for fit in validation.folds], axis=0)
     of_models = mean.reshape(len(mean), -1, len(POOL), len(LAMBDAS)).sum(axis=(1, 3))
-    return [{model.name: float(one) for model, one in zip(POOL, its, strict=True)} for its in of_models]
+    return [{model.name: float(one) for model, one in zip(POOL, shares, strict=True)} for shares in of_models]
 
 
 def pulled_share(validation: Validation) -> list[float]:
@@ -121,18 +120,18 @@ def summary(validation: Validation) -> dict[str, Any]:
     """All figures as JSON types; forces in N, torques in N mm, in the order of ``axes``."""
     run, truth, predicted = validation.run, validation.run.truth, validation.predicted
     lin = validation.by_model[LIN][0]
-    of = [rmse(p, truth) for p in predicted]
+    errors = [rmse(p, truth) for p in predicted]
     result: dict[str, Any] = {
         "file": run.name,
         "rows": len(truth),
         "model": POOLED,
         "axes": list(run.axes),
-        "rmse_n": _list(of[0][:3]),
+        "rmse_n": _list(errors[0][:3]),
         "r2": _list(r2(predicted[0], truth)),
         "median_angle_deg": median_angle_deg(predicted[0], truth),
         "drift_counts": list(SHIFTS_COUNTS[1:]),
-        "drift_rmse_n": [_list(shifted[:3]) for shifted in of[1:]],
-        "better_than_lin": _list(lin / np.maximum(of[0], 1e-12)),
+        "drift_rmse_n": [_list(shifted[:3]) for shifted in errors[1:]],
+        "better_than_lin": _list(lin / np.maximum(errors[0], 1e-12)),
         "rest_n": rest_n(validation),
         "air_share": validation.final.air_share,
         "lag_rows": validation.lag_rows,
@@ -141,8 +140,8 @@ def summary(validation: Validation) -> dict[str, Any]:
         "affine_r2": validation.affine_r2,
         "weights": dict(zip(run.axes, weights(validation), strict=True)),
         "pulled_to_others": dict(zip(run.axes, pulled_share(validation), strict=True)),
-        "models": {name: _list(errors[0]) for name, errors in validation.by_model.items()},
-        "models_drifted": {name: _list(errors[1:].max(axis=0)) for name, errors in validation.by_model.items()},
+        "models": {name: _list(each[0]) for name, each in validation.by_model.items()},
+        "models_drifted": {name: _list(each[1:].max(axis=0)) for name, each in validation.by_model.items()},
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],
         "worst_region": regions(validation)[0],
         "minutes": minutes(validation),
@@ -152,13 +151,13 @@ def summary(validation: Validation) -> dict[str, Any]:
         "notes": list(run.notes),
     }
     if len(run.axes) > 3:
-        result["rmse_nmm"] = _list(of[0][3:6])
-        # numerics.md 4: only two electrodes at the tip sense it, with a lever of a millimetre and a half
+        result["rmse_nmm"] = _list(errors[0][3:6])
+        # only two electrodes at the tip sense it, with a lever of a millimetre and a half
         result["notes"].append(
             "Mx cannot be measured with this electrode layout: its figures come from what correlates with it"
         )
     if len(run.axes) > 6:
-        result["torsion_rmse_nmm"] = float(of[0][6])
+        result["torsion_rmse_nmm"] = float(errors[0][6])
     return result
 
 
@@ -167,10 +166,10 @@ def rest_n(validation: Validation) -> list[float]:
     run, final = validation.run, validation.final
     still = np.zeros((1, len(run.tare)))
     pdc = None if run.pdc is None else np.zeros(1)
-    said = [
+    wrenches = [
         with_one(columns(Signals(still + counts * run.drift, run.tare, pdc))) @ final.best for counts in SHIFTS_COUNTS
     ]
-    return [float(np.linalg.norm(wrench[0, :3])) for wrench in said]
+    return [float(np.linalg.norm(wrench[0, :3])) for wrench in wrenches]
 
 
 def _list(values: Floats) -> list[float | None]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ...core.board_map import pdc_above_rest_q4
 from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
+from ...map.board_map import pdc_above_rest_q4
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
 from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units

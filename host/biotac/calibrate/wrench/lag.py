@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ...core.map_columns import Signals
 from ...errors import RecordingError
+from ...map.columns import Signals
 from .models import solve
 from .moments import NO_DRIFT, at, linear_columns, moved, stacked, strip_sums
 from .run import Run
@@ -19,7 +19,7 @@ from .splits import BLOCKS, Blocks
 SEARCH_ROWS = 50
 MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is not a transport delay but another clock
 APART_ROWS = 5  # an axis's lag against the common one: skin creeps longer under shear than under a press (F1 2/5/2)
-MIN_R2 = 0.3  # held out; the weakest real finger has 0.5 to 0.9 (biotac.md 5), unrelated files have less than 0
+MIN_R2 = 0.3  # held out; the weakest real finger has 0.5 to 0.9, unrelated files have less than 0
 LAGS: npt.NDArray[np.int64] = np.arange(-SEARCH_ROWS, SEARCH_ROWS + 1)
 LEAST_RIDGE = 1e-6
 

@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
-from ...core.map_columns import ELECTRODES, SIGNAL_COUNTS
-from . import features
-from .features import Family
+from ...map.columns import BLOCKS, ELECTRODES, SIGNAL_COUNTS, SPLIT, STRAIGHT
+from ...wire import map_gen as _map
+from ...wire.map_gen import Gate, Kind
 from .moments import Sums
 
 # Ridge per row, in units of each column's own variance; every model is fitted with both.
@@ -25,11 +26,31 @@ LAMBDAS = (1e-5, 1e-3)
 # error and takes a fifteenth off F2's.
 OTHERS_LAMBDAS = (1e-3, 1e-1)
 # A column that is constant in training has no variance to scale by: without a floor its coefficient is unconstrained,
-# and a test row in which it varies can give anything (the hinge model of biotac.md 5: R2 -34).
+# and a test row in which it varies can give anything (a model with a hinge once had R2 -34).
 COLUMN_FLOOR = 0.01
 # How much of each member's own squared error is added as chance: 0 trusts the inner folds and follows their noise. It
 # is in proportion to the error: a member that is far off in some folds (extrapolation) varies most between folds.
 CHANCE = 0.5
+
+
+@dataclass(frozen=True)
+class Family:
+    """The blocks of columns that a model uses, in the order of BLOCKS; PRESSURE only where it was recorded."""
+
+    blocks: tuple[tuple[Kind, Gate], ...]
+
+    def index(self, columns: int) -> npt.NDArray[np.intp]:
+        """Indices of the family's columns; ``columns`` is the number of all columns of a run, with or without PDC."""
+        every = np.repeat(np.arange(len(BLOCKS)), [_map.KINDS[kind].columns for kind, _ in BLOCKS])
+        own = [k for k, block in enumerate(BLOCKS) if block in self.blocks]
+        return np.flatnonzero(np.isin(every, own)[:columns])
+
+
+_PRESSURE = tuple((Kind.PRESSURE, gate) for gate in STRAIGHT)
+_CONDUCTANCES = ((Kind.CONDUCTANCE, Gate.ONE), (Kind.CONDUCTANCE_PAIRS, Gate.ONE))
+LINEAR = Family(((Kind.SIGNAL, Gate.ONE),))
+GATED = Family(tuple((kind, gate) for gate in STRAIGHT for kind in (*SPLIT, Kind.PRESSURE)))
+CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCES, *_PRESSURE))
 
 
 @dataclass(frozen=True)
@@ -38,15 +59,21 @@ class Model:
 
     name: str
     family: Family
-    words: str
+    text: str
 
 
-AFFINE = Model("affine", features.LINEAR, "every electrode to every axis")
-QUADRATIC = Model("quadratic", features.QUADRATIC, "all products of two electrodes, PDC where recorded")
-CONDUCTANCE = Model(
-    "conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "all products of two conductances, PDC where recorded"
+AFFINE = Model("affine", LINEAR, "every electrode to every axis")
+QUADRATIC = Model(
+    "quadratic",
+    Family(((Kind.SIGNAL, Gate.ONE), (Kind.SIGNAL_PAIRS, Gate.ONE), *_PRESSURE)),
+    "all products of two electrodes, PDC where recorded",
 )
-JOINED = Model("joined", features.JOINED, "the same, plus gains by sign that follow the contact")
+CONDUCTANCE = Model(
+    "conductance-quadratic", CONDUCTANCE_QUADRATIC, "all products of two conductances, PDC where recorded"
+)
+JOINED = Model(
+    "joined", Family((*GATED.blocks, *_CONDUCTANCES)), "the same, plus gains by sign that follow the contact"
+)
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
 LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
@@ -54,13 +81,11 @@ LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
 # of all (F2, x: 0.43 N instead of 0.35 N).
 POOL = (QUADRATIC, CONDUCTANCE, JOINED)
 POOLED = "pooled"
-TEMPLATE = "template"
-WORDS = {
+TEXTS = {
     LIN: "Lin's sums, one scale per axis",
     LIN_OFFSET: "the same, with an offset per axis",
-    **{model.name: model.words for model in MODELS},
+    **{model.name: model.text for model in MODELS},
     POOLED: "weighted mean of " + ", ".join(model.name for model in POOL),
-    TEMPLATE: "five shapes around the contact, one 5x5 solve per frame; host only, for comparison",
 }
 
 
@@ -78,7 +103,7 @@ def lin_directions(axes: int) -> Floats:
 def lin(sums: Sums, *, offset: bool = True) -> Floats:
     """Lin's scales, least squares per axis, as coefficients (p + 1, axes) of all columns."""
     axes = sums.cross.shape[1]
-    index = features.LINEAR.index(len(sums.gram) - 1)
+    index = LINEAR.index(len(sums.gram) - 1)
     small = sums.part(index)
     result = np.zeros(sums.cross.shape)
     for axis, direction in enumerate(lin_directions(axes).T):
@@ -148,11 +173,11 @@ def weights(error: Floats) -> Floats:
     error = error + CHANCE * np.diag(np.diag(error))
     some = np.arange(size)
     while True:
-        its = np.linalg.solve(error[np.ix_(some, some)], np.ones(len(some)))
-        its /= its.sum()
-        if (its >= 0.0).all():
+        share = np.linalg.solve(error[np.ix_(some, some)], np.ones(len(some)))
+        share /= share.sum()
+        if (share >= 0.0).all():
             break
-        some = some[its > 0.0]
+        some = some[share > 0.0]
     result = np.zeros(size)
-    result[some] = its
+    result[some] = share
     return result

@@ -17,11 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.geometry import Floats
-from ...core.map_columns import SIGNAL_COUNTS, Signals
-from . import features
+from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
 from .run import Run
 
-# A finger drifts by some 100 counts in two minutes of warm-up (biotac.md finding 6). Training for all of that costs a
+# A finger drifts by some 100 counts in two minutes of warm-up. Training for all of that costs a
 # map a tenth of its accuracy in x; when trained for this, 100 counts cost at most 0.03 N (F1, F2).
 DRIFT_SIGMA_COUNTS = 60.0
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))
@@ -70,8 +69,9 @@ class Sums:
 
     def left_by(self, coefficients: Floats) -> Sums:
         """Sums with the prediction of ``coefficients`` (q, axes) subtracted from the truth."""
-        said = self.gram @ coefficients
-        return Sums(self.gram, self.cross - said, self.square + (coefficients * (said - 2.0 * self.cross)).sum(axis=0))
+        fitted = self.gram @ coefficients
+        square = self.square + (coefficients * (fitted - 2.0 * self.cross)).sum(axis=0)
+        return Sums(self.gram, self.cross - fitted, square)
 
     def errors(self, coefficients: Floats) -> Floats:
         """Sum of squared errors (..., axes) of ``coefficients`` (..., q, axes)."""
@@ -86,11 +86,11 @@ class Sums:
         return result
 
 
-def _added(of: Floats, strips: npt.NDArray[np.bool_]) -> Floats:
+def _added(values: Floats, strips: npt.NDArray[np.bool_]) -> Floats:
     # one by one: copying the chosen matrices, or a product with zeros and ones, takes three times as long
-    total = np.zeros(of.shape[1:])
+    total = np.zeros(values.shape[1:])
     for k in np.flatnonzero(strips):
-        total += of[k]
+        total += values[k]
     return total
 
 
@@ -125,22 +125,17 @@ def linear_columns(signals: Signals) -> Floats:
     return signals.e / SIGNAL_COUNTS
 
 
-def with_one(columns: Floats) -> Floats:
-    """Columns (n, p) with a column of ones for the offset appended, (n, p + 1)."""
-    return np.concatenate([columns, np.ones((len(columns), 1))], axis=1)
-
-
 def strip_sums(
     signals: Signals,
     truth: Floats,
     drift: Floats,
-    columns: Columns = features.columns,
+    columns_of: Columns = columns,
     nodes: Nodes = DRIFT_NODES,
 ) -> Sums:
     """Sums over rows of ``signals`` and ``truth`` (n, axes); ``drift`` (19,) is per count of mean drift."""
     gram, cross = np.zeros(()), np.zeros(())
-    for place, weight in nodes:
-        z = with_one(columns(signals.drifted(place * DRIFT_SIGMA_COUNTS * drift)))
+    for node, weight in nodes:
+        z = with_one(columns_of(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift)))
         gram = gram + weight * (z.T @ z)
         cross = cross + weight * (z.T @ truth)
     return Sums(gram, cross, (truth**2).sum(axis=0))
@@ -158,6 +153,6 @@ def air_sums(run: Run, window_rows: int) -> Sums | None:
         return None
     pdc = None if run.pdc is None else np.zeros(len(run.air))
     signals = Signals(averaged(run.air, window_rows) - run.tare, run.tare, pdc)
-    its = strip_sums(signals, np.zeros((len(run.air), run.truth.shape[1])), run.drift)
+    sums = strip_sums(signals, np.zeros((len(run.air), run.truth.shape[1])), run.drift)
     share = len(run.truth) / len(run.air)
-    return Sums(its.gram * share, its.cross, its.square)
+    return Sums(sums.gram * share, sums.cross, sums.square)

@@ -11,7 +11,7 @@ from ...markdown import table
 from . import figures
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
 from .lag import MAX_LAG_ROWS
-from .models import POOLED, WORDS
+from .models import POOLED, TEXTS
 from .splits import BLOCKS, GUARD_ROWS
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
@@ -124,7 +124,7 @@ def _models(validation: Validation) -> list[str]:
     rows = []
     for name, errors in validation.by_model.items():
         drifted = errors[1:].max(axis=0)
-        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], WORDS[name]])
+        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], TEXTS[name]])
     return table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
 
 
@@ -144,9 +144,9 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
     ]
     blocks = [validation.blocks.rows(k) for k in range(BLOCKS)]
     errors = np.array([figures.rmse(validation.predicted[0][r], validation.run.truth[r]) for r in blocks])
-    for name, of_axis in zip(validation.run.axes, errors.T, strict=True):
-        worst_block = int(np.argmax(of_axis))
-        error = f"{of_axis[worst_block]:.3f} {_unit(name)}"
+    for name, axis_errors in zip(validation.run.axes, errors.T, strict=True):
+        worst_block = int(np.argmax(axis_errors))
+        error = f"{axis_errors[worst_block]:.3f} {_unit(name)}"
         lines.append(f"* {name}: worst block {worst_block + 1} of {BLOCKS}, RMSE {error}")
     return lines
 

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.geometry import Floats
-from ...core.map_columns import AXES
 from ...errors import RecordingError
+from ...map.columns import AXES
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
 from ...wire.native import lib
@@ -25,8 +25,8 @@ from .splits import BLOCKS, GUARD_ROWS, contacts
 MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a shorter block would be nothing but its two guards
 REST_N = 0.1  # a plate's reading below this means that nothing touches
 MIN_REST_ROWS = 50
-MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s (biotac.md finding 6), a press hundreds
-RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()  # numerics.md 1.3: beyond these an electrode is railed
+MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s, a press hundreds
+RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()  # beyond these an electrode is railed
 MAX_RAILED_SHARE = 0.01
 LEAST_SWING_COUNTS = 2  # over so many rows, the noise alone of a live electrode exceeds this
 MAX_CLIPPED_SHARE = 0.005

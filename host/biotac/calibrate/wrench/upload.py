@@ -12,35 +12,41 @@ from typing import Any
 
 import numpy as np
 
-from ...core.board_map import from_blob, pdc_above_rest_q4
+from ...core.geometry import Floats
 from ...errors import PortError
-from ...hand.compatibility import MAP_SINCE_MINOR, need
 from ...hand.hand import Hand
+from ...map.board_map import from_blob, pdc_above_rest_q4
+from ...map.bound import compare
+from ...map.fitted import WrenchMap
 from ...wire import messages_gen as wire
 from ...wire.dtypes_gen import DTYPES
 from ...wire.frames import StructArray
 from ...wire.map_gen import HEADER_BYTES
-from . import board
-from .fitted import WrenchMap
-from .run import Run
 
 STREAM_S = 0.5
 TRIES = 60  # a simulated board that runs ahead has some seconds of unread frames
 
 
 def upload(
-    hand: Hand, finger: int, its: WrenchMap, run: Run, *, serial: str, made_s: int, force: bool = False
+    hand: Hand,
+    finger: int,
+    fitted: WrenchMap,
+    counts: Floats,
+    pdc: Floats | None = None,
+    *,
+    serial: str,
+    made_s: int,
+    force: bool = False,
 ) -> dict[str, Any]:
     """Give ``finger`` the map, only for the sensor ``serial`` unless forced.
 
     The map is in force until the next reboot, or for good with save_settings. Returns, as JSON types, the Comparison
-    with the float model on the run's rows, and ``frames_bit_for_bit``: how many frames of the board were checked, 0 if
-    it sends no more (a simulated source that has ended). Not while streaming. Raises WireVersionError for a board older
-    than maps, InputError for a map that no board takes, CommandRefusedError for another sensor, PortError when the
-    board does not compute what was fitted.
+    with the float model on recorded ``counts`` (n, 19) and ``pdc`` (n,), and ``frames_bit_for_bit``: how many frames of
+    the board were checked, 0 if it sends no more (a simulated source that has ended). Not while streaming. Raises
+    InputError for a map that no board takes, CommandRefusedError for another sensor, PortError when the board does not
+    compute what was fitted.
     """
-    need(hand.info, MAP_SINCE_MINOR, "wrench maps")
-    sent = board.quantise(its, serial=serial, made_s=made_s).blob
+    sent = fitted.on_board(serial=serial, made_s=made_s).blob
     hand.set_map(finger, sent, force=force)
     blob = hand.get_map(finger)
     # only the header may differ: a forced map has no serial number in it
@@ -50,7 +56,7 @@ def upload(
             f"the board accepted the map of {len(sent)} bytes, but has {seen}: expected the same; upload it again"
         )
     on_board = from_blob(blob)
-    comparison = board.compare(its, on_board, np.rint(run.counts), run.pdc if its.with_pdc else None)
+    comparison = compare(fitted, on_board, np.rint(counts), pdc if fitted.with_pdc else None)
     if comparison.outside:
         raise PortError(
             f"{comparison.outside} recorded values differ from the float model by more than rounding allows: "

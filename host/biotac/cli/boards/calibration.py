@@ -10,6 +10,7 @@ from pathlib import Path
 
 from biotac import Calibration, Hand
 
+from ...documents import made_text
 from ...errors import InputError
 from ...keep import calibration_file as file
 from ...keep import eeprom
@@ -28,7 +29,7 @@ def _write(hand: Hand, finger: int, its: Calibration, force: bool) -> None:
 
 
 def _title(its: Calibration) -> str:
-    return f"for {f'sensor {its.serial}' if its.serial else 'any sensor'}, {file.when(its.made_s)}"
+    return f"for {f'sensor {its.serial}' if its.serial else 'any sensor'}, {made_text(its.made_s)}"
 
 
 def _lines(its: Calibration) -> list[str]:

@@ -9,9 +9,10 @@ from typing import Any
 
 import biotac
 
-from ...keep import map_file
-from ...keep.calibration_file import to_dict, when
-from ...keep.map_blob import made_s
+from ...documents import made_text
+from ...keep.calibration_file import to_dict
+from ...map import file as map_file
+from ...map.board_map import made_s_of
 from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_text, serial_text, setting_text, version_text
 from .. import values
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
                 {"finger": s.finger, "serial": ascii_text(s.serial), "software": ascii_text(s.software_version)}
                 for s in sensors
             ],
-            "calibrations": {finger: to_dict(its) for finger, its in calibrations.items()},
+            "calibrations": {finger: to_dict(calibration) for finger, calibration in calibrations.items()},
             "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
             "settings": {s.name.lower(): value for s, value in settings.items()},
             "status": dataclasses.asdict(status),
@@ -60,8 +61,8 @@ def run(args: argparse.Namespace) -> int:
     for warning in warnings:
         print(f"warning: {warning.text}")
     for s in sensors:
-        own = f", calibration {when(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
-        own += f", wrench map {when(made_s(maps[s.finger]))}" if s.finger in maps else ""
+        own = f", calibration {made_text(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
+        own += f", wrench map {made_text(made_s_of(maps[s.finger]))}" if s.finger in maps else ""
         print(f"finger {s.finger}: BioTac {ascii_text(s.serial)}, software {ascii_text(s.software_version)}{own}")
     for setting, value in settings.items():
         print(setting_text(setting, value))

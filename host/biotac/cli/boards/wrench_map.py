@@ -8,7 +8,7 @@ from pathlib import Path
 
 from biotac import Hand
 
-from ...keep import map_file as file
+from ...map import file
 from . import subverbs
 
 EXAMPLE = "biotac map put /dev/ttyACM0 index.json --finger index --save"

@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import asdict
 
-from ...calibrate.wrench.contact import compare
+from ...calibrate.wrench.contact_errors import compare
 from .. import values
 
 NAME = "contact"

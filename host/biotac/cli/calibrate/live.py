@@ -13,7 +13,7 @@ from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
 from ...calibrate.reference.samples import Reader
 from ...calibrate.wrench.guided import Places, Procedure, walk
-from ...calibrate.wrench.provenance import check_serial
+from ...calibrate.wrench.sources import check_serial
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
 from ...sim.nano17_reader import Nano17Reader

@@ -8,19 +8,21 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import biotac
 
-from ...calibrate.population import map_file
+from ...calibrate.population import population_map
 from ...calibrate.population.presses import Fit, Held, found
 from ...calibrate.pressure.presses import Phase, Step
-from ...calibrate.wrench import board, fitted, provenance
+from ...calibrate.wrench.sources import Provenance
 from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.hand import Hand
+from ...map import file
+from ...map.bound import summary
 from ...partial_file import whole
 from ...recording import Recording
 from ...wire.identity import ascii_text
@@ -89,39 +91,40 @@ class Guide:
 
 
 def tell(
-    args: argparse.Namespace, its: Pressed, fit: Fit, how: str, more: Callable[[map_file.Kept], dict[str, Any]]
+    args: argparse.Namespace, its: Pressed, fit: Fit, how: str, more: Callable[[population_map.Trained], dict[str, Any]]
 ) -> dict[str, Any]:
     """Fit the map, and upload it only if it helps or --force is given; return the findings as JSON types.
 
     ``how`` says where the force is from; ``more`` gives further findings.
     """
-    kept = map_file.load(args.population)
-    result = found(kept.its, its.held, fit)
+    trained = population_map.load(args.population)
+    result = found(trained.population, its.held, fit)
     own = result.own.wrench_map(its.held.tare)
-    run, made_s = its.held.run(args.where), int(time.time())
+    made_s = int(time.time())
     facts: dict[str, Any] = {
         "finger": args.finger,
         "serial": its.serial,
         "presses": len(its.held.force_n),
-        **more(kept),
+        **more(trained),
         "before_n": result.before_n.tolist(),
         "held_out_n": result.held_out_n.tolist(),
-        "why_not": result.why_not(kept.sigma_scale5_n),
-        "sigma_n": kept.sigma_scale5_n.tolist(),
-        "fixed_point": board.summary(own, run),
+        "why_not": result.why_not(trained.sigma_scale5_n),
+        "sigma_n": trained.sigma_scale5_n.tolist(),
+        "fixed_point": summary(own, its.held.counts),
     }
     if args.out is not None:
-        origin = provenance.Provenance(
-            its.serial, made_s, kept.provenance.get("software", ""), (args.where,), "",
-            f"{len(its.held.force_n)} {how}; population map from {', '.join(kept.provenance.get('files', {}))}",
+        origin = Provenance(
+            its.serial, made_s, trained.provenance.get("software", ""), (args.where,), "",
+            f"{len(its.held.force_n)} {how}; population map from {', '.join(trained.provenance.get('files', {}))}",
         )  # fmt: skip
         with whole(args.out, overwrite=args.force) as place:
-            place.write_text(fitted.dumps(own, origin), encoding="utf-8")
+            text = file.dumps_fitted(own, serial=its.serial, made_s=made_s, provenance=asdict(origin))
+            place.write_text(text, encoding="utf-8")
         facts["written"] = str(args.out)
     wanted = its.hand is not None and not args.no_upload
     facts["refused"] = wanted and bool(facts["why_not"]) and not args.force
     if its.hand is not None and wanted and not facts["refused"]:
-        facts["board"] = upload(its.hand, args.finger, own, run, serial=its.serial, made_s=made_s)
+        facts["board"] = upload(its.hand, args.finger, own, its.held.counts, serial=its.serial, made_s=made_s)
         if args.save:
             its.hand.save_settings()
     return facts

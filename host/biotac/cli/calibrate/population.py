@@ -9,7 +9,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from ...calibrate.population import held_out_error, map_file, training
+from ...calibrate.population import held_out_error, population_map, training
 from ...calibrate.wrench.run import Run
 from ...calibrate.wrench.sources import load
 from ...errors import InputError
@@ -47,31 +47,33 @@ def run(args: argparse.Namespace) -> int:
     with threadpool_limits(limits=THREADS, user_api="blas"):
         runs = [training.aligned(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
-        facts, kept = _calibrated(args, runs, tested)
+        facts, trained = _calibrated(args, runs, tested)
     if args.out is not None:
         with whole(args.out, overwrite=args.force) as place:
-            place.write_text(map_file.dumps(kept), encoding="utf-8")
+            place.write_text(population_map.dumps(trained), encoding="utf-8")
         facts["written"] = str(args.out)
     print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
     return 0
 
 
-def _calibrated(args: argparse.Namespace, runs: list[Run], tested: Run | None) -> tuple[dict[str, Any], map_file.Kept]:
+def _calibrated(
+    args: argparse.Namespace, runs: list[Run], tested: Run | None
+) -> tuple[dict[str, Any], population_map.Trained]:
     fingers = [training.sums_of(run) for run in runs]
     its = training.train(fingers, symmetric=args.symmetric)
     sigma = held_out_error.sigma_of(fingers, runs, symmetric=args.symmetric)
     facts: dict[str, Any] = {
         "files": [path.name for path in args.files],
         "symmetric": args.symmetric,
-        "columns": training.COLUMNS,
+        "columns": population_map.COLUMNS,
         "sigma_n": sigma[0].tolist(),
         "sigma_scale5_n": sigma[1].tolist(),
     }
     if tested is not None:
         facts["test"] = args.test.name
         facts |= held_out_error.facts(held_out_error.worth(its, tested), sigma)
-    source = map_file.provenance_of(args.files, args.source, symmetric=args.symmetric)
-    return facts, map_file.Kept(its, sigma[0], sigma[1], source)
+    source = population_map.provenance_of(args.files, args.source, symmetric=args.symmetric)
+    return facts, population_map.Trained(its, sigma[0], sigma[1], source)
 
 
 def _lines(facts: dict[str, Any]) -> list[str]:

@@ -7,7 +7,7 @@ import sys
 from contextlib import ExitStack
 from typing import Any
 
-from ...calibrate.population import fewshot, map_file, presses
+from ...calibrate.population import fewshot, population_map, presses
 from ...calibrate.pressure.force_source import Truth
 from ...calibrate.pressure.presses import Step
 from ...calibrate.reference.scale import UNITS_N, Scale
@@ -72,8 +72,8 @@ def run(args: argparse.Namespace) -> int:
 
     with own_map.pressed(args, guide, recorded) as its:
 
-        def more(kept: map_file.Kept) -> dict[str, Any]:
-            scale = fewshot.scale_of(its.held.columns @ kept.its.coefficients, its.held.force_n[:, 2])
+        def more(trained: population_map.Trained) -> dict[str, Any]:
+            scale = fewshot.scale_of(its.held.columns @ trained.population.coefficients, its.held.force_n[:, 2])
             return {"shown_n": its.held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
 
         facts = own_map.tell(args, its, fewshot.scaled, "presses on a scale", more)

@@ -7,21 +7,23 @@ import contextlib
 import json
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import biotac
 
-from ...calibrate.population import map_file
+from ...calibrate.population import population_map
 from ...calibrate.reference.files import read_reference
 from ...calibrate.reference.mounting import read_mounting
-from ...calibrate.wrench import board, figures, fitted, provenance, report
+from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
 from ...calibrate.wrench.joined import choose_finger
-from ...calibrate.wrench.sources import Loaded, load
+from ...calibrate.wrench.sources import Loaded, Provenance, check_serial, load
 from ...calibrate.wrench.upload import upload
 from ...errors import InputError
+from ...map import file
+from ...map.bound import summary, summary_text
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
@@ -118,14 +120,14 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _upload(
-    args: argparse.Namespace, finger: int | None, loaded: Loaded, validation: Validation, its: provenance.Provenance
+    args: argparse.Namespace, finger: int | None, loaded: Loaded, validation: Validation, its: Provenance
 ) -> dict[str, Any]:
     with biotac.open(args.upload) as hand:
         if finger is None:
             known = loaded.joined
             finger = known.finger if known is not None else choose_finger(args.upload, hand.fingers, None)
         serial = ascii_text(hand.sensor_info(finger).serial)
-        provenance.check_serial(f"{loaded.run.name}", its.serial, serial, force=args.force)
+        check_serial(f"{loaded.run.name}", its.serial, serial, force=args.force)
         return _put(args, hand, finger, loaded, validation, its)
 
 
@@ -135,10 +137,17 @@ def _put(
     finger: int,
     loaded: Loaded,
     validation: Validation,
-    its: provenance.Provenance,
+    its: Provenance,
 ) -> dict[str, Any]:
     found = upload(
-        hand, finger, fitted.of(validation), loaded.run, serial=its.serial, made_s=its.made_s, force=args.force
+        hand,
+        finger,
+        validation.wrench_map,
+        loaded.run.counts,
+        loaded.run.pdc,
+        serial=its.serial,
+        made_s=its.made_s,
+        force=args.force,
     )
     if args.save:
         hand.save_settings()
@@ -154,7 +163,7 @@ def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
     return dict(zip(recordings, references, strict=False))
 
 
-def _fit(args: argparse.Namespace, loaded: Loaded) -> tuple[Validation, provenance.Provenance, dict[str, Any]]:
+def _fit(args: argparse.Namespace, loaded: Loaded) -> tuple[Validation, Provenance, dict[str, Any]]:
     """Fit, and write the files first: they are safe whatever happens on the board afterwards."""
     progress = Progress()
     try:
@@ -163,15 +172,15 @@ def _fit(args: argparse.Namespace, loaded: Loaded) -> tuple[Validation, provenan
         its_own_lag = not args.as_recorded and not loaded.run.by_clocks
         run, others = loaded.run, None
         if args.population != "none":
-            kept = map_file.load(None if args.population is None else Path(args.population))
-            others, note = map_file.others_than(kept, loaded.files)
+            trained = population_map.load(None if args.population is None else Path(args.population))
+            others, note = trained.others_than(loaded.files)
             run = replace(run, notes=(*run.notes, note))
         validation = validate(run, align=its_own_lag, windows=windows, others=others, show=progress.show)
     finally:
         progress.done()
     its = loaded.provenance(int(time.time()))
     facts = figures.summary(validation) | loaded.facts() | {"serial": its.serial, "data_sha256": its.data_sha256}
-    facts["fixed_point"] = board.summary(fitted.of(validation), validation.run)
+    facts["fixed_point"] = summary(validation.wrench_map, validation.run.counts, validation.run.pdc)
     if args.out is not None:
         places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
         facts["written"] = [str(place) for place in places]
@@ -192,20 +201,19 @@ def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     outputs.make_folder(folder)
 
 
-def _write(
-    validation: Validation, its: provenance.Provenance, path: Path, folder: Path, *, overwrite: bool
-) -> tuple[Path, ...]:
+def _write(validation: Validation, its: Provenance, path: Path, folder: Path, *, overwrite: bool) -> tuple[Path, ...]:
     page, picture, its_map = places = _places(folder, path)
     with contextlib.ExitStack() as stack:
         parts = [stack.enter_context(whole(place, overwrite=overwrite)) for place in (page, picture, its_map)]
         parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
         with drawn(parts[1]) as figure:
             report.draw(validation, figure)
-        parts[2].write_text(fitted.dumps(fitted.of(validation), its), encoding="utf-8")
+        text = file.dumps_fitted(validation.wrench_map, serial=its.serial, made_s=its.made_s, provenance=asdict(its))
+        parts[2].write_text(text, encoding="utf-8")
     return places
 
 
-def _origin(its: provenance.Provenance) -> str:
+def _origin(its: Provenance) -> str:
     rows = [
         ("sensor", its.serial or "not stated in the recording"),
         ("made", f"{its.made}, {its.software}"),
@@ -236,7 +244,7 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         f"  counts lag the force by {facts['lag_rows']} rows, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
         f"  untouched:              {numbers(facts['rest_n'][:1])} N",
-        f"  {board.words(facts['fixed_point'])}",
+        f"  {summary_text(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
         *[f"  written: {place}" for place in facts.get("written", [])],
         *(_board_lines(facts["board"]) if "board" in facts else []),

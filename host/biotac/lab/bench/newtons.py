@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ...calibrate.population import held_out_error, map_file, training
-from ...calibrate.population.training import Population
-from ...calibrate.wrench import figures, fitted, models
+from ...calibrate.population import held_out_error, population_map, training
+from ...calibrate.population.population_map import Population
+from ...calibrate.wrench import figures, models
 from ...calibrate.wrench.crossvalidation import Validation, validate
 from ...calibrate.wrench.run import Run
 from ...calibrate.wrench.sources import load
@@ -138,11 +138,11 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
             path.name: training.train([its for j, its in enumerate(fingers) if j != k], symmetric=True)
             for k, path in enumerate(files)
         }, ["population maps are trained on the other recordings, symmetric like the package's"]
-    kept = map_file.load(None)
+    shipped = population_map.load(None)
     path = files[0]
-    if map_file.made_of(kept, [path]):
+    if shipped.made_of([path]):
         return {}, [f"the package's population map was made from {path.name}: name another finger's recording too"]
-    return {path.name: kept.its}, ["the population map is the package's"]
+    return {path.name: shipped.population}, ["the population map is the package's"]
 
 
 def _untrained(its: Population, run: Run) -> dict[str, list[float]]:
@@ -158,7 +158,7 @@ def _noise(its: Validation) -> list[float]:
     sigma = np.median(np.abs(curve), axis=0) / 0.6745 / np.sqrt(6.0)
     rows = rng.integers(0, len(run.counts), 2000)
     pdc = None if run.pdc is None else run.pdc[rows]
-    map_of_all = fitted.of(its)
+    map_of_all = its.wrench_map
     counts = run.counts[rows]
     noisy = counts + rng.normal(size=counts.shape) * sigma
     there, here = (map_of_all.predict(its, pdc)[:, :3] for its in (noisy, counts))

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...calibrate.wrench import fitted
-from ...calibrate.wrench.fitted import WrenchMap
 from ...core import geometry as surface
 from ...core.compiled import Settings
 from ...core.geometry import Floats
 from ...errors import InputError
+from ...map.file import load_fitted
+from ...map.fitted import WrenchMap
 from ...sim.gains import fit_gains
 from ...wire import messages_gen as wire
 from .trial import Bools, Trial
@@ -99,7 +99,7 @@ def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:
             raise InputError(
                 f"{path}: map name {name} is taken, or begins with 'paper' like the built-in models; rename the file"
             )
-        maps[name] = path, fitted.load(path)
+        maps[name] = path, load_fitted(path)
     return maps
 
 

@@ -11,13 +11,13 @@ import numpy as np
 
 from ...calibrate.wrench import crossvalidation
 from ...calibrate.wrench.run import load_run
-from ...core import population
 from ...core.geometry import Floats
-from ...core.map_columns import Signals
 from ...features import force, inputs
 from ...features.paf import paf
 from ...features.scores import score
 from ...features.signals import skin
+from ...map import population
+from ...map.columns import Signals
 from ...sim.physics import Finger
 from ...sim.stimulations import Stimulations, stimulate
 from .outcome import Facts, number

@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from ...calibrate.wrench import features, figures, fitted, report
+from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import Validation, validate
 from ...calibrate.wrench.models import lin_directions
-from ...calibrate.wrench.moments import with_one
 from ...calibrate.wrench.run import load_run
 from ...calibrate.wrench.splits import BLOCKS
 from ...core import geometry as surface
 from ...core.geometry import Floats
-from ...core.map_columns import AXES, Signals
+from ...map.columns import AXES, Signals, columns, with_one
+from ...map.file import dumps_fitted
 from ...markdown import table
 from ...sim import sampling
 from ...sim.physics import REST_CELSIUS, Finger, States
@@ -68,7 +68,7 @@ def run(options: Options) -> Result:
         np.savez(path, **random_loads.recording(finger, loads, cell, options.seed))
         validation = validate(load_run(path), show=options.show)
         its = Path(folder) / f"{CALIBRATED}.wrench.json"
-        its.write_text(fitted.dumps(fitted.of(validation)), encoding="utf-8")
+        its.write_text(dumps_fitted(validation.wrench_map), encoding="utf-8")
         replayed = torsion_shear.run(replace(options, maps=(its,)))
     both = np.asarray((np.linalg.norm(loads.shear_n, axis=1) > 0.0) & (loads.torsion_nmm != 0.0))
     warm = _warm(finger, loads, both, validation, options.seed)
@@ -123,7 +123,7 @@ def _held_out(validation: Validation, counts: Floats, tare: Floats) -> Floats:
         rows = validation.blocks.rows(block)
         pdc = validation.run.pdc
         signals = Signals(counts[rows] - tare[rows], tare[rows], None if pdc is None else pdc[rows])
-        result[rows] = with_one(features.columns(signals)) @ fit.best
+        result[rows] = with_one(columns(signals)) @ fit.best
     return result
 
 

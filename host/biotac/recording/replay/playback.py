@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...errors import InputError
-from ...keep import map_blob as maps
+from ...map import board_map as maps
 from ...wire import messages_gen as wire
 from ...wire.counters import nearest
 from ...wire.decoder import Decoder

@@ -8,16 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..core.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArray, tare_to_q4
-from ..wire.map_gen import Gate, Kind
 from .board_map import BoardBlock, BoardMap
-from .geometry import Floats
-from .map_columns import Signals, summed, tared
-from .map_quantise import unit
+from .columns import Signals, summed, tared
+from .quantise import unit
 
-Unrounded = dict[tuple[Kind, Gate], Floats]  # of each block, as unrounded()
 _CHUNK_ROWS = 4096
 
 
@@ -27,7 +25,7 @@ def result_units(axes: int) -> Floats:
     return units[:axes]
 
 
-def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
+def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
     """Replace in ``results`` of biotac.compute, MAPPED_RESULT_DTYPE, what the map has; returns the same array.
 
     Shapes are as there. ``pdc_above_rest``, in counts, is (n,), one number, or None: missing. Raises ValueError for a
@@ -41,13 +39,13 @@ def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_abov
         raise ValueError(f"pdc_above_rest has shape {pressure.shape}, expected ({len(rows)},) or one number")
     known = np.rint(16 * np.nan_to_num(np.broadcast_to(pressure, len(rows))))
     pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
-    wrench = exact(its, raw, tare_q4, pdc_q4)
-    replace_gains(its, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
+    wrench = exact(board_map, raw, tare_q4, pdc_q4)
+    replace_gains(board_map, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
     return results
 
 
 def replace_gains(
-    its: BoardMap, wrench: Floats, poc_mm: Floats, force_n: Floats, torque_nmm: Floats, torsion_nmm: Floats
+    board_map: BoardMap, wrench: Floats, poc_mm: Floats, force_n: Floats, torque_nmm: Floats, torsion_nmm: Floats
 ) -> None:
     """Put a map's ``wrench`` (n, axes), as from exact(), into the gains' results: (n, 3) each, torsion (n,).
 
@@ -55,11 +53,11 @@ def replace_gains(
     the torque stays. If it has no torsion, that is NaN.
     """
     force_n[:] = wrench[:, :3]
-    if its.axes > 3:
+    if board_map.axes > 3:
         torque_nmm[:] = wrench[:, 3:6]
     else:
         torque_nmm[:, 0] = derived_torque_x(poc_mm, wrench)
-    torsion_nmm[:] = wrench[:, 6] if its.axes == _map.AXES_TORSION else np.nan
+    torsion_nmm[:] = wrench[:, 6] if board_map.axes == _map.AXES_TORSION else np.nan
 
 
 def derived_torque_x(poc_mm: Floats, force_n: Floats) -> Floats:
@@ -68,29 +66,29 @@ def derived_torque_x(poc_mm: Floats, force_n: Floats) -> Floats:
 
 
 def exact(
-    its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
+    board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Floats:
     """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results()."""
-    blocks = [(block.kind, block.gate, unrounded(block)) for block in its.blocks]
-    parts = [summed(blocks, signals) for signals in tared_chunks(its, counts, tare_q4, pdc_q4)]
+    blocks = [(block.kind, block.gate, unrounded(block)) for block in board_map.blocks]
+    parts = [summed(blocks, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
-    result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(its.axes)
+    result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(board_map.axes)
     return result
 
 
 def tared_chunks(
-    its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
+    board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Iterator[Signals]:
     """Signals in chunks of frames whose columns fit in memory; arguments as exact()."""
     every = tared(counts, tare_q4)
     known = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4_PER_COUNT)
-    pressure = known if its.with_pdc else np.zeros(len(counts))
+    pressure = known if board_map.with_pdc else np.zeros(len(counts))
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
         yield Signals(every.e[rows], every.tare[rows], pressure[rows])
 
 
 def unrounded(block: BoardBlock) -> Floats:
-    """A block's coefficients (columns, axes) as real numbers, in the results' units per 1 of a column of features."""
+    """A block's coefficients (columns, axes) as real numbers, in the results' units per 1 of a column."""
     scale = unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)
     return np.asarray(block.coefficients * scale, dtype=np.float64)

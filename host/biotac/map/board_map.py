@@ -1,12 +1,12 @@
 """A wrench map as a board stores it: its blob, and the board's own code that runs it.
 
-The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps. Maps are made by
-``biotac.calibrate.wrench``.
+The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps.
 """
 
 from __future__ import annotations
 
 import struct
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,30 +14,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.compiled import ELECTRODES, Settings, board_settings, integers
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import StructArray
+from ..wire.identity import ascii_text
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
-from .compiled import ELECTRODES, Settings, board_settings, integers
 
 Integers = NDArray[np.int64]
 BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
-HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
-BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
+_HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
+_BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
+_SERIAL = slice(4, 4 + _map.SERIAL_BYTES)
+PART_BYTES = len(wire.MapData.unpack(bytes(wire.MapData.STRUCT.size)).data)
 _ELECTRODES = _map.KINDS[Kind.SIGNAL].columns
 
 
 def _ring() -> NDArray[np.intp]:
     """For each pair in the blob's order, its index in i <= j, row by row: each electrode with itself and the next 9."""
-    place = np.zeros((_ELECTRODES, _ELECTRODES), np.intp)
+    index = np.zeros((_ELECTRODES, _ELECTRODES), np.intp)
     upper = np.triu_indices(_ELECTRODES)
-    place[upper] = np.arange(len(upper[0]))
+    index[upper] = np.arange(len(upper[0]))
     first, behind = np.indices((_ELECTRODES, (_ELECTRODES + 1) // 2)).reshape(2, -1)
     second = (first + behind) % _ELECTRODES
-    ring: NDArray[np.intp] = place[np.minimum(first, second), np.maximum(first, second)]
+    ring: NDArray[np.intp] = index[np.minimum(first, second), np.maximum(first, second)]
     return ring
 
 
@@ -70,21 +73,22 @@ class BoardMap:
     def blob(self) -> bytes:
         """What a board stores. Raises InputError when the board would refuse it."""
         try:
-            blob = self._packed()
+            blob = self.packed()
         except (struct.error, UnicodeEncodeError, ValueError) as error:
             raise InputError(f"a wrench map cannot be stored ({error}); see protocol/SPEC.md, Wrench maps") from error
-        _judged(blob)
+        _opened(blob)
         return blob
 
-    def _packed(self) -> bytes:
+    def packed(self) -> bytes:
+        """The bytes, whether or not a board would accept them. Raises as struct.pack."""
         serial = self.serial.encode("ascii")
         if len(serial) > _map.SERIAL_BYTES:
             raise ValueError(f"the serial number {self.serial!r} has more than {_map.SERIAL_BYTES} characters")
-        head = HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
+        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
         blocks, coefficients = b"", b""
         for block in self.blocks:
             unused = (0,) * (_map.EXPONENTS - self.axes)
-            blocks += BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
+            blocks += _BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
             shape = _map.KINDS[block.kind].columns, self.axes
             values = integers(f"coefficients of {block.kind.name}", block.coefficients, np.int64, *shape)
             coefficients += b"".join(_halves(block.kind, group) for group in np.split(values, [3], axis=1))
@@ -98,11 +102,11 @@ class BoardMap:
     @property
     def handle(self) -> Any:
         """The C struct bt_map, valid as long as this object lives."""
-        return self._opened[0]
+        return self._open[0]
 
     @cached_property
-    def _opened(self) -> tuple[Any, Any]:
-        return _judged(self.blob)
+    def _open(self) -> tuple[Any, Any]:
+        return _opened(self.blob)
 
     def results(
         self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
@@ -133,9 +137,9 @@ class BoardMap:
 
 def from_blob(blob: bytes) -> BoardMap:
     """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
-    _judged(blob)
-    _, axes, count, _, serial, made_s = HEADER.unpack_from(blob)
-    heads = [BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
+    _opened(blob)
+    _, axes, count, _, serial, made_s = _HEADER.unpack_from(blob)
+    heads = [_BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
     at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
     blocks = []
     for kind, gate, *exponent in heads:
@@ -149,12 +153,59 @@ def from_blob(blob: bytes) -> BoardMap:
     return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
 
 
-def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> BoardResults:
+def opened(board_map: BoardMap | bytes) -> BoardMap:
+    """The map itself, or the one in a blob. Raises InputError when a board would refuse the blob."""
+    return board_map if isinstance(board_map, BoardMap) else from_blob(board_map)
+
+
+# ---- a blob as it is moved: the board judges it -------------------------------------------------
+
+
+def as_blob(board_map: bytes | BoardMap) -> bytes:
+    """The bytes of a map. Raises InputError for a size that no map has; the board checks the rest."""
+    blob = board_map.blob if isinstance(board_map, BoardMap) else bytes(board_map)
+    if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
+        raise InputError(
+            f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}; is it a wrench map?"
+        )
+    return blob
+
+
+def serial_of(blob: bytes) -> str:
+    """Serial number of the sensor that the map was made for; "" for any sensor."""
+    return ascii_text(blob[_SERIAL])
+
+
+def made_s_of(blob: bytes) -> int:
+    """When the map was made, in seconds since 1970 UTC; 0 when unknown."""
+    return int.from_bytes(blob[_SERIAL.stop : _SERIAL.stop + 4], "little")
+
+
+def for_any_sensor(blob: bytes) -> bytes:
+    """The same map without a serial number."""
+    return blob[: _SERIAL.start] + bytes(_map.SERIAL_BYTES) + blob[_SERIAL.stop :]
+
+
+def info(blob: bytes, req_id: int, finger: int) -> wire.MapInfo:
+    """The MAP_INFO that a board with this map in force sends."""
+    state, serial = wire.CalibrationState.IN_FORCE, tuple(blob[_SERIAL])
+    return wire.MapInfo(req_id, finger, state, serial, made_s_of(blob), len(blob), zlib.crc32(blob))
+
+
+def part(blob: bytes, offset: int) -> tuple[int, ...]:
+    """The part of the map at ``offset`` that READ_MAP and WRITE_MAP carry, padded with 0xFF."""
+    return tuple(blob[offset : offset + PART_BYTES].ljust(PART_BYTES, b"\xff"))
+
+
+# ---- on a board --------------------------------------------------------------------------------
+
+
+def on_board_q4(frames: StructArray, settings: Settings, board_map: BoardMap) -> BoardResults:
     """compiled.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; adds torsion_mnmm."""
     raw, tare_q4 = (integers(name, frames[name], np.uint16, len(frames), ELECTRODES) for name in ("counts", "tare_q4"))
     pdc, pdc_tare_q4 = (integers(name, frames[name], np.uint16, len(frames)) for name in ("pdc", "pdc_tare_q4"))
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
-    kernel.map = its.handle
+    kernel.map = board_map.handle
     n = len(frames)
     poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
     force_100un, torque_mnmm, torsion_mnmm = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
@@ -196,15 +247,24 @@ def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
     return values
 
 
-def _judged(blob: bytes) -> tuple[Any, Any]:
-    """A bt_map into a copy of the blob, and that copy. Raises InputError when the board's own check refuses it."""
-    room = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # of words, for alignment
-    ffi.memmove(room, blob, len(blob))
-    handle = ffi.new("bt_map *")
-    error = lib.bt_map_open(handle, ffi.cast("uint8_t *", room), len(blob))
+def is_accepted(board_map: BoardMap) -> bool:
+    """Whether a board accepts this map: the judgement of firmware/core/map/open.c."""
+    return _judged(board_map.packed())[0] == wire.Error.OK
+
+
+def _opened(blob: bytes) -> tuple[Any, Any]:
+    """A bt_map into a copy of the blob, and that copy. Raises InputError when the board would refuse it."""
+    error, handle, words = _judged(blob)
     if error != wire.Error.OK:
         raise InputError(
             f"the board would refuse this wrench map of {len(blob)} bytes ({wire.Error(error).name}): expected at most "
             f"{_map.MAX_BYTES} bytes, version {_map.VERSION}, laid out as in protocol/SPEC.md; make the map again"
         )
-    return handle, room
+    return handle, words
+
+
+def _judged(blob: bytes) -> tuple[int, Any, Any]:
+    words = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # for alignment
+    ffi.memmove(words, blob, len(blob))
+    handle = ffi.new("bt_map *")
+    return lib.bt_map_open(handle, ffi.cast("uint8_t *", words), len(blob)), handle, words

@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..core.compiled import FORCE_GAINS
+from ..core.geometry import Floats
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N
-from ..wire.map_gen import KINDS, Gate, Kind
+from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi
-from . import map_quantise
 from .board_map import BoardMap
-from .compiled import FORCE_GAINS
-from .geometry import Floats
-from .map_columns import AXES, SIGNAL_COUNTS, Signals, summed, tared
-from .map_float64 import derived_torque_x
+from .columns import SIGNAL_COUNTS, Signals, split, summed, tared
+from .float64 import derived_torque_x
+from .quantise import quantise
 
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]
@@ -58,19 +58,13 @@ def blocks() -> list[Block]:
     """Kind, gate and coefficients (columns, 3) in N of each block."""
     facts = json.loads(shipped())
     named = [(Kind[kind], Gate[gate]) for kind, gate in facts["blocks"]]
-    return split(named, np.array(facts["coefficients_n_and_variance"], dtype=np.float64)[:, :3])
+    coefficients = np.array(facts["coefficients_n_and_variance"], dtype=np.float64)[:, :3]
+    return [(*name, values) for name, values in split(named, coefficients).items()]
 
 
-def split(named: list[tuple[Kind, Gate]], coefficients: Floats) -> list[Block]:
-    """Split the coefficients (columns, 3) of concatenated blocks into those of each block."""
-    ends = np.cumsum([KINDS[kind].columns for kind, _ in named])
-    return [(*name, its) for name, its in zip(named, np.split(coefficients, ends[:-1]), strict=True)]
-
-
-def board_map(of: list[Block]) -> BoardMap:
+def board_map(each: list[Block]) -> BoardMap:
     """The blocks as a board's map. Raises InputError when they do not fit the board's formats."""
-    made = (map_quantise.block(kind, gate, its * FORCE_LSB_PER_N, AXES[:3]) for kind, gate, its in of)
-    return BoardMap(3, tuple(made))
+    return quantise({(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in each})
 
 
 def alone(signals: Signals) -> Floats:
@@ -113,10 +107,9 @@ def replace_force(
 @cache
 def compiled_coefficients() -> Any:
     """The coefficients as host/binding/population_float64.h wants them; they live as long as the process."""
-    its = blocks()
-    if [(kind, gate) for kind, gate, _ in its] != _COMPILED:
+    if [(kind, gate) for kind, gate, _ in blocks()] != _COMPILED:
         raise ValueError(
             f"{SHIPPED} has different blocks from host/binding/population_float64.c; retrain it with this version"
         )
-    per_count = [c / SIGNAL_COUNTS if kind in (Kind.COMPRESSION, Kind.BULGE) else c for kind, _, c in its]
+    per_count = [c / SIGNAL_COUNTS if kind in (Kind.COMPRESSION, Kind.BULGE) else c for kind, _, c in blocks()]
     return ffi.new("double[]", np.concatenate(per_count).ravel().tolist())

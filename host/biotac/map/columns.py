@@ -1,7 +1,8 @@
 """The columns in which a wrench map is linear (protocol/map.toml): kinds of columns, and the gates that weight them.
 
-They are functions of one frame's tared counts (and of PDC if there is any) alone. Columns are scaled to be of the order
-of one. None is centred or standardised by a run's own data, because a fitted map has to mean the same on the next run.
+They are functions of one frame's tared counts (and of PDC if there is any) alone, so a frame can be checked by itself
+and at any drift. Columns are scaled to be of the order of one. None is centred or standardised by a run's own data,
+because a fitted map has to mean the same on the next run.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..core import geometry as surface
+from ..core.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as _sensor
 from ..wire.frames import Q4_PER_COUNT
 from ..wire.map_gen import Gate, Kind
-from . import geometry as surface
-from .geometry import Floats
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
@@ -52,11 +53,62 @@ def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Si
 
 def summed(blocks: Iterable[tuple[Kind, Gate, Floats]], signals: Signals) -> Floats:
     """The sum of blocks (n, axes), each with coefficients (columns, axes)."""
-    columns, gate = kinds(signals), gates(signals.e)
+    found, gate = kinds(signals), gates(signals.e)
     total: Floats = np.zeros(())
-    for kind, which, its in blocks:
-        total = total + columns[kind] @ its * gate[which]
+    for kind, which, coefficients in blocks:
+        total = total + found[kind] @ coefficients * gate[which]
     return total
+
+
+# ---- the columns of a fitted map, block by block ------------------------------------------------
+
+STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
+SPLIT = (Kind.COMPRESSION, Kind.BULGE)  # different physics: a squeezed path and one that is wider than at rest
+#: Each block's kind and gate. PRESSURE is last: without PDC there are just the columns before it.
+BLOCKS: tuple[tuple[Kind, Gate], ...] = (
+    (Kind.SIGNAL, Gate.ONE),
+    (Kind.SIGNAL_PAIRS, Gate.ONE),
+    (Kind.CONDUCTANCE, Gate.ONE),
+    (Kind.CONDUCTANCE_PAIRS, Gate.ONE),
+    *((kind, gate) for gate in STRAIGHT for kind in SPLIT),
+    *((Kind.PRESSURE, gate) for gate in STRAIGHT),
+)
+
+
+def blocks(*, with_pdc: bool) -> tuple[tuple[Kind, Gate], ...]:
+    """The blocks of columns(), in order."""
+    return BLOCKS if with_pdc else BLOCKS[: -len(STRAIGHT)]
+
+
+def width(*, with_pdc: bool) -> int:
+    """Number of columns of columns()."""
+    return sum(_map.KINDS[kind].columns for kind, _ in blocks(with_pdc=with_pdc))
+
+
+def split(named: Iterable[tuple[Kind, Gate]], coefficients: Floats) -> dict[tuple[Kind, Gate], Floats]:
+    """The coefficients of each block, from those of all of them (columns, axes)."""
+    parts, at = {}, 0
+    for kind, gate in named:
+        parts[kind, gate] = coefficients[at : at + _map.KINDS[kind].columns]
+        at += _map.KINDS[kind].columns
+    return parts
+
+
+def columns(signals: Signals) -> Floats:
+    """All columns (n, 532), or (n, 535) with PDC, in the order of blocks()."""
+    found, gate = kinds(signals), gates(signals.e)
+    parts = []
+    for kind, which in blocks(with_pdc=signals.pdc is not None):
+        parts.append(found[kind] if which == Gate.ONE else found[kind] * gate[which])
+    return np.concatenate(parts, axis=1)
+
+
+def with_one(values: Floats) -> Floats:
+    """Columns (n, p) with a column of ones for the offset appended, (n, p + 1)."""
+    return np.concatenate([values, np.ones((len(values), 1))], axis=1)
+
+
+# ---- kinds and gates ---------------------------------------------------------------------------
 
 
 def kinds(signals: Signals) -> dict[Kind, Floats]:
@@ -103,6 +155,6 @@ def _conductance(count: Floats) -> Floats:
     return count / (_sensor.FULL_SCALE_COUNT - count)
 
 
-def _products(of: Floats) -> Floats:
-    products: Floats = of[:, _UPPER[0]] * of[:, _UPPER[1]]
+def _products(factors: Floats) -> Floats:
+    products: Floats = factors[:, _UPPER[0]] * factors[:, _UPPER[1]]
     return products

@@ -7,12 +7,12 @@ import pytest
 from core_in_units import on_board
 
 import biotac
-from biotac.calibrate.population import map_file
-from biotac.core import population
+from biotac.calibrate.population import population_map
 from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
-from biotac.core.map_columns import tared
 from biotac.recording.crosscheck import CrossCheck
+from biotac.map import population
+from biotac.map.columns import tared
 from biotac.wire import messages_gen as wire
 
 POPULATION = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.POPULATION)}
@@ -44,7 +44,7 @@ def test_on_plates_it_is_the_trained_map_to_what_16_bits_leave() -> None:
     inside = population.share(its) == population.ALL
     assert 500 < inside.sum() < 3900
     got = biotac.compute(counts, TARE, POPULATION)["force_n"][inside]
-    wanted = map_file.load(None).its.force(counts[inside], TARE)
+    wanted = population_map.load(None).population.force(counts[inside], TARE)
     np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9)
 
 
@@ -100,7 +100,7 @@ def test_sigma_is_what_a_new_finger_leaves() -> None:
     rows = rows_of(POPULATION, pressed(500, 6))
     inside = rows["flags"] & wire.FrameFlags.OUTSIDE == 0
     assert inside.any()
-    told, wanted = rows["force_sigma_100un"][inside] / 1e4, map_file.load(None).sigma_n
+    told, wanted = rows["force_sigma_100un"][inside] / 1e4, population_map.load(None).sigma_n
     np.testing.assert_allclose(told, np.broadcast_to(wanted, told.shape), rtol=0, atol=5.1e-5)
 
 

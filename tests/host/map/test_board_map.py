@@ -12,15 +12,15 @@ import pytest
 import wrench_run
 
 import biotac
-from biotac.calibrate.wrench import board, features, fitted, models
-from biotac.calibrate.wrench.fitted import WrenchMap
+from biotac.calibrate.wrench import models
 from biotac.calibrate.wrench.run import Run, load_run
-from biotac.core import board_map
-from biotac.core.board_map import BoardBlock, BoardMap, from_blob
 from biotac.core.compiled import default_settings, on_board_q4, pressure_filtered_q4, pressure_force_100un
-from biotac.core.map_float64 import exact, result_units
 from biotac.errors import InputError
 from biotac.recording.crosscheck import CrossCheck
+from biotac.map import board_map, bound, columns, file
+from biotac.map.board_map import BoardBlock, BoardMap, from_blob
+from biotac.map.fitted import WrenchMap
+from biotac.map.float64 import exact, result_units
 from biotac.recording.rounds import Rounds, frames_and_tares
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
@@ -36,10 +36,10 @@ TARE = np.array([2955.0 + 31 * k for k in range(19)])
 def random_map(seed: int, axes: int = 3, *, pdc: bool = True, unused: tuple[Kind, ...] = ()) -> WrenchMap:
     """Coefficients as large as fits on real fingers have, and of every size below that."""
     rng = np.random.default_rng([seed, 9])
-    blocks = features.blocks(with_pdc=pdc)
+    blocks = columns.blocks(with_pdc=pdc)
     parts = [
-        rng.normal(0.0, 4.0, (block.width, axes)) * 10.0 ** rng.uniform(-3.0, 0.0) * (block.kind not in unused)
-        for block in blocks
+        rng.normal(0.0, 4.0, (_map.KINDS[kind].columns, axes)) * 10.0 ** rng.uniform(-3.0, 0.0) * (kind not in unused)
+        for kind, _ in blocks
     ]
     names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[:axes]
     coefficients = np.concatenate([*parts, rng.normal(0.0, 2.0, (1, axes))])
@@ -70,7 +70,7 @@ def got(its: BoardMap, *frames: np.ndarray) -> np.ndarray:
 
 def test_a_blob_comes_back_to_the_bit() -> None:
     for axes in (3, 6, 7):
-        its = board.quantise(random_map(1, axes), serial="BTEMU00000000042", made_s=1763731310)
+        its = random_map(1, axes).on_board(serial="BTEMU00000000042", made_s=1763731310)
         back = from_blob(its.blob)
         assert (back.axes, back.serial, back.made_s) == (axes, "BTEMU00000000042", 1763731310)
         assert [(b.kind, b.gate, b.exponent) for b in back.blocks] == [(b.kind, b.gate, b.exponent) for b in its.blocks]
@@ -111,7 +111,7 @@ def test_pairs_go_round_a_ring() -> None:
 
 
 def test_what_a_board_would_refuse_is_refused_in_words() -> None:
-    blob = board.quantise(random_map(2)).blob
+    blob = random_map(2).on_board().blob
     for bad in (b"", blob[:-1], blob + b"\0", b"\3" + blob[1:], blob[:24] + b"\xff" + blob[25:]):
         with pytest.raises(InputError, match=rf"refuse this wrench map of {len(bad)} bytes .* make the map again"):
             from_blob(bad)
@@ -142,7 +142,7 @@ def test_what_would_wrap_in_a_blob_is_refused(change: dict, words: str) -> None:
 
 
 def test_c_is_given_what_it_expects_or_nothing() -> None:
-    its = board.quantise(random_map(4))
+    its = random_map(4).on_board()
     good = frames_of(1, 5)
     for k, bad in [
         (0, good[0][:, :18]), (0, good[0][0]), (1, good[1][:4]), (2, good[2][:4]), (2, good[2][:, None]),
@@ -168,19 +168,19 @@ def test_a_map_beyond_the_formats_is_refused_by_name() -> None:
     huge = its.coefficients.copy()
     huge[19:209, 1] = 1e6  # N for each pair of 500 counts
     with pytest.raises(InputError, match=r"coefficients of SIGNAL_PAIRS x ONE for Fy add up to .* larger lambda"):
-        board.quantise(dataclasses.replace(its, coefficients=huge))
+        dataclasses.replace(its, coefficients=huge).on_board()
     with pytest.raises(InputError, match="every coefficient of the map is 0"):
-        board.quantise(dataclasses.replace(its, coefficients=0.0 * its.coefficients))
+        dataclasses.replace(its, coefficients=0.0 * its.coefficients).on_board()
 
 
 # ---- arithmetic --------------------------------------------------------------------------------
 
 
 def test_blocks_that_are_all_zero_are_left_away_and_signals_go_into_the_split() -> None:
-    whole = board.quantise(random_map(4, pdc=False))
+    whole = random_map(4, pdc=False).on_board()
     assert (Kind.SIGNAL, Gate.ONE) not in [(b.kind, b.gate) for b in whole.blocks]
     split = (Kind.COMPRESSION, Kind.BULGE, Kind.SIGNAL_PAIRS, Kind.CONDUCTANCE, Kind.CONDUCTANCE_PAIRS)
-    affine = board.quantise(random_map(4, pdc=False, unused=split))
+    affine = random_map(4, pdc=False, unused=split).on_board()
     assert [(b.kind, b.gate) for b in affine.blocks] == [(Kind.SIGNAL, Gate.ONE), (Kind.OFFSET, Gate.ONE)]
     assert len(affine.blob) == 24 + 2 * 12 + 2 * 3 * (20 + 2)
 
@@ -189,9 +189,9 @@ def test_blocks_that_are_all_zero_are_left_away_and_signals_go_into_the_split() 
 @pytest.mark.parametrize("seed", range(4))
 def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -> None:
     model = random_map(seed, axes)
-    its = board.quantise(model)
+    its = model.on_board()
     frames = frames_of(seed, 3000)
-    meant, off = exact(its, *frames), board.bound(its, None, *frames)
+    meant, off = exact(its, *frames), bound.error_bound(its, None, *frames)
     error = np.abs(got(its, *frames) - meant)
     assert (error <= off).all()
     assert error.max() > 0.02 * off.max()  # the bound is about something
@@ -199,34 +199,34 @@ def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -
 
 def test_the_integers_mean_the_fitted_map() -> None:
     model = random_map(5, 7)
-    its = board.quantise(model)
+    its = model.on_board()
     counts, _, pdc_q4 = frames_of(5, 2000)
     counts = np.minimum(counts, 4095).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(TARE, counts.shape))
     truth = model.predict(counts.astype(float), pdc_q4 / 16)
-    limit = board.bound(its, model, counts, tare_q4, pdc_q4)
+    limit = bound.error_bound(its, model.blocks(), counts, tare_q4, pdc_q4)
     assert (np.abs(got(its, counts, tare_q4, pdc_q4) - truth) <= limit).all()
     assert np.abs(exact(its, counts, tare_q4, pdc_q4) - truth).max() < 1e-3 * np.abs(truth).max()
 
 
 def test_a_whole_model_of_seven_axes_has_room_on_a_board() -> None:
-    its = board.quantise(random_map(5, 7))
+    its = random_map(5, 7).on_board()
     halves = sum(_map.KINDS[block.kind].halves for block in its.blocks)
     assert len(its.blob) == 24 + 12 * len(its.blocks) + 14 * halves <= _map.MAX_BYTES
 
 
 def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     its = random_map(5, 7)
-    size = len(board.quantise(its).blob)
+    size = len(its.on_board().blob)
     monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
     with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, which fit a board"):
-        board.quantise(its)
+        its.on_board()
 
 
 def test_a_row_of_torsion_changes_nothing_of_the_other_six() -> None:
     model, frames = random_map(5, 7), frames_of(5, 500)
     six = dataclasses.replace(model, axes=model.axes[:6], coefficients=model.coefficients[:, :6])
-    with_torsion, without = board.quantise(model).results(*frames), board.quantise(six).results(*frames)
+    with_torsion, without = model.on_board().results(*frames), six.on_board().results(*frames)
     np.testing.assert_array_equal(with_torsion[0], without[0])
     np.testing.assert_array_equal(with_torsion[1], without[1])
     assert (with_torsion[2] != wire.INVALID_I32).all() and (without[2] == wire.INVALID_I32).all()
@@ -293,11 +293,11 @@ def test_the_specification_written_once_more_gives_the_same_bits() -> None:
 def test_pressure_that_is_missing_makes_results_nan_only_where_it_is_needed() -> None:
     counts, tare_q4, pdc_q4 = frames_of(7, 4)
     pdc_q4[1] = wire.INVALID_I32
-    force, torque, torsion = board.quantise(random_map(7, 7)).results(counts, tare_q4, pdc_q4)
+    force, torque, torsion = random_map(7, 7).on_board().results(counts, tare_q4, pdc_q4)
     np.testing.assert_array_equal(torsion == wire.INVALID_I32, [False, True, False, False])
     assert (force[1] == wire.INVALID_I32).all() and (torque[1] == wire.INVALID_I32).all()
     assert (force[[0, 2, 3]] != wire.INVALID_I32).all() and (torque[[0, 2, 3]] != wire.INVALID_I32).all()
-    without, torque, torsion = board.quantise(random_map(7, pdc=False)).results(counts, tare_q4, pdc_q4)
+    without, torque, torsion = random_map(7, pdc=False).on_board().results(counts, tare_q4, pdc_q4)
     assert (without != wire.INVALID_I32).all() and (torque == wire.INVALID_I32).all()
     assert (torsion == wire.INVALID_I32).all()
 
@@ -307,8 +307,8 @@ def test_pressure_that_is_missing_makes_results_nan_only_where_it_is_needed() ->
 
 def fit(run: Run, lam: float) -> WrenchMap:
     """Ridge as the models have it on all columns at once; coefficients of the size that data make, held out or not."""
-    signals = features.Signals(run.counts - run.tare, run.tare, run.pdc)
-    z = np.column_stack([features.columns(signals), np.ones(len(run.counts))])
+    signals = columns.Signals(run.counts - run.tare, run.tare, run.pdc)
+    z = np.column_stack([columns.columns(signals), np.ones(len(run.counts))])
     variance = z.var(axis=0)
     penalty = lam * len(z) * np.maximum(variance, models.COLUMN_FLOOR * np.median(variance[:-1]))
     penalty[-1] = 0.0
@@ -321,11 +321,11 @@ def fit(run: Run, lam: float) -> WrenchMap:
 def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Path, lam: float) -> None:
     path = wrench_run.save(tmp_path / "run.npz", wrench_run.fields(6000, 3, moment=True, pdc=True))
     run = load_run(path)
-    facts = board.summary(fit(run, lam), run)
+    facts = bound.summary(fit(run, lam), run.counts, run.pdc)
     assert facts["rows"] == 6000 and facts["outside"] == 0
     assert facts["force_mn_max"] <= facts["force_mn_bound"] and facts["force_mn_rms"] <= FORCE_MN
     assert facts["torque_nmm_max"] <= facts["torque_nmm_bound"] and facts["torque_nmm_rms"] <= TORQUE_NMM
-    assert "on all 6000 rows" in board.words(facts)
+    assert "on all 6000 rows" in bound.summary_text(facts)
 
 
 @pytest.mark.parametrize("lam", [1e-5, 1e-2])
@@ -333,7 +333,7 @@ def test_on_a_real_finger_every_row_is_right(lam: float) -> None:
     if not SHARED.exists():
         pytest.skip(f"{SHARED.name} is not at ../shared/data: real recordings are not part of the project")
     run = load_run(SHARED)
-    facts = board.summary(fit(run, lam), run)
+    facts = bound.summary(fit(run, lam), run.counts, run.pdc)
     assert facts["rows"] == len(run.counts) and facts["outside"] == 0
     assert facts["force_mn_max"] <= facts["force_mn_bound"] and facts["force_mn_rms"] <= FORCE_MN
 
@@ -341,8 +341,8 @@ def test_on_a_real_finger_every_row_is_right(lam: float) -> None:
 def test_a_map_that_no_board_can_hold_is_told_and_not_raised(tmp_path: Path) -> None:
     run = load_run(wrench_run.save(tmp_path / "run.npz", wrench_run.fields(4000, 4)))
     model = fit(run, 1e-3)
-    facts = board.summary(dataclasses.replace(model, coefficients=1e9 * model.coefficients), run)
-    assert "add up to" in facts["refused"] and facts["refused"] in board.words(facts)
+    facts = bound.summary(dataclasses.replace(model, coefficients=1e9 * model.coefficients), run.counts)
+    assert "add up to" in facts["refused"] and facts["refused"] in bound.summary_text(facts)
     json.dumps(facts)
 
 
@@ -360,7 +360,7 @@ def mapped_frames(its: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> None:
-    its = board.quantise(random_map(11, axes))
+    its = random_map(11, axes).on_board()
     frames = mapped_frames(its, pdc=2120)
     plain = mapped_frames(None, pdc=2120)
     tared = (frames["flags"] & wire.FrameFlags.UNTARED) == 0
@@ -383,7 +383,7 @@ def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> Non
 
 
 def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
-    its = board.quantise(random_map(12))
+    its = random_map(12).on_board()
     frames = mapped_frames(its)
     wrong = frames.copy()
     wrong["force_100un"][100, 1] += 4000  # 0.4 N
@@ -391,7 +391,7 @@ def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
     outcome.add(wrong, default_settings(), maps={3: its})
     assert outcome.violations >= 1 and "finger 3 frame" in outcome.findings[0] and "force y" in outcome.findings[0]
     other = CrossCheck()
-    other.add(frames, default_settings(), maps={3: board.quantise(random_map(13))})
+    other.add(frames, default_settings(), maps={3: random_map(13).on_board()})
     assert other.violations > 200
     none = CrossCheck()
     none.add(frames, default_settings(), maps={2: its})
@@ -400,7 +400,7 @@ def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
 
 
 def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:
-    its = board.quantise(random_map(17, 7))
+    its = random_map(17, 7).on_board()
     frames = mapped_frames(its)
     for value, seen in (
         (frames["torsion_mnmm"][100] + 900, "torsion off by 0."),
@@ -420,7 +420,7 @@ def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_kernels_over_recorded_frames_give_the_same_frames(axes: int) -> None:
-    its = board.quantise(random_map(14, axes))
+    its = random_map(14, axes).on_board()
     frames = mapped_frames(its)
     frames = frames[(frames["flags"] & wire.FrameFlags.MAPPED) != 0]
     poc, force, torque, torsion, flags = board_map.on_board_q4(frames, default_settings(), its)
@@ -434,13 +434,15 @@ def test_kernels_over_recorded_frames_give_the_same_frames(axes: int) -> None:
 def test_a_fitted_maps_file_makes_the_same_blob(tmp_path: Path) -> None:
     model = random_map(15)
     path = tmp_path / "thumb.wrench.json"
-    path.write_text(fitted.dumps(model), encoding="utf-8")
-    assert board.quantise(fitted.load(path)).blob == board.quantise(model).blob
+    path.write_text(file.dumps_fitted(model, serial="BT1", made_s=7), encoding="utf-8")
+    fitted = file.load_fitted(path)
+    np.testing.assert_array_equal(fitted.coefficients, model.coefficients)
+    assert file.load(path) == fitted.on_board(serial="BT1", made_s=7).blob
 
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
-    its = board.quantise(random_map(16, axes))
+    its = random_map(16, axes).on_board()
     frames = mapped_frames(its, pdc=2100)
     frames = frames[(frames["flags"] & wire.FrameFlags.MAPPED) != 0][50:]
     pressure = board_map.pdc_above_rest_q4(frames) / 16

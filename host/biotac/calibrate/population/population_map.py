@@ -1,0 +1,183 @@
+"""The population map: a force for fingers without a calibration of their own, its file, and the package's own.
+
+It is linear in 323 columns: those of a wrench map that have no offset and are 0 where counts are at their tare, so that
+rest is 0 N on any finger. Coefficients have seven digits in the file: short, the same on every computer, and off by a
+thousandth of the map's error. biotac-lab trains such maps.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.geometry import Floats
+from ...documents import parse_document, read_document, sealed
+from ...map import columns as map_columns
+from ...map.columns import ELECTRODES, Signals, split
+from ...map.fitted import WrenchMap
+from ...map.population import SHIPPED, board_map, shipped
+from ...version import __version__
+from ..wrench.models import CONDUCTANCE_QUADRATIC, GATED
+
+FORMAT = "biotac-population-map/1"
+_CURE = f"expected a {FORMAT}, as `biotac-lab population --out` writes it"
+DIGITS = 7
+NOTHING = 1e-9
+MODEL = "population"
+AXES = map_columns.AXES[:3]
+ROWS_AT_ONCE = 4096
+
+FAMILIES = (GATED, CONDUCTANCE_QUADRATIC)
+ALL_COLUMNS = map_columns.width(with_pdc=False)
+INDEX: tuple[npt.NDArray[np.intp], ...] = tuple(family.index(ALL_COLUMNS) for family in FAMILIES)
+COLUMNS = sum(len(index) for index in INDEX)
+_STACKED = np.concatenate(INDEX)
+PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
+_OWN = map_columns.blocks(with_pdc=False)
+_BLOCKS = [block for family in FAMILIES for block in _OWN if block in family.blocks]
+_BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in _BLOCKS]
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Means over rows and drift: ``gram`` (323, 323), ``cross`` (323, 3) with force in N, ``mean`` (323,)."""
+
+    gram: Floats
+    cross: Floats
+    mean: Floats
+
+
+@dataclass(frozen=True)
+class Population:
+    """A population map: ``coefficients`` (323, 3) of columns(), in N.
+
+    ``variance`` (323,) is that of the columns in training, with a floor.
+    """
+
+    coefficients: Floats
+    variance: Floats
+
+    def force(self, counts: Floats, tare: Floats) -> Floats:
+        """Force (n, 3) in N on the finger, from counts (n, 19) and their ``tare`` (19,)."""
+        return by_columns(counts, tare, lambda z: z @ self.coefficients)
+
+    def wrench_map(self, tare: Floats) -> WrenchMap:
+        """The same map in the form of a calibrated finger's, for ``tare`` (19,), with an offset of 0."""
+        every = np.zeros((ALL_COLUMNS + 1, len(AXES)))
+        every[_STACKED] = self.coefficients
+        return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every)
+
+
+def columns(e: Floats, tare: Floats) -> Floats:
+    """The columns (n, 323) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
+    return map_columns.columns(Signals(e, tare))[:, _STACKED]
+
+
+def by_columns(counts: Floats, tare: Floats, function: Callable[[Floats], Floats]) -> Floats:
+    """``function`` applied to the columns (n, 323) of counts (n, 19), in chunks of rows that fit the cache."""
+    rows = range(0, len(counts), ROWS_AT_ONCE)
+    return np.concatenate([function(columns(counts[at : at + ROWS_AT_ONCE] - tare, tare)) for at in rows])
+
+
+# ---- its file ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A map and its provenance, with one sigma (3,) in N of a new finger's force, as it is and after five presses."""
+
+    population: Population
+    sigma_n: Floats
+    sigma_scale5_n: Floats
+    provenance: dict[str, Any]
+
+    @property
+    def fingers(self) -> str:
+        """Names of the recordings that it was made of."""
+        return ", ".join(self.provenance.get("files", {})) or "unnamed fingers"
+
+    def made_of(self, files: Sequence[Path]) -> bool:
+        """Whether it was trained on one of ``files``: its error on these is no estimate for a new finger."""
+        return bool(set(_sha256(files).values()) & set(self.provenance.get("files", {}).values()))
+
+    def others_than(self, files: Sequence[Path]) -> tuple[Floats | None, str]:
+        """Coefficients (533, 3) of a wrench map to pull the finger of ``files`` to, and a note.
+
+        They are None if the map was trained on one of the files.
+        """
+        if self.made_of(files):
+            return None, (
+                f"not regularized towards the population map of {self.fingers}, which was made from this recording"
+            )
+        # any tare will do: the columns mean the same with every tare
+        coefficients = self.population.wrench_map(np.zeros(ELECTRODES)).coefficients
+        return coefficients, f"regularized towards the population map of {self.fingers}"
+
+
+def provenance_of(files: Sequence[Path], source: str, *, symmetric: bool) -> dict[str, Any]:
+    """Names and SHA-256 of the recordings, and ``source``: where they come from and under which licence."""
+    software = f"biotac-gateway {__version__}"
+    return {"source": source, "files": _sha256(files), "symmetric": symmetric, "software": software}
+
+
+def _sha256(files: Sequence[Path]) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def dumps(trained: Trained) -> str:
+    """The map as JSON, one line for each column."""
+    rounded = np.array([_short(row) for row in trained.population.coefficients])
+    # the board's map is made from the rounded coefficients, so that a reader of the file gets the same one
+    on_board = board_map([(*name, values) for name, values in split(_BLOCKS, rounded).items()])
+    rows = np.column_stack([rounded, trained.population.variance])
+    document = sealed(
+        {
+            "format": FORMAT,
+            "provenance": trained.provenance,
+            "axes": list(AXES),
+            "sigma_n": _short(trained.sigma_n),
+            "sigma_scale5_n": _short(trained.sigma_scale5_n),
+            "blocks": _BLOCK_NAMES,
+            "board_map": base64.b64encode(on_board.blob).decode("ascii"),
+            "coefficients_n_and_variance": [_short(row) for row in rows],
+        }
+    )
+    lines = []
+    for key, value in document.items():
+        text = json.dumps(value)
+        if key == "coefficients_n_and_variance":
+            text = "[\n" + ",\n".join(f"  {json.dumps(row)}" for row in value) + "\n ]"
+        lines.append(f" {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def load(path: Path | None) -> Trained:
+    """The map in a file, or the package's own if ``path`` is None. Raises InputError if it cannot be read or used."""
+    if path is None:
+        return parse_document(shipped(), SHIPPED, FORMAT, _trained, _CURE)
+    return read_document(path, FORMAT, _trained, _CURE)
+
+
+def _trained(content: dict[str, Any]) -> Trained:
+    if content["blocks"] != _BLOCK_NAMES:
+        raise ValueError(f"its blocks are {content['blocks']}")
+    rows = np.array(content["coefficients_n_and_variance"], dtype=np.float64)
+    sigmas = [np.array(content[key], dtype=np.float64) for key in ("sigma_n", "sigma_scale5_n")]
+    if rows.shape != (COLUMNS, len(AXES) + 1) or any(one.shape != (len(AXES),) for one in sigmas):
+        raise ValueError(f"its coefficients have shape {rows.shape}")
+    if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
+        raise ValueError("a coefficient is not finite, or a variance is not above 0")
+    return Trained(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(content["provenance"]))
+
+
+def _short(values: Floats) -> list[float]:
+    # what cancels between mirror images is not exactly 0, and differs between computers
+    return [float(f"{value:.{DIGITS}g}") if abs(value) > NOTHING else 0.0 for value in values]
