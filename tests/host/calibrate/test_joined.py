@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from biotac.calibrate.wrench.provenance import check_serial
 
 import biotac
 from biotac.calibrate.reference.alignment import align
@@ -15,6 +14,7 @@ from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
+from biotac.calibrate.wrench.sources import check_serial
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.recording import Recording
@@ -206,7 +206,7 @@ def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:
 
 
 def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
-    from biotac.calibrate.wrench.provenance import of_files
+    from biotac.calibrate.wrench.sources import of_files
 
     a, b = tmp_path / "a", tmp_path / "b"
     a.write_bytes(b"counts")

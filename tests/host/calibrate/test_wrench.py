@@ -279,7 +279,7 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
         {"lag_rows": 1},
     ):
         place.write_text(json.dumps(facts | {"fit": facts["fit"] | change, "crc32": "edited"}))
-        with pytest.raises(InputError, match=r"map.json is not a usable wrench map"):
+        with pytest.raises(InputError, match=r"map.json is not usable: "):
             file.load_fitted(place)
 
 

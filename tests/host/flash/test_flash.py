@@ -248,11 +248,11 @@ def test_firmware_that_does_not_answer_is_touched_only_when_told(
     assert (outcome.before, outcome.backup) == (None, None)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "else"}', '{"format": "biotac settings 1"}'])
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "else"}', '{"format": "biotac-settings/1"}'])
 def test_a_backup_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "backup.json"
     path.write_text(text)
-    with pytest.raises(InputError, match="holds no settings"):
+    with pytest.raises(InputError, match=r"is not usable: .*; expected a file written by biotac flash"):
         read_backup(path)
 
 

@@ -316,7 +316,7 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
     wrong = {
         '"crc32": .* it is damaged; take an intact copy, or, if you edited it, write "crc32": "edited"': [
             tree | {"serial": "BT8"},
-            tree | {"map": "A" + tree["map"][1:]},
+            tree | {"map": "B" + tree["map"][1:]},
             {key: value for key, value in tree.items() if key != "crc32"},
         ],
         "serial is 'BT8', but the map says 'BT7'": [edited | {"serial": "BT8"}],

@@ -134,7 +134,7 @@ def test_every_key_but_provenance_must_be_there(key: str) -> None:
 
 @pytest.mark.parametrize("text", ["", "[]", "5", "{", '{"format": NaN}', "[" * 100_000, "\x00"])
 def test_what_is_no_file_at_all(text: str) -> None:
-    with pytest.raises(biotac.InputError, match="it is not usable: .* expected a calibration, as"):
+    with pytest.raises(biotac.InputError, match=r"it is not usable: .* expected a calibration, as"):
         file.loads(text, "it")
 
 
@@ -144,7 +144,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     with pytest.raises(biotac.InputError, match="cannot be written"):
         file.save(tmp_path / "no" / "such.json", ODD, {})
     (tmp_path / "latin.json").write_bytes(b'{"by": "M\xfcller"}')
-    with pytest.raises(biotac.InputError, match="is not usable: .* decode"):
+    with pytest.raises(biotac.InputError, match=r"is not usable: .* decode"):
         file.load(tmp_path / "latin.json")
 
 

@@ -16,11 +16,11 @@ from biotac.calibrate.wrench import models
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core.compiled import default_settings, on_board_q4, pressure_filtered_q4, pressure_force_100un
 from biotac.errors import InputError
-from biotac.recording.crosscheck import CrossCheck
 from biotac.map import board_map, bound, columns, file
 from biotac.map.board_map import BoardBlock, BoardMap, from_blob
 from biotac.map.fitted import WrenchMap
 from biotac.map.float64 import exact, result_units
+from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.rounds import Rounds, frames_and_tares
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire

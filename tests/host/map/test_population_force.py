@@ -10,9 +10,9 @@ import biotac
 from biotac.calibrate.population import population_map
 from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
-from biotac.recording.crosscheck import CrossCheck
 from biotac.map import population
 from biotac.map.columns import tared
+from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
 POPULATION = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.POPULATION)}
