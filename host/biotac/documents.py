@@ -106,7 +106,7 @@ def _parsed(
     try:
         return parse(unsealed(load(), format_name))
     except OSError as error:
-        raise InputError(f"{where} cannot be read ({error.strerror}); {cure}") from error
+        raise InputError(f"{where} cannot be read ({error.strerror}); check the path; {cure}") from error
     except KeyError as error:
         raise InputError(f"{where} is not usable: {error} is missing; {cure}") from error
     except (InputError, ValueError, TypeError, AttributeError, OverflowError) as error:
