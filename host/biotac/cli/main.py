@@ -43,10 +43,9 @@ VERBS = {
         "biotac.cli.recordings.export",
         "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, many to a lake.",
     ),
-    "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or query it in SQL."),
-    "inventory": (
-        "biotac.cli.recordings.inventory",
-        "List a lake's boards and sensors, their ages, and their health against their own history.",
+    "lake": (
+        "biotac.cli.recordings.lake",
+        "Check a lake of recordings, query it in SQL, or list its boards and sensors.",
     ),
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (

@@ -1,4 +1,4 @@
-"""A lake's folder layout: where files are, and which ones do not belong there."""
+"""A lake's files, and the list of their checksums: what is not listed is not in the lake."""
 
 from __future__ import annotations
 
@@ -7,103 +7,111 @@ import os
 import re
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..partial_file import whole
 
-#: The topic with one row per recording; its file seals the recording's other files.
+#: The topic with one row per recording; its file is written last, so a recording without it is not complete.
 RECORDINGS = "recordings"
+#: Lines of ``HASH  PATH`` that ``sha256sum -c`` reads; paths are relative to the lake.
+SUMS = "SHA256SUMS"
 #: Folder of incomplete files. Readers skip names that begin with a dot.
 PARTIAL = ".partial"
-LOCK = ".lock"
-#: Inventory of boards and sensors, in the lake's top folder; rewritten by each `biotac inventory`.
-INVENTORY = "inventory.json"
-_PLACE = re.compile(r"([a-z][a-z0-9_]*)/(board=[^/]+/date=\d{4}-\d\d-\d\d)/([0-9a-f]{16})\.parquet")
+_LOCK = ".lock"
+_DEPTH = 4  # of TOPIC/board=.../date=.../RECORDING.parquet
+_FILE = re.compile(r"([a-z][a-z0-9_]*)/board=[^/\n]+/date=\d{4}-\d\d-\d\d/([0-9a-f]{16})\.parquet")
+_LINE = re.compile(rf"([0-9a-f]{{64}})  ({_FILE.pattern})")
 
 
 @dataclass
 class Lake:
-    """The contents of ``folder`` now: partitions by recording, and recordings by topic."""
+    """The contents of ``folder``: SHA-256 by path of all files that exports have completed, and files beside those."""
 
     folder: Path
-    partition: dict[str, str] = field(default_factory=dict)
-    topics: dict[str, set[str]] = field(default_factory=dict)  # recordings by topic
-    unfinished: int = 0  # files of recordings whose export did not finish
+    sums: dict[str, str]
+    unlisted: list[str]
 
-    def path(self, topic: str, recording: str) -> Path:
-        """The file of a topic for a recording that is in the lake."""
-        return place(self.folder, topic, self.partition[recording], recording)
+    @property
+    def recordings(self) -> dict[str, dict[str, str]]:
+        """By recording: its files, as in ``sums``."""
+        files: dict[str, dict[str, str]] = {}
+        for path, sha256 in sorted(self.sums.items()):
+            files.setdefault(Path(path).stem, {})[path] = sha256
+        return files
 
-    def paths(self, topic: str) -> list[Path]:
-        """All files of a topic, sorted by recording id."""
-        return [self.path(topic, recording) for recording in sorted(self.topics.get(topic, ()))]
+    def topics(self) -> dict[str, list[Path]]:
+        """By topic: files of the recordings that are complete. Raises InputError for what is no file, as a FIFO is."""
+        found: dict[str, list[Path]] = {}
+        for files in self.recordings.values():
+            own = {path.partition("/")[0]: self.folder / path for path in files}
+            if RECORDINGS in own and own[RECORDINGS].exists():
+                for topic, path in own.items():
+                    if not path.is_file():
+                        raise InputError(
+                            f"{path} is missing, or no file; see `biotac lake check`, and export it again with --force"
+                        )
+                    found.setdefault(topic, []).append(path)
+        return found
+
+    def add(self, recording: str, sums: dict[str, str]) -> None:
+        """List the files of a recording, in place of those of an earlier export; only within ``writing``."""
+        for path in [path for path in self.sums if Path(path).stem == recording]:
+            del self.sums[path]
+        self.sums |= sums
+        with (self.folder / SUMS).open("a", encoding="utf-8") as out:
+            out.write(_text(sums))
 
 
-def place(folder: Path, topic: str, partition: str, recording: str) -> Path:
-    """Path of one file."""
-    return folder / topic / partition / f"{recording}.parquet"
-
-
-def opened(folder: Path, *, create: bool = False) -> Lake:
-    """The lake in ``folder``. Raises InputError if it is not a lake, or holds files that no export wrote."""
-    if create:
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(parents=True)
-    if not folder.is_dir() or not (create or (folder / RECORDINGS).is_dir()):
+def opened(folder: Path) -> Lake:
+    """The lake in ``folder``. Raises InputError if it is not a lake, or its list of checksums is damaged."""
+    if not (folder / SUMS).is_file():
+        if (folder / RECORDINGS).is_dir():
+            raise InputError(f"{folder} has lost its {SUMS}: nothing in it can be checked; export the recordings again")
         raise InputError(f"{folder} is not a lake; create one with `biotac export RECS... --lake {folder}`")
-    lake = Lake(folder)
-    found: list[tuple[str, str, str]] = []
-    foreign: list[str] = []
-    for file in _files(folder):
-        match = _PLACE.fullmatch(file)
-        if match:
-            found.append((match[1], match[2], match[3]))
-        elif file != INVENTORY:
-            foreign.append(file)
-    if foreign:
-        more = f" and {len(foreign) - 1} more" if foreign[1:] else ""
-        raise InputError(
-            f"no part of the lake: {folder / min(foreign)}{more}; expected only TOPIC/board=.../date=.../ID.parquet: "
-            "move the rest elsewhere"
-        )
-    for topic, partition, recording in found:
-        if topic == RECORDINGS:
-            if recording in lake.partition:
-                raise InputError(
-                    f"{folder} holds recording {recording} in {lake.partition[recording]} and in {partition}; "
-                    "expected one: remove the copy"
-                )
-            lake.partition[recording] = partition
-    for topic, partition, recording in found:
-        if lake.partition.get(recording) == partition:
-            lake.topics.setdefault(topic, set()).add(recording)
-        else:
-            lake.unfinished += 1
-    return lake
+    sums = {}
+    try:
+        text = (folder / SUMS).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder / SUMS} cannot be read ({error}); export the recordings again") from error
+    for number, line in enumerate(text.split("\n")[:-1], 1):  # a killed export may leave part of a line
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise InputError(f"{folder / SUMS} is damaged in line {number}; remove it and export the recordings again")
+        sums[match[2]] = match[1]
+    unlisted = sorted(path for path in _files(folder) if path not in sums and path != SUMS)
+    return Lake(folder, sums, unlisted)
 
 
 def _files(folder: Path) -> Iterator[str]:
     """All files below ``folder``, as relative POSIX paths; skips names that begin with a dot."""
-    for at, folders, files in os.walk(folder):
-        folders[:] = [name for name in folders if not name.startswith(".")]
-        where = Path(at).relative_to(folder).as_posix()
-        for name in files:
-            if not name.startswith("."):
-                yield name if where == "." else f"{where}/{name}"
+    for at, folders, files in os.walk(folder, followlinks=True):
+        where = Path(at).relative_to(folder)
+        folders[:] = [name for name in folders if not name.startswith(".") and len(where.parts) < _DEPTH]
+        yield from ((where / name).as_posix() for name in files if not name.startswith("."))
 
 
 @contextlib.contextmanager
-def sole_writer(folder: Path) -> Iterator[None]:
-    """Lock the lake while an export writes, and remove what a killed one left half-written.
+def writing(folder: Path) -> Iterator[Lake]:
+    """The lake in ``folder``, made if it is not there; nobody else can write to it meanwhile.
 
-    Raises InputError when another export is writing. Nothing is locked on systems without flock.
+    Removes what a killed export left half-written. Raises InputError when another export is writing, or ``folder``
+    holds something else. Nothing is locked on systems without flock.
     """
     try:
         import fcntl
     except ImportError:
         fcntl = None  # type: ignore[assignment]
-    with (folder / LOCK).open("w") as lock:
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(parents=True)
+    if folder.is_dir() and not (folder / SUMS).exists() and not any(_files(folder)):
+        (folder / SUMS).touch()
+    lake = opened(folder)
+    if any(not _FILE.fullmatch(path) for path in lake.unlisted):
+        path = next(path for path in lake.unlisted if not _FILE.fullmatch(path))
+        raise InputError(f"no part of the lake: {folder / path}; move it elsewhere")
+    with (folder / _LOCK).open("w") as lock:
         try:
             if fcntl is not None:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -111,6 +119,14 @@ def sole_writer(folder: Path) -> Iterator[None]:
             raise InputError(f"another export is writing to {folder}; wait until it ends") from error
         shutil.rmtree(folder / PARTIAL, ignore_errors=True)
         try:
-            yield
+            yield lake
         finally:
             shutil.rmtree(folder / PARTIAL, ignore_errors=True)
+            with whole(folder / SUMS, overwrite=True) as partial:
+                partial.write_text(_text(lake.sums), encoding="utf-8")
+
+
+def _text(sums: dict[str, str]) -> str:
+    """Lines of ``sums``; those of recordings come last, so that what they stand for is listed before."""
+    paths = sorted(sums, key=lambda path: (path.startswith(f"{RECORDINGS}/"), path))
+    return "".join(f"{sums[path]}  {path}\n" for path in paths)

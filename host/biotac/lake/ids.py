@@ -20,10 +20,11 @@ NO_BOARD = "none"  # for imported files
 _LETTERS = 16
 
 
-def recording_id(path: Path) -> str:
-    """A recording's id: a hash of its metadata and first second, so that a recording that has grown keeps its id.
+def recording_id(path: Path) -> tuple[str, str]:
+    """A recording's id and its partition: a folder by board and by the day (UTC) on which it began.
 
-    Reads only that part of the file. Raises RecordingError if it is not a recording, or holds no data.
+    The id is a hash of its metadata and first second, so that a recording that has grown keeps it. Reads only that part
+    of the file. Raises RecordingError if it is not a recording, or holds no data.
     """
     blocks = Blocks(path, check=False)
     first = next(iter(blocks), None)
@@ -31,24 +32,20 @@ def recording_id(path: Path) -> str:
         Recording(path)  # raises an error that says what is wrong
         raise RecordingError(f"{path} holds no data; there is nothing to export")
     begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
-    return hashlib.sha256(begin + b"".join(packet.data for packet in first.packets())).hexdigest()[:_LETTERS]
-
-
-def partition(recording: Recording) -> str:
-    """Folder by board and by the day (UTC) on which the recording began."""
-    day = datetime.fromtimestamp(recording.begin_ns // 10**9, timezone.utc)
-    return f"board={quote(board(recording), safe='')}/date={day:%Y-%m-%d}"
-
-
-def board(recording: Recording) -> str:
-    """The board's serial number, as on USB; NO_BOARD if it has none."""
-    return serial_text(recording.info) if any(recording.info.board_serial) else NO_BOARD
+    data = b"".join(packet.data for packet in first.packets())
+    try:
+        info = Facts.read(blocks.metadata).info
+    except ValueError as error:
+        raise RecordingError(f"{path} has damaged metadata ({error}) and cannot be used; try another copy") from error
+    board = serial_text(info) if any(info.board_serial) else NO_BOARD
+    day = datetime.fromtimestamp(first.arrived_ns // 10**9, timezone.utc)
+    return hashlib.sha256(begin + data).hexdigest()[:_LETTERS], f"board={quote(board, safe='')}/date={day:%Y-%m-%d}"
 
 
 def sensors(recording: Recording) -> dict[int, str]:
     """Serial numbers by finger, of sensors that report one."""
-    told = {s.finger: ascii_text(s.serial) for s in recording.sensors if s.present}
-    return {finger: serial for finger, serial in told.items() if serial}
+    serials = {s.finger: ascii_text(s.serial) for s in recording.sensors if s.present}
+    return {finger: serial for finger, serial in serials.items() if serial}
 
 
 def calibrations(facts: Facts | Recording) -> dict[int, str]:
@@ -56,6 +53,6 @@ def calibrations(facts: Facts | Recording) -> dict[int, str]:
     made = {}
     for finger in sorted({*facts.calibrations, *facts.maps}):
         own = facts.calibrations.get(finger)
-        told = [own and to_dict(own), maps_text({0: facts.maps[finger]} if finger in facts.maps else {})]
-        made[finger] = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:_LETTERS]
+        in_force = [own and to_dict(own), maps_text({0: facts.maps[finger]} if finger in facts.maps else {})]
+        made[finger] = hashlib.sha256(json.dumps(in_force, sort_keys=True).encode()).hexdigest()[:_LETTERS]
     return made

@@ -10,8 +10,8 @@ import duckdb
 from ..errors import InputError
 from .folder import Lake
 
-# Stated explicitly, or a serial number of digits alone would be read as a number and lose its leading zeros.
-_TYPES = "hive_types = {'board': VARCHAR, 'date': DATE}"
+# From the end of the path: folders above the lake may be called anything. DuckDB's own partitions would name them, too.
+_PARTITION = r"/board=([^/]+)/date=([^/]+)/[^/]+$"
 
 
 def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
@@ -19,17 +19,23 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
 
     Each topic is a view over the complete recordings. Raises InputError for what DuckDB refuses.
     """
+    topics = lake.topics()
     connection = duckdb.connect(":memory:")
     connection.execute("SET TimeZone = 'UTC'")
     try:
-        for topic in sorted(lake.topics):
-            paths = ", ".join("'" + str(path).replace("'", "''") + "'" for path in lake.paths(topic))
+        for topic, files in topics.items():
+            paths = ", ".join("'" + str(path.absolute()).replace("'", "''") + "'" for path in files)
             connection.execute(
-                f"CREATE VIEW {topic} AS SELECT * FROM read_parquet([{paths}], hive_partitioning = true, {_TYPES})"
+                f"CREATE VIEW {topic} AS SELECT * EXCLUDE (filename), "
+                f"url_decode(regexp_extract(filename, '{_PARTITION}', 1)) AS board, "
+                f"CAST(regexp_extract(filename, '{_PARTITION}', 2) AS DATE) AS date "
+                f"FROM read_parquet([{paths}], filename = true, hive_partitioning = false)"
             )
         result = connection.execute(text)
+    except UnicodeEncodeError as error:
+        raise InputError(f"{lake.folder} has a name that is not UTF-8, which DuckDB cannot open; rename it") from error
     except duckdb.Error as error:
-        known = ", ".join(sorted(lake.topics))
+        known = ", ".join(sorted(topics))
         raise InputError(
             f"DuckDB rejects the query: {_reason(error)}; topics are {known}; the query 'DESCRIBE TOPIC' lists columns"
         ) from error
@@ -37,21 +43,22 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     return names, _rows(result)
 
 
+def rows(lake: Lake, text: str) -> list[dict[str, Any]]:
+    """The rows of a query as dictionaries."""
+    names, found = query(lake, text)
+    return [dict(zip(names, row, strict=True)) for row in found]
+
+
 def _rows(result: Any) -> Iterator[tuple[Any, ...]]:
     try:
-        while rows := result.fetchmany(10_000):
-            yield from rows
+        while found := result.fetchmany(10_000):
+            yield from found
     except duckdb.Error as error:
-        raise InputError(
-            f"DuckDB stopped: {_first_line(error)}; look for damaged files with `biotac lake check`"
-        ) from error
+        first_line = str(error).strip().splitlines()[0]
+        raise InputError(f"DuckDB stopped: {first_line}; look for damaged files with `biotac lake check`") from error
 
 
 def _reason(error: Exception) -> str:
     """DuckDB's sentences, such as the columns that there are, without the query that follows them."""
-    said, *_ = str(error).partition("\nLINE ")
-    return "; ".join(line.rstrip("!") for line in said.splitlines() if line).replace(": :", ":")
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0]
+    sentences, *_ = str(error).partition("\nLINE ")
+    return "; ".join(line.rstrip("!") for line in sentences.splitlines() if line).replace(": :", ":")

@@ -1,13 +1,12 @@
-"""Writing a recording into a lake: first its topics' files, then the file that seals them."""
+"""Writing a recording into a lake: first its topics' files, then the one in ``recordings``."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -19,13 +18,11 @@ from ..export.parquet import Label, frame_ids, write_labelled
 from ..recording import Recording
 from ..recording.layout import CHECKSUM
 from . import ids
-from .folder import PARTIAL, RECORDINGS, place
+from .folder import PARTIAL, RECORDINGS
 
 SIZE = b"biotac.size_bytes"  # of the source: a recording that has grown is exported again
-DIGEST = b"biotac.sha256"  # of the seal itself; those of the other files are in the seal
-NO_DIGEST = b"0" * 64
 
-_SEAL = pa.schema(
+_RECORDINGS = pa.schema(
     [
         pa.field("recording", pa.string(), metadata={"what": "id, the name of its files"}),
         pa.field("source", pa.string(), metadata={"what": "name of the file it was exported from"}),
@@ -42,43 +39,36 @@ _SEAL = pa.schema(
         pa.field(
             "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as described in host/docs/recording.md"}
         ),
-        pa.field(
-            "files",
-            pa.list_(
-                pa.struct(
-                    [("topic", pa.string()), ("rows", pa.int64()), ("bytes", pa.int64()), ("sha256", pa.string())]
-                )
-            ),
-            metadata={"what": "the recording's other files"},
-        ),
     ]
 )
 
 
 @dataclass(frozen=True)
 class Written:
-    """Result of ``put``. ``rows`` by topic; ``new`` is False if it was in the lake before this export."""
+    """Result of ``put``. ``new`` is False, and the rest empty, if it was in the lake before this export."""
 
     recording: str
+    path: str  #: of its file in ``recordings``
     new: bool
-    rows: dict[str, int]
+    rows: int = 0
+    sums: dict[str, str] = field(default_factory=dict)  #: SHA-256 of its files by path
 
 
-def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
+def put(lake: str, force: bool, source: str) -> Written:
     """Write the recording ``source`` into ``lake``, unless it is there already from a file of at least the same size.
 
-    ``known`` are partitions by recording. The same recording and version give the same bytes on any machine. Raises
-    RecordingError or InputError if ``source`` cannot be read or ``lake`` not written; the recording is then not sealed.
+    The same recording and version give the same bytes on any machine. Raises RecordingError or InputError if
+    ``source`` cannot be read or ``lake`` not written.
     """
     folder, path = Path(lake), Path(source)
-    name = ids.recording_id(path)
+    name, partition = ids.recording_id(path)
+    file = f"{partition}/{name}.parquet"
     size = path.stat().st_size
-    if name in known and not force and _sealed(folder, known[name], name) >= size:
-        return Written(name, False, {})
+    if not force and _source_bytes(folder / RECORDINGS / file) >= size:
+        return Written(name, f"{RECORDINGS}/{file}", False)
     recording = Recording(path)
-    partition = ids.partition(recording)
-    if name not in known and _sealed(folder, partition, name) >= size:  # written meanwhile from a copy of it
-        return Written(name, True, {})
+    if not force and _source_bytes(folder / RECORDINGS / file) >= size:  # written meanwhile from a copy of it
+        return Written(name, f"{RECORDINGS}/{file}", False)
     topics: dict[str, list[Table]] = {}
     for table in [*tables(recording, {**EXPORTED, **HEARTBEATS}), *message_tables(recording)]:
         topics.setdefault(table.kind, []).append(table)
@@ -88,31 +78,36 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
         partial = folder / PARTIAL
         partial.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f"{name}.", dir=partial) as stage:
-            files = [_write(Path(stage), topic, made, recording, name) for topic, made in sorted(topics.items())]
-            _seal(Path(stage) / RECORDINGS, recording, name, size, files)
-            # An old seal goes first and the new one comes last: what is sealed is complete, and of one export.
-            place(folder, RECORDINGS, partition, name).unlink(missing_ok=True)
+            for topic, made in topics.items():
+                _write(Path(stage) / topic, made, recording, name)
+            _write_facts(Path(stage) / RECORDINGS, recording, name, size)
+            # The old one goes first and the new one comes last: what has one is complete, and of one export.
+            (folder / RECORDINGS / file).unlink(missing_ok=True)
+            for old in folder.glob(f"*/{partition}/{name}.parquet"):
+                old.unlink(missing_ok=True)
+            sums = {}
             for topic in [*sorted(topics), RECORDINGS]:
-                target = place(folder, topic, partition, name)
+                target = folder / topic / file
                 target.parent.mkdir(parents=True, exist_ok=True)
+                sums[f"{topic}/{file}"] = hashlib.sha256((Path(stage) / topic).read_bytes()).hexdigest()
                 os.replace(Path(stage) / topic, target)
     except OSError as error:
         raise InputError(
             f"{folder} cannot be written ({error.strerror or error}); fix that and run the export again"
         ) from error
-    return Written(name, True, {its["topic"]: its["rows"] for its in files})
+    rows = sum(len(table) for made in topics.values() for table in made)
+    return Written(name, f"{RECORDINGS}/{file}", True, rows, sums)
 
 
-def _sealed(folder: Path, partition: str, name: str) -> int:
-    """Size in bytes of the source of the recording in the lake; -1 if it is not there."""
+def _source_bytes(file: Path) -> int:
+    """Size in bytes of the source of a recording in the lake; -1 if it is not there."""
     try:
-        facts = pq.read_metadata(place(folder, RECORDINGS, partition, name)).metadata or {}
-        return int(facts.get(SIZE, 0))
+        return int((pq.read_metadata(file).metadata or {}).get(SIZE, 0)) if file.is_file() else -1
     except (OSError, ValueError, pa.ArrowException):
         return -1
 
 
-def _write(stage: Path, topic: str, made: list[Table], recording: Recording, name: str) -> dict[str, Any]:
+def _write(path: Path, made: list[Table], recording: Recording, name: str) -> None:
     sensors, calibrations = ids.sensors(recording), ids.calibrations(recording)
     fingers = [table.finger for table in made if table.finger is not None]
     labels = [Label("recording", "id of the recording", (name,) * len(made))]
@@ -126,13 +121,10 @@ def _write(stage: Path, topic: str, made: list[Table], recording: Recording, nam
                 tuple(map(calibrations.get, fingers)),
             ),
         ]
-    write_labelled(stage / topic, made, labels, {"biotac.recording": name})
-    data = (stage / topic).read_bytes()
-    rows = sum(len(table) for table in made)
-    return {"topic": topic, "rows": rows, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    write_labelled(path, made, labels, {"biotac.recording": name})
 
 
-def _seal(place: Path, recording: Recording, name: str, size: int, files: list[dict[str, Any]]) -> None:
+def _write_facts(path: Path, recording: Recording, name: str, size: int) -> None:
     row = {
         "recording": name,
         "source": recording.path.name,
@@ -144,17 +136,7 @@ def _seal(place: Path, recording: Recording, name: str, size: int, files: list[d
         "problems": [text.replace(str(recording.path), recording.path.name) for text in recording.problems],
         "sensors": list(ids.sensors(recording).items()),
         "calibrations": list(ids.calibrations(recording).items()),
-        "metadata": sorted((key, its) for key, its in recording.metadata.items() if key != CHECKSUM),
-        "files": files,
+        "metadata": sorted((key, value) for key, value in recording.metadata.items() if key != CHECKSUM),
     }
-    schema = _SEAL.with_metadata({SIZE: str(size).encode()})
-    with pq.ParquetWriter(place, schema, compression="zstd") as writer:
-        writer.write_table(pa.Table.from_pylist([row], schema=schema))
-        writer.add_key_value_metadata({DIGEST: NO_DIGEST})
-    data = place.read_bytes()
-    place.write_bytes(data.replace(NO_DIGEST, digest_of(data, NO_DIGEST)))
-
-
-def digest_of(data: bytes, its: bytes) -> bytes:
-    """SHA-256 of a seal's bytes with its digest ``its`` replaced by NO_DIGEST: Parquet's footer has no checksum."""
-    return hashlib.sha256(data.replace(its, NO_DIGEST)).hexdigest().encode()
+    schema = _RECORDINGS.with_metadata({SIZE: str(size).encode()})
+    pq.write_table(pa.Table.from_pylist([row], schema=schema), path, compression="zstd")

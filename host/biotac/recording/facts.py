@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -35,10 +36,17 @@ class Facts:
 
     @classmethod
     def read(cls, metadata: Mapping[str, str]) -> Facts:
-        """Facts from a recording's metadata.
+        """Facts from a recording's metadata. Raises ValueError if it is damaged."""
+        try:
+            facts = cls._read(metadata)
+            for message in (facts.info, *facts.sensors):
+                message.pack()  # so that every number fits its field, and every text has its length
+            return facts
+        except (KeyError, TypeError, AttributeError, RecursionError, OverflowError, struct.error) as error:
+            raise ValueError(f"{type(error).__name__}: {error}") from error
 
-        Raises KeyError, TypeError, ValueError, AttributeError, RecursionError or OverflowError if it is damaged.
-        """
+    @classmethod
+    def _read(cls, metadata: Mapping[str, str]) -> Facts:
         hello: dict[str, Any] = {"image_crc32": NO_IMAGE} | json.loads(metadata["hello"])
         named = json.loads(metadata["settings"])
         own = json.loads(metadata.get("calibrations", "{}"))
@@ -47,7 +55,7 @@ class Facts:
             [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
             # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
             {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
-            {int(finger): from_dict(its) for finger, its in own.items()},
+            {int(finger): from_dict(facts) for finger, facts in own.items()},
             _maps(metadata.get("maps", "{}")),
             layout.names_of(metadata),
         )
@@ -71,7 +79,7 @@ def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: 
     """Metadata entries for what a recording's results depend on."""
     return {
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
-        "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
+        "calibrations": json.dumps({finger: to_dict(own) for finger, own in calibrations.items()}),
         "maps": layout.maps_text(maps),
     }
 
@@ -79,7 +87,7 @@ def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: 
 def _maps(text: str) -> dict[int, bytes]:
     """Maps by finger from their JSON text. Raises ValueError if one is invalid."""
     try:
-        return {finger: as_blob(its) for finger, its in layout.maps_of(text).items()}
+        return {finger: as_blob(data) for finger, data in layout.maps_of(text).items()}
     except InputError as error:
         raise ValueError(error) from error
 

@@ -66,7 +66,7 @@ class Recording:
             raise RecordingError(self._without_metadata(blocks.damaged_metadata > 0))
         try:
             self._take_metadata(blocks.metadata)
-        except (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+        except (KeyError, ValueError) as error:
             raise RecordingError(
                 f"{self.path} has damaged metadata ({error}) and cannot be used; try another copy"
             ) from error

@@ -197,7 +197,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "`biotac export RECS... --lake", "lake check +no"),
     (2, "`biotac export RECS... --lake", "lake sql SELECT +no"),
     (2, "name the lake's folder", "lake sql SELECT"),
-    (2, "`biotac export RECS... --lake", "inventory +no"),
+    (2, "`biotac export RECS... --lake", "lake inventory +no"),
     (3, "`biotac list` shows the ports", "sensor /dev/ttyNOWHERE7"),
     (2, "check the path", "import +no.btd +out.mcap"),
     (2, "expected a SynTouch .btd", "import @none.btd +out.mcap"),
@@ -434,7 +434,7 @@ def test_bench_recording_names_a_package_as_pip_does(capsys, monkeypatch) -> Non
 
 def test_an_inventory_of_no_lake_does_not_ask_for_duckdb(capsys, monkeypatch, tmp_path) -> None:
     monkeypatch.setitem(sys.modules, "biotac.lake.inventory", None)
-    assert "is not a lake" in line_of(capsys, 2, ["inventory", str(tmp_path / "no")])
+    assert "is not a lake" in line_of(capsys, 2, ["lake", "inventory", str(tmp_path / "no")])
 
 
 def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""biotac lake check DIR, biotac lake sql QUERY DIR, and what biotac export --lake does"""
+"""biotac lake check DIR, biotac lake sql QUERY DIR, biotac lake inventory DIR, and what biotac export --lake does"""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import csv
 import functools
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from datetime import datetime, timezone
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -34,19 +35,26 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the subverbs of a lake."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    words = {
-        "check": "Check all files against their seals, and every on-board result against the float64 reference.",
-        "sql": "Query with DuckDB; each topic is a table. Prints CSV, or with --json one object per line.",
+    subverbs = {
+        "check": (
+            run_check,
+            "Check all files against their checksums, and every on-board result against the float64 reference.",
+        ),
+        "sql": (run_sql, "Query with DuckDB; each topic is a table. Prints CSV, or with --json one object per line."),
+        "inventory": (
+            run_inventory,
+            "List boards and sensors, their ages, and their health against their own history.",
+        ),
     }
-    its = {name: what.add_parser(name, help=text, description=text) for name, text in words.items()}
-    for name, one in its.items():
+    for name, (action, text) in subverbs.items():
+        one = what.add_parser(name, help=text, description=text)
         one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
         if name == "sql":
             one.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
         one.add_argument("folder", metavar="DIR", nargs="?" if name == "sql" else None, type=Path, help="the lake")
-    _add_workers(its["check"])
-    its["check"].set_defaults(action=run_check)
-    its["sql"].set_defaults(action=run_sql)
+        if name == "check":
+            _add_workers(one)
+        one.set_defaults(action=action)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -56,74 +64,83 @@ def run(args: argparse.Namespace) -> int:
 
 def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
     """Return 0 if all are in the lake, 2 if some are not: those are named, the others are in."""
-    lake_folder, writing = room("folder"), room("writing")
-    lake = lake_folder.opened(args.lake, create=True)
-    with lake_folder.sole_writer(args.lake):
-        work = functools.partial(writing.put, str(args.lake.absolute()), lake.partition, args.force)
-        done, failed = _all(work, [str(path.absolute()) for path in dict.fromkeys(sources)], args, "exported")
-    new = {its.recording for its in done if its.new}
+    put = room("writing").put
+    new: dict[str, int] = {}  # rows by recording
+    there: set[str] = set()
+    failed: list[str] = []
+    with room("folder").writing(args.lake) as lake:
+        todo, force = [str(path.absolute()) for path in dict.fromkeys(sources)], args.force
+        while todo:
+            again = []
+            for source, written in _all(functools.partial(put, str(args.lake.absolute()), force), todo, args, failed):
+                if written.new:
+                    lake.add(written.recording, written.sums)
+                    new[written.recording] = written.rows
+                elif written.path in lake.sums:
+                    there.add(written.recording)
+                else:
+                    again.append(source)  # a killed export wrote it, but did not list it
+            todo, force = again, True
     facts = {
         "lake": str(args.lake),
         "exported": len(new),
-        "already_there": len({its.recording for its in done} - new),
-        "same_as_another": len(done) - len({its.recording for its in done}),
+        "already_there": len(there - set(new)),
         "failed": failed,
-        "rows": sum(sum(its.rows.values()) for its in done),
+        "rows": sum(new.values()),
     }
-    if args.json:
-        print(json.dumps(facts))
-    else:
-        print(
-            f"{args.lake}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already there, "
-            f"{facts['same_as_another']} duplicates, {len(failed)} failed"
-        )
+    print(
+        json.dumps(facts)
+        if args.json
+        else f"{args.lake}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already "
+        f"there, {len(failed)} failed"
+    )
     return InputError.exit_code if failed else 0
 
 
 def run_check(args: argparse.Namespace) -> int:
-    """Return 0 if all is right, 1 if something is wrong, which is named. Raises (code 2): no lake, or foreign files."""
+    """Return 0 if all is right, 1 if something is wrong, which is named. Raises (code 2) if it is no lake."""
     lake = room("folder").opened(args.folder)
-    work = functools.partial(room("checking").check, str(args.folder.absolute()), lake.topics, lake.partition)
-    done, failed = _all(work, sorted(lake.partition), args, "checked")
-    wrong = [text for its in done for text in its.wrong]
-    for text in wrong if not args.json else ():
-        print(text)
+    work = functools.partial(room("checking").check, str(args.folder.absolute()))
+    failed: list[str] = []
+    done = [checked for _, checked in _all(work, list(lake.recordings.items()), args, failed)]
+    wrong = [text for checked in done for text in checked.wrong]
+    wrong += [
+        f"{args.folder / path} is not in the list of checksums; export again or remove it" for path in lake.unlisted
+    ]
     good = not wrong and not failed and bool(done)
     facts: dict[str, Any] = {
         "lake": str(args.folder),
         "good": good,
-        "recordings": len(lake.partition),
-        "unfinished": lake.unfinished,
-        "frames": sum(its.outcome.frames for its in done),
-        "violations": sum(its.outcome.violations for its in done),
+        "recordings": len(lake.recordings),
+        "frames": sum(checked.outcome.frames for checked in done),
+        "violations": sum(checked.outcome.violations for checked in done),
         "wrong": wrong,
         "failed": failed,
     }
     largest = {
-        name: max((getattr(its.outcome, name) for its in done), default=0.0)
+        name: max((getattr(checked.outcome, name) for checked in done), default=0.0)
         for name in ("poc_um_max", "force_mn_max", "torque_nmm_max")
     }
-    facts |= largest
     if args.json:
-        print(json.dumps(facts))
-    else:
-        _warn_of_unfinished(lake)
-        verdict = "good" if good else f"{len(wrong) + len(failed)} problem(s)" if lake.partition else "empty"
-        poc_um, force_mn, torque_nmm = largest.values()
-        print(
-            f"{args.folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
-            f"PoC {poc_um:.3f} um, force {force_mn:.4f} mN, torque {torque_nmm:.5f} N*mm"
-        )
+        print(json.dumps(facts | largest))
+        return 0 if good else 1
+    for text in wrong:
+        print(text)
+    verdict = "good" if good else f"{len(wrong) + len(failed)} problem(s)" if done else "empty"
+    poc_um, force_mn, torque_nmm = largest.values()
+    print(
+        f"{args.folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
+        f"PoC {poc_um:.3f} um, force {force_mn:.4f} mN, torque {torque_nmm:.5f} N*mm"
+    )
     return 0 if good else 1
 
 
 def run_sql(args: argparse.Namespace) -> int:
     """Print the query's result."""
-    here = Path()
-    if args.folder is None and not (here / room("folder").RECORDINGS).is_dir():
+    folder = args.folder or Path()
+    if args.folder is None and not (folder / room("folder").SUMS).is_file():
         raise InputError("this folder is not a lake; name the lake's folder: biotac lake sql QUERY DIR")
-    lake = room("folder").opened(args.folder or here)
-    _warn_of_unfinished(lake)
+    lake = _opened(folder)
     names, rows = room("sql").query(lake, args.query)
     if args.json:
         for row in rows:
@@ -135,32 +152,69 @@ def run_sql(args: argparse.Namespace) -> int:
     return 0
 
 
-def _warn_of_unfinished(lake: Any) -> None:
-    if lake.unfinished:
-        print(
-            f"biotac: {lake.unfinished} file(s) of unfinished exports are ignored; export again",
-            file=sys.stderr,
-        )
+def run_inventory(args: argparse.Namespace) -> int:
+    """Print the inventory; return 1 if a sensor is not as it used to be."""
+    lake = _opened(args.folder)
+    found = room("inventory").take(lake)
+    if args.json:
+        print(json.dumps(found))
+    else:
+        for board in found["boards"]:
+            print(
+                f"board {board['board']}: firmware {board['firmware']}, {board['recordings']} recordings, "
+                f"{board['hours']:.2f} h, {_day(board['first_ns'])} to {_day(board['last_ns'])}, "
+                f"{board['frames_lost']} frames lost"
+            )
+        for sensor in found["sensors"]:
+            print(_sensor_line(sensor))
+    return 1 if any(sensor["findings"] for sensor in found["sensors"]) else 0
+
+
+def _sensor_line(sensor: dict[str, Any]) -> str:
+    made_ns = sensor["calibration_made_ns"]
+    calibration = f"calibration {sensor['calibration']}" if sensor["calibration"] else "not calibrated"
+    known = {"noise": sensor["noise_count"], "drift": sensor["drift_count"]}
+    usual = "as usual" if sensor["recordings"] > room("inventory").ENOUGH else "no history yet"
+    parts = [
+        f"{sensor['recordings']} recordings",
+        f"{sensor['hours']:.2f} h, last {_day(sensor['last_ns'])}",
+        calibration + (f" of {_day(made_ns)}" if made_ns is not None else ""),
+        *(f"{what} {value:.1f} counts" for what, value in known.items() if value is not None),
+    ]
+    name = sensor["sensor"] or "without a serial number"
+    health = "; ".join(sensor["findings"]) or usual
+    return f"sensor {name} on {sensor['board']}, finger {sensor['finger']}: {', '.join(parts)}: {health}"
+
+
+def _day(at_ns: int) -> str:
+    return f"{datetime.fromtimestamp(at_ns // 10**9, timezone.utc):%Y-%m-%d}"
+
+
+def _opened(folder: Path) -> Any:
+    lake = room("folder").opened(folder)
+    if lake.unlisted:
+        print(f"biotac: {len(lake.unlisted)} file(s) of no finished export are ignored; export again", file=sys.stderr)
+    return lake
 
 
 def _all(
-    work: Callable[[str], Any], items: list[str], args: argparse.Namespace, did: str
-) -> tuple[list[Any], list[str]]:
-    """The results of ``work``, and the messages about items that failed, both in the order of ``items``."""
-    progress = Progress()
-    results: dict[str, Any] = {}
-    try:
-        for item, result in room("workers").each(work, items, args.jobs, args.dask):
-            results[item] = result
-            progress.show(f"{len(results)} of {len(items)} {did}; Ctrl-C stops, run it again to finish")
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{len(results)} of {len(items)} {did}; run the same command again to finish") from None
-    finally:
-        progress.done()
-    failed = [str(results[item]) for item in items if isinstance(results[item], BiotacError)]
-    for text in failed:
+    work: Callable[[Any], Any], items: list[Any], args: argparse.Namespace, failed: list[str]
+) -> Iterator[tuple[Any, Any]]:
+    """Each item that succeeds, with the result of ``work``, as they complete; ``failed`` gets the others' messages."""
+    problems: dict[int, str] = {}
+    with Progress() as progress:
+        try:
+            for done, (k, result) in enumerate(room("workers").each(work, items, args.jobs, args.dask), 1):
+                if isinstance(result, BiotacError):
+                    problems[k] = str(result)
+                else:
+                    yield items[k], result
+                progress.show(f"{done} of {len(items)} done; Ctrl-C stops, run it again to finish")
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("run the same command again to finish") from None
+    for _, text in sorted(problems.items()):
+        failed.append(text)
         print(f"biotac: {text}", file=sys.stderr)
-    return [its for item in items if not isinstance(its := results[item], BiotacError)], failed
 
 
 def room(name: str) -> ModuleType:
