@@ -11,7 +11,7 @@ import math
 import random
 import sys
 
-from biotac.calibrate.population import weights
+from biotac.calibrate.press import weights
 from biotac.core.geometry import RADIUS_MM
 from committed import ROOT, write_or_check
 
@@ -89,9 +89,9 @@ def contact(rng: random.Random, x: float, y: float, turn: int, *, shear_to_tip: 
 
 
 def weighed() -> str:
-    """A finger under the loads that `biotac calibrate weights` asks for, at several places along the pad."""
+    """A finger under the loads that `biotac calibrate press --weights` asks for, at several places along the pad."""
     lines = [
-        "# Weights on a finger's pad, its block tilted to every side: what `biotac calibrate weights` asks for.",
+        "# Weights on a finger's pad, its block tilted to all sides, as `biotac calibrate press --weights` asks.",
         "# Made by tools/make/calibration_scenarios.py.",
         'name = "weights"',
         "seed = 3",

@@ -1,4 +1,4 @@
-"""The population map in the firmware: the blob written by `biotac calibrate population`."""
+"""The population map in the firmware: the blob as biotac-lab writes it."""
 
 from __future__ import annotations
 

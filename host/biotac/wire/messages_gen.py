@@ -443,7 +443,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.PRESSURE_GAIN_NN: SettingSpec(
         "nN/count", 0, 100000000, 0,
-        "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, no force. Navarro has 9 to 16 million; `biotac calibrate pressure` finds yours",
+        "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, no force. Navarro has 9 to 16 million; `biotac calibrate press --pressure` finds yours",
     ),
     Setting.PRESSURE_FILTER_MILLI: SettingSpec(
         "1/1000", 10, 1000, 500,

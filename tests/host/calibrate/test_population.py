@@ -11,8 +11,8 @@ import pytest
 import wrench_run
 
 from biotac.calibrate.population import held_out_error, population_map, training
-from biotac.calibrate.population.fewshot import Scale, pulled, scale_of
 from biotac.calibrate.population.population_map import Population, Trained
+from biotac.calibrate.press.few_shot import Scale, pulled, scale_of
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.cli.main import main
 from biotac.core import geometry as surface
@@ -136,7 +136,7 @@ def test_the_command_trains_judges_and_keeps(
     files: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "population.json"
-    arguments = ["calibrate", "population", str(files[0]), str(files[1]), "--test", str(files[2]), "--json"]
+    arguments = ["calibrate", "train", str(files[0]), str(files[1]), "--test", str(files[2]), "--json"]
     assert main([*arguments, "--out", str(out), "--source", "made up"]) == 0
     facts = json.loads(capsys.readouterr().out)
     for field in ("rmse_n", "rmse_scale5_n", "sigma_n", "sigma_scale5_n"):
@@ -149,7 +149,7 @@ def test_the_command_trains_judges_and_keeps(
     assert population_map.dumps(trained) == out.read_text(encoding="utf-8")
     assert main([*arguments, "--out", str(out)]) != 0
     assert "exists" in capsys.readouterr().err
-    assert main(["calibrate", "population", str(files[0]), "--test", str(files[0])]) != 0
+    assert main(["calibrate", "train", str(files[0]), "--test", str(files[0])]) != 0
     assert "both a training file and --test" in capsys.readouterr().err
 
 

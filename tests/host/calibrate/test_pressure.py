@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from biotac import InputError
-from biotac.calibrate.pressure import formulas, guided, report
-from biotac.calibrate.pressure.fit import Fit, fit, told_by, verify
-from biotac.calibrate.pressure.force_source import MAX_LAG_ROWS, Series, check_alignment, lag_rows
-from biotac.calibrate.pressure.presses import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
-from biotac.calibrate.pressure.rows import ROW_DTYPE
+from biotac.calibrate.press import pressure
+from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
+from biotac.calibrate.press.force_source import MAX_LAG_ROWS, Series, check_alignment, lag_rows
+from biotac.calibrate.press.guide import _ask_forces
+from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
+from biotac.calibrate.press.rows import ROW_DTYPE
 from biotac.core.compiled import pressure_filtered_q4
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import Q4_PER_COUNT
@@ -37,7 +38,7 @@ def course(
     for k in range(1, len(words)):
         words[k] = alpha * words[k] + (1.0 - alpha) * words[k - 1]
     rows["pressure"], rows["rest"] = words, REST
-    rows["told_n"], rows["force_n"] = np.nan, force
+    rows["board_n"], rows["force_n"] = np.nan, force
     rows["touched"] = force > 0.05
     return rows
 
@@ -78,9 +79,8 @@ def test_the_filter_is_the_papers_by_hand() -> None:
 def test_k_is_the_pseudo_inverse() -> None:
     above, force = np.array([100.0, 200.0, 300.0]), np.array([1.0, 2.2, 2.9])
     # By hand: sum P F / sum P^2 = (100 + 440 + 870) / (1 + 4 + 9) / 1e4
-    assert formulas.gain(above, force) == pytest.approx(1410 / 140_000, rel=1e-12)
-    assert formulas.magnitude([[3.0, 0.0, 4.0]]).tolist() == [5.0]
-    assert formulas.relative_error([3.0, 4.4], [3.0, 4.0]) == pytest.approx(0.4 / 5.0)
+    assert pressure.gain_of(above, force) == pytest.approx(1410 / 140_000, rel=1e-12)
+    assert pressure.relative_error(np.array([3.0, 4.4]), np.array([3.0, 4.0])) == pytest.approx(0.4 / 5.0)
 
 
 # ---- plateaus ----------------------------------------------------------------------------------
@@ -101,7 +101,7 @@ def test_ramps_are_left_out_and_would_bias_k() -> None:
     rows = course(presses(2, 3.5, 5, ramp=30), alpha=0.1)
     assert its_fit(rows).gain_n == pytest.approx(K, rel=1e-3)
     rising = rows[np.gradient(rows["force_n"]) > 0]
-    biased = formulas.gain(rising["pressure"] - rising["rest"], rising["force_n"])
+    biased = pressure.gain_of(rising["pressure"] - rising["rest"], rising["force_n"])
     assert biased > 1.03 * K  # what the course is made of shows it
 
 
@@ -240,7 +240,7 @@ def test_who_presses_faster_than_they_type_is_asked_for_every_press_once() -> No
     typed: dict[tuple[int, int], float] = {}
     procedure.feed(changed(GOOD, without_force))
     for _ in range(2):
-        guided.ask_forces(procedure, typed, Slow())
+        _ask_forces(procedure, typed, Slow())
     assert procedure.done
     assert asked == [(0, 1, 2.0), (0, 2, 3.5), (0, 3, 5.0)]
     assert typed == {(0, 1): 10.0, (0, 2): 20.0, (0, 3): 30.0}
@@ -258,7 +258,7 @@ def test_no_sequence_without_fingers_or_forces(fingers: list[int], forces: list[
 def held(force_n: float, counts: float, number: int = 1, rows: int = HOLD_ROWS) -> Press:
     out = np.zeros(rows, ROW_DTYPE)
     out["pressure"], out["rest"], out["force_n"] = REST + counts, REST, force_n
-    out["told_n"] = np.nan
+    out["board_n"] = np.nan
     return Press(0, number, out)
 
 
@@ -292,11 +292,11 @@ def test_presses_that_disagree_a_little_are_noted() -> None:
 def test_the_verification_counts_scatter_as_well_as_offset() -> None:
     its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
     assert (its.gain_n, its.gain_nn) == (pytest.approx(0.01), 10_000_000)
-    wrong = told_by(held(3.0, 330), its.gain_nn)
+    wrong = with_board_force(held(3.0, 330), its.gain_nn)
     seen = verify(its, wrong)
     assert (seen.board_error, seen.float_error) == (pytest.approx(0.1), pytest.approx(0.1))
     rows = wrong.rows.copy()
-    rows["told_n"] = np.tile([2.7, 3.3], HOLD_ROWS // 2)  # right in the mean
+    rows["board_n"] = np.tile([2.7, 3.3], HOLD_ROWS // 2)  # right in the mean
     assert verify(its, Press(0, 1, rows)).board_error == pytest.approx(0.1)
     with pytest.raises(InputError, match="the board gave no force from pressure in 50 of 50 held rows"):
         verify(its, held(3.0, 300))
@@ -306,7 +306,7 @@ def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:
     its = its_fit(course(presses(2, 3.5, 5), noise=1.0))
     rows = course([4.0] * HOLD_ROWS, noise=1.0, seed=9)
     rows["pressure"] = np.rint(rows["pressure"] * 16) / 16  # as published
-    seen = verify(its, told_by(Press(0, 4, rows), its.gain_nn))
+    seen = verify(its, with_board_force(Press(0, 4, rows), its.gain_nn))
     assert 0 < seen.apart_n <= 0.5e-4 + 1e-9
     assert abs(seen.board_error - seen.float_error) < 1e-4
 
@@ -358,12 +358,15 @@ def test_the_table_has_k_and_p0_and_the_errors() -> None:
     its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
     from biotac import Calibration
 
-    outcome = report.Outcome(
-        {0: its}, {0: Calibration(serial="BTX")}, {0: {}}, {0: verify(its, told_by(held(3.0, 303), its.gain_nn))}
+    outcome = pressure.Outcome(
+        {0: its},
+        {0: Calibration(serial="BTX")},
+        {0: {}},
+        {0: verify(its, with_board_force(held(3.0, 303), its.gain_nn))},
     )
-    head, line = report.lines(outcome)
+    head, line = pressure.lines(outcome)
     assert head.split() == ["finger", "sensor", "K", "N/count", "P0", "count", "fit", "force", "N", "board", "N",
                             "error", "float64"]  # fmt: skip
     assert line.split() == ["0", "BTX", "0.010000", "1300.0", "0.00%", "3.000", "3.030", "1.00%", "1.00%"]
-    (facts,) = report.facts(outcome)
+    (facts,) = pressure.facts(outcome)
     assert (facts["pressure_gain_nn"], facts["verification"]["board_error"]) == (10_000_000, 0.01)

@@ -1,4 +1,4 @@
-"""`biotac calibrate pressure` and Navarro's experiment: on the emulated hand, on recordings, and what is refused."""
+"""`biotac calibrate press --pressure` and an experiment: on the emulated hand, on recordings, and what is refused."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibrate.pressure import guided
-from biotac.calibrate.pressure.force_source import load_csv
-from biotac.calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
+from biotac.calibrate.press.detector import Step
+from biotac.calibrate.press.force_source import load_csv
+from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
+from biotac.calibrate.press.pressure_procedure import Plan, calibrate
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.lab.experiments import navarro
@@ -68,7 +69,7 @@ def test_the_bundled_scenario_is_the_experiments() -> None:
 
 
 def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
-    assert main(["calibrate", "pressure", "sim:fingers.toml", "--json", "--out", str(tmp_path)]) == 0
+    assert main(["calibrate", "press", "sim:fingers.toml", "--pressure", "--json", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
     facts = json.loads(said.out)
     assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
@@ -83,9 +84,9 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
         provenance = json.loads((tmp_path / f"finger{one['finger']}.json").read_text())["provenance"]
         assert provenance["from"] == "sim:fingers.toml" and provenance["rows"] == 150
     assert said.err.splitlines()[:3] == [
-        "let go of finger 0",
-        "press 1 of 3: finger 0 with about 2 N, and hold still",
-        "held; let go of finger 0",
+        "let go of finger 0, and do not touch it",
+        "1 of 3: press finger 0 with about 2 N, and hold still",
+        "held: let go of finger 0",
     ]
 
 
@@ -119,7 +120,7 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) 
         hand.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         return hand
 
-    outcome = guided.calibrate(opened_once, guided.Plan((0,)), Silent(), made_s=77)
+    outcome = calibrate(opened_once, Plan((0,)), Silent(), made_s=77)
     assert len(opened) == 1
     its = outcome.calibrations[0]
     assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
@@ -144,7 +145,7 @@ def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) ->
 
     try:
         face = Scale()
-        outcome = guided.calibrate(opened, guided.Plan((0,)), face, made_s=1, save=True)
+        outcome = calibrate(opened, Plan((0,)), face, made_s=1, save=True)
     finally:
         board.close()
     assert outcome.verified[0].board_error <= 0.059
@@ -158,7 +159,7 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
 
     monkeypatch.setattr(biotac.Hand, "save_settings", refuse)
     port = "sim:fingers.toml?fingers=1"
-    assert main(["calibrate", "pressure", port, "--save", "--out", str(tmp_path)]) == 7
+    assert main(["calibrate", "press", port, "--pressure", "--save", "--out", str(tmp_path)]) == 7
     said = capsys.readouterr()
     assert "NOT_STORED" in said.err and "in force until the next reboot" in said.out
     assert file.load(tmp_path / "finger0.json").pressure_gain_nn > 10_000_000
@@ -166,20 +167,23 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
 
 def test_files_that_are_there_are_seen_before_anybody_presses(tmp_path: Path, capsys) -> None:
     (tmp_path / "finger3.json").write_text("mine")
-    assert main(["calibrate", "pressure", "sim:fingers.toml", "--out", str(tmp_path)]) == 2
+    assert main(["calibrate", "press", "sim:fingers.toml", "--pressure", "--out", str(tmp_path)]) == 2
     assert "finger3.json already exists" in capsys.readouterr().err
     assert (tmp_path / "finger3.json").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
     with pytest.raises(biotac.InputError, match=r"no sensor on finger 3 \(0, 1 are there\)"):
-        guided.calibrate(lambda: biotac.open("sim:fingers.toml?fingers=2"), guided.Plan((0, 3)), Silent(), made_s=0)
+        calibrate(lambda: biotac.open("sim:fingers.toml?fingers=2"), Plan((0, 3)), Silent(), made_s=0)
 
 
 def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
     with pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"):
-        guided.calibrate(
-            lambda: biotac.open("sim:fingers.toml?fingers=1&seconds=9"), guided.Plan((0,)), Silent(), made_s=0
+        calibrate(
+            lambda: biotac.open("sim:fingers.toml?fingers=1&seconds=9"),
+            Plan((0,)),
+            Silent(),
+            made_s=0,
         )
 
 
@@ -210,11 +214,11 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(pressed: Path, *options: str) -> int:
-    return main(["calibrate", "pressure", str(pressed / "two.mcap"), *options])
+    return main(["calibrate", "press", str(pressed / "two.mcap"), "--pressure", *options])
 
 
 def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None:
-    assert run(pressed, "--reference", str(pressed / "plate.csv"), "--json", "--out", str(tmp_path)) == 0
+    assert run(pressed, str(pressed / "plate.csv"), "--json", "--out", str(tmp_path)) == 0
     (zero, one) = json.loads(capsys.readouterr().out)["fingers"]
     for facts in (zero, one):
         assert -K_LOW <= facts["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
@@ -225,12 +229,12 @@ def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None
 
 def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
     typed = ",".join(f"{force:g}" for force in FORCES)
-    assert run(pressed, "--forces", typed, "--fingers", "1", "--json") == 0
+    assert run(pressed, "--readings", typed, "--finger", "1", "--json") == 0
     (one,) = json.loads(capsys.readouterr().out)["fingers"]
     assert one["finger"] == 1 and one["verification"]["board_error"] <= 0.059
-    assert run(pressed, "--forces", typed) == 0
+    assert run(pressed, "--readings", typed) == 0
     table = capsys.readouterr().out.splitlines()
-    assert len(table) == 4 and "BTSIM00000000011" in table[2]
+    assert len(table) == 3 and "BTSIM00000000011" in table[1]
 
 
 def changed_csv(pressed: Path, tmp_path: Path, change: str) -> Path:
@@ -274,13 +278,13 @@ def test_a_reference_that_is_none_is_refused_with_its_number(
     pressed: Path, tmp_path: Path, capsys, change: str, words: str
 ) -> None:
     place = changed_csv(pressed, tmp_path, change)
-    assert run(pressed, "--reference", str(place), "--out", str(tmp_path / "out")) == 2
+    assert run(pressed, str(place), "--out", str(tmp_path / "out")) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_another_fingers_file_is_refused_by_the_board(pressed: Path, tmp_path: Path, capsys) -> None:
-    assert run(pressed, "--reference", str(pressed / "plate.csv"), "--out", str(tmp_path)) == 0
+    assert run(pressed, str(pressed / "plate.csv"), "--out", str(tmp_path)) == 0
     assert main(["calibration", "put", "sim:fingers.toml", str(tmp_path / "two-finger0.json"), "--finger", "0"]) == 7
     assert "OTHER_SENSOR" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""`biotac calibrate scale`: guided on the emulated hand, from its recording, and what presses are worth held out."""
+"""`biotac calibrate press --scale`: guided on the emulated hand, from its recording, and held out."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from biotac.calibrate.population import population_map
-from biotac.calibrate.population.fewshot import scaled
 from biotac.calibrate.population.population_map import Population
-from biotac.calibrate.population.presses import Held, found
+from biotac.calibrate.press.few_shot import scaled
+from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
 from biotac.errors import InputError
 from biotac.map.file import load_fitted
@@ -59,19 +59,13 @@ def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
 def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "own.wrench.json"
     words = [
-        "calibrate",
-        "scale",
+        *("calibrate", "press"),
         # An idle simulated board plays on: not to be over before a busy computer has fitted the map.
-        "sim:fingers.toml?fingers=1&seconds=2400",
-        "--finger",
-        "index",
-        "--presses",
-        "3",
-        "--json",
+        *("sim:fingers.toml?fingers=1&seconds=2400", "--scale", "--finger", "index", "--presses", "3", "--json"),
     ]
     assert main([*words, "--out", str(out)]) == 1  # nothing was uploaded
     said = capsys.readouterr()
-    assert "press 1 of 3: push the pad" in said.err and "biotac: " not in said.err  # prompts are no errors
+    assert "1 of 3: push the pad" in said.err and "biotac: " not in said.err  # prompts are no errors
     facts = json.loads(said.out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]
     assert load_fitted(out).axes == ("Fx", "Fy", "Fz")
@@ -88,7 +82,8 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     capsys.readouterr()
     # four presses of the first finger are in it: 2, 3.5, 5 and 4 N; in grams
     grams = ",".join(f"{1000 * force / 9.80665:.2f}" for force in (2.0, 3.5, 5.0, 4.0))
-    words = ["calibrate", "scale", str(recording), "--finger", "0", "--unit", "g", "--json", "--readings", grams]
+    words = ["calibrate", "press", str(recording), "--scale", "--finger", "0", "--unit", "g", "--json"]
+    words += ["--readings", grams]
     assert main(words) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == pytest.approx([2.0, 3.5, 5.0, 4.0], abs=1e-4)
@@ -100,7 +95,7 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
 
 
 def test_too_few_presses_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["calibrate", "scale", "sim:fingers.toml", "--finger", "0", "--presses", "2"]) != 0
+    assert main(["calibrate", "press", "sim:fingers.toml", "--scale", "--finger", "0", "--presses", "2"]) != 0
     assert "expected 3 or more" in capsys.readouterr().err
     with pytest.raises(InputError):
         population_map.load(Path("nowhere.json"))

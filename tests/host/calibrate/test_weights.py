@@ -1,4 +1,4 @@
-"""`biotac calibrate weights`: the emulated finger by what its scenario applied, judged on loads that it lacks."""
+"""`biotac calibrate press --weights`: the emulated finger by its scenario's forces, judged on loads that it lacks."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import fewshot, population_map, training, weights
+from biotac.calibrate.population import population_map, training
 from biotac.calibrate.population.population_map import Population
-from biotac.calibrate.population.presses import Held, found
+from biotac.calibrate.press import few_shot, weights
+from biotac.calibrate.press.known_force import Held, found
 from biotac.calibrate.wrench.run import load_run
 from biotac.cli.main import main
 from biotac.core.geometry import RADIUS_MM
@@ -87,11 +88,12 @@ def test_weights_mend_the_map_of_other_fingers(
 ) -> None:
     out = tmp_path / "own.wrench.json"
     # An idle simulated board plays on, 170 s in one: with 240 s it was over before a busy computer had fitted the map.
-    words = ["calibrate", "weights", "sim:weights.toml?seconds=2400", "--finger", "index", "--population", str(others)]
+    words = ["calibrate", "press", "sim:weights.toml?seconds=2400", "--weights", "--finger", "index"]
+    words += ["--population", str(others)]
     assert main([*words, "--out", str(out), "--json"]) == 0
     captured = capsys.readouterr()
     facts = json.loads(captured.out)
-    assert "weight 3 of 10: 200 g on the pad, the block tilted by 15 deg, the tip down" in captured.err
+    assert "3 of 10: 200 g on the pad, the block tilted by 15 deg, the tip down" in captured.err
     assert facts["presses"] == 10 and not facts["why_not"]
     assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0
     counts, rest, truth = between()
@@ -123,7 +125,7 @@ def test_a_recording_says_the_same_and_goes_to_no_board(
     recording = tmp_path / "weights.mcap"
     assert main(["record", "sim:weights.toml", str(recording)]) == 0
     capsys.readouterr()
-    words = ["calibrate", "weights", str(recording), "--finger", "0", "--population", str(others), "--json"]
+    words = ["calibrate", "press", str(recording), "--weights", "--finger", "0", "--population", str(others), "--json"]
     assert main(words) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["serial"] == "BTSIM00000000003" and "board" not in facts
@@ -143,5 +145,5 @@ def test_axes_that_are_mixed_are_told_apart() -> None:
     tare = np.full(19, 2800.0)
     mixing = np.array([[0.9, 0.1, -0.1], [0.05, 1.2, 0.1], [0.1, -0.1, 1.1]])
     held = Held(counts, tare, np.arange(12), firm.force(counts, tare) @ mixing)
-    result = found(firm, held, fewshot.weighed)
+    result = found(firm, held, few_shot.weighed)
     assert (result.held_out_n < 0.2 * result.before_n).all()

@@ -177,7 +177,7 @@ def test_too_many_fingers_exit_2(capsys, tmp_path: Path) -> None:
         "record sim:press.toml OUT --f",
         "record sim:press.toml OUT --forc",
         "calibration get sim:press.toml OUT --finger 0 --forc",
-        "calibrate scale sim:press.toml --finger 0 --forc",
+        "calibrate press sim:press.toml --scale --finger 0 --forc",
         "lake check OUT --js",
     ],
 )
@@ -275,8 +275,8 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
         "map clear PORT --finger 5",
         "experiment poke rec.mcap --finger 7",
         "calibrate wrench rec.mcap --finger nose",
-        "calibrate scale PORT --finger nose",
-        "calibrate pressure PORT --fingers thumb,9",
+        "calibrate press PORT --scale --finger nose",
+        "calibrate press PORT --pressure --finger thumb,9",
     ],
 )
 def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> None:
@@ -294,10 +294,13 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
         ("calibrate contact --contacts 100001", "--contacts: seen '100001'; expected a whole number, 1 to 100000"),
         ("bench live --rounds 0", "--rounds: seen '0'; expected a whole number, 1 to 1000000"),
         ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
-        ("calibrate scale PORT --readings 1,x", "--readings: seen '1,x'; expected numbers, separated by commas"),
-        ("calibrate scale PORT --readings 1,nan", "--readings: seen '1,nan'; expected numbers, separated by commas"),
-        ("calibrate pressure PORT --verify hard", "--verify: seen 'hard'; expected newtons above 0 and below 100"),
-        ("calibrate pressure PORT --forces 2,,3", "--forces: seen ''; expected newtons above 0 and below 100"),
+        ("calibrate press P --scale --readings 1,x", "--readings: seen '1,x'; expected numbers, separated by commas"),
+        (
+            "calibrate press P --scale --readings 1,nan",
+            "--readings: seen '1,nan'; expected numbers, separated by commas",
+        ),
+        ("calibrate press PORT --scale --verify hard", "--verify: seen 'hard'; expected newtons above 0 and below 100"),
+        ("calibrate press PORT --scale --forces 2,,3", "--forces: seen ''; expected newtons above 0 and below 100"),
     ],
 )
 def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, words: str, capsys) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...core.geometry import Floats
+from ..press.few_shot import Scale, pulled, scale_of
 from ..wrench.run import Run
-from .fewshot import Scale, pulled, scale_of
 from .population_map import Population
 from .training import FingerSums, mirrored, sums, train
 

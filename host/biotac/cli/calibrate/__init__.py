@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from . import contact, normal, population, pressure, scale, weights, wrench
+from . import contact, normal, population, press, train, wrench
 
 EXAMPLE = wrench.EXAMPLE
 
-WHATS = (wrench, population, scale, weights, pressure, normal, contact)
+WHATS = (wrench, press, population, train, normal, contact)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

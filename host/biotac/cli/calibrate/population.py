@@ -1,98 +1,66 @@
-"""biotac calibrate population REC..."""
+"""biotac calibrate population PORT"""
 
 from __future__ import annotations
 
 import argparse
 import json
+import time
 from pathlib import Path
-from typing import Any
 
-from threadpoolctl import threadpool_limits
+import numpy as np
 
-from ...calibrate.population import held_out_error, population_map, training
-from ...calibrate.wrench.run import Run
-from ...calibrate.wrench.sources import load
+import biotac
+
+from ...calibrate.population import population_map
 from ...errors import InputError
-from ...partial_file import whole
-from .. import outputs
+from ...map.columns import ELECTRODES
+from ...map.population import in_force
+from ...wire import messages_gen as wire
+from .. import values
 
 NAME = "population"
-HELP = "A force map for uncalibrated fingers, trained on other fingers on a force plate."
-EXAMPLE = "biotac calibrate population F1.npz F2.npz --out population.json"
-# The fit is a few products of large matrices; threads beyond the free cores only wait for each other.
-THREADS = 2
+HELP = "Force of an uncalibrated finger from a map of other fingers: the firmware's, or one made by biotac-lab."
+EXAMPLE = "biotac calibrate population /dev/ttyACM0 --finger index --population ours.json --save"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the training recordings, the test recording, and where the map goes."""
+    """Add the board, the finger and the map."""
+    parser.add_argument("port", metavar="PORT", help="a board")
+    parser.add_argument("--finger", metavar="NAME", type=values.finger, required=True, help="name or chip select")
     parser.add_argument(
-        "files", metavar="REC", nargs="+", type=Path, help="one finger per file, as for calibrate wrench"
+        "--population", metavar="FILE", type=Path, help="a map of other fingers (default: the firmware's own)"
     )
-    parser.add_argument("--test", metavar="REC", type=Path, help="a finger to test the map on; not used for training")
-    parser.add_argument(
-        "--symmetric", action="store_true", help="F_y too from mirrored fingers: for use on another rig than theirs"
-    )
-    parser.add_argument("--out", metavar="FILE", type=Path, help="the map goes here (.json)")
-    parser.add_argument(
-        "--source", metavar="TEXT", default="not stated", help="origin and licence of the data, stored in the map"
-    )
-    parser.add_argument("--force", action="store_true", help="overwrite existing files")
+    parser.add_argument("--save", action="store_true", help="save it on the board, so that it survives a restart")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Train the map, judge it, write it."""
-    if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
-        raise InputError(f"{args.test} is both a training file and --test: expected another finger; drop it from one")
-    outputs.check_file(args.out, overwrite=args.force)
-    with threadpool_limits(limits=THREADS, user_api="blas"):
-        runs = [training.aligned(load(path).run) for path in args.files]
-        tested = None if args.test is None else training.aligned(load(args.test).run)
-        facts, trained = _calibrated(args, runs, tested)
-    if args.out is not None:
-        with whole(args.out, overwrite=args.force) as place:
-            place.write_text(population_map.dumps(trained), encoding="utf-8")
-        facts["written"] = str(args.out)
-    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
+    """Put the map into force, and print which fingers it is from and how far off it may be."""
+    trained = population_map.load(args.population)
+    with biotac.open(args.port) as hand:
+        if args.finger not in hand.fingers:
+            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; check its cable")
+        if args.population is None:
+            _use_firmwares(hand, args.finger)
+        else:
+            # the board takes counts above its own tare: any will do here
+            fitted = trained.population.wrench_map(np.zeros(ELECTRODES))
+            hand.set_map(args.finger, fitted.on_board(made_s=int(time.time())))
+        if args.save:
+            hand.save_settings()
+    facts = {"finger": args.finger, "made_of": trained.fingers, "sigma_n": trained.sigma_n.tolist(), "saved": args.save}
+    sigma = "  ".join(f"{value:.2f}" for value in trained.sigma_n)
+    kept = "saved" if args.save else "until the next reboot (--save keeps it)"
+    text = f"finger {args.finger}: map of {trained.fingers}, in force, {kept}\n  one sigma along x, y, z: {sigma} N"
+    print(json.dumps(facts) if args.json else text)
     return 0
 
 
-def _calibrated(
-    args: argparse.Namespace, runs: list[Run], tested: Run | None
-) -> tuple[dict[str, Any], population_map.Trained]:
-    fingers = [training.sums_of(run) for run in runs]
-    its = training.train(fingers, symmetric=args.symmetric)
-    sigma = held_out_error.sigma_of(fingers, runs, symmetric=args.symmetric)
-    facts: dict[str, Any] = {
-        "files": [path.name for path in args.files],
-        "symmetric": args.symmetric,
-        "columns": population_map.COLUMNS,
-        "sigma_n": sigma[0].tolist(),
-        "sigma_scale5_n": sigma[1].tolist(),
-    }
-    if tested is not None:
-        facts["test"] = args.test.name
-        facts |= held_out_error.facts(held_out_error.worth(its, tested), sigma)
-    source = population_map.provenance_of(args.files, args.source, symmetric=args.symmetric)
-    return facts, population_map.Trained(its, sigma[0], sigma[1], source)
-
-
-def _lines(facts: dict[str, Any]) -> list[str]:
-    def numbers(values: list[float] | None) -> str:
-        return "    -" if values is None else "  ".join(f"{value:5.3f}" for value in values)
-
-    lines = [
-        f"{', '.join(facts['files'])}: {facts['columns']} columns per axis",
-        f"  a new finger, one sigma, x y z:   {numbers(facts['sigma_n'])} N",
-        f"  after five presses on a scale:    {numbers(facts['sigma_scale5_n'])} N",
-    ]
-    if "test" in facts:
-        within = ", ".join(f"{share:.0%}" for share in facts["coverage"])
-        lines += [
-            f"{facts['test']}, RMSE uncorrected:       {numbers(facts['rmse_n'])} N",
-            f"  five straight presses on a scale: {numbers(facts['rmse_scale5_n'])} N",
-            f"  a minute on a force plate:        {numbers(facts['rmse_60s_n'])} N",
-            f"  within one and two sigma:         {within}",
-        ]
-    if "written" in facts:
-        lines.append(f"  written: {facts['written']}")
-    return lines
+def _use_firmwares(hand: biotac.Hand, finger: int) -> None:
+    if hand.get_map(finger) is not None:
+        hand.clear_map(finger)
+    hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
+    if not in_force(hand.finger_settings().get(finger, hand.settings())):
+        raise InputError(
+            f"finger {finger} has force gains of its own, which go before the map: expected the default ones; "
+            "`biotac calibration clear` removes a finger's, and the board's are the settings force_gain_x_nn to _z_nn"
+        )

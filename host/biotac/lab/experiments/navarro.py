@@ -17,12 +17,22 @@ from typing import Any
 
 import numpy as np
 
-from ...calibrate.pressure import formulas, guided
-from ...calibrate.pressure.fit import Fit, Verification, fit, told_by, verify
-from ...calibrate.pressure.force_source import Truth
-from ...calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Press, Procedure
-from ...calibrate.pressure.report import PAPER_ERROR
-from ...calibrate.pressure.rows import rows_of
+from ...calibrate.press.detector import Press, Procedure
+from ...calibrate.press.force_source import Truth
+from ...calibrate.press.guide import Unattended, guide
+from ...calibrate.press.pressure import (
+    CALIBRATION_FORCES_N,
+    PAPER_ERROR,
+    VERIFICATION_FORCES_N,
+    Fit,
+    Verification,
+    fit,
+    relative_error,
+    verify,
+    with_board_force,
+)
+from ...calibrate.press.pressure_procedure import put, with_gain
+from ...calibrate.press.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
 from ...markdown import table
@@ -107,7 +117,7 @@ def calibrate(
     first = Procedure(fingers, CALIBRATION_FORCES_N)
     show(f"{profile}: three presses per finger")
     with _open(source, board) as hand:
-        guided.drive(hand, first, Truth(source))
+        guide(hand, first, Truth(source), Unattended())
     fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
 
     second = Procedure(fingers, VERIFICATION_FORCES_N)
@@ -115,7 +125,7 @@ def calibrate(
     show(f"{profile}: one verification press per finger")
     with _open(source, board) as hand:
         for its in fits.values():
-            guided.put(hand, its.finger, guided.with_gain(hand, its, int(time.time())))
+            put(hand, its.finger, with_gain(hand, its, int(time.time())))
         settings, own = hand.settings(), hand.finger_settings()
         for batch in hand.batches():
             outcome.add(batch.wire, settings, own)
@@ -140,7 +150,7 @@ def places(seed: int) -> Facts:
     source = emulated_hand("places", [seed], "new", presses([0], forces, np.repeat(PLACES, each).tolist()))
     procedure = Procedure([0], forces)
     with _open(source, "posix") as hand:
-        guided.drive(hand, procedure, Truth(source))
+        guide(hand, procedure, Truth(source), Unattended())
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]
     assert source.truth is not None
@@ -154,8 +164,8 @@ def places(seed: int) -> Facts:
 
 
 def _error_percent(gain_nn: int, group: Sequence[Press]) -> float:
-    rows = np.concatenate([told_by(press, gain_nn).rows for press in group])
-    return 100 * formulas.relative_error(rows["told_n"], rows["force_n"])
+    rows = np.concatenate([with_board_force(press, gain_nn).rows for press in group])
+    return 100 * relative_error(rows["board_n"], rows["force_n"])
 
 
 def _open(source: Source, board: str) -> Hand:

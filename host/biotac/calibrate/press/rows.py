@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import pressure_filtered_q4
 from ...recording.pressure_check import usable
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 from .force_source import Reference
 
 #: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.
-#: ``told_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``touched`` means
+#: ``board_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``touched`` means
 #: contact or a fault, ``railed`` a PDC at an end of its range.
 ROW_DTYPE = np.dtype(
     [
@@ -20,7 +19,7 @@ ROW_DTYPE = np.dtype(
         ("t_us", "<i8"),
         ("pressure", "<f8"),
         ("rest", "<f8"),
-        ("told_n", "<f8"),
+        ("board_n", "<f8"),
         ("force_n", "<f8"),
         ("touched", "?"),
         ("railed", "?"),
@@ -34,17 +33,8 @@ def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: Reference
     out["finger"], out["t_us"] = messages["finger"], t_us
     out["pressure"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
     out["rest"] = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
-    out["told_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
+    out["board_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
     out["force_n"] = np.nan if reference is None else reference.at(messages["finger"], t_us)
     out["touched"] = (messages["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.FAULT)) != 0
     out["railed"] = ~usable(messages["pdc"]) & (messages["pdc"] != wire.INVALID_COUNT)
-    return out
-
-
-def with_filter(messages: StructArray, filter_milli: int) -> StructArray:
-    """FRAME messages (n,) with ``pdc_filtered_q4`` by the board's own code, for boards before wire 1.4."""
-    out: StructArray = messages.copy()
-    for finger in np.unique(messages["finger"]):
-        mine = messages["finger"] == finger
-        out["pdc_filtered_q4"][mine] = pressure_filtered_q4(messages["pdc"][mine], filter_milli)
     return out

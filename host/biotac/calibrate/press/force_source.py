@@ -11,12 +11,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...link.base import Played
 from ...wire.slots import FRAME_HZ
 from ..reference.csv_file import columns, open_table
-from . import formulas
-from .formulas import Floats
 
 LAG_ROWS = 100
 MAX_LAG_ROWS = 20  # 0.2 s: more is not a transport delay but another clock; a contact held for 0.5 s allows this much
@@ -41,7 +40,7 @@ class Truth:
         known = source.known_force_n
         if known is None:
             raise InputError(f"{source.name} has no force; expected a scenario or a recording with one")
-        self._force_n = formulas.magnitude(known)
+        self._force_n = np.linalg.norm(known, axis=-1)
         self._first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
         self._first_us: int | None = None
 
@@ -129,15 +128,15 @@ def load_csv(path: Path) -> Series:
     _, head, read = open_table(path)
     for axes in (["force_n"], ["fx_n", "fy_n", "fz_n"]):
         if {"t_s", *axes} <= set(head):
-            places = [head.index(name) for name in ("t_s", *axes)]
+            indices = [head.index(name) for name in ("t_s", *axes)]
             break
     else:
         try:
-            places, _ = columns(path, head, torque=False)
+            indices, _ = columns(path, head, torque=False)
         except RecordingError as error:
             raise InputError(
                 f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and "
                 f"fz_n, in seconds and newtons, or a wrench ({error})"
             ) from None
-    values = read(places)
-    return Series(str(path), values[:, 0], formulas.magnitude(values[:, 1:]))
+    values = read(indices)
+    return Series(str(path), values[:, 0], np.linalg.norm(values[:, 1:], axis=-1))

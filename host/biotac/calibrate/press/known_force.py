@@ -1,4 +1,4 @@
-"""Presses of known force, guided on a board or from a recording: the map fitted to them, and its held-out error."""
+"""Presses of known force, guided on a board or from a recording: the population map fitted to them, and its error."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ...recording import Recording
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch, join
 from ...wire.frames import Q4_PER_COUNT, StructArray
-from ..pressure.force_source import Truth
-from ..pressure.from_recording import recorded_rows
-from ..pressure.guided import Face, ask_forces, drive
-from ..pressure.presses import Press, Procedure, Step
-from .population_map import Population, by_columns
+from ..population.population_map import Population, by_columns
+from .detector import Press, Procedure
+from .force_source import Reference
+from .guide import Face, guide
+from .rows import rows_of
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
@@ -28,7 +28,7 @@ STRAIGHT = (0.0, 0.0, 1.0)
 ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # light and firm in turn; starts again after the last
 
 
-#: From a map, and columns (k, 323) and force (k, 3) in N of presses, to the map fitted to them; see fewshot.
+#: From a map, and columns (k, 323) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
 Fit = Callable[[Population, Floats, Floats], Population]
 
 
@@ -80,13 +80,15 @@ class Found:
         return ""
 
 
-def found(its: Population, held: Held, fit: Fit) -> Found:
+def found(population: Population, held: Held, fit: Fit) -> Found:
     """The finger's own map by ``fit``, and its errors. Raises InputError for presses that ``fit`` cannot use."""
     columns, force_n = held.columns, held.force_n
-    own = fit(its, columns, force_n)
+    own = fit(population, columns, force_n)
     every = np.arange(len(force_n))
-    out = [columns[k] @ fit(its, columns[every != k], force_n[every != k]).coefficients for k in every]
-    before, after = (np.sqrt(((said - force_n) ** 2).mean(axis=0)) for said in (columns @ its.coefficients, out))
+    out = [columns[k] @ fit(population, columns[every != k], force_n[every != k]).coefficients for k in every]
+    before, after = (
+        np.sqrt(((felt_n - force_n) ** 2).mean(axis=0)) for felt_n in (columns @ population.coefficients, out)
+    )
     return Found(own, before, after)
 
 
@@ -102,31 +104,22 @@ def guided(
     forces_n: Sequence[float],
     face: Face,
     *,
-    truth: Truth | None = None,
+    reference: Reference | None = None,
     toward: Sequence[Sequence[float]] | None = None,
 ) -> Held:
     """Presses on a board, one for each of ``forces_n`` (k,): ``face`` says what to do, and gives the force of each.
 
-    With a scenario, ``truth`` gives the force instead. ``toward`` (k, 3) are directions, straight down if not given.
-    Raises InputError for too few presses, for one that does not come, or for one without a complete frame.
+    A ``reference`` gives the force instead. ``toward`` (k, 3) are directions, straight down if not given. Raises
+    InputError for too few presses, for one that does not come, or for one without a complete frame.
     """
     _check_enough(len(forces_n))
-    procedure = Procedure([finger], forces_n, needs_force=truth is not None)
-    told: dict[tuple[int, int], float] = {}
+    procedure = Procedure([finger], forces_n, needs_force=reference is not None)
     heard: list[Batch] = []
-
-    def show(step: Step | None) -> None:
-        if truth is None:
-            ask_forces(procedure, told, face)
-        face.show(step)
-
-    drive(hand, procedure, truth, show, heard=heard.append)
+    presses = guide(hand, procedure, reference, face, heard=heard.append)[finger]
     hand.stop()
     batch = join(heard)
-    mine = batch.wire["finger"] == finger
-    presses = procedure.presses[finger]
-    sizes_n = [told.get((finger, press.number), float(np.mean(press.rows["force_n"]))) for press in presses]
-    return _held(batch.wire[mine], batch.t_us[mine], presses, sizes_n, toward)
+    own = batch.wire["finger"] == finger
+    return _held(batch.wire[own], batch.t_us[own], presses, toward)
 
 
 def recorded(
@@ -134,12 +127,11 @@ def recorded(
 ) -> Held:
     """Presses in a recording, one for each of ``forces_n`` (k,). Raises InputError when it has fewer."""
     _check_enough(len(forces_n))
-    rows = recorded_rows(recording, None)
-    procedure = Procedure([finger], forces_n, needs_force=False)
-    procedure.feed(rows[rows["finger"] == finger])
-    procedure.finish()
-    mine = recording.wire["finger"] == finger
-    return _held(recording.wire[mine], recording.frames["t_us"][mine], procedure.presses[finger], forces_n, toward)
+    own = recording.wire["finger"] == finger
+    messages, t_us = recording.wire[own], recording.frames["t_us"][own]
+    found = Procedure([finger], forces_n, needs_force=False).find(rows_of(messages, t_us))[finger]
+    presses = [press.with_force(force) for press, force in zip(found, forces_n, strict=True)]
+    return _held(messages, t_us, presses, toward)
 
 
 def _check_enough(presses: int) -> None:
@@ -151,22 +143,22 @@ def _held(
     frames: StructArray,
     t_us: Any,
     presses: Sequence[Press],
-    sizes_n: Sequence[float],
     toward: Sequence[Sequence[float]] | None,
 ) -> Held:
     counts, numbers, tares = [], [], []
     for k, press in enumerate(presses):
-        its = frames[np.isin(t_us, press.rows["t_us"])]
-        whole = (its["counts"] != wire.INVALID_COUNT).all(axis=1) & (its["tare_q4"] != wire.INVALID_COUNT).all(axis=1)
+        held = frames[np.isin(t_us, press.rows["t_us"])]
+        whole = (held["counts"] != wire.INVALID_COUNT).all(axis=1) & (held["tare_q4"] != wire.INVALID_COUNT).all(axis=1)
         if not whole.any():
             raise InputError(
                 f"press {k + 1} has no frame with all electrodes and a tare: expected one; check the sensor"
             )
-        counts.append(its["counts"][whole].astype(np.float64))
-        tares.append(its["tare_q4"][whole] / Q4_PER_COUNT)
+        counts.append(held["counts"][whole].astype(np.float64))
+        tares.append(held["tare_q4"][whole] / Q4_PER_COUNT)
         numbers.append(np.full(int(whole.sum()), k))
     tare = tares[0].mean(axis=0)
     # counts above each press's own tare: the board takes a new one between presses
     level = [one - at + tare for one, at in zip(counts, tares, strict=True)]
     directions = np.array([STRAIGHT] * len(presses) if toward is None else toward)
-    return Held(np.concatenate(level), tare, np.concatenate(numbers), np.array(sizes_n)[:, None] * directions)
+    sizes_n = np.array([press.force_n for press in presses])
+    return Held(np.concatenate(level), tare, np.concatenate(numbers), sizes_n[:, None] * directions)

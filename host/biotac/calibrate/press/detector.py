@@ -5,8 +5,8 @@ presses count. Held is decided from the pressure alone: over the latest 0.4 s, m
 1 % of the load, or than the noise at rest explains. (Two halves would not do: at the crest of a wave they are equal.)
 What passes this test changes by at most some 3 % a second, an error of 0.03 % where the filter lags by one row.
 
-The guided sequence goes finger by finger, with a number of presses each. Nothing here prints, waits or reads a clock:
-the caller feeds rows, live or from a file, and shows ``step`` to the person who presses. Time is counted in rows.
+Nothing here prints, waits or reads a clock: the caller feeds rows, live or from a file, and shows ``step`` to the
+person who presses. Time is counted in rows.
 """
 
 from __future__ import annotations
@@ -66,10 +66,19 @@ class Press:
         """P - P0 (n,) in counts, with the tare that each frame carries."""
         return self.rows["pressure"] - self.rows["rest"]
 
+    @property
+    def force_n(self) -> float:
+        """Its mean force in N."""
+        return float(np.mean(self.rows["force_n"]))
+
     def with_force(self, force_n: float) -> Press:
         """The same press with one force in all rows, as a scale showed it."""
+        return self.with_column("force_n", force_n)
+
+    def with_column(self, name: str, values: Any) -> Press:
+        """The same press with other values in a column of its rows."""
         rows = self.rows.copy()
-        rows["force_n"] = force_n
+        rows[name] = values
         return Press(self.finger, self.number, rows)
 
 
@@ -160,7 +169,7 @@ class Presses:
         if self._most_above < PRESS_COUNTS:
             return (
                 f"{seen}: {which} never came: pressure rose by at most {self._most_above:.1f} counts, expected "
-                f"{PRESS_COUNTS:g}; press harder, and check that this finger is on the plate"
+                f"{PRESS_COUNTS:g}; press harder, and check that this finger is the one that is pressed"
             )
         return (
             f"{seen}: {which} has no plateau: at most {self._most_kept} held rows in a row, {self._moved()}; expected "
@@ -240,9 +249,7 @@ class Presses:
             self._enter(Phase.RELEASE)
 
 
-#: Forces to ask for, N. The paper asks for joint angles of 18, 20 and 22 degrees, "with increasing pressure".
-CALIBRATION_FORCES_N = (2.0, 3.5, 5.0)
-VERIFICATION_FORCES_N = (4.0,)
+MAX_N = 100.0  # no finger bears more
 
 
 @dataclass(frozen=True)
@@ -259,17 +266,18 @@ class Step:
 class Procedure:
     """Takes ``fingers`` in turn through a press for each of ``forces_n``.
 
-    Only the finger whose turn it is matters; the others may be touched or not. Raises InputError for no fingers, one
-    that occurs twice, no forces, or forces that are not above 0 and below 100 N.
+    Only the finger whose turn it is matters; the others may be touched or not. With ``needs_force``, rows without a
+    reference do not count as held. Raises InputError for no fingers, one that occurs twice, no forces, or forces that
+    are not above 0 and below 100 N.
     """
 
     def __init__(self, fingers: Sequence[int], forces_n: Sequence[float], *, needs_force: bool = True) -> None:
         if not fingers or len(set(fingers)) != len(fingers):
             raise InputError(f"fingers are {list(fingers)}; expected one or more, each once")
-        if not forces_n or not all(0 < force < 100 for force in forces_n):
-            raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below 100")
+        if not forces_n or not all(0 < force < MAX_N for force in forces_n):
+            raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
         self.forces_n = tuple(float(force) for force in forces_n)
-        self.fingers = tuple(fingers)
+        self.needs_force = needs_force
         self._machines = [Presses(finger, len(self.forces_n), needs_force=needs_force) for finger in fingers]
 
     @property
@@ -304,14 +312,20 @@ class Procedure:
         for machine in self._machines:
             if machine.phase is Phase.DONE:
                 continue
-            mine = rows[rows["finger"] == machine.finger]
-            taken = machine.feed(mine)
+            own = rows[rows["finger"] == machine.finger]
+            taken = machine.feed(own)
             if not machine.done:
                 return
             # The next finger begins after this row, even if later rows came in the same call.
-            rows = rows[rows["t_us"] > mine["t_us"][taken - 1]] if taken else rows
+            rows = rows[rows["t_us"] > own["t_us"][taken - 1]] if taken else rows
 
     def finish(self) -> None:
         """End: no more rows come. Raises InputError unless every press was seen."""
         for machine in self._machines:
             machine.finish()
+
+    def find(self, rows: StructArray) -> dict[int, list[Press]]:
+        """The presses in all rows of a recording, by finger. Raises InputError unless every press was seen."""
+        self.feed(rows)
+        self.finish()
+        return self.presses

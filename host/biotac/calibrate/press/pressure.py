@@ -1,0 +1,260 @@
+"""K of a finger's pressure from its presses, its error on another press, and what is refused.
+
+F = (P - P0) K          Eq 1 of Navarro et al. 2015
+K = pinv(P - P0) |F|    Eq 6, over the held rows of all presses
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...core.compiled import NN_PER_N, pressure_force_100un
+from ...core.geometry import Floats
+from ...documents import Provenance
+from ...errors import CommandRefusedError, InputError
+from ...keep import Calibration
+from ...version import __version__
+from ...wire import messages_gen as wire
+from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, to_units
+from .detector import HOLD_ROWS, Press, Rest
+
+#: Forces to ask for, N. The paper asks for joint angles of 18, 20 and 22 degrees, "with increasing pressure".
+CALIBRATION_FORCES_N = (2.0, 3.5, 5.0)
+VERIFICATION_FORCES_N = (4.0,)
+MIN_PRESSES = 3
+PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
+# The paper found 0.009 to 0.016 N per count. The limits are a tenth of the smallest, and what a board accepts, six
+# times the largest: beyond these something else is wrong.
+GAIN_MIN_N = 0.0009
+GAIN_MAX_N = wire.SETTINGS[wire.Setting.PRESSURE_GAIN_NN].high / NN_PER_N
+#: The gains of single presses may be this far apart, as a share of K, before the fit is refused. A press at another
+#: place or with another alignment shows up here.
+SPREAD_MAX = 0.5
+SPREAD_NOTED = 0.1
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One finger's fit: ``gain_n`` is K in N per count, ``rest`` has P0, ``press_gains_n`` is K of each press alone."""
+
+    finger: int
+    gain_n: float
+    rest: Rest
+    rows: int
+    press_counts: tuple[float, ...]
+    press_forces_n: tuple[float, ...]
+    press_gains_n: tuple[float, ...]
+    relative_error: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def gain_nn(self) -> int:
+        """K as the board keeps it, in whole nN per count."""
+        return round(self.gain_n * NN_PER_N)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Errors on one more press.
+
+    ``board_error`` is the relative error of the board's force ``board_n``, ``float_error`` that of Eq 1 in float64 from
+    the same frames, ``apart_n`` the largest difference between the two forces in N.
+    """
+
+    finger: int
+    force_n: float
+    board_n: float
+    board_error: float
+    float_error: float
+    apart_n: float
+
+
+def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
+    """K of one finger. Raises InputError, with the number that shows why, for presses that do not give K."""
+    finger = presses[0].finger if presses else -1
+    where = f"finger {finger}"
+    if len(presses) < MIN_PRESSES:
+        raise InputError(f"{where}: {len(presses)} presses, expected at least {MIN_PRESSES}; press again")
+    for press in presses:
+        _check(where, press)
+    above = np.concatenate([press.above_rest for press in presses])
+    force = np.concatenate([press.rows["force_n"] for press in presses])
+    gain_n = gain_of(above, force)
+    if gain_n <= 0:
+        raise InputError(
+            f"{where}: K is {gain_n:.3g} N/count: force falls while pressure rises; expected both to rise; is the "
+            "reference from another press, or its sign wrong?"
+        )
+    if not GAIN_MIN_N <= gain_n <= GAIN_MAX_N:
+        raise InputError(
+            f"{where}: K is {gain_n:.3g} N/count, expected {GAIN_MIN_N:g} to {GAIN_MAX_N:g}; is "
+            "the reference in newtons?"
+        )
+    gains = [gain_of(press.above_rest, press.rows["force_n"]) for press in presses]
+    spread = (max(gains) - min(gains)) / gain_n
+    if spread > SPREAD_MAX:
+        raise InputError(
+            f"{where}: K of single presses is {min(gains):.4g} to {max(gains):.4g} N/count, a spread of {spread:.0%}, "
+            f"expected at most {SPREAD_MAX:.0%}; is the reference for this finger, and were all presses at one place?"
+        )
+    notes = []
+    if spread > SPREAD_NOTED:
+        notes.append(f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place")
+    return Fit(
+        finger=finger,
+        gain_n=gain_n,
+        rest=rest,
+        rows=len(above),
+        press_counts=tuple(float(press.above_rest.mean()) for press in presses),
+        press_forces_n=tuple(float(press.rows["force_n"].mean()) for press in presses),
+        press_gains_n=tuple(gains),
+        relative_error=relative_error(above * gain_n, force),
+        notes=tuple(notes),
+    )
+
+
+def verify(fitted: Fit, press: Press) -> Verification:
+    """Compare the board's own force in a press, and float64's, with the reference.
+
+    Raises InputError when the board gave none in some row, or the reference is unusable.
+    """
+    where = f"finger {fitted.finger}"
+    _check(where, press)
+    board = press.rows["board_n"]
+    if np.isnan(board).any():
+        raise InputError(
+            f"{where}: the board gave no force from pressure in {np.isnan(board).sum()} of {len(board)} held rows; "
+            "expected its calibration to be in force; see `biotac calibration show`"
+        )
+    exact = press.above_rest * (fitted.gain_nn / NN_PER_N)
+    force = press.rows["force_n"]
+    return Verification(
+        finger=fitted.finger,
+        force_n=float(force.mean()),
+        board_n=float(board.mean()),
+        board_error=relative_error(board, force),
+        float_error=relative_error(exact, force),
+        apart_n=float(np.abs(board - exact).max()),
+    )
+
+
+def with_board_force(press: Press, gain_nn: int) -> Press:
+    """The press with the force that a board with this gain gives, by the board's own code; for recordings without."""
+    rows = press.rows
+    filtered_q4, rest_q4 = (np.rint(rows[name] * Q4_PER_COUNT).astype(np.uint16) for name in ("pressure", "rest"))
+    return press.with_column("board_n", to_units(pressure_force_100un(filtered_q4, rest_q4, gain_nn), FORCE_LSB_PER_N))
+
+
+def gain_of(above_rest: Any, force_n: Any) -> float:
+    """Eq 6: K in N per count, the pseudo-inverse of the column P - P0 (n,) times F (n,) in N."""
+    column = np.asarray(above_rest, np.float64).reshape(-1, 1)
+    (solved,) = np.linalg.pinv(column) @ np.asarray(force_n, np.float64)
+    return float(solved)
+
+
+def relative_error(seen_n: Floats, force_n: Floats) -> float:
+    """|seen - F| / |F| over a press, both (n,) in N; the bars are Euclidean norms.
+
+    The paper gives a "relative error" of 5.91 % without its formula. This one includes what a mean would hide: scatter
+    from row to row.
+    """
+    return float(np.linalg.norm(seen_n - force_n) / np.linalg.norm(force_n))
+
+
+def _check(where: str, press: Press) -> None:
+    force = press.rows["force_n"]
+    which = f"{where}, press {press.number}"
+    if len(force) < HOLD_ROWS:
+        raise InputError(f"{which}: {len(force)} held rows, expected at least {HOLD_ROWS}; hold longer")
+    if not np.isfinite(force).all():
+        bad = int((~np.isfinite(force)).sum())
+        raise InputError(
+            f"{which}: the reference is NaN in {bad} of {len(force)} rows, expected a force in each; record it longer"
+        )
+    if not (force > 0).all():
+        raise InputError(
+            f"{which}: the reference is {float(force.min()):.3g} N while pressure is {press.above_rest.mean():.0f} "
+            "counts above rest, expected a magnitude above 0; zero it at rest, and check that it belongs to this press"
+        )
+
+
+# ---- results -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Results by finger: K, the calibration with it, its provenance, and the verification press.
+
+    ``lag_rows`` is how many rows pressure lags a reference that has its own times. ``not_saved`` is why the board did
+    not save the calibrations, None if it did or was not asked to.
+    """
+
+    fits: dict[int, Fit]
+    calibrations: dict[int, Calibration]
+    provenance: dict[int, Provenance]
+    verified: dict[int, Verification]
+    lag_rows: dict[int, int] = field(default_factory=dict)
+    not_saved: CommandRefusedError | None = None
+
+
+def provenance(fitted: Fit, **source: str) -> Provenance:
+    """How K was made, for a calibration's file: its ``source`` and the numbers of the fit."""
+    made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
+    return {**made, **source, **_numbers(fitted)}
+
+
+def _numbers(fitted: Fit) -> Provenance:
+    return {
+        "finger": fitted.finger,
+        "gain_n": fitted.gain_n,
+        "rest_counts": round(fitted.rest.counts, 2),
+        "rows": fitted.rows,
+        "press_forces_n": [round(force, 4) for force in fitted.press_forces_n],
+        "press_counts": [round(counts, 2) for counts in fitted.press_counts],
+        "press_gains_n": [round(gain, 7) for gain in fitted.press_gains_n],
+        "relative_error": round(fitted.relative_error, 5),
+    }
+
+
+def facts(outcome: Outcome) -> list[dict[str, Any]]:
+    """One object for each finger, in JSON types."""
+    out = []
+    for finger, fitted in outcome.fits.items():
+        digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
+        seen = outcome.verified[finger]
+        one = _numbers(fitted) | {
+            "serial": outcome.calibrations[finger].serial,
+            "pressure_gain_nn": fitted.gain_nn,
+            "notes": list(fitted.notes),
+            "verification": {name: round(getattr(seen, name), decimals) for name, decimals in digits.items()},
+        }
+        if finger in outcome.lag_rows:
+            one["lag_rows"] = outcome.lag_rows[finger]
+        out.append(one)
+    return out
+
+
+def lines(outcome: Outcome) -> list[str]:
+    """The table of K and P0, with the verification press."""
+    head = f"{'finger':>6}  {'sensor':<16}  {'K N/count':>9}  {'P0 count':>8}  {'fit':>6}"
+    out = [head + f"  {'force N':>7}  {'board N':>7}  {'error':>6}  {'float64':>7}"]
+    for finger, fitted in outcome.fits.items():
+        serial = outcome.calibrations[finger].serial or "any"
+        line = f"{finger:>6}  {serial:<16}  {fitted.gain_n:>9.6f}  {fitted.rest.counts:>8.1f}"
+        line += f"  {fitted.relative_error:>6.2%}"
+        seen = outcome.verified[finger]
+        line += f"  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
+        out.append(line)
+    notes = [note for fitted in outcome.fits.values() for note in fitted.notes]
+    notes += [
+        f"finger {f}: {seen.board_error:.1%} off on the verification press (the paper's: {PAPER_ERROR:.2%}): was it at "
+        "another place, or pressed in another way?"
+        for f, seen in outcome.verified.items()
+        if seen.board_error > PAPER_ERROR
+    ]
+    lags = [f"finger {f}: pressure lags the force by {lag} rows" for f, lag in outcome.lag_rows.items() if lag]
+    return [*out, *(f"  {note}" for note in (*notes, *lags))]

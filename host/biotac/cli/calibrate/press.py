@@ -1,0 +1,351 @@
+"""biotac calibrate press PORT|REC"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import biotac
+
+from ...calibrate.population import population_map
+from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
+from ...calibrate.press.detector import MAX_N, Phase, Step
+from ...calibrate.press.force_source import Truth, load_csv
+from ...calibrate.reference.scale import UNITS_N, Scale
+from ...calibrate.wrench.sources import Provenance
+from ...calibrate.wrench.upload import upload
+from ...errors import InputError
+from ...hand.hand import Hand
+from ...keep import calibration_file
+from ...map import file as map_file
+from ...map.bound import summary
+from ...partial_file import whole
+from ...recording import Recording
+from ...wire.identity import ascii_text
+from ...wire.sensor_gen import MAX_SENSORS
+from .. import outputs, values
+from ..recordings.loading import load
+
+NAME = "press"
+HELP = (
+    "A finger's own force from presses of known force: the population map fitted to presses on a kitchen scale or to "
+    "weights, or one gain from pressure to force. Guided on a board, or from a recording of that."
+)
+EXAMPLE = "biotac calibrate press sim:fingers.toml --scale --finger index --presses 3"
+CURE = "tare, and load the pad flat, firmly and steadily, or upload it anyway with --force"
+LET_GO = "let go of finger {finger}, and do not touch it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what the finger is pressed against, the forces, and where the result goes."""
+    parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
+    against = parser.add_mutually_exclusive_group(required=True)
+    against.add_argument(
+        "--scale",
+        metavar="PORT",
+        nargs="?",
+        const="",
+        help="fit z and the balance of the population map to presses straight down on a scale, whose readings are "
+        "typed in, or read from a serial port (MT-SICS or A&D, ?baud=9600&parity=N&bits=8)",
+    )
+    against.add_argument(
+        "--weights", action="store_true", help="fit all axes of the population map to weights, level and tilted"
+    )
+    against.add_argument(
+        "--pressure",
+        metavar="FILE",
+        nargs="?",
+        const="",
+        help="from pressure to force, one gain per finger: press a plate or scale whose readings are typed in; for a "
+        "recording, a CSV with t_s in the board's time and force_n (or fx_n, fy_n, fz_n)",
+    )
+    parser.add_argument(
+        "--finger", metavar="NAME,NAME", type=values.fingers, default=(),
+        help="names or chip selects; one, or for --pressure several, in order (all)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--readings", metavar="X,X,X", type=values.numbers, help="what the scale showed at each press of a recording"
+    )
+    parser.add_argument("--unit", choices=list(UNITS_N), default="N", help="of the readings (default %(default)s)")
+    parser.add_argument(
+        "--presses", metavar="N", type=int, default=5, help="on a scale (default %(default)s; 20 are better)"
+    )
+    for name, default, metavar, what in (
+        ("--masses", weights.MASSES_G, "G,G", "weights in grams"),
+        ("--tilts", weights.TILTS_DEG, "DEG,DEG", "degrees of the block under the weights"),
+    ):
+        text = f"{what} (default {','.join(f'{value:g}' for value in default)})"
+        parser.add_argument(name, metavar=metavar, type=values.numbers, default=default, help=text)
+    asked = ",".join(f"{force:g}" for force in pressure.CALIBRATION_FORCES_N)
+    parser.add_argument("--forces", metavar="N,N,N", type=_forces, help=f"newtons to press with, --pressure ({asked})")
+    parser.add_argument(
+        "--verify", metavar="N", type=_force, default=pressure.VERIFICATION_FORCES_N[0],
+        help="newtons of the verification press, --pressure (default %(default)g)",
+    )  # fmt: skip
+    parser.add_argument("--population", metavar="FILE", type=Path, help="another map than the package's own")
+    parser.add_argument(
+        "--out", metavar="PATH", type=Path,
+        help="the finger's map goes here (.wrench.json); with --pressure a folder, for a calibration of each finger",
+    )  # fmt: skip
+    parser.add_argument("--no-upload", action="store_true", help="leave the board as it is; not with --pressure")
+    parser.add_argument("--save", action="store_true", help="save it on the board, so that it survives a restart")
+    parser.add_argument("--force", action="store_true", help="overwrite files; upload a map even if it does not help")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate on a board or from a recording."""
+    recorded = Path(args.where).is_file() or args.where.endswith(".mcap")
+    if recorded and args.save:
+        raise InputError("--save needs a board, not a recording: drop --save, or name a PORT")
+    if args.pressure is not None:
+        return _pressure(args, recorded=recorded)
+    if len(args.finger) != 1:
+        raise InputError(f"{len(args.finger)} fingers named: expected --finger NAME, the one that is pressed")
+    outputs.check_file(args.out, overwrite=args.force)
+    loads = _on_scale(args) if args.scale is not None else _weights(args)
+    (finger,) = args.finger
+    if recorded:
+        recording = load(Path(args.where))
+        serial = next((ascii_text(s.serial) for s in recording.sensors if s.finger == finger), "")
+        return _fit_map(args, loads, loads.recorded(recording), serial, None)
+    with biotac.open(args.where) as hand:
+        if finger not in hand.fingers:
+            raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; check its cable")
+        held = loads.guided(hand)
+        return _fit_map(args, loads, held, ascii_text(hand.sensor_info(finger).serial), hand)
+
+
+class _Guide:
+    """A Face that prints instructions on stderr, leaving stdout to the result; ``press`` words a press."""
+
+    def __init__(self, press: Callable[[Step], str], force_n: Callable[[Step], float], held: str) -> None:
+        self._press, self._force_n, self._held = press, force_n, held
+
+    def show(self, step: Step | None) -> None:
+        if step is None:
+            text = "done"
+        elif step.phase is Phase.PRESS:
+            text = f"{step.press} of {step.presses}: {self._press(step)}"
+        else:
+            text = (LET_GO if step.phase is Phase.REST else f"held: {self._held}").format(finger=step.finger)
+        print(text, file=sys.stderr)
+
+    def force_n(self, step: Step) -> float:
+        return self._force_n(step)
+
+
+def _typed_n(step: Step, unit: str = "N") -> float:
+    """Ask on stderr until a force between 0 and MAX_N is typed in, in ``unit``; in N."""
+    while True:
+        print(
+            f"finger {step.finger}, press {step.press}: the scale shows [{unit}] ", end="", file=sys.stderr, flush=True
+        )
+        try:
+            value_n = float(input()) * UNITS_N[unit]
+        except ValueError:
+            continue
+        except EOFError as error:
+            raise InputError(f"no reading was typed in; expected a number in {unit}") from error
+        if 0 < value_n < MAX_N:
+            return value_n
+
+
+def _check_terminal(hand: Hand, where: str) -> None:
+    if hand.link.source is None and not sys.stdin.isatty():
+        raise InputError(
+            f"{where} gives no force, and stdin is not a terminal to type it in; use a terminal, or --scale PORT"
+        )
+
+
+# ---- a map, by a scale or by weights -----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Loads:
+    """How the finger is loaded, and what is fitted to that; ``how`` says where the force is from."""
+
+    guided: Callable[[Hand], known_force.Held]
+    recorded: Callable[[Recording], known_force.Held]
+    fit: known_force.Fit
+    how: str
+    facts: Callable[[known_force.Held, population_map.Trained], dict[str, Any]]
+
+
+def _on_scale(args: argparse.Namespace) -> _Loads:
+    (finger,), newtons = args.finger, UNITS_N[args.unit]
+
+    def press(step: Step) -> str:
+        return (
+            f"push the pad straight down on the scale with about {step.force_n / newtons:.0f} {args.unit}, in a new "
+            "place each time; hold still until told"
+        )
+
+    def guided(hand: Hand) -> known_force.Held:
+        source = hand.link.source
+        forces_n = known_force.asked_n(args.presses)
+        with ExitStack() as stack:
+            if args.scale:
+                scale = stack.enter_context(Scale(args.scale))
+                face = _Guide(press, lambda step: scale.force_n(), "let go")
+                return known_force.guided(hand, finger, forces_n, face)
+            _check_terminal(hand, args.where)
+            face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go")
+            reference = None if source is None else Truth(source)
+            return known_force.guided(hand, finger, forces_n, face, reference=reference)
+
+    def recorded(recording: Recording) -> known_force.Held:
+        if args.readings is None:
+            raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
+        return known_force.recorded(recording, finger, [value * newtons for value in args.readings])
+
+    def facts(held: known_force.Held, trained: population_map.Trained) -> dict[str, Any]:
+        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n[:, 2])
+        return {"shown_n": held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
+
+    return _Loads(guided, recorded, few_shot.scaled, "presses on a scale", facts)
+
+
+def _weights(args: argparse.Namespace) -> _Loads:
+    (finger,), loads = args.finger, weights.plan(args.masses, args.tilts)
+    sizes_n, toward = [load.size_n for load in loads], [load.toward for load in loads]
+
+    def press(step: Step) -> str:
+        return f"{loads[step.press - 1]}; do not touch it"
+
+    face = _Guide(press, lambda step: sizes_n[step.press - 1], "take the weight off")
+    return _Loads(
+        lambda hand: known_force.guided(hand, finger, sizes_n, face, toward=toward),
+        lambda recording: known_force.recorded(recording, finger, sizes_n, toward),
+        few_shot.weighed,
+        "weights on tilted blocks",
+        lambda held, trained: {"force_n": held.force_n.tolist()},
+    )
+
+
+def _fit_map(args: argparse.Namespace, loads: _Loads, held: known_force.Held, serial: str, hand: Hand | None) -> int:
+    """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
+    trained = population_map.load(args.population)
+    found = known_force.found(trained.population, held, loads.fit)
+    own = found.own.wrench_map(held.tare)
+    (finger,), made_s = args.finger, int(time.time())
+    facts: dict[str, Any] = {
+        "finger": finger,
+        "serial": serial,
+        "presses": len(held.force_n),
+        **loads.facts(held, trained),
+        "before_n": found.before_n.tolist(),
+        "held_out_n": found.held_out_n.tolist(),
+        "why_not": found.why_not(trained.sigma_scale5_n),
+        "sigma_n": trained.sigma_scale5_n.tolist(),
+        "fixed_point": summary(own, held.counts),
+    }
+    if args.out is not None:
+        how = f"{len(held.force_n)} {loads.how}; population map from {trained.fingers}"
+        origin = Provenance(serial, made_s, trained.provenance.get("software", ""), (args.where,), "", how)
+        text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=asdict(origin))
+        with whole(args.out, overwrite=args.force) as path:
+            path.write_text(text, encoding="utf-8")
+        facts["written"] = str(args.out)
+    wanted = hand is not None and not args.no_upload
+    facts["refused"] = wanted and bool(facts["why_not"]) and not args.force
+    if hand is not None and wanted and not facts["refused"]:
+        facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
+        if args.save:
+            hand.save_settings()
+    print(json.dumps(facts) if args.json else "\n".join(_map_lines(facts, loads.how)))
+    return int(facts["refused"])
+
+
+def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
+    def numbers(axes: Sequence[float]) -> str:
+        return "  ".join(f"{value:5.2f}" for value in axes)
+
+    gain = f": z gain {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N" if "gain" in facts else ""
+    return [
+        f"finger {facts['finger']}, {facts['presses']} {how}{gain}",
+        f"  error along x, y, z before:   {numbers(facts['before_n'])} N",
+        f"  each press held out:          {numbers(facts['held_out_n'])} N",
+        f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
+        *([f"  not worth using: {facts['why_not']}; {CURE}"] if facts["why_not"] else []),
+        *([f"  written: {facts['written']}"] if "written" in facts else []),
+        "  on the board; without --save, only until it restarts" if "board" in facts else "  no board was changed",
+    ]
+
+
+# ---- from pressure to force --------------------------------------------------------------------
+
+
+def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
+    stem = f"{Path(args.where).stem}-" if recorded else ""
+    if args.out is not None:
+        every = [args.out / f"{stem}finger{finger}.json" for finger in args.finger or range(MAX_SENSORS)]
+        outputs.check(args.out, every, overwrite=args.force)
+    if recorded:
+        outcome = _from_recording(args)
+    elif args.pressure:
+        raise InputError(
+            "--pressure FILE needs a recording; on a board, type in what a scale shows: drop FILE, or record the "
+            "presses together with the plate"
+        )
+    else:
+        outcome = _on_board(args)
+    written = []
+    for finger, calibration in outcome.calibrations.items() if args.out is not None else ():
+        outputs.make_folder(args.out)
+        path = args.out / f"{stem}finger{finger}.json"
+        calibration_file.save(path, calibration, outcome.provenance[finger], overwrite=args.force)
+        written.append(str(path))
+    if args.json:
+        print(json.dumps({"fingers": pressure.facts(outcome), "written": written}))
+    else:
+        print("\n".join([*pressure.lines(outcome), *(f"  written: {path}" for path in written)]))
+        if not recorded and (not args.save or outcome.not_saved is not None):
+            print("in force until the next reboot (--save keeps it)")
+    if outcome.not_saved is not None:
+        raise outcome.not_saved
+    return 0
+
+
+def _from_recording(args: argparse.Namespace) -> pressure.Outcome:
+    reference = load_csv(Path(args.pressure)) if args.pressure else None
+    readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
+    return pressure_procedure.calibrate_recording(
+        load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=int(time.time())
+    )
+
+
+def _on_board(args: argparse.Namespace) -> pressure.Outcome:
+    def opened() -> Hand:
+        hand = biotac.open(args.where)
+        try:
+            _check_terminal(hand, args.where)
+        except InputError:
+            hand.close()
+            raise
+        return hand
+
+    def press(step: Step) -> str:
+        return f"press finger {step.finger} with about {step.force_n:g} N, and hold still"
+
+    face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go of finger {finger}")
+    forces_n = args.forces or pressure.CALIBRATION_FORCES_N
+    plan = pressure_procedure.Plan(args.finger, forces_n, (args.verify,))
+    return pressure_procedure.calibrate(opened, plan, face, made_s=int(time.time()), save=args.save)
+
+
+def _force(text: str) -> float:
+    force = values.number(text)
+    if not 0 < force < MAX_N:
+        raise argparse.ArgumentTypeError(f"seen {text!r}; expected newtons above 0 and below {MAX_N:g}")
+    return force
+
+
+def _forces(text: str) -> tuple[float, ...]:
+    return tuple(_force(part) for part in text.split(","))
