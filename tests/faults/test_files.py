@@ -26,7 +26,7 @@ from biotac.calibrate.population import population_map
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.mcap_file import read_mcap
 from biotac.calibrate.reference.mounting import LIN, from_json, read_mounting
-from biotac.cli.recordings.recompute import read_settings
+from biotac.cli.recordings.export import read_settings
 from biotac.errors import BiotacError
 from biotac.flash import read_backup
 from biotac.flash.backup import FORMAT as BACKUP

@@ -38,16 +38,14 @@ VERBS = {
         "Check every on-board result of a recording against the float64 reference.",
     ),
     "replay": ("biotac.cli.recordings.replay", "Play a recording as the board that made it, here or on a pty."),
-    "recompute": ("biotac.cli.recordings.recompute", "Run a recording's counts through the maths with other settings."),
     "export": (
         "biotac.cli.recordings.export",
-        "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, many to a lake.",
+        "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, or recomputed; many to a lake.",
     ),
     "lake": (
         "biotac.cli.recordings.lake",
         "Check a lake of recordings, query it in SQL, or list its boards and sensors.",
     ),
-    "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
         "biotac.cli.calibrate",
         "Fit a finger's wrench or pressure to a reference, test it on held-out data, upload it.",

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..recording.layout import frame_id
@@ -20,6 +21,8 @@ STAMP = Field(
     "stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), corrected for the drift seen in the recording"
 )
 
+GAP = Field("gap_s", "<f4", "s", "how long the board was away just before this row; 0 where it was there")
+
 
 def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
     """A table's columns: without the finger, as a table is one finger's, and with stamps after the times."""
@@ -28,7 +31,7 @@ def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
 
 
 #: One row per finger and round of 10 ms.
-COLUMNS = _stamped(FRAME_FIELDS)
+COLUMNS = (*_stamped(FRAME_FIELDS), GAP)
 #: One row per finger and round: 22 samples, the k-th (from 0) k/2200 s after t_us.
 PAC_COLUMNS = _stamped(PAC_FIELDS)
 #: One row per finger and round: a spectrogram of PAC, in octaves.
@@ -84,5 +87,16 @@ def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORT
 
 
 def _arrays(recording: Recording, columns: Sequence[Field], rows: StructArray) -> dict[str, NDArray[Any]]:
-    stamps = recording.stamp_ns(rows["t_us"])
-    return {column.name: stamps if column is STAMP else rows[column.name] for column in columns}
+    made: dict[str, Callable[[], NDArray[Any]]] = {
+        STAMP.name: lambda: recording.stamp_ns(rows["t_us"]),
+        GAP.name: lambda: _gap_s(recording, rows["t_us"]),
+    }
+    return {column.name: made[column.name]() if column.name in made else rows[column.name] for column in columns}
+
+
+def _gap_s(recording: Recording, t_us: NDArray[np.int64]) -> NDArray[np.float32]:
+    out = np.zeros(len(t_us), np.float32)
+    for gap in recording.gaps:
+        if gap.next_t_us is not None and (t_us >= gap.next_t_us).any():
+            out[np.argmax(t_us >= gap.next_t_us)] += (gap.back_at_ns - gap.lost_at_ns) / 1e9
+    return out

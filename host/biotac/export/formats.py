@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from ..errors import InputError
 from ..partial_file import whole
@@ -41,15 +42,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
     An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an extra that is
     not installed, a recording without rows, or a path that exists or cannot be written.
     """
-    kind = FORMATS.get(out.suffix.lower())
-    if kind is None:
-        raise InputError(f"{out}: unknown suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
-    try:
-        module = import_module(kind.module)
-    except ImportError as error:
-        raise InputError(
-            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"
-        ) from error
+    module = writer_for(out)
     made = tables(recording)
     if not any(len(table) for table in made):
         raise InputError(f"{recording.path} holds no frames and no PAC; there is nothing to export")
@@ -60,6 +53,19 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
             write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
             written.append(path)
     return written
+
+
+def writer_for(out: Path) -> ModuleType:
+    """The module of ``out``'s format. Raises InputError for an unknown suffix, or an extra that is not installed."""
+    kind = FORMATS.get(out.suffix.lower())
+    if kind is None:
+        raise InputError(f"{out}: unknown suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
+    try:
+        return import_module(kind.module)
+    except ImportError as error:
+        raise InputError(
+            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"
+        ) from error
 
 
 def parts(out: Path, made: list[Table], *, apart: bool) -> list[tuple[Path, list[Table]]]:

@@ -14,11 +14,13 @@ from .columns import Show, Table
 
 KINDS_APART = False
 _SHOW_ROWS = 1000
+_LOG = "rcl_interfaces/msg/Log"
+_WARN = 30
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write a bag with topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``
-    and ``bands``.
+    and ``bands``, and ``/biotac/log`` with the gaps.
     """
     total = sum(len(table) for table in made)
     done = 0
@@ -30,6 +32,17 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
                 if row % _SHOW_ROWS == 0:
                     show((done + row) / total)
             done += len(table)
+        if recording.gaps:
+            store = get_typestore(Stores.ROS2_HUMBLE)
+            log = bag.add_connection("/biotac/log", _LOG, typestore=store)
+            for gap in recording.gaps:
+                text = store.types[_LOG](_time(store.types, gap.back_at_ns), _WARN, "biotac", gap.words(), "", "", 0)
+                bag.write(log, gap.back_at_ns, store.serialize_cdr(text, _LOG))
+
+
+def _time(types: Any, stamp_ns: int) -> Any:
+    """ROS 2 counts seconds in 32 bits: after January 2038, header stamps stand still."""
+    return types["builtin_interfaces/msg/Time"](min(stamp_ns // 10**9, 2**31 - 1), stamp_ns % 10**9)
 
 
 class _Topics:
@@ -71,7 +84,7 @@ class _Topics:
             return
         header = self._make(
             "std_msgs/msg/Header",
-            self._make("builtin_interfaces/msg/Time", stamp_ns // 10**9, stamp_ns % 10**9),
+            _time(self._types, stamp_ns),
             self._table.frame_id,
         )
         force, torque = (

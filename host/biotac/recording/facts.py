@@ -39,7 +39,8 @@ class Facts:
         """Facts from a recording's metadata. Raises ValueError if it is damaged."""
         try:
             facts = cls._read(metadata)
-            for message in (facts.info, *facts.sensors):
+            messages: list[Any] = [facts.info, *facts.sensors]
+            for message in messages:
                 message.pack()  # so that every number fits its field, and every text has its length
             return facts
         except (KeyError, TypeError, AttributeError, RecursionError, OverflowError, struct.error) as error:

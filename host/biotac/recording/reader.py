@@ -85,7 +85,8 @@ class Recording:
         rests = [block.rest for block in self._blocks]
         self.pac_lost = sum(rest.lost_pac for rest in rests)
         self.disordered = sum(rest.disordered for rest in rests)
-        self.gaps = [gap for rest in rests for facts in rest.gaps if (gap := self._gap(facts)) is not None]
+        self._gaps = [[gap for facts in rest.gaps if (gap := self._gap(facts)) is not None] for rest in rests]
+        self.gaps = [gap for before_block in self._gaps for gap in before_block]
         in_damaged = sum(block.missing for block in self._blocks) + lost_between(self._blocks)
         self.frames_lost = sum(frames for rest in rests for _, _, frames in rest.lost) + in_damaged
         if self.cut_off and not len(self.seq):
@@ -100,6 +101,10 @@ class Recording:
         for k, block in enumerate(self._blocks):
             for packet in block.packets():
                 yield k, packet
+
+    def gaps_before(self, block: int) -> list[Gap]:
+        """Those between this block, by its number in ``blocks``, and the one before it."""
+        return self._gaps[block]
 
     @cached_property
     def frames(self) -> StructArray:

@@ -277,6 +277,8 @@ def _write(
     with out.open("xb") as stream:
         file = RecordingFile(stream, metadata)
         for k, block in enumerate(blocks):
+            for gap in recording.gaps_before(k):
+                file.add_gap(gap)
             file.add(bytes(block), recording.arrived_ns[k], recording.all_here_ns[k])
             show((k + 1) / len(blocks))
         file.close()

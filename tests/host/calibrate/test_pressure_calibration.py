@@ -295,7 +295,9 @@ def test_the_gain_of_a_file_recomputes_a_recording(pressed: Path, tmp_path: Path
     for name, options in (("kept", ["--keep-tare"]), ("run", [])):
         out = tmp_path / f"{name}.mcap"
         settings = str(tmp_path / "gain.json")
-        assert main(["recompute", str(pressed / "two.mcap"), str(out), "--settings", settings, *options]) == 0
+        assert (
+            main(["export", "--recompute", str(pressed / "two.mcap"), str(out), "--settings", settings, *options]) == 0
+        )
     kept, ran = (Recording(tmp_path / f"{name}.mcap") for name in ("kept", "run"))
     assert np.nanmax(kept.frames["pressure_force_n"]) == pytest.approx(5.0, rel=0.02)
     np.testing.assert_array_equal(kept.frames["pressure_force_n"], ran.frames["pressure_force_n"])

@@ -182,14 +182,14 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected 0 <= from", "replay @rec.mcap --from 0.5 --to 0.2"),
     (2, "add --pty", "replay @rec.mcap --link +link"),
     (3, "choose another path", "replay @rec.mcap --pty --link @dir"),
-    (2, "check the path", "recompute +no.mcap +out.mcap"),
-    (2, "nothing to recompute", "recompute @empty.mcap +out.mcap"),
-    (2, "overwrite it (--force", "recompute @rec.mcap @text.mcap"),
-    (2, "expected .csv", "recompute @rec.mcap +out.xyz"),
-    (2, "expected an object", "recompute @rec.mcap +out.mcap --settings @broken.json"),
-    (2, "expected one such as", "recompute @rec.mcap +out.mcap --settings @list.json"),
-    (2, "expected one of poc_weights", "recompute @rec.mcap +out.mcap --settings @none.json"),
-    (2, "expected an object", "recompute @rec.mcap +out.mcap --settings +no.json"),
+    (2, "check the path", "export --recompute +no.mcap +out.mcap"),
+    (2, "nothing to recompute", "export --recompute @empty.mcap +out.mcap"),
+    (2, "overwrite it (--force", "export --recompute @rec.mcap @text.mcap"),
+    (2, "expected .csv", "export --recompute @rec.mcap +out.xyz"),
+    (2, "expected an object", "export --recompute @rec.mcap +out.mcap --settings @broken.json"),
+    (2, "expected one such as", "export --recompute @rec.mcap +out.mcap --settings @list.json"),
+    (2, "expected one of poc_weights", "export --recompute @rec.mcap +out.mcap --settings @none.json"),
+    (2, "expected an object", "export --recompute @rec.mcap +out.mcap --settings +no.json"),
     (2, "check the path", "export +no.mcap +out.csv"),
     (2, "nothing to export", "export @empty.mcap +out.csv"),
     (2, "expected .csv", "export @rec.mcap +out.xyz"),
@@ -201,9 +201,9 @@ CASES: list[tuple[int, str, str]] = [
     (2, "name the lake's folder", "lake sql SELECT"),
     (2, "`biotac export RECS... --lake", "lake inventory +no"),
     (3, "`biotac list` shows the ports", "sensor /dev/ttyNOWHERE7"),
-    (2, "check the path", "import +no.btd +out.mcap"),
-    (2, "expected a SynTouch .btd", "import @none.btd +out.mcap"),
-    (2, "overwrite it (--force", "import @none.btd @rec.mcap"),
+    (2, "check the path", "export +no.btd +out.mcap"),
+    (2, "expected a SynTouch .btd", "export @none.btd +out.mcap"),
+    (2, "overwrite it (--force", "export @none.btd @rec.mcap"),
     (2, "see `biotac calibration show --help`", "calibration show"),
     (2, "expected one of 24c01", "calibration show --i2c 1:0x50"),
     (2, "check the path", "calibration show +no.json"),
@@ -442,4 +442,4 @@ def test_an_inventory_of_no_lake_does_not_ask_for_duckdb(capsys, monkeypatch, tm
 def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr("biotac.recording.btd_file._MAX_BYTES", 4)
     (tmp_path / "long.btd").write_text("Begin File\n" + "0\n" * 10)
-    assert "split it" in line_of(capsys, 2, ["import", str(tmp_path / "long.btd"), str(tmp_path / "a.mcap")])
+    assert "split it" in line_of(capsys, 2, ["export", str(tmp_path / "long.btd"), str(tmp_path / "a.mcap")])

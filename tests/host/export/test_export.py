@@ -22,19 +22,42 @@ import biotac
 from biotac.cli.main import main
 from biotac.core.bands import pac_bands
 from biotac.export import BANDS_COLUMNS, COLUMNS, FORMATS, PAC_COLUMNS
-from biotac.export.columns import STAMP
+from biotac.export.columns import GAP, STAMP
+from biotac.hand.gap import Gap
+from biotac.recording.file import RecordingFile
+from biotac.wire.batches import StreamDecoder
 from biotac.wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
 
+GAP_S = 2.5
 FINGERS = 2
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> biotac.Recording:
     """With faults in it, so that there are missing words and invalid results."""
-    path = record_all(f"sim:faults.toml?fingers={FINGERS}", tmp_path_factory.mktemp("export") / "a.mcap")
-    recording = biotac.Recording(path)
+    folder = tmp_path_factory.mktemp("export")
+    whole = biotac.Recording(record_all(f"sim:faults.toml?fingers={FINGERS}", folder / "whole.mcap"))
+    recording = written_again(whole, folder / "a.mcap", {1: GAP_S})
     assert np.isnan(recording.frames["poc_mm"]).any() and (recording.frames["counts"] == 65535).any()
     return recording
+
+
+def written_again(whole: biotac.Recording, path: Path, gaps_s: dict[int, float], later_ns: int = 0) -> biotac.Recording:
+    """``whole`` with gaps before blocks."""
+    file = RecordingFile(path.open("xb"), whole.metadata)
+    for k, block in enumerate(whole.blocks):
+        at_ns = whole.arrived_ns[k] + later_ns
+        if k in gaps_s:
+            file.add_gap(Gap("silence", None, first_us(whole, k), at_ns - round(gaps_s[k] * 1e9), at_ns, 7))
+        file.add(block, at_ns)
+    file.close()
+    return biotac.Recording(path)
+
+
+def first_us(recording: biotac.Recording, block: int) -> int:
+    first_us = StreamDecoder().feed(recording.blocks[block]).first_t_us()
+    assert first_us is not None
+    return first_us
 
 
 def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
@@ -66,6 +89,9 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "torsion_nmm": scaled("torsion_mnmm", 1000, -(2**31)),
         "wrench_age_ms": sent["wrench_age_ms"],
         "flags": sent["flags"],
+        "gap_s": np.where(
+            np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0
+        ),
     }
 
 
@@ -101,7 +127,7 @@ def test_every_column_is_documented_and_has_a_unit() -> None:
     assert re.findall(r"^\| `.*$", page, re.MULTILINE) == [
         f"| `{f.name}` | {f.unit} | {' to '.join(f.parts[:: len(f.parts) - 1]) if f.parts else ''} "
         f"| {np.dtype(f.dtype)} | {f.what} |"
-        for f in (*FRAME_FIELDS, *PAC_FIELDS, *BANDS_FIELDS, *IDLE_FIELDS, STAMP)
+        for f in (*FRAME_FIELDS, *PAC_FIELDS, *BANDS_FIELDS, *IDLE_FIELDS, STAMP, GAP)
     ]
 
 
@@ -206,6 +232,15 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
         assert np.array_equal([m.data for _, m in topics["counts"]], slow)
         assert np.array_equal([m.data for _, m in topics["pac"]], pac["pac"])
         assert np.array_equal([m.data for _, m in topics["bands"]], expected_bands(recorded, finger)["energy_count2"])
+
+
+def test_a_ros_bag_has_gaps_and_outlives_2038(recorded, tmp_path) -> None:
+    late = written_again(recorded, tmp_path / "late.mcap", {1: GAP_S}, later_ns=20 * 365 * 86_400 * 10**9)
+    assert export(late, tmp_path / "a.ros2") == 0
+    with AnyReader([tmp_path / "a.ros2"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        ((_, stamp_ns, data),) = bag.messages([c for c in bag.connections if c.topic == "/biotac/log"])
+        assert stamp_ns == late.gaps[0].back_at_ns
+        assert bag.deserialize(data, "rcl_interfaces/msg/Log").msg == late.gaps[0].words()
 
 
 @pytest.mark.parametrize("suffix", list(FORMATS))

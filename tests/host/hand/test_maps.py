@@ -276,7 +276,7 @@ def test_a_recording_has_the_maps_and_answers_with_them(recorded: Path) -> None:
 def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.mcap"
     assert main(["check", str(recorded)]) == 0
-    assert main(["recompute", str(recorded), str(again)]) == 0
+    assert main(["export", "--recompute", str(recorded), str(again)]) == 0
     old, new = Recording(recorded), Recording(again)
     assert new.maps == old.maps
     assert new.wire.tobytes() == old.wire.tobytes()

@@ -40,7 +40,7 @@ def imported(tmp_path_factory) -> tuple[biotac.Recording, np.ndarray, np.ndarray
     folder = tmp_path_factory.mktemp("btd")
     samples = load_source("press.toml", fingers=2, seconds=3.0).samples
     times = write_btd(folder / "a.btd", samples)
-    assert main(["import", str(folder / "a.btd"), str(folder / "a.mcap")]) == 0
+    assert main(["export", str(folder / "a.btd"), str(folder / "a.mcap")]) == 0
     return biotac.Recording(folder / "a.mcap"), samples, times
 
 
@@ -92,14 +92,14 @@ def test_an_interrupted_import_leaves_nothing(imported, tmp_path, capsys, monkey
 
     monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
     source = imported[0].path.with_name("a.btd")
-    assert main(["import", str(source), str(tmp_path / "b.mcap")]) == 130
+    assert main(["export", str(source), str(tmp_path / "b.mcap")]) == 130
     assert "was not written" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_no_btd_is_refused(tmp_path, capsys) -> None:
     (tmp_path / "a.btd").write_text("nothing")
-    assert main(["import", str(tmp_path / "a.btd"), str(tmp_path / "b.mcap")]) == 2
+    assert main(["export", str(tmp_path / "a.btd"), str(tmp_path / "b.mcap")]) == 2
     assert "Begin File" in capsys.readouterr().err
     assert not (tmp_path / "b.mcap").exists()
 
@@ -107,7 +107,7 @@ def test_what_is_no_btd_is_refused(tmp_path, capsys) -> None:
 def test_a_real_file_with_gaps(tmp_path) -> None:
     if not DATA.exists():
         pytest.skip(f"needs a recording whose licence keeps it out of this project; not at {DATA}")
-    assert main(["import", str(DATA), str(tmp_path / "b.mcap")]) == 0
+    assert main(["export", str(DATA), str(tmp_path / "b.mcap")]) == 0
     recording = biotac.Recording(tmp_path / "b.mcap")
     with np.load(DATA.with_name("btd.npz")) as truth:
         assert np.array_equal(recording.frames["counts"], truth["E"])

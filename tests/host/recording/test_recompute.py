@@ -47,7 +47,7 @@ def tares(recording: biotac.Recording) -> list[wire.Tare]:
 def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: str, options: list[str]) -> None:
     was = record(folder / "same.mcap", f"sim:{source}")
     (folder / "again.mcap").unlink(missing_ok=True)
-    assert main(["recompute", str(folder / "same.mcap"), str(folder / "again.mcap"), *options]) == 0
+    assert main(["export", "--recompute", str(folder / "same.mcap"), str(folder / "again.mcap"), *options]) == 0
     again = biotac.Recording(folder / "again.mcap")
     assert again.wire.tobytes() == was.wire.tobytes()
     assert tares(again) == tares(was) != []
@@ -59,7 +59,7 @@ def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
     # Unplugged twice, and asked who it is when it comes back: rounds that no FRAME tells of.
     was = record(folder / "silent.mcap", "sim:faults.toml", pressure_filter_milli=100)
     assert (np.diff(was.frames["t_us"][was.wire["finger"] == 1]) > 400_000).sum() == 2
-    assert main(["recompute", str(folder / "silent.mcap"), str(folder / "silent_again.mcap")]) == 0
+    assert main(["export", "--recompute", str(folder / "silent.mcap"), str(folder / "silent_again.mcap")]) == 0
     assert biotac.Recording(folder / "silent_again.mcap").wire.tobytes() == was.wire.tobytes()
 
 
@@ -81,7 +81,7 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) ->
     assert (wire.TareReason.HOLD_LAPSED in reasons) == (timeout_ms > 0)
     held = (was.wire["flags"] & wire.FrameFlags.HELD) != 0
     assert 20 < held.sum() < len(held)
-    assert main(["recompute", str(folder / "grasp.mcap"), str(folder / "grasp_again.mcap")]) == 0
+    assert main(["export", "--recompute", str(folder / "grasp.mcap"), str(folder / "grasp_again.mcap")]) == 0
     again = biotac.Recording(folder / "grasp_again.mcap")
     assert again.wire.tobytes() == was.wire.tobytes()
     # A TARE goes before its FRAME, and the recording may end between them.
@@ -93,7 +93,7 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) ->
 def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, capsys, weights, options: list[str]) -> None:
     """The truth is another simulated board, which had the setting while it measured."""
     expected = record(folder / "truth.mcap", "sim:press.toml?fingers=2", poc_weights=weights)
-    words = ["recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
+    words = ["export", "--recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
     assert main([*words, "--poc-weights", weights.name.lower(), *options]) == 0
     assert f"poc_weights = {weights.name} ({int(weights)})" in capsys.readouterr().out
     (folder / "truth.mcap").unlink()
@@ -119,7 +119,7 @@ def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: 
     sent = record(names[1], "sim:press.toml", force_model=wire.ForceModel.POPULATION, **gains)
     forced = (sent.wire["flags"] & wire.FrameFlags.UNTARED) == 0
     assert forced.any() and (sent.wire["flags"][forced] & wire.FrameFlags.POPULATION).all()
-    assert main(["recompute", str(names[0]), str(names[2]), "--settings", str(model), *options]) == 0
+    assert main(["export", "--recompute", str(names[0]), str(names[2]), "--settings", str(model), *options]) == 0
     assert biotac.Recording(names[2]).wire.tobytes() == sent.wire.tobytes()
     assert main(["check", str(names[1])]) == 0
 
@@ -127,7 +127,10 @@ def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: 
 def test_settings_come_from_a_file(folder, recorded, capsys) -> None:
     (folder / "s.json").write_text(json.dumps({"settings": {"force_gain_z_nn": 4_524_468}}))
     out = folder / "gain.mcap"
-    assert main(["recompute", str(recorded.path), str(out), "--settings", str(folder / "s.json"), "--json"]) == 0
+    assert (
+        main(["export", "--recompute", str(recorded.path), str(out), "--settings", str(folder / "s.json"), "--json"])
+        == 0
+    )
     assert json.loads(capsys.readouterr().out)["frames"] == len(recorded.frames)
     new = biotac.Recording(out)
     truth = reference_q4(new.wire["counts"], new.wire["tare_q4"], new.settings)
@@ -141,7 +144,7 @@ def test_the_tare_machine_hears_its_settings(folder, recorded) -> None:
     """A threshold nothing reaches: no contact any more, as on a board with it."""
     expected = record(folder / "deaf.mcap", "sim:press.toml?fingers=2", contact_energy_count2=1_000_000)
     (folder / "deaf.json").write_text('{"contact_energy_count2": 1000000}')
-    words = ["recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
+    words = ["export", "--recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
     assert main([*words, "--settings", str(folder / "deaf.json")]) == 0
     new = biotac.Recording(folder / "new.mcap")
     assert new.wire.tobytes() == expected.wire.tobytes() != recorded.wire.tobytes()
@@ -156,7 +159,7 @@ def test_a_recording_that_began_in_mid_life_says_so(folder, capsys) -> None:
         hand.read(3.0)
         hand.record(path)
         hand.read(10.0, fresh=True)
-    assert main(["recompute", str(path), str(folder / "mid2.mcap"), "--force"]) == 0
+    assert main(["export", "--recompute", str(path), str(folder / "mid2.mcap"), "--force"]) == 0
     assert "finger 0 was tared before the recording began" in capsys.readouterr().err
     new, was = biotac.Recording(folder / "mid2.mcap"), biotac.Recording(path)
     assert np.array_equal(new.wire["seq"], was.wire["seq"]) and int(was.wire["seq"][0]) > 200
@@ -166,16 +169,16 @@ def test_a_recording_that_began_in_mid_life_says_so(folder, capsys) -> None:
 def test_heartbeats_need_kept_tares(folder, capsys) -> None:
     path = folder / "quiet.mcap"
     record(path, "sim:press.toml", quantities=RESULTS)
-    assert main(["recompute", str(path), str(folder / "q2.mcap")]) == 2
+    assert main(["export", "--recompute", str(path), str(folder / "q2.mcap")]) == 2
     assert "heartbeats" in capsys.readouterr().err
     assert not (folder / "q2.mcap").exists()
-    assert main(["recompute", str(path), str(folder / "q2.mcap"), "--keep-tare"]) == 0
+    assert main(["export", "--recompute", str(path), str(folder / "q2.mcap"), "--keep-tare"]) == 0
     assert biotac.Recording(folder / "q2.mcap").wire.tobytes() == biotac.Recording(path).wire.tobytes()
 
 
 def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
     before = recorded.path.read_bytes()
-    assert main(["recompute", str(recorded.path), str(recorded.path)]) == 2
+    assert main(["export", "--recompute", str(recorded.path), str(recorded.path)]) == 2
     assert "--force" in capsys.readouterr().err
     assert recorded.path.read_bytes() == before
 
@@ -191,7 +194,19 @@ def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
 )
 def test_settings_that_are_none_are_refused(folder, recorded, capsys, text: str, seen: str) -> None:
     (folder / "bad.json").write_text(text)
-    assert main(["recompute", str(recorded.path), str(folder / "x.mcap"), "--settings", str(folder / "bad.json")]) == 2
+    assert (
+        main(
+            [
+                "export",
+                "--recompute",
+                str(recorded.path),
+                str(folder / "x.mcap"),
+                "--settings",
+                str(folder / "bad.json"),
+            ]
+        )
+        == 2
+    )
     error = capsys.readouterr().err
     assert seen in error and error.count("\n") == 1
     assert not (folder / "x.mcap").exists()
@@ -199,7 +214,7 @@ def test_settings_that_are_none_are_refused(folder, recorded, capsys, text: str,
 
 def test_out_may_be_an_export(folder, recorded) -> None:
     out = folder / "again.npz"
-    assert main(["recompute", str(recorded.path), str(out), "--poc-weights", "abs_n2"]) == 0
+    assert main(["export", "--recompute", str(recorded.path), str(out), "--poc-weights", "abs_n2"]) == 0
     with np.load(out) as arrays:
         about = json.loads(str(arrays["columns"]))
         assert json.loads(about["metadata"]["settings"])["poc_weights"] == 0
@@ -231,6 +246,6 @@ def test_an_interrupted_recomputation_leaves_nothing(
             raise KeyboardInterrupt
 
     monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
-    assert main(["recompute", str(recorded.path), str(tmp_path / out)]) == 130
+    assert main(["export", "--recompute", str(recorded.path), str(tmp_path / out)]) == 130
     assert f"{out} was not written" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

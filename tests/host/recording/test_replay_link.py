@@ -92,7 +92,7 @@ def test_it_answers_as_its_board_did(recorded, capsys) -> None:
 def test_what_would_change_a_board_is_refused_in_words(recorded, command, name: str) -> None:
     path, recording = recorded
     with biotac.open(f"replay:{path}") as hand:
-        with pytest.raises(biotac.CommandRefusedError, match=f"is a recording: {name}.*biotac recompute"):
+        with pytest.raises(biotac.CommandRefusedError, match=f"is a recording: {name}.*biotac export --recompute"):
             command(hand)
         assert len(hand.read(100)) == len(recording.frames)  # and it still plays
 

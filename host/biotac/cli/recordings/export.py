@@ -4,44 +4,138 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
+from ...documents import read_json
 from ...errors import InputError
 from ...export import FORMATS, export
+from ...export.formats import writer_for
+from ...partial_file import whole
+from ...recording import Recording
+from ...recording.btd_import import import_btd
+from ...recording.recompute import recompute
+from ...wire import messages_gen as wire
+from ...wire.identity import setting_text
 from ..progress import Progress
 from . import lake
 from .loading import load
 
 EXAMPLE = "biotac export grasp.mcap grasp.parquet, or biotac export trials/*.mcap --lake trials.lake -j 4"
+RECORDING = ".mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recordings, the output, and whether to overwrite."""
-    parser.add_argument("recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record")
-    formats = "; ".join(f"{suffix} {its.what}" for suffix, its in FORMATS.items())
+    """Add the recordings, the output, what to recompute, and whether to overwrite."""
+    parser.add_argument(
+        "recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record, or SynTouch's .btd(.gz)"
+    )
+    formats = "; ".join(f"{suffix} {kind.what}" for suffix, kind in FORMATS.items())
     # Without --lake the last word is OUT. It is here for argparse's help; run() takes it from the recordings.
-    parser.add_argument("out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}")
+    parser.add_argument(
+        "out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}; .mcap of a .btd, or recomputed"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite OUT, or the recordings' files in the lake")
+    parser.add_argument("--recompute", action="store_true", help="run the counts through the maths again")
+    names = [weights.name.lower() for weights in wire.PocWeights]
+    parser.add_argument("--poc-weights", choices=names, help="recompute with these weights of the point of contact")
+    parser.add_argument(
+        "--settings", metavar="FILE", type=Path, help="recompute with these: JSON by name, as biotac info --json prints"
+    )
+    parser.add_argument(
+        "--keep-tare", action="store_true", help="recompute with the recorded tares, not with the tare machine's"
+    )
     lake.add_export_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write OUT, or leave nothing behind; stderr says what the recording lacks."""
-    places = [*args.recordings, *([args.out] if args.out else [])]
+    paths = [*args.recordings, *([args.out] if args.out else [])]
+    recomputes = bool(args.recompute or args.poc_weights or args.settings or args.keep_tare)
     if args.lake is not None:
-        return lake.run_export(args, places)
-    if len(places) != 2:
-        raise InputError(f"{len(places)} files given, expected REC OUT; to export many recordings, use --lake DIR")
-    source, out = places
-    recording = load(source)
+        if recomputes:
+            raise InputError("a lake takes recordings as they are; recompute them to .mcap files first")
+        return lake.run_export(args, paths)
+    if len(paths) != 2:
+        raise InputError(f"{len(paths)} files given, expected REC OUT; to export many recordings, use --lake DIR")
+    source, out = paths
+    imports = source.name.lower().endswith((".btd", ".btd.gz"))
+    if out.suffix.lower() != RECORDING:
+        writer_for(out)
+    elif not (imports or recomputes):
+        raise InputError(f"{out}: {source} is an .mcap file already; add --recompute, or name a file of another format")
+    elif imports and recomputes:
+        raise InputError(f"{source} is recomputed as it is read; export it to .mcap first, then recompute that")
+    written: list[Path] = []
     with Progress() as progress:
-        written = export(
-            recording,
-            out,
-            overwrite=args.force,
-            show=lambda share: progress.show(f"{out}: {share:.0%}, Ctrl-C stops and leaves nothing behind"),
-        )
+
+        def show(share: float) -> None:
+            progress.show(f"{out}: {share:.0%}, Ctrl-C stops and leaves nothing behind")
+
+        if imports:
+            with _recording_at(out, args.force, written) as place:
+                made: dict[str, Any] = import_btd(source, place, show)
+                text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
+        elif recomputes:
+            changes = _changes(args)
+            recording = load(source)
+            with _recording_at(out, args.force, written) as place:
+                notes = recompute(recording, place, changes, keep_tare=args.keep_tare, show=show)
+            for note in notes:
+                print(f"biotac: {note}", file=sys.stderr)
+            made = {"frames": len(recording.frames), "pac": len(recording.pac), "notes": notes}
+            changed = ", ".join(setting_text(s, value) for s, value in changes.items()) or "no setting changed"
+            text = f"{made['frames']} frames, {changed},"
+        else:
+            recording = load(source)
+            written += export(recording, out, overwrite=args.force, show=show)
+            made = {"frames": len(recording.frames), "pac": len(recording.pac)}
+            text = f"{made['frames']} frames"
     names = [str(path) for path in written]
-    facts = {"written": names, "frames": len(recording.frames), "pac": len(recording.pac)}
-    print(json.dumps(facts) if args.json else f"{len(recording.frames)} frames to {', '.join(names)}")
+    print(json.dumps({"written": names} | made) if args.json else f"{text} to {', '.join(names)}")
     return 0
+
+
+@contextmanager
+def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]:
+    """Where to write a recording that becomes ``out``, or is exported there; ``written`` gets the files' paths."""
+    if out.suffix.lower() == RECORDING:
+        with whole(out, overwrite=force) as place:
+            yield place
+        written.append(out)
+        return
+    try:
+        with TemporaryDirectory(prefix="biotac-export-") as folder:
+            place = Path(folder) / "made.mcap"
+            yield place
+            written += export(Recording(place), out, overwrite=force)
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt(*interrupt.args or (f"{out} was not written",)) from None
+
+
+def _changes(args: argparse.Namespace) -> dict[wire.Setting, int]:
+    changes = read_settings(args.settings) if args.settings else {}
+    if args.poc_weights:
+        changes[wire.Setting.POC_WEIGHTS] = int(wire.PocWeights[args.poc_weights.upper()])
+    return changes
+
+
+def read_settings(path: Path) -> dict[wire.Setting, int]:
+    """Settings by name from a JSON file. Raises InputError naming what is wrong in it."""
+    try:
+        named = read_json(path)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read as JSON ({error}); expected an object of settings") from error
+    # `biotac info --json` prints them under "settings".
+    named = named.get("settings", named) if isinstance(named, dict) else named
+    known = {setting.name.lower(): setting for setting in wire.Setting}
+    if not isinstance(named, dict) or not all(type(value) is int for value in named.values()):
+        raise InputError(f'{path} is not a JSON object of integers; expected one such as {{"poc_weights": 2}}')
+    unknown = sorted(set(named) - set(known))
+    if unknown:
+        raise InputError(f"{path}: unknown setting {unknown[0]!r}; expected one of {', '.join(known)}")
+    return {known[name]: value for name, value in named.items()}

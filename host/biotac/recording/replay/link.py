@@ -105,7 +105,7 @@ class ReplayLink(Link):
             if answer is None:
                 raise CommandRefusedError(
                     f"{self.port} is a recording: {command_name(message_id)} needs a board; "
-                    "to try other settings on its counts, use `biotac recompute`"
+                    "to try other settings on its counts, use `biotac export --recompute`"
                 )
             with self._answering:
                 self._answers += answer
