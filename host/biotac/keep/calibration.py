@@ -85,7 +85,7 @@ def own_settings(
     settings: Mapping[wire.Setting, int], calibrations: Mapping[int, Calibration]
 ) -> dict[int, dict[wire.Setting, int]]:
     """The settings that each finger's results are computed with, for the fingers in ``calibrations``."""
-    return {finger: {**settings, **its.settings()} for finger, its in calibrations.items()}
+    return {finger: {**settings, **calibration.settings()} for finger, calibration in calibrations.items()}
 
 
 def _whole(name: str, value: object) -> int:

@@ -22,13 +22,13 @@ _WHY = {
 
 def pack(calibration: Calibration) -> bytes:
     """Header and data, as in a page of the board's flash for finger 0."""
-    its = ffi.new("bt_calibration *")
-    its.present = True
-    its.serial = calibration.wire_serial()
-    its.made_s = calibration.made_s
-    its.value = calibration.wire_values()
+    record = ffi.new("bt_calibration *")
+    record.present = True
+    record.serial = calibration.wire_serial()
+    record.made_s = calibration.made_s
+    record.value = calibration.wire_values()
     page = ffi.new("uint8_t[]", MAX_BYTES)
-    return bytes(ffi.buffer(page, lib.bt_record_pack(its, page)))
+    return bytes(ffi.buffer(page, lib.bt_record_pack(record, page)))
 
 
 def unpack(data: bytes, where: str) -> Calibration:
@@ -36,11 +36,11 @@ def unpack(data: bytes, where: str) -> Calibration:
 
     Raises InputError that begins with ``where`` and says why there is none that can be used.
     """
-    its = ffi.new("bt_calibration *")
-    judgement = lib.bt_record_unpack(its, data, len(data))
+    record = ffi.new("bt_calibration *")
+    judgement = lib.bt_record_unpack(record, data, len(data))
     if judgement != lib.BT_RECORD_GOOD:
         raise InputError(f"{where} {_WHY[judgement]}")
     try:
-        return Calibration.from_wire(list(its.serial), its.made_s, list(its.value))
+        return Calibration.from_wire(list(record.serial), record.made_s, list(record.value))
     except ValueError as error:
         raise InputError(f"{where} holds an invalid calibration ({error}); store a valid one") from error

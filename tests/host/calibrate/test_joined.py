@@ -206,14 +206,14 @@ def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:
 
 
 def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
-    from biotac.calibrate.wrench.sources import of_files
+    from biotac.calibrate.wrench.sources import provenance_of
 
     a, b = tmp_path / "a", tmp_path / "b"
     a.write_bytes(b"counts")
     b.write_bytes(b"force")
-    its = of_files("BTA", [a, b], "plate", made_s=86_400)
+    its = provenance_of("BTA", [a, b], "plate", made_s=86_400)
     # sha256sum of "countsforce"
-    assert its.data_sha256 == __import__("hashlib").sha256(b"countsforce").hexdigest()
-    assert its.made == "1970-01-02 00:00 UTC"
+    assert its["data_sha256"] == __import__("hashlib").sha256(b"countsforce").hexdigest()
+    assert (its["serial"], its["made_s"], its["files"]) == ("BTA", 86_400, ["a", "b"])
     b.write_bytes(b"forcf")
-    assert of_files("BTA", [a, b], "plate", made_s=0).data_sha256 != its.data_sha256
+    assert provenance_of("BTA", [a, b], "plate", made_s=0)["data_sha256"] != its["data_sha256"]

@@ -13,7 +13,7 @@ from biotac.calibrate.reference.mounting import LIN
 from biotac.calibrate.reference.rdt import HOLD_RECORDS
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
-from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Places, Procedure, Step, walk
+from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Files, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording import Recording
@@ -223,8 +223,8 @@ class Interrupting(Nano17Reader):
 
 def walked(
     folder: Path, scenario: str, at_s: float | None = None, error: type[BaseException] = KeyboardInterrupt
-) -> tuple[Procedure, list[str], Places, Interrupting]:
-    places = Places(folder / "walk.mcap", folder / "walk.csv")
+) -> tuple[Procedure, list[str], Files, Interrupting]:
+    places = Files(folder / "walk.mcap", folder / "walk.csv")
     words: list[str] = []
     with biotac.open(f"sim:{scenario}") as hand:
         assert hand.link.source is not None
@@ -238,11 +238,11 @@ def walked(
 
 
 @pytest.fixture(scope="module")
-def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Places]:
+def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Files]:
     return walked(tmp_path_factory.mktemp("walk"), "calibrate.toml")[:3]
 
 
-def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Places]) -> None:
+def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Files]) -> None:
     procedure, words, places = everywhere
     assert procedure.step is Step.DONE
     assert procedure.coverage.complete and procedure.coverage.missing() == []
@@ -259,7 +259,7 @@ def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Plac
     assert (recording.end_us - recording.begin_us) / 1e6 < 0.9 * len(load_source("calibrate.toml").samples) / 100.0
 
 
-def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedure, list[str], Places]) -> None:
+def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedure, list[str], Files]) -> None:
     _, _, places = everywhere
     reference = read_csv(places.reference)
     loaded = load(places.recording, (places.reference, reference), serial="BTSIM00000000006")

@@ -68,8 +68,9 @@ class Press:
 
     @property
     def force_n(self) -> float:
-        """Its mean force in N."""
-        return float(np.mean(self.rows["force_n"]))
+        """Its mean force in N; exactly what a scale showed, where that is in all rows."""
+        force_n = self.rows["force_n"]
+        return float(force_n[0] if (force_n == force_n[0]).all() else np.mean(force_n))
 
     def with_force(self, force_n: float) -> Press:
         """The same press with one force in all rows, as a scale showed it."""

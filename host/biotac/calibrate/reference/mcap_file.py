@@ -55,9 +55,9 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
         known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no messages"
         cure = "name one: --reference FILE:TOPIC" if rows else "record the sensor's topic too"
         raise RecordingError(f"{path}: holds {known}: expected one topic of {SCHEMAS[0]}; {cure}")
-    ((name, its),) = rows.items()
-    its.sort(key=lambda row: row[0])  # a bag is in order of arrival, not of the sensor's stamps
-    samples = Samples(np.array([t for t, _ in its]), np.array([w for _, w in its]))
+    ((name, samples_of),) = rows.items()
+    samples_of.sort(key=lambda row: row[0])  # a bag is in order of arrival, not of the sensor's stamps
+    samples = Samples(np.array([t for t, _ in samples_of]), np.array([w for _, w in samples_of]))
     check(f"{path} {name}", samples)
     return Reference(path.name, samples, mounting, name)
 
@@ -83,5 +83,5 @@ def _row(message: Any) -> Row:
     # ROS 2 has sec and nanosec, Foxglove's JSON sec and nsec, ROS 1 secs and nsecs.
     second = stamp.sec if hasattr(stamp, "sec") else stamp.secs
     nanosec = next(getattr(stamp, name) for name in ("nanosec", "nsec", "nsecs") if hasattr(stamp, name))
-    force, torque = ([float(getattr(of, axis)) for axis in "xyz"] for of in (wrench.force, wrench.torque))
+    force, torque = ([float(getattr(vector, axis)) for axis in "xyz"] for vector in (wrench.force, wrench.torque))
     return float(second) + float(nanosec) * 1e-9, [*force, *[NMM_PER_NM * t for t in torque]]

@@ -76,7 +76,7 @@ class Mounting:
         return self.sign * np.column_stack([force @ self.rotation, moment @ self.rotation])
 
     def facts(self) -> dict[str, Any]:
-        """The mounting as JSON types; of() reads them."""
+        """The mounting as JSON types; mounting_of() reads them."""
         reads = READS[0] if self.sign > 0 else READS[1]
         return {"rotation": self.rotation.tolist(), "offset_mm": self.offset_mm.tolist(), "reads": reads}
 
@@ -85,7 +85,7 @@ class Mounting:
 LIN = Mounting(np.eye(3), np.zeros(3))
 
 
-def of(facts: Mapping[str, Any], where: str) -> Mounting:
+def mounting_of(facts: Mapping[str, Any], where: str) -> Mounting:
     """The mounting from its three values. Raises InputError that begins with ``where``."""
     missing, unknown = [key for key in KEYS if key not in facts], sorted(set(facts) - set(KEYS))
     if missing or unknown:
@@ -114,7 +114,7 @@ def read_mounting(text: str) -> Mounting:
     except (OSError, ValueError) as error:
         seen = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{path}: {seen}: expected TOML with {', '.join(KEYS)}, or the word lin") from None
-    return of(facts, str(path))
+    return mounting_of(facts, str(path))
 
 
 def from_json(text: str, where: str) -> Mounting:
@@ -125,4 +125,4 @@ def from_json(text: str, where: str) -> Mounting:
         raise InputError(f"{where}: {error}: expected a mounting in JSON") from None
     if not isinstance(facts, dict):
         raise InputError(f"{where}: {text[:40]!r}: expected an object with {', '.join(KEYS)}")
-    return of(facts, where)
+    return mounting_of(facts, where)

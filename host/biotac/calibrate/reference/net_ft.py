@@ -138,8 +138,8 @@ class NetFtReader:
     @property
     def stats(self) -> ReaderStats:
         """Counts so far; a datagram that holds no records counts as bad."""
-        its = self._decoder
-        return ReaderStats(its.lost, its.late, its.bad + its.refused)
+        decoder = self._decoder
+        return ReaderStats(decoder.lost, decoder.late, decoder.bad + decoder.refused)
 
     def read(self, board_s: float = 0.0) -> Samples:
         """New samples that are in order. Raises DeviceLostError after SILENCE_S without a datagram."""

@@ -72,7 +72,7 @@ class Procedure:
         self._asked = False
         self._tared_frames = 0
         self._recent: deque[Samples] = deque()
-        self._last_words = ""
+        self._last_status = ""
 
     # ---- input ---------------------------------------------------------------------------------
 
@@ -94,7 +94,7 @@ class Procedure:
         elif self.step is Step.LOADS and self.zero is not None:
             step_s = float(np.median(np.diff(samples.t_s))) if len(samples) > 1 else 0.0
             self.coverage.add(self.mounting.to_finger(samples.wrench - self.zero), step_s)
-            self._tell_progress()
+            self._report_progress()
 
     def tared(self, *, accepted: bool) -> None:
         """Take the board's answer; if it refused, it is asked again after TARE_FRAMES untouched frames."""
@@ -115,8 +115,8 @@ class Procedure:
             return f"{Step.WARM_UP.value}: {self.drift_counts_per_min:+.0f} counts/min"
         if self.step is Step.LOADS:
             return f"{self.coverage.summary()}; missing: {next(iter(self.coverage.missing()), 'nothing')}"
-        words: str = self.step.value
-        return words
+        text: str = self.step.value
+        return text
 
     def take_events(self) -> list[str]:
         """The events since the last call."""
@@ -195,25 +195,25 @@ class Procedure:
 
     # ---- loads ---------------------------------------------------------------------------------
 
-    def _tell_progress(self) -> None:
+    def _report_progress(self) -> None:
         if self.coverage.complete:
             self._go(Step.DONE, f"covered: {self.coverage.summary()}")
             return
-        words = self.status()
-        if words != self._last_words:
-            self._last_words = words
-            self.events.append(words)
+        text = self.status()
+        if text != self._last_status:
+            self._last_status = text
+            self.events.append(text)
 
-    def _go(self, step: Step, words: str) -> None:
+    def _go(self, step: Step, event: str) -> None:
         self.last_step, self.step = self.step, step
-        self.events.append(words)
+        self.events.append(event)
 
 
 Show = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Places:
+class Files:
     """Paths for the board's recording (.mcap) and the reference (.csv)."""
 
     recording: Path
@@ -224,7 +224,7 @@ def walk(
     hand: Hand,
     reader: Reader,
     procedure: Procedure,
-    places: Places,
+    files: Files,
     *,
     overwrite: bool = False,
     show: Show = lambda event: None,
@@ -236,8 +236,8 @@ def walk(
     keeps drifting or the reference has no torque, and DeviceLostError when the board or the reference is lost; what was
     recorded until then is kept.
     """
-    reference = CsvWriter(places.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
-    with closing(reference) as writer, closing(hand.record(places.recording, overwrite=overwrite)):
+    reference = CsvWriter(files.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
+    with closing(reference) as writer, closing(hand.record(files.recording, overwrite=overwrite)):
         try:
             _loop(hand, reader, procedure, writer, show, progress)
             if procedure.step is not Step.DONE:

@@ -112,8 +112,8 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
 def _run(
     where: str, board: Board, there: Mask, truth: Floats, reference: Reference, alignment: Alignment, zero: Floats
 ) -> Joined:
-    its = board.only(there)
-    counts, e = its.counts, its.e
+    known = board.only(there)
+    counts, e = known.counts, known.e
     check_electrodes(where, counts)
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
@@ -126,13 +126,13 @@ def _run(
         on_skin_note = [f"{on_skin:.1%} of the rows above {FIRM_N:g} N have their line of action on the skin"]
         about_normal, about_torsion = contact.torsion_truth(where, None, truth[:, :3], truth[:, 3:])
         truth = np.column_stack([truth, about_normal])
-    resting = counts[its.quiet]
+    resting = counts[known.quiet]
     whole = len(resting) // IDLE_MEAN_ROWS * IDLE_MEAN_ROWS
     drift, drift_note = drift_of("rest", resting[:whole].reshape(-1, IDLE_MEAN_ROWS, counts.shape[1]).mean(axis=1))
     notes = (
         f"tare: the board's own, which moved by up to {moved:.0f} counts",
         f"reference: {reference.name}" + (f", {reference.sensor}" if reference.sensor else ""),
-        f"reference's zero: {_words(zero)}, from {int(board.quiet.sum())} rows in which the board saw no contact",
+        f"reference's zero: {_zero_text(zero)}, from {int(board.quiet.sum())} rows in which the board saw no contact",
         f"clocks: offset {alignment.offset_s:+.4f} s, {alignment.drift_ppm:+.0f} ppm; "
         f"correlation {alignment.peak:.2f}, next best {alignment.runner_up:.2f}, "
         f"{alignment.width_s * 1e3:.0f} ms wide at half height; "
@@ -148,7 +148,7 @@ def _run(
         counts=e + tare,
         tare=tare,
         truth=truth,
-        pdc=its.pdc if np.isfinite(its.pdc).all() else None,
+        pdc=known.pdc if np.isfinite(known.pdc).all() else None,
         drift=drift,
         rest=np.linalg.norm(truth[:, :3], axis=1) < REST_N,
         notes=notes,
@@ -166,14 +166,14 @@ def _align(where: str, board: Board, t_s: Floats, wrench: Floats, zero: Floats) 
         tries.append((PDC_S, board.pdc))
     found: list[Alignment] = []
     refusals: list[RecordingError] = []
-    for after_s, its in tries:
+    for after_s, board_load in tries:
         try:
-            found.append(align(where, board.t_s + after_s, its, t_s, load))
+            found.append(align(where, board.t_s + after_s, board_load, t_s, load))
         except RecordingError as error:
             refusals.append(error)
     if not found:
         raise refusals[0]
-    return max(found, key=lambda its: its.peak)
+    return max(found, key=lambda alignment: alignment.peak)
 
 
 def _common_value(wrench: Floats) -> Floats:
@@ -240,8 +240,8 @@ def _on_skin(where: str, truth: Floats) -> float:
             f"{where}: torque over force is {lever:.3g} mm about the fingertip's centre: expected {LEVER_MM[0]:g} to "
             f"{LEVER_MM[1]:g} mm; {guess}"
         )
-    its = contact.locate(firm[:, :3], firm[:, 3:])
-    share = float(np.mean(its.on_skin & ~its.missed))
+    found = contact.locate(firm[:, :3], firm[:, 3:])
+    share = float(np.mean(found.on_skin & ~found.missed))
     if share < MIN_ON_SKIN_SHARE:
         raise RecordingError(
             f"{where}: in {share:.0%} of the rows above {FIRM_N:g} N the line of force meets the finger's skin: "
@@ -251,7 +251,7 @@ def _on_skin(where: str, truth: Floats) -> float:
     return share
 
 
-def _words(zero: Floats) -> str:
+def _zero_text(zero: Floats) -> str:
     text = ", ".join(f"{v:+.3f}" for v in zero[:3]) + " N"
     return text if len(zero) == 3 else text + "; " + ", ".join(f"{v:+.2f}" for v in zero[3:]) + " N mm"
 

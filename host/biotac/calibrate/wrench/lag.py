@@ -78,8 +78,8 @@ class Lags:
         return share.reshape(len(LAGS), self._axes)
 
     def _held_out_r2(self, lag: int) -> float:
-        place = (lag + SEARCH_ROWS) * self._axes
-        force = self._sums.axes(range(place, place + 3))
+        first = (lag + SEARCH_ROWS) * self._axes
+        force = self._sums.axes(range(first, first + 3))
         total = np.zeros(3)
         for block in range(BLOCKS):
             fitted = solve(force.of(self._blocks.kept_from([block])), LEAST_RIDGE)

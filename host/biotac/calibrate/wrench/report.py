@@ -188,14 +188,14 @@ def _draw_models(axes: Any, validation: Validation) -> None:
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     names = list(validation.by_model)
-    place = np.arange(len(names))
+    rows = np.arange(len(names))
     for axis in range(3):
         errors = [validation.by_model[name][0][axis] for name in names]
         drifted = [validation.by_model[name][1:, axis].max() for name in names]
-        at = place + (axis - 1) * 0.26
+        at = rows + (axis - 1) * 0.26
         axes.barh(at, errors, height=0.24, color=AXIS_COLORS[axis], label=validation.run.axes[axis])
         axes.plot(drifted, at, "|", color="#111111", markersize=6, label="drifted" if axis == 2 else None)
-    axes.set_yticks(place, names, fontsize=8)
+    axes.set_yticks(rows, names, fontsize=8)
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))

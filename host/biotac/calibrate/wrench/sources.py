@@ -7,7 +7,6 @@ give the same hash, and a single changed count gives another.
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...documents import Provenance
 from ...errors import InputError
 from ...recording import Recording
 from ...version import __version__
@@ -24,44 +24,25 @@ from .joined import Joined, board_of, choose_finger, join
 from .run import Run, load_run
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """Origin of a map. ``serial`` is the sensor's, "" if unknown; ``made_s`` is in seconds since 1970 UTC.
-
-    ``alignment`` and ``mounting`` are None where force and counts came from one file.
-    """
-
-    serial: str
-    made_s: int
-    software: str
-    files: tuple[str, ...]
-    data_sha256: str
-    reference: str
-    mounting: dict[str, Any] | None = None
-    alignment: dict[str, Any] | None = None
-
-    @property
-    def made(self) -> str:
-        """Date and time as text, in UTC."""
-        return time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(self.made_s))
-
-
-def of_files(
-    serial: str,
-    files: Sequence[Path],
-    reference: str,
-    *,
-    made_s: int,
-    mounting: dict[str, Any] | None = None,
-    alignment: dict[str, Any] | None = None,
+def provenance_of(
+    serial: str, files: Sequence[Path], reference: str, *, made_s: int, **more: dict[str, Any]
 ) -> Provenance:
-    """The provenance of a map made from ``files``, which it reads; the caller gives ``made_s``."""
+    """The provenance of a map made from ``files``, which it reads, at ``made_s`` in seconds since 1970 UTC.
+
+    ``serial`` is the sensor's, "" if unknown.
+    """
     digest = hashlib.sha256()
     for path in files:
         digest.update(path.read_bytes())
-    names = tuple(path.name for path in files)
-    software = f"biotac-gateway {__version__}"
-    return Provenance(serial, made_s, software, names, digest.hexdigest(), reference, mounting, alignment)
+    return {
+        "serial": serial,
+        "made_s": made_s,
+        "software": f"biotac-gateway {__version__}",
+        "files": [path.name for path in files],
+        "data_sha256": digest.hexdigest(),
+        "reference": reference,
+        **more,
+    }
 
 
 def check_serial(where: str, made_for: str, serial: str, *, force: bool = False) -> None:
@@ -88,10 +69,12 @@ class Loaded:
         """The provenance of a map made from this run."""
         joined = self.joined
         if joined is None:
-            return of_files(self.run.serial, self.files, "in the same file", made_s=made_s)
+            return provenance_of(self.run.serial, self.files, "in the same file", made_s=made_s)
         reference = f"{joined.reference.name} {joined.reference.sensor}".strip()
         mounting, alignment = joined.reference.mounting.facts(), asdict(joined.alignment)
-        return of_files(self.run.serial, self.files, reference, made_s=made_s, mounting=mounting, alignment=alignment)
+        return provenance_of(
+            self.run.serial, self.files, reference, made_s=made_s, mounting=mounting, alignment=alignment
+        )
 
     def facts(self) -> dict[str, Any]:
         """Results of joining, as JSON types; empty for an .npz."""

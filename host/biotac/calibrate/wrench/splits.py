@@ -49,11 +49,11 @@ class Blocks:
         self.contacts = 0
         self.whole_contacts = 0
         if contact is not None:
-            names, of = np.unique(contact, return_inverse=True)
+            names, number = np.unique(contact, return_inverse=True)
             self.contacts = len(names)
             # shuffled: if contacts are numbered along the finger, a block must not be one region
             order = np.random.default_rng(0).permutation(len(names))
-            block_of = (order % BLOCKS)[of.reshape(-1)]
+            block_of = (order % BLOCKS)[number.reshape(-1)]
             self.strips = [
                 np.flatnonzero(block_of == k // 3) if k % 3 == 1 else np.zeros(0, dtype=np.intp)
                 for k in range(3 * BLOCKS)

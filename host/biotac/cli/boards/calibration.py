@@ -24,16 +24,17 @@ EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
 run = subverbs.run
 
 
-def _write(hand: Hand, finger: int, its: Calibration, force: bool) -> None:
-    hand.set_calibration(finger, replace(its, serial="") if force else its)
+def _write(hand: Hand, finger: int, calibration: Calibration, force: bool) -> None:
+    hand.set_calibration(finger, replace(calibration, serial="") if force else calibration)
 
 
-def _title(its: Calibration) -> str:
-    return f"for {f'sensor {its.serial}' if its.serial else 'any sensor'}, {made_text(its.made_s)}"
+def _title(calibration: Calibration) -> str:
+    sensor = f"sensor {calibration.serial}" if calibration.serial else "any sensor"
+    return f"for {sensor}, {made_text(calibration.made_s)}"
 
 
-def _lines(its: Calibration) -> list[str]:
-    return [f"  {setting_text(setting, value)}" for setting, value in its.settings().items()]
+def _lines(calibration: Calibration) -> list[str]:
+    return [f"  {setting_text(setting, value)}" for setting, value in calibration.settings().items()]
 
 
 CALIBRATION = subverbs.Kept(
@@ -42,7 +43,7 @@ CALIBRATION = subverbs.Kept(
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the subverbs, each with its own arguments."""
+    """Add the subverbs, each with calibration own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     add = partial(subverbs.add, what, "calibration")
 
@@ -68,20 +69,21 @@ def _add_eeprom(parser: argparse.ArgumentParser, *, required: bool) -> None:
 
 
 def _store(args: argparse.Namespace) -> None:
-    its = file.load(args.file) if args.file else file.loads(sys.stdin.read(), "standard input")
+    calibration = file.load(args.file) if args.file else file.loads(sys.stdin.read(), "standard input")
     with Chip(args.i2c, args.chip) as chip:
-        written = eeprom.store(chip, its)
-    CALIBRATION.say(args, f"EEPROM {args.i2c}", its, more=f", {'stored' if written else 'which it held already'}")
+        written = eeprom.store(chip, calibration)
+    more = ", stored" if written else ", which it held already"
+    CALIBRATION.say(args, f"EEPROM {args.i2c}", calibration, more=more)
 
 
 def _load(args: argparse.Namespace) -> None:
     with Chip(args.i2c, args.chip) as chip:
-        its = eeprom.load(chip)
+        calibration = eeprom.load(chip)
     source = {"from": f"EEPROM {args.i2c}"}
     if args.file is None:
-        print(file.dumps(its, {"software": f"biotac-gateway {__version__}", **source}), end="")
+        print(file.dumps(calibration, {"software": f"biotac-gateway {__version__}", **source}), end="")
     else:
-        CALIBRATION.save(args, its, source)
+        CALIBRATION.save(args, calibration, source)
 
 
 def _show(args: argparse.Namespace) -> None:
@@ -91,8 +93,8 @@ def _show(args: argparse.Namespace) -> None:
         if args.chip is None:
             raise InputError(f"--i2c {args.i2c} needs --chip; expected one of {', '.join(KINDS)}")
         with Chip(args.i2c, args.chip) as chip:
-            its = eeprom.load(chip)
-        CALIBRATION.say(args, f"EEPROM {args.i2c}", its, whole=True)
+            calibration = eeprom.load(chip)
+        CALIBRATION.say(args, f"EEPROM {args.i2c}", calibration, whole=True)
     elif Path(args.where).is_file() or args.where.endswith(".json"):
         CALIBRATION.say(args, args.where, file.load(Path(args.where)), whole=True)
     else:

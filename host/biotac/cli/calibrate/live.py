@@ -12,7 +12,7 @@ import biotac
 from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
 from ...calibrate.reference.samples import Reader
-from ...calibrate.wrench.guided import Places, Procedure, walk
+from ...calibrate.wrench.guided import Files, Procedure, walk
 from ...calibrate.wrench.sources import check_serial
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
@@ -25,15 +25,15 @@ from ..progress import Progress
 EMULATED = "nano17"
 
 
-def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Places, list[str]]:
-    """Guide through the procedure; return the files, and what is missing in words.
+def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Files, list[str]]:
+    """Guide through the procedure; return the files, and what is missing.
 
     Raises KeyboardInterrupt, with a message, if it was ended before there was anything to fit.
     """
     serial = ascii_text(hand.sensor_info(finger).serial)
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
     name = serial or f"finger{finger}"
-    places = Places(args.out / f"{name}.mcap", args.out / f"{name}.csv")
+    files = Files(args.out / f"{name}.mcap", args.out / f"{name}.csv")
     progress = Progress()
 
     def show(event: str) -> None:
@@ -44,10 +44,10 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
         outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
-            walk(hand, reader, procedure, places, overwrite=args.force, show=show, progress=progress.show)
+            walk(hand, reader, procedure, files, overwrite=args.force, show=show, progress=progress.show)
         except BiotacError:
-            if places.recording.exists():
-                print(f"biotac: the recorded data is in {places.recording} and {places.reference}", file=sys.stderr)
+            if files.recording.exists():
+                print(f"biotac: the recorded data is in {files.recording} and {files.reference}", file=sys.stderr)
             raise
         finally:
             progress.done()
@@ -56,10 +56,10 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
         print(f"biotac: reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad", file=sys.stderr)
     if procedure.zero is None:
         raise KeyboardInterrupt(
-            f"ended while {procedure.last_step.value.partition(':')[0]}; the recorded data is in {places.recording} "
-            f"and {places.reference}"
+            f"ended while {procedure.last_step.value.partition(':')[0]}; the recorded data is in {files.recording} "
+            f"and {files.reference}"
         )
-    return places, procedure.coverage.missing()
+    return files, procedure.coverage.missing()
 
 
 def open_board(args: argparse.Namespace) -> biotac.Hand:

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from ...calibrate.press import few_shot, known_force, pressure, pressure_procedu
 from ...calibrate.press.detector import MAX_N, Phase, Step
 from ...calibrate.press.force_source import Truth, load_csv
 from ...calibrate.reference.scale import UNITS_N, Scale
-from ...calibrate.wrench.sources import Provenance
 from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.hand import Hand
@@ -248,8 +247,9 @@ def _fit_map(args: argparse.Namespace, loads: _Loads, held: known_force.Held, se
     }
     if args.out is not None:
         how = f"{len(held.force_n)} {loads.how}; population map from {trained.fingers}"
-        origin = Provenance(serial, made_s, trained.provenance.get("software", ""), (args.where,), "", how)
-        text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=asdict(origin))
+        software = trained.provenance.get("software", "")
+        origin = {"serial": serial, "made_s": made_s, "software": software, "files": [args.where], "reference": how}
+        text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=origin)
         with whole(args.out, overwrite=args.force) as path:
             path.write_text(text, encoding="utf-8")
         facts["written"] = str(args.out)

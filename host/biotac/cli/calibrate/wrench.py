@@ -7,7 +7,7 @@ import contextlib
 import json
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +19,19 @@ from ...calibrate.reference.mounting import read_mounting
 from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
 from ...calibrate.wrench.joined import choose_finger
-from ...calibrate.wrench.sources import Loaded, Provenance, check_serial, load
+from ...calibrate.wrench.sources import Loaded, check_serial, load
 from ...calibrate.wrench.upload import upload
+from ...documents import Provenance, made_text
 from ...errors import InputError
-from ...map import file
 from ...map.bound import summary, summary_text
+from ...map.file import dumps_fitted
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
 from ...wire.identity import ascii_text
 from .. import outputs, values
 from ..progress import Progress
-from . import live as calibrate_live
+from . import live
 
 NAME = "wrench"
 HELP = (
@@ -61,13 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data from any other sensor")
     parser.add_argument("--force", action="store_true", help="overwrite existing files; accept another sensor's data")
-    live = parser.add_argument_group("guided, on a board")
-    live.add_argument(
+    guided = parser.add_argument_group("guided, on a board")
+    guided.add_argument(
         "--live", metavar="PORT", help="guided: warm up, tare, load everywhere, fit, upload; Ctrl-C ends the loading"
     )
-    live.add_argument("--upload", metavar="PORT", help="upload the map fitted from FILE to this board's finger")
-    live.add_argument("--no-upload", action="store_true", help="with --live: leave the board as it is")
-    live.add_argument("--save", action="store_true", help="save the map on the board, so that it survives a restart")
+    guided.add_argument("--upload", metavar="PORT", help="upload the map fitted from FILE to this board's finger")
+    guided.add_argument("--no-upload", action="store_true", help="with --live: leave the board as it is")
+    guided.add_argument("--save", action="store_true", help="save the map on the board, so that it survives a restart")
     parser.add_argument(
         "--as-recorded", action="store_true", help="do not correct the lag of counts after force, do not smooth counts"
     )
@@ -85,15 +86,13 @@ def run(args: argparse.Namespace) -> int:
         _check_out(args.out, args.files, overwrite=args.force)
     references = _references(args.files, args.reference)
     mounting = None if args.mounting is None else read_mounting(args.mounting)
-    finger = args.finger
     for path in args.files:
         reference = references.get(path)
         beside = None if reference is None else (Path(reference), read_reference(reference, mounting))
-        loaded = load(path, beside, finger=finger, serial=args.serial, force=args.force)
-        validation, its, facts = _fit(args, loaded)
+        calibrated = _fit(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
         if args.upload is not None:
-            facts["board"] = _upload(args, finger, loaded, validation, its)
-        _tell(args, facts)
+            _upload_to_port(args, calibrated)
+        _print(args, calibrated.facts)
     return 0
 
 
@@ -102,56 +101,75 @@ def _live(args: argparse.Namespace) -> int:
         raise InputError("--live calibrates one finger: expected --finger NAME")
     if args.out is None:
         raise InputError("--live saves its recording: expected --out FOLDER")
-    finger = args.finger
-    with calibrate_live.open_board(args) as hand:
-        if finger not in hand.fingers:
-            raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; check its cable")
-        places, missing = calibrate_live.record(args, hand, finger)
+    with live.open_board(args) as hand:
+        if args.finger not in hand.fingers:
+            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; check its cable")
+        files, missing = live.record(args, hand, args.finger)
         for line in missing:
             print(f"biotac: not covered: {line}", file=sys.stderr)
         if not args.force:
-            _check_out(args.out, [places.recording], overwrite=False)
-        loaded = load(places.recording, (places.reference, read_reference(str(places.reference))), finger=finger)
-        validation, its, facts = _fit(args, loaded)
+            _check_out(args.out, [files.recording], overwrite=False)
+        reference = files.reference, read_reference(str(files.reference))
+        calibrated = _fit(args, load(files.recording, reference, finger=args.finger))
         if not args.no_upload:
-            facts["board"] = _put(args, hand, finger, loaded, validation, its)
-        _tell(args, facts | {"not_covered": missing})
+            _upload(args, hand, args.finger, calibrated)
+        _print(args, calibrated.facts | {"not_covered": missing})
     return 0
 
 
-def _upload(
-    args: argparse.Namespace, finger: int | None, loaded: Loaded, validation: Validation, its: Provenance
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Calibrated:
+    """A fitted run, where its map comes from, and all findings as JSON types."""
+
+    loaded: Loaded
+    validation: Validation
+    provenance: Provenance
+    facts: dict[str, Any]
+
+
+def _fit(args: argparse.Namespace, loaded: Loaded) -> _Calibrated:
+    """Fit, and write the files first: they are safe whatever happens on the board afterwards."""
+    progress = Progress()
+    try:
+        run, others = loaded.run, None
+        if args.population != "none":
+            trained = population_map.load(None if args.population is None else Path(args.population))
+            others, note = trained.others_than(loaded.files)
+            run = replace(run, notes=(*run.notes, note))
+        # data aligned by their own times leave no lag to search for
+        align = not args.as_recorded and not run.by_clocks
+        windows = (1,) if args.as_recorded else WINDOWS_ROWS
+        validation = validate(run, align=align, windows=windows, others=others, show=progress.show)
+    finally:
+        progress.done()
+    provenance = loaded.provenance(int(time.time()))
+    facts = figures.summary(validation) | loaded.facts() | {key: provenance[key] for key in ("serial", "data_sha256")}
+    facts["fixed_point"] = summary(validation.wrench_map, run.counts, run.pdc)
+    if args.out is not None:
+        written = _write(validation, provenance, loaded.files[0], args.out, overwrite=args.force)
+        facts["written"] = [str(path) for path in written]
+    return _Calibrated(loaded, validation, provenance, facts)
+
+
+def _upload_to_port(args: argparse.Namespace, calibrated: _Calibrated) -> None:
     with biotac.open(args.upload) as hand:
+        finger, joined = args.finger, calibrated.loaded.joined
         if finger is None:
-            known = loaded.joined
-            finger = known.finger if known is not None else choose_finger(args.upload, hand.fingers, None)
+            finger = joined.finger if joined is not None else choose_finger(args.upload, hand.fingers, None)
         serial = ascii_text(hand.sensor_info(finger).serial)
-        check_serial(f"{loaded.run.name}", its.serial, serial, force=args.force)
-        return _put(args, hand, finger, loaded, validation, its)
+        check_serial(calibrated.loaded.run.name, calibrated.provenance["serial"], serial, force=args.force)
+        _upload(args, hand, finger, calibrated)
 
 
-def _put(
-    args: argparse.Namespace,
-    hand: biotac.Hand,
-    finger: int,
-    loaded: Loaded,
-    validation: Validation,
-    its: Provenance,
-) -> dict[str, Any]:
+def _upload(args: argparse.Namespace, hand: biotac.Hand, finger: int, calibrated: _Calibrated) -> None:
+    run, origin = calibrated.loaded.run, calibrated.provenance
+    fitted = calibrated.validation.wrench_map
     found = upload(
-        hand,
-        finger,
-        validation.wrench_map,
-        loaded.run.counts,
-        loaded.run.pdc,
-        serial=its.serial,
-        made_s=its.made_s,
-        force=args.force,
+        hand, finger, fitted, run.counts, run.pdc, serial=origin["serial"], made_s=origin["made_s"], force=args.force
     )
     if args.save:
         hand.save_settings()
-    return found | {"saved": args.save}
+    calibrated.facts["board"] = found | {"saved": args.save}
 
 
 def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
@@ -163,64 +181,45 @@ def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
     return dict(zip(recordings, references, strict=False))
 
 
-def _fit(args: argparse.Namespace, loaded: Loaded) -> tuple[Validation, Provenance, dict[str, Any]]:
-    """Fit, and write the files first: they are safe whatever happens on the board afterwards."""
-    progress = Progress()
-    try:
-        windows = (1,) if args.as_recorded else WINDOWS_ROWS
-        # data aligned by their own times leave no lag to search for
-        its_own_lag = not args.as_recorded and not loaded.run.by_clocks
-        run, others = loaded.run, None
-        if args.population != "none":
-            trained = population_map.load(None if args.population is None else Path(args.population))
-            others, note = trained.others_than(loaded.files)
-            run = replace(run, notes=(*run.notes, note))
-        validation = validate(run, align=its_own_lag, windows=windows, others=others, show=progress.show)
-    finally:
-        progress.done()
-    its = loaded.provenance(int(time.time()))
-    facts = figures.summary(validation) | loaded.facts() | {"serial": its.serial, "data_sha256": its.data_sha256}
-    facts["fixed_point"] = summary(validation.wrench_map, validation.run.counts, validation.run.pdc)
-    if args.out is not None:
-        places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
-        facts["written"] = [str(place) for place in places]
-    return validation, its, facts
+# ---- files and text ----------------------------------------------------------------------------
 
 
-def _tell(args: argparse.Namespace, facts: dict[str, Any]) -> None:
-    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
-
-
-def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
+def _outputs(folder: Path, path: Path) -> tuple[Path, Path, Path]:
     return folder / f"{path.stem}.md", folder / f"{path.stem}.png", folder / f"{path.stem}.wrench.json"
 
 
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     check_drawable()
-    outputs.check(folder, [place for path in files for place in _places(folder, path)], overwrite=overwrite)
+    outputs.check(folder, [out for path in files for out in _outputs(folder, path)], overwrite=overwrite)
     outputs.make_folder(folder)
 
 
-def _write(validation: Validation, its: Provenance, path: Path, folder: Path, *, overwrite: bool) -> tuple[Path, ...]:
-    page, picture, its_map = places = _places(folder, path)
+def _write(
+    validation: Validation, origin: Provenance, path: Path, folder: Path, *, overwrite: bool
+) -> tuple[Path, ...]:
+    written = _outputs(folder, path)
     with contextlib.ExitStack() as stack:
-        parts = [stack.enter_context(whole(place, overwrite=overwrite)) for place in (page, picture, its_map)]
-        parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
-        with drawn(parts[1]) as figure:
+        page, picture, map_file = (stack.enter_context(whole(out, overwrite=overwrite)) for out in written)
+        page.write_text(report.markdown(validation, written[1].name) + _origin(origin), encoding="utf-8")
+        with drawn(picture) as figure:
             report.draw(validation, figure)
-        text = file.dumps_fitted(validation.wrench_map, serial=its.serial, made_s=its.made_s, provenance=asdict(its))
-        parts[2].write_text(text, encoding="utf-8")
-    return places
+        text = dumps_fitted(validation.wrench_map, serial=origin["serial"], made_s=origin["made_s"], provenance=origin)
+        map_file.write_text(text, encoding="utf-8")
+    return written
 
 
-def _origin(its: Provenance) -> str:
+def _origin(origin: Provenance) -> str:
     rows = [
-        ("sensor", its.serial or "not stated in the recording"),
-        ("made", f"{its.made}, {its.software}"),
-        ("data", f"{', '.join(its.files)}, SHA-256 {its.data_sha256}"),
-        ("reference", its.reference),
+        ("sensor", origin["serial"] or "not stated in the recording"),
+        ("software", f"{origin['software']}, {made_text(origin['made_s'])}"),
+        ("data", f"{', '.join(origin['files'])}, SHA-256 {origin['data_sha256']}"),
+        ("reference", origin["reference"]),
     ]
     return "\n".join(["", "## Provenance", "", *[f"* {name}: {what}" for name, what in rows], ""])
+
+
+def _print(args: argparse.Namespace, facts: dict[str, Any]) -> None:
+    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
 
 
 def _lines(facts: dict[str, Any]) -> list[str]:
@@ -246,19 +245,19 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         f"  untouched:              {numbers(facts['rest_n'][:1])} N",
         f"  {summary_text(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
-        *[f"  written: {place}" for place in facts.get("written", [])],
+        *[f"  written: {path}" for path in facts.get("written", [])],
         *(_board_lines(facts["board"]) if "board" in facts else []),
     ]
 
 
-def _board_lines(its: dict[str, Any]) -> list[str]:
-    torque = "" if its["torque_nmm_max"] is None else f", {its['torque_nmm_max']:.4f} N mm"
-    kept = "survives a restart" if its["saved"] else "until it restarts; --save keeps it"
-    sent = f"all {its['frames_bit_for_bit']} frames it then sent match its map bit for bit"
-    if not its["frames_bit_for_bit"]:
+def _board_lines(found: dict[str, Any]) -> list[str]:
+    torque = "" if found["torque_nmm_max"] is None else f", {found['torque_nmm_max']:.4f} N mm"
+    kept = "survives a restart" if found["saved"] else "until it restarts; --save keeps it"
+    sent = f"all {found['frames_bit_for_bit']} frames it then sent match its map bit for bit"
+    if not found["frames_bit_for_bit"]:
         sent = "it sent no frame to compare: the simulated finger's script had ended"
     return [
-        f"  on the board, {kept}: {its['bytes']} bytes, read back identical",
-        f"  its code on {its['rows']} recorded rows: within {its['force_mn_max']:.3f} mN{torque} of the float model",
+        f"  on the board, {kept}: {found['bytes']} bytes, read back identical",
+        f"  its code on {found['rows']} recorded rows: within {found['force_mn_max']:.3f} mN{torque} of the fit",
         f"  {sent}",
     ]
