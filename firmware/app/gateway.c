@@ -10,6 +10,8 @@
 
 #include "version.h"
 
+#include <string.h>
+
 _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS
                    && BT_CALIBRATION_RECORD_BYTES <= BT_STORAGE_MAX_BYTES,
                "every finger's calibration must have a record of its own, and fit it");
@@ -26,33 +28,58 @@ _Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES,
 // the alarm's time had passed by then, the first slot and its frame's time would be late.
 #define START_AHEAD_US (BT_GAP_US + 50)
 
-static const bt_flash flash = {
-    .erase = port_flash_erase,
-    .program = port_flash_program,
-    .read = port_flash_read,
-};
+// ---- the port, as the core asks for it: the context of the session is the gateway, that of the flash the
+// port
+
+static bool erase_sector(void *port, uint32_t sector_offset)
+{
+    return port_flash_erase(port, sector_offset);
+}
+
+static bool program_page(void *port, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
+{
+    return port_flash_program(port, page_offset, page);
+}
+
+static void read_flash(void *port, uint32_t offset, uint8_t *data, size_t bytes)
+{
+    port_flash_read(port, offset, data, bytes);
+}
 
 // Maps follow the settings in flash.
-static bool erase_map_sector(uint32_t sector_offset)
+static bool erase_map_sector(void *port, uint32_t sector_offset)
 {
-    return port_flash_erase(BT_STORAGE_BYTES + sector_offset);
+    return port_flash_erase(port, BT_STORAGE_BYTES + sector_offset);
 }
 
-static bool program_map_page(uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
+static bool program_map_page(void *port, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
 {
-    return port_flash_program(BT_STORAGE_BYTES + page_offset, page);
+    return port_flash_program(port, BT_STORAGE_BYTES + page_offset, page);
 }
 
-static uint8_t store(uint16_t id, uint16_t version, const uint8_t *record, size_t bytes)
+static bool write_link(void *context, const uint8_t *data, size_t bytes)
 {
-    return bt_storage_write(&flash, id, version, record, bytes) ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
+    const bt_gateway *gateway = context;
+    return port_link_write(gateway->port, data, bytes);
 }
 
-static uint8_t save_settings(const bt_settings *settings)
+static uint32_t now_us(void *context)
+{
+    const bt_gateway *gateway = context;
+    return port_now_us(gateway->port);
+}
+
+static uint8_t store(const bt_gateway *gateway, uint16_t id, uint16_t version, const uint8_t *record,
+                     size_t bytes)
+{
+    return bt_storage_write(&gateway->flash, id, version, record, bytes) ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
+}
+
+static uint8_t save_settings(void *context, const bt_settings *settings)
 {
     uint8_t record[BT_SETTINGS_RECORD_BYTES];
     bt_settings_pack(settings, record);
-    return store(BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
+    return store(context, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
 }
 
 static uint16_t calibration_id(uint8_t finger)
@@ -60,11 +87,11 @@ static uint16_t calibration_id(uint8_t finger)
     return (uint16_t)(BT_RECORD_CALIBRATION + finger);
 }
 
-static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
+static uint8_t save_calibration(void *context, uint8_t finger, const bt_calibration *calibration)
 {
     uint8_t record[BT_CALIBRATION_RECORD_BYTES];
     size_t bytes = bt_calibration_pack(calibration, record);
-    return store(calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes);
+    return store(context, calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes);
 }
 
 static uint16_t map_id(uint8_t finger)
@@ -72,33 +99,38 @@ static uint16_t map_id(uint8_t finger)
     return (uint16_t)(BT_RECORD_MAP + finger);
 }
 
-static uint8_t save_map(uint8_t finger, const bt_map_place *place)
+static uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
 {
     uint8_t record[BT_MAP_RECORD_BYTES];
     size_t bytes = bt_map_place_pack(place, record);
-    return store(map_id(finger), BT_MAP_RECORD_VERSION, record, bytes);
+    return store(context, map_id(finger), BT_MAP_RECORD_VERSION, record, bytes);
 }
 
-static uint8_t reboot_bootloader(void)
+static uint8_t reboot_bootloader(void *context)
 {
-    return port_reboot_bootloader() ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
+    const bt_gateway *gateway = context;
+    return port_reboot_bootloader(gateway->port) ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
 }
 
-static void load_settings(bt_session *session)
+// ------------------------------------------------------------------------------------------------------
+
+static void load_settings(bt_gateway *gateway)
 {
-    session->faults |= bt_storage_damaged(&flash) ? BT_FAULT_FLAG_STORAGE : 0;
+    bt_session *session = &gateway->session;
+    const bt_flash *flash = &gateway->flash;
+    session->faults |= bt_storage_damaged(flash) ? BT_FAULT_FLAG_STORAGE : 0;
     uint8_t record[BT_STORAGE_MAX_BYTES];
     uint16_t version;
-    int bytes = bt_storage_read(&flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
+    int bytes = bt_storage_read(flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
     if (bytes > 0) {
         bt_settings_unpack(&session->settings, version, record, (size_t)bytes);
     }
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bytes = bt_storage_read(&flash, calibration_id(f), &version, record, sizeof record);
+        bytes = bt_storage_read(flash, calibration_id(f), &version, record, sizeof record);
         if (bytes > 0) {
             bt_calibration_unpack(&session->calibration[f], version, record, (size_t)bytes);
         }
-        bytes = bt_storage_read(&flash, map_id(f), &version, record, sizeof record);
+        bytes = bt_storage_read(flash, map_id(f), &version, record, sizeof record);
         if (bytes > 0
             && !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record,
                                    (size_t)bytes)) {
@@ -111,14 +143,15 @@ static void load_settings(bt_session *session)
 // A slower UART is not used: one FRAME would take longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
 
-static void start_uart(const bt_settings *settings)
+static void start_uart(const bt_gateway *gateway)
 {
+    const bt_settings *settings = &gateway->session.settings;
     int32_t bits_per_s = bt_settings_get(settings, BT_SETTING_UART_BITS_PER_S);
     uint32_t pins = (uint32_t)bt_settings_get(settings, BT_SETTING_UART_PINS);
-    port_link_uart(bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s, pins);
+    port_link_uart(gateway->port, bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s, pins);
 }
 
-void bt_gateway_init(bt_gateway *gateway)
+void bt_gateway_init(bt_gateway *gateway, bt_port *port)
 {
     const bt_board_actions actions = {
         .save_settings = save_settings,
@@ -126,41 +159,48 @@ void bt_gateway_init(bt_gateway *gateway)
         .save_map = save_map,
         .reboot_bootloader = reboot_bootloader,
         .maps = &gateway->map_flash,
-        .now_us = port_now_us,
+        .now_us = now_us,
     };
-    gateway->map_flash =
-        (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps(), gateway->map_ram};
+    gateway->port = port;
+    gateway->flash =
+        (bt_flash){.context = port, .erase = erase_sector, .program = program_page, .read = read_flash};
+    gateway->map_flash = (bt_map_flash){.context = port,
+                                        .erase = erase_map_sector,
+                                        .program = program_map_page,
+                                        .bytes = port_flash_maps(port),
+                                        .ram = gateway->map_ram};
+    const port_identity board = port_identify(port);
     bt_identity identity = {
-        .board = port_board(),
+        .board = board.board,
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
-        .boot_id = port_boot_id(),
-        .image_crc32 = port_image_crc32(),
+        .boot_id = board.boot_id,
+        .image_crc32 = board.image_crc32,
     };
-    port_board_serial(identity.board_serial);
-    port_delay_us(BT_POWER_ON_MS * 1000);
-    bt_session_init(&gateway->session, &identity, port_link_write, port_now_us());
+    memcpy(identity.board_serial, board.serial, sizeof identity.board_serial);
+    port_delay_us(port, BT_POWER_ON_MS * 1000);
+    bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
-    gateway->session.faults |= port_started_by();
+    gateway->session.faults |= board.started_by;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_properties_read(f, &gateway->session.info[f]);
+        bt_properties_read(port, f, &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
         if (!gateway->session.info[f].present) {
             bt_sensors_doubt(&gateway->session, f);
         }
     }
-    load_settings(&gateway->session); // only now is it known which sensors a calibration can be for
-    start_uart(&gateway->session.settings);
+    load_settings(gateway); // only now is it known which sensors a calibration can be for
+    start_uart(gateway);
     gateway->round_open = false;
     gateway->link_was_up = false;
     // Absent sensors are read too: one that is plugged in later shows up by itself.
-    uint32_t start_us = port_now_us() + START_AHEAD_US;
-    bt_sampler_start(&gateway->sampler, ALL_FINGERS, start_us);
-    port_alarm_at(start_us);
+    uint32_t start_us = port_now_us(port) + START_AHEAD_US;
+    bt_sampler_start(&gateway->sampler, port, ALL_FINGERS, start_us);
+    port_alarm_at(port, start_us);
 }
 
 bool bt_gateway_alarm(bt_gateway *gateway)
 {
-    port_alarm_at(bt_sampler_alarm(&gateway->sampler));
+    port_alarm_at(gateway->port, bt_sampler_alarm(&gateway->sampler));
     return !gateway->sampler.commanded;
 }
 
@@ -235,14 +275,14 @@ void bt_gateway_poll(bt_gateway *gateway)
     bt_session *session = &gateway->session;
     uint8_t bytes[64];
     size_t n;
-    bool up = port_link_up();
+    bool up = port_link_up(gateway->port);
     if (gateway->link_was_up && !up) {
         bt_session_link_down(session);
     }
     gateway->link_was_up = up;
     // One bufferful per turn: a host that floods the link must not starve the slots.
-    if ((n = port_link_read(bytes, sizeof bytes)) > 0) {
-        bt_session_receive(session, bytes, n, port_now_us());
+    if ((n = port_link_read(gateway->port, bytes, sizeof bytes)) > 0) {
+        bt_session_receive(session, bytes, n, port_now_us(gateway->port));
     }
     // At most a round's worth: a main loop that is behind must still hear the host and feed the watchdog.
     bt_slot slot;
@@ -253,5 +293,5 @@ void bt_gateway_poll(bt_gateway *gateway)
         session->slots_late = gateway->sampler.late;
         session->faults |= BT_FAULT_FLAG_SLOTS_LATE;
     }
-    bt_session_tick(session, port_now_us());
+    bt_session_tick(session, port_now_us(gateway->port));
 }

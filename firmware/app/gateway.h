@@ -2,12 +2,15 @@
 #ifndef BIOTAC_GATEWAY_H
 #define BIOTAC_GATEWAY_H
 
+#include "port.h"
 #include "sampler.h"
 #include "talk/session.h"
 
 typedef struct {
+    bt_port *port;
     bt_sampler sampler;
     bt_session session;
+    bt_flash flash;
     bt_map_flash map_flash;
     _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // maps in force
     uint32_t round;                                                // being assembled
@@ -16,7 +19,7 @@ typedef struct {
 } bt_gateway;
 
 // Wait for the sensors to power up, identify them, start sampling.
-void bt_gateway_init(bt_gateway *gateway);
+void bt_gateway_init(bt_gateway *gateway, bt_port *port);
 
 // Main loop: host bytes, finished slots, periodic work.
 void bt_gateway_poll(bt_gateway *gateway);

@@ -10,10 +10,10 @@ bool bt_port_alarm(void)
 
 int main(int argc, char **argv)
 {
-    port_init(argc, argv);
-    bt_gateway_init(&gateway);
+    bt_port *port = port_init(argc, argv);
+    bt_gateway_init(&gateway, port);
     for (;;) {
         bt_gateway_poll(&gateway);
-        port_idle();
+        port_idle(port);
     }
 }

@@ -7,79 +7,85 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// A board, as its port defines it. Most ports know only one and ignore which they are asked for
+// (only_board.h); a program may hold several of Linux's (host/binding/sbc.c).
+typedef struct bt_port bt_port;
+
 // Call once, before anything else. argc and argv are for boards that have a command line.
-void port_init(int argc, char **argv);
+bt_port *port_init(int argc, char **argv);
 
 // ---- time -----------------------------------------------------------------------------------
-uint32_t port_now_us(void);
+uint32_t port_now_us(bt_port *port);
 
 // Busy wait: a few us between reads, and once the sensors' power-up time.
-void port_delay_us(uint32_t us);
+void port_delay_us(bt_port *port, uint32_t us);
 
 // Call bt_port_alarm() from interrupt context once `at_us` has come; replaces an earlier alarm.
-void port_alarm_at(uint32_t at_us);
+void port_alarm_at(bt_port *port, uint32_t at_us);
 
 // Defined by the app. Runs in interrupt context. True when the main loop has something to do.
 bool bt_port_alarm(void);
 
 // Sleep until an interrupt may have brought work.
-void port_idle(void);
+void port_idle(bt_port *port);
 
 // ---- SPI ------------------------------------------------------------------------------------
 // Pull low the chip selects of the sensors in mask, release all others. The board's pins.h says how long to
 // wait before and after a word; when this returns, a word may be sent.
-void port_spi_select(uint8_t mask);
+void port_spi_select(bt_port *port, uint8_t mask);
 
 // Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
-uint16_t port_spi_transfer16(uint16_t mosi);
+uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi);
 
 // The same with 8 bits: a property's bytes come one by one.
-uint8_t port_spi_transfer8(uint8_t mosi);
+uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi);
 
 // Begin a whole slot, if the board's hardware can do it: the command to the sensors of mask at once,
 // BT_SETTLE_US later BT_LISTEN_WORD to each of them, BT_GAP_US apart. Returns after how many us it is over
 // and port_spi_slot_end may be called; 0 if the core must do it word by word (spi_word_by_word.h).
-uint32_t port_spi_slot_begin(uint16_t command, uint8_t mask);
+uint32_t port_spi_slot_begin(bt_port *port, uint16_t command, uint8_t mask);
 
 // The sensors' answers: BT_MAX_FINGERS words; 0 for sensors not in mask, and for all if a word was late.
-void port_spi_slot_end(uint16_t *word);
+void port_spi_slot_end(bt_port *port, uint16_t *word);
 
 // ---- link to the host -----------------------------------------------------------------------
 // Takes all bytes or none; false: no room, or no host.
-bool port_link_write(const uint8_t *data, size_t bytes);
+bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes);
 
 // Returns how many bytes came, 0 when none did.
-size_t port_link_read(uint8_t *data, size_t bytes);
+size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes);
 
 // True if a host has the port open (DTR), or there is a UART. False once when one takes over from the other.
-bool port_link_up(void);
+bool port_link_up(bt_port *port);
 
 // Call once: a UART to use while no host has the port open, in bits per second, 0 for none, and an enum
 // bt_uart_pins. Does nothing on a board without a UART.
-void port_link_uart(uint32_t bits_per_s, uint32_t pins);
+void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins);
 
 // ---- flash for settings and maps ------------------------------------------------------------
 // Storage for the core, as one run of bytes: settings (keep/storage.h), then the slots for maps (map/store.h,
 // which has the total). The port decides where in which chip it lies. Erasing and programming may hold off
 // interrupts for up to 0.4 s, and return false if the flash failed.
-bool port_flash_erase(uint32_t sector_offset);
-bool port_flash_program(uint32_t page_offset, const uint8_t *page);
-void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes);
+bool port_flash_erase(bt_port *port, uint32_t sector_offset);
+bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page);
+void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes);
 
 // The slots for maps as memory, which changes as they are erased and programmed. Aligned to 4 bytes.
-const uint8_t *port_flash_maps(void);
+const uint8_t *port_flash_maps(bt_port *port);
 
 // Enter the bootloader as soon as what was written to the link is out, or after a short while. False if this
 // board has none.
-bool port_reboot_bootloader(void);
+bool port_reboot_bootloader(bt_port *port);
 
 // ---- identity -------------------------------------------------------------------------------
 #define PORT_SERIAL_BYTES 12
-uint16_t port_board(void); // enum bt_board
-void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES]);
-uint32_t port_boot_id(void);    // random at each boot
-uint16_t port_started_by(void); // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
-// CRC-32 of the image that runs, read where it is stored; 0xFFFFFFFF where there is no image.
-uint32_t port_image_crc32(void);
+typedef struct {
+    uint16_t board; // enum bt_board
+    uint8_t serial[PORT_SERIAL_BYTES];
+    uint32_t boot_id;     // random at each boot
+    uint16_t started_by;  // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
+    uint32_t image_crc32; // of the image that runs, read where it is stored; 0xFFFFFFFF where there is none
+} port_identity;
+port_identity port_identify(bt_port *port);
 
 #endif

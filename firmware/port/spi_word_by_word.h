@@ -4,16 +4,15 @@
 
 #include "port.h"
 
-uint32_t port_spi_slot_begin(uint16_t command, uint8_t mask)
+uint32_t port_spi_slot_begin(bt_port *port, uint16_t command, uint8_t mask)
 {
-    (void)command;
-    (void)mask;
+    (void)port, (void)command, (void)mask;
     return 0;
 }
 
-void port_spi_slot_end(uint16_t *word)
+void port_spi_slot_end(bt_port *port, uint16_t *word)
 {
-    (void)word;
+    (void)port, (void)word;
 }
 
 #endif

@@ -1,6 +1,5 @@
 #include "properties.h"
 
-#include "port.h"
 #include "wire/sensor_gen.h"
 
 #include <string.h>
@@ -12,16 +11,16 @@
 #define QUERY_STEPS   (1 + VERSION_BYTES + 2 * (1 + BT_SERIAL_CHARS))
 _Static_assert(QUERY_STEPS <= BT_SLOTS, "one round must suffice to ask");
 
-bool bt_property_step(bt_property *property, uint8_t finger)
+bool bt_property_step(bt_property *property, bt_port *port, uint8_t finger)
 {
-    port_spi_select((uint8_t)(1u << finger));
+    port_spi_select(port, (uint8_t)(1u << finger));
     if (!property->asked) {
         property->asked = true;
-        (void)port_spi_transfer16((uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | property->selector));
+        (void)port_spi_transfer16(port, (uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | property->selector));
     } else {
-        property->got[property->at++] = port_spi_transfer8(BT_LISTEN_WORD >> 8);
+        property->got[property->at++] = port_spi_transfer8(port, BT_LISTEN_WORD >> 8);
     }
-    port_spi_select(0);
+    port_spi_select(port, 0);
     return property->at == property->bytes;
 }
 
@@ -43,9 +42,9 @@ void bt_serial_query_begin(bt_serial_query *query)
     begin(&query->read[2], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
 }
 
-void bt_serial_query_step(bt_serial_query *query, uint8_t finger)
+void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger)
 {
-    if (query->whole < QUERY_READS && bt_property_step(&query->read[query->whole], finger)) {
+    if (query->whole < QUERY_READS && bt_property_step(&query->read[query->whole], port, finger)) {
         query->whole++;
     }
 }
@@ -81,21 +80,21 @@ bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERI
 
 // ---- all of them ------------------------------------------------------------------------------------
 
-static void read_once(uint8_t finger, bt_property *property, uint8_t selector, uint8_t bytes)
+static void read_once(bt_port *port, uint8_t finger, bt_property *property, uint8_t selector, uint8_t bytes)
 {
     begin(property, selector, bytes);
-    while (!bt_property_step(property, finger)) {
-        port_delay_us((property->at == 0 ? BT_SETTLE_US : BT_PROPERTY_GAP_US) + 1);
+    while (!bt_property_step(property, port, finger)) {
+        port_delay_us(port, (property->at == 0 ? BT_SETTLE_US : BT_PROPERTY_GAP_US) + 1);
     }
-    port_delay_us(BT_PROPERTY_GAP_US + 1);
+    port_delay_us(port, BT_PROPERTY_GAP_US + 1);
 }
 
-static bool read_alike(uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
+static bool read_alike(bt_port *port, uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
 {
     bt_property first, second;
     for (int k = 0; k < TRIES; k++) {
-        read_once(finger, &first, selector, (uint8_t)bytes);
-        read_once(finger, &second, selector, (uint8_t)bytes);
+        read_once(port, finger, &first, selector, (uint8_t)bytes);
+        read_once(port, finger, &second, selector, (uint8_t)bytes);
         if (memcmp(first.got, second.got, bytes) == 0 && first.got[0] != ERROR_HIGH && first.got[0] != 0xFF) {
             memcpy(out, first.got, bytes);
             return true;
@@ -105,33 +104,34 @@ static bool read_alike(uint8_t finger, uint8_t selector, uint8_t *out, size_t by
     return false;
 }
 
-static void read_text(uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
+static void read_text(bt_port *port, uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
 {
-    if (!read_alike(finger, selector, out, bytes) || !trim_text(out, (unsigned)bytes)) {
+    if (!read_alike(port, finger, selector, out, bytes) || !trim_text(out, (unsigned)bytes)) {
         memset(out, 0, bytes);
     }
 }
 
-static uint16_t read_number(uint8_t finger, uint8_t selector)
+static uint16_t read_number(bt_port *port, uint8_t finger, uint8_t selector)
 {
     uint8_t bytes[2];
-    (void)read_alike(finger, selector, bytes, sizeof bytes);
+    (void)read_alike(port, finger, selector, bytes, sizeof bytes);
     return (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-void bt_properties_read(uint8_t finger, bt_msg_sensor_info *info)
+void bt_properties_read(bt_port *port, uint8_t finger, bt_msg_sensor_info *info)
 {
     bt_property thrown_away;
     memset(info, 0, sizeof *info);
     info->finger = finger;
-    read_once(finger, &thrown_away, BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
-    read_text(finger, BT_PROPERTY_SERIAL, info->serial, sizeof info->serial);
+    read_once(port, finger, &thrown_away, BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
+    read_text(port, finger, BT_PROPERTY_SERIAL, info->serial, sizeof info->serial);
     info->present = trim_serial(info->serial);
     if (!info->present) {
         return;
     }
-    read_text(finger, BT_PROPERTY_SOFTWARE_VERSION, info->software_version, sizeof info->software_version);
-    read_text(finger, BT_PROPERTY_FLEX_VERSION, info->flex_version, sizeof info->flex_version);
-    info->cpu_khz = read_number(finger, BT_PROPERTY_CPU_SPEED);
-    info->sampling_hz = read_number(finger, BT_PROPERTY_SAMPLING_HZ);
+    read_text(port, finger, BT_PROPERTY_SOFTWARE_VERSION, info->software_version,
+              sizeof info->software_version);
+    read_text(port, finger, BT_PROPERTY_FLEX_VERSION, info->flex_version, sizeof info->flex_version);
+    info->cpu_khz = read_number(port, finger, BT_PROPERTY_CPU_SPEED);
+    info->sampling_hz = read_number(port, finger, BT_PROPERTY_SAMPLING_HZ);
 }

@@ -8,6 +8,7 @@
 #ifndef BIOTAC_PROPERTIES_H
 #define BIOTAC_PROPERTIES_H
 
+#include "port.h"
 #include "wire/messages_gen.h"
 
 #include <stdbool.h>
@@ -26,7 +27,7 @@ typedef struct {
 
 // One chip select period: sends the command, or reads the next byte. Returns true once all bytes are there.
 // Wait BT_SETTLE_US before the first byte and BT_PROPERTY_GAP_US before each other one.
-bool bt_property_step(bt_property *property, uint8_t finger);
+bool bt_property_step(bt_property *property, bt_port *port, uint8_t finger);
 
 // Asks for the serial number in at most as many steps as a round has slots, which the sampler's interrupt
 // takes instead of samples.
@@ -36,7 +37,7 @@ typedef struct {
 } bt_serial_query;
 
 void bt_serial_query_begin(bt_serial_query *query);
-void bt_serial_query_step(bt_serial_query *query, uint8_t finger);
+void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger);
 
 // The serial number, padded with zeros. Returns false if the two reads differ, or if it is not that of a
 // BioTac with 19 electrodes.
@@ -45,6 +46,6 @@ bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERI
 // Read all properties into info, before sampling begins; takes some 1.3 ms. present is 1 if there is a serial
 // number that begins with "BT", as SynTouch's own library requires, and is not that of a BioTac with 24
 // electrodes. A property that was not read twice alike in three tries is zero.
-void bt_properties_read(uint8_t finger, bt_msg_sensor_info *info);
+void bt_properties_read(bt_port *port, uint8_t finger, bt_msg_sensor_info *info);
 
 #endif

@@ -1,7 +1,5 @@
 #include "sampler.h"
 
-#include "port.h"
-
 #include <string.h>
 
 // port_now_us() truncates, so a minimum time needs one us more.
@@ -10,9 +8,10 @@
 _Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
                "ring indices wrap in a byte");
 
-void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us)
+void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us)
 {
     memset(sampler, 0, sizeof *sampler);
+    sampler->port = port;
     sampler->fingers = fingers;
     sampler->slot_start_us = start_us;
 }
@@ -97,24 +96,24 @@ static uint32_t command(bt_sampler *sampler)
     uint8_t code = bt_channel_command[bt_slot_channel[sampler->current.slot]];
     uint8_t mask = (uint8_t)(sampler->fingers & ~sampler->current.asked);
     sampler->commanded = true;
-    sampler->current.t_us = port_now_us();
-    uint32_t busy_us = port_spi_slot_begin((uint16_t)(code << 8), mask);
+    sampler->current.t_us = port_now_us(sampler->port);
+    uint32_t busy_us = port_spi_slot_begin(sampler->port, (uint16_t)(code << 8), mask);
     sampler->by_itself = busy_us != 0;
     if (sampler->by_itself) {
-        return port_now_us() + busy_us;
+        return port_now_us(sampler->port) + busy_us;
     }
-    port_spi_select(mask);
+    port_spi_select(sampler->port, mask);
     // All selected sensors drive MISO at once here, so what it carries means nothing.
-    (void)port_spi_transfer16((uint16_t)(code << 8));
-    port_spi_select(0);
-    return port_now_us() + SETTLE_TICKS_US;
+    (void)port_spi_transfer16(sampler->port, (uint16_t)(code << 8));
+    port_spi_select(sampler->port, 0);
+    return port_now_us(sampler->port) + SETTLE_TICKS_US;
 }
 
-static uint16_t read_one(uint8_t f)
+static uint16_t read_one(const bt_sampler *sampler, uint8_t f)
 {
-    port_spi_select((uint8_t)(1u << f));
-    uint16_t word = port_spi_transfer16(BT_LISTEN_WORD);
-    port_spi_select(0);
+    port_spi_select(sampler->port, (uint8_t)(1u << f));
+    uint16_t word = port_spi_transfer16(sampler->port, BT_LISTEN_WORD);
+    port_spi_select(sampler->port, 0);
     return word;
 }
 
@@ -122,7 +121,7 @@ static uint16_t read_one(uint8_t f)
 static void read_sensors(bt_sampler *sampler)
 {
     if (sampler->by_itself) {
-        port_spi_slot_end(sampler->current.word);
+        port_spi_slot_end(sampler->port, sampler->current.word);
     }
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bool asked = sampler->current.asked >> f & 1;
@@ -134,12 +133,12 @@ static void read_sensors(bt_sampler *sampler)
             continue;
         }
         if (asked) {
-            bt_serial_query_step(&sampler->query[f], f); // waits for its byte, but only rarely
+            bt_serial_query_step(&sampler->query[f], sampler->port, f); // waits for its byte, but only rarely
         } else {
-            sampler->current.word[f] = read_one(f);
+            sampler->current.word[f] = read_one(sampler, f);
         }
         if (sampler->fingers >> f != 1) { // not the last of them
-            port_delay_us(BT_GAP_US);
+            port_delay_us(sampler->port, BT_GAP_US);
         }
     }
 }
@@ -155,7 +154,7 @@ uint32_t bt_sampler_alarm(bt_sampler *sampler)
     advance(sampler);
     // An interrupt held off for longer than a slot loses slots, but not the time base. The next command must
     // not follow the last read sooner than the bus allows.
-    while ((int32_t)(sampler->slot_start_us - port_now_us()) <= BT_GAP_US) {
+    while ((int32_t)(sampler->slot_start_us - port_now_us(sampler->port)) <= BT_GAP_US) {
         count_late(sampler);
         advance(sampler);
     }

@@ -27,6 +27,7 @@ typedef struct {
 } bt_slot;
 
 typedef struct {
+    bt_port *port;
     uint8_t fingers; // bit mask of the sensors that are read
     bool commanded;  // the command is out, the reads are due
     bool by_itself;  // hardware does the slot under way (port_spi_slot_begin)
@@ -43,7 +44,7 @@ typedef struct {
 } bt_sampler;
 
 // The first slot begins at start_us. The caller arms the alarm for start_us.
-void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us);
+void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us);
 
 // Interrupt context: do what is due. Returns when to be called next; `commanded` is false when a slot is
 // over.

@@ -6,7 +6,7 @@
 
 #include "keep/storage.h"
 #include "loop.h"
-#include "port.h"
+#include "only_board.h"
 #include "rp2040_regs.h"
 #include "shifter.h"
 #include "system.h"
@@ -44,12 +44,12 @@ static void set_alarm(void)
             next = f;
         }
     }
-    port_alarm_at(next >= 0 ? settling[next].at_us : port_now_us() + HEARTBEAT_US);
+    port_alarm_at(ONLY_BOARD, next >= 0 ? settling[next].at_us : port_now_us(ONLY_BOARD) + HEARTBEAT_US);
 }
 
 bool bt_port_alarm(void)
 {
-    uint32_t now_us = port_now_us();
+    uint32_t now_us = port_now_us(ONLY_BOARD);
     bool heartbeat = true;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         if (settling[f].waits && (int32_t)(settling[f].at_us - now_us) <= 0) {
@@ -129,7 +129,7 @@ static void exchanged(void)
             counts.first_us = started ? counts.first_us : done.t_us;
             counts.latest_us = done.t_us;
         }
-        uint32_t took_us = port_now_us() - done.t_us;
+        uint32_t took_us = port_now_us(ONLY_BOARD) - done.t_us;
         counts.slowest_us = took_us > counts.slowest_us ? took_us : counts.slowest_us;
     }
 }

@@ -2,7 +2,7 @@
 
 #include "answers.h"
 #include "loop.h"
-#include "port.h"
+#include "only_board.h"
 #include "version.h"
 #include "wire/framing.h"
 
@@ -23,7 +23,8 @@ void commands_start(bt_emu_stream *its)
 static void send(uint8_t id, const uint8_t *payload)
 {
     uint8_t frame[BT_ENCODED_MAX_BYTES];
-    (void)port_link_write(frame, bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
+    (void)port_link_write(ONLY_BOARD, frame,
+                          bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
 }
 
 static void reply(uint8_t req_id, uint8_t command, uint8_t error)
@@ -59,6 +60,7 @@ static void send_status(uint8_t req_id)
 
 static void send_hello(const bt_msg_hello_request *request)
 {
+    const port_identity identity = port_identify(ONLY_BOARD);
     bt_msg_hello hello = {
         .req_id = request->req_id,
         .nonce = request->nonce,
@@ -68,14 +70,14 @@ static void send_hello(const bt_msg_hello_request *request)
         .firmware_major = BT_VERSION_MAJOR,
         .firmware_minor = BT_VERSION_MINOR,
         .firmware_patch = BT_VERSION_PATCH,
-        .board = port_board(),
-        .boot_id = port_boot_id(),
+        .board = identity.board,
+        .boot_id = identity.boot_id,
         .slot_hz = BT_SLOT_HZ,
         .fingers_present = plugged,
-        .image_crc32 = port_image_crc32(),
+        .image_crc32 = identity.image_crc32,
     };
     _Static_assert(sizeof hello.board_serial == PORT_SERIAL_BYTES, "the board's serial number is sent whole");
-    port_board_serial(hello.board_serial);
+    memcpy(hello.board_serial, identity.serial, sizeof hello.board_serial);
     uint8_t payload[BT_HELLO_BYTES];
     bt_msg_hello_pack(&hello, payload);
     send(BT_HELLO_ID, payload);
@@ -145,7 +147,7 @@ static void obey(uint8_t id, const uint8_t *payload)
     case BT_REBOOT_BOOTLOADER_ID:
         bt_msg_reboot_bootloader_unpack(&got.reboot, payload);
         error = got.reboot.magic != BT_BOOTLOADER_MAGIC ? BT_ERROR_OUT_OF_RANGE
-                : port_reboot_bootloader()              ? BT_ERROR_OK
+                : port_reboot_bootloader(ONLY_BOARD)    ? BT_ERROR_OK
                                                         : BT_ERROR_NOT_HERE;
         reply(req_id, id, error);
         return;
@@ -187,7 +189,7 @@ void commands_poll(void)
 {
     uint8_t bytes[64];
     size_t n;
-    while ((n = port_link_read(bytes, sizeof bytes)) > 0) {
+    while ((n = port_link_read(ONLY_BOARD, bytes, sizeof bytes)) > 0) {
         for (size_t k = 0; k < n; k++) {
             if (bt_deframer_push(&deframer, bytes[k]) == BT_DEFRAMED_GOOD && deframer.payload_bytes > 0) {
                 obey(deframer.id, deframer.buffer + 1);

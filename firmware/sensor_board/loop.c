@@ -3,7 +3,7 @@
 
 #include "keep/storage.h"
 #include "map/store.h"
-#include "port.h"
+#include "only_board.h"
 #include "wire/crc32.h"
 
 #include <string.h>
@@ -33,12 +33,12 @@ static uint32_t known_slots;
 
 static const label *kept(void)
 {
-    return (const label *)(const void *)port_flash_maps();
+    return (const label *)(const void *)port_flash_maps(ONLY_BOARD);
 }
 
 static const uint8_t *kept_samples(void)
 {
-    return port_flash_maps() + BT_FLASH_SECTOR_BYTES;
+    return port_flash_maps(ONLY_BOARD) + BT_FLASH_SECTOR_BYTES;
 }
 
 static uint32_t look(void)
@@ -83,10 +83,10 @@ uint8_t loop_keep(const bt_emu_stream *stream, uint32_t slots, uint32_t crc32)
 
 static bool write_sector(void)
 {
-    bool done = port_flash_erase(SAMPLE_AT + writing.at);
+    bool done = port_flash_erase(ONLY_BOARD, SAMPLE_AT + writing.at);
     for (uint32_t k = 0; done && k < BT_FLASH_SECTOR_BYTES && writing.at < writing.bytes;
          k += BT_FLASH_PAGE_BYTES) {
-        done = port_flash_program(SAMPLE_AT + writing.at, writing.samples + writing.at);
+        done = port_flash_program(ONLY_BOARD, SAMPLE_AT + writing.at, writing.samples + writing.at);
         writing.at += BT_FLASH_PAGE_BYTES;
     }
     return done;
@@ -97,7 +97,7 @@ static bool write_label(void)
     uint8_t page[BT_FLASH_PAGE_BYTES];
     memset(page, 0xFF, sizeof page);
     memcpy(page, &writing.label, sizeof writing.label);
-    return port_flash_program(LABEL_AT, page);
+    return port_flash_program(ONLY_BOARD, LABEL_AT, page);
 }
 
 void loop_poll(void)
@@ -105,7 +105,7 @@ void loop_poll(void)
     if (!writing.open) {
         return;
     }
-    bool done = writing.at > 0 || port_flash_erase(LABEL_AT);
+    bool done = writing.at > 0 || port_flash_erase(ONLY_BOARD, LABEL_AT);
     if (done && writing.at < writing.bytes) {
         done = write_sector();
     }

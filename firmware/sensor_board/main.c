@@ -1,7 +1,7 @@
 #include "answers.h"
 #include "commands.h"
 #include "loop.h"
-#include "port.h"
+#include "only_board.h"
 #include "system.h"
 
 static bt_emu_stream stream;
@@ -13,11 +13,11 @@ void bus_start(void)
 
 int main(int argc, char **argv)
 {
-    port_init(argc, argv);
+    (void)port_init(argc, argv);
     commands_start(&stream);
     for (;;) {
         commands_poll();
         loop_poll();
-        port_idle();
+        port_idle(ONLY_BOARD);
     }
 }

@@ -13,7 +13,7 @@
 #include "wait.h"
 #include "wire/sensor_gen.h"
 
-#include "port.h"
+#include "only_board.h"
 
 _Static_assert(PIN_SELECT_4 == PIN_SELECT_0 + BT_MAX_FINGERS - 1, "taken in at once");
 
@@ -135,7 +135,7 @@ static void keep_exchange(uint32_t offer, uint8_t selected, uint32_t now_us)
 
 static void end_exchange(uint32_t offer)
 {
-    uint32_t now_us = port_now_us();
+    uint32_t now_us = port_now_us(ONLY_BOARD);
     uint8_t selected = (uint8_t)(NOBODY & ~offer);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         if (!(selected >> f & 1)) {

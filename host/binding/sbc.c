@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct bt_sbc {
+struct bt_port {
     bt_gateway gateway;
     void *python;
     uint8_t devices; // bit mask of fingers that are wired
@@ -22,9 +22,6 @@ struct bt_sbc {
     bool unsent; // the last word was for sensors that are not wired
     _Alignas(4) uint8_t maps[BT_MAPS_BYTES];
 };
-
-// port.h has no argument for the board: this is the one that the running call is for.
-static _Thread_local bt_sbc *board;
 
 bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id)
 {
@@ -44,19 +41,16 @@ void bt_sbc_free(bt_sbc *sbc)
 
 void bt_sbc_start(bt_sbc *sbc)
 {
-    board = sbc;
-    bt_gateway_init(&sbc->gateway);
+    bt_gateway_init(&sbc->gateway, sbc);
 }
 
 void bt_sbc_poll(bt_sbc *sbc)
 {
-    board = sbc;
     bt_gateway_poll(&sbc->gateway);
 }
 
 void bt_sbc_alarm(bt_sbc *sbc)
 {
-    board = sbc;
     (void)bt_gateway_alarm(&sbc->gateway);
 }
 
@@ -67,12 +61,12 @@ uint32_t bt_sbc_due_us(const bt_sbc *sbc)
 
 // ---- time -------------------------------------------------------------------------------------
 
-uint32_t port_now_us(void)
+uint32_t port_now_us(bt_port *board)
 {
     return bt_sbc_now_us(board->python);
 }
 
-void port_delay_us(uint32_t us)
+void port_delay_us(bt_port *board, uint32_t us)
 {
     // Nobody needs a pause from what never was on the bus, and four absent fingers' would cost a tenth of a
     // slot.
@@ -81,20 +75,20 @@ void port_delay_us(uint32_t us)
     }
 }
 
-void port_alarm_at(uint32_t at_us)
+void port_alarm_at(bt_port *board, uint32_t at_us)
 {
     board->due_us = at_us;
 }
 
 // ---- SPI --------------------------------------------------------------------------------------
 
-void port_spi_select(uint8_t mask)
+void port_spi_select(bt_port *board, uint8_t mask)
 {
     board->selected = mask & board->devices;
     board->unsent = mask != 0 ? board->selected == 0 : board->unsent;
 }
 
-uint16_t port_spi_transfer16(uint16_t mosi)
+uint16_t port_spi_transfer16(bt_port *board, uint16_t mosi)
 {
     uint16_t miso = 0;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
@@ -107,7 +101,7 @@ uint16_t port_spi_transfer16(uint16_t mosi)
     return miso;
 }
 
-uint8_t port_spi_transfer8(uint8_t mosi)
+uint8_t port_spi_transfer8(bt_port *board, uint8_t mosi)
 {
     uint8_t miso = 0;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
@@ -122,30 +116,30 @@ uint8_t port_spi_transfer8(uint8_t mosi)
 
 // ---- link -------------------------------------------------------------------------------------
 
-bool port_link_write(const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *board, const uint8_t *data, size_t bytes)
 {
     return bt_sbc_link_write(board->python, data, bytes);
 }
 
-size_t port_link_read(uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *board, uint8_t *data, size_t bytes)
 {
     return bt_sbc_link_read(board->python, data, bytes);
 }
 
-bool port_link_up(void)
+bool port_link_up(bt_port *board)
 {
+    (void)board;
     return true; // the host is this process
 }
 
-void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *board, uint32_t bits_per_s, uint32_t pins)
 {
-    (void)bits_per_s;
-    (void)pins;
+    (void)board, (void)bits_per_s, (void)pins;
 }
 
 // ---- flash: none, so settings and maps last as long as the process; maps are kept in memory ------
 
-bool port_flash_erase(uint32_t sector_offset)
+bool port_flash_erase(bt_port *board, uint32_t sector_offset)
 {
     if (sector_offset < BT_STORAGE_BYTES) {
         return false;
@@ -154,7 +148,7 @@ bool port_flash_erase(uint32_t sector_offset)
     return true;
 }
 
-bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+bool port_flash_program(bt_port *board, uint32_t page_offset, const uint8_t *page)
 {
     if (page_offset < BT_STORAGE_BYTES) {
         return false;
@@ -166,45 +160,32 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     return true;
 }
 
-const uint8_t *port_flash_maps(void)
+const uint8_t *port_flash_maps(bt_port *board)
 {
     return board->maps;
 }
 
-void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+void port_flash_read(bt_port *board, uint32_t offset, uint8_t *data, size_t bytes)
 {
-    (void)offset;
+    (void)board, (void)offset;
     memset(data, 0xFF, bytes);
 }
 
-bool port_reboot_bootloader(void)
+bool port_reboot_bootloader(bt_port *board)
 {
+    (void)board;
     return false;
 }
 
 // ---- identity ---------------------------------------------------------------------------------
 
-uint16_t port_board(void)
+port_identity port_identify(bt_port *board)
 {
-    return BT_BOARD_LINUX_SBC;
-}
-
-void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
-{
-    memcpy(serial, "linux-spidev", PORT_SERIAL_BYTES);
-}
-
-uint32_t port_boot_id(void)
-{
-    return board->boot_id;
-}
-
-uint16_t port_started_by(void)
-{
-    return BT_FAULT_FLAG_STARTED;
-}
-
-uint32_t port_image_crc32(void)
-{
-    return UINT32_MAX;
+    return (port_identity){
+        .board = BT_BOARD_LINUX_SBC,
+        .serial = "linux-spidev",
+        .boot_id = board->boot_id,
+        .started_by = BT_FAULT_FLAG_STARTED,
+        .image_crc32 = UINT32_MAX,
+    };
 }

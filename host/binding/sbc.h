@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef struct bt_sbc bt_sbc;
+typedef struct bt_port bt_sbc; // port.h's board
 
 // devices: how many sensors are wired, fingers 0 to devices - 1. python: handed to every function below.
 // NULL without memory. Several may live at once, each on a thread of its own.

@@ -53,8 +53,9 @@ static inline void host_take_bytes(const uint8_t *data, size_t bytes)
 }
 
 // A bt_link_write: all or none.
-static inline bool host_write(const uint8_t *data, size_t bytes)
+static inline bool host_write(void *context, const uint8_t *data, size_t bytes)
 {
+    (void)context;
     if (bytes > host.room) {
         return false;
     }
@@ -130,7 +131,7 @@ static inline int new_session(void **state)
     bt_identity identity = {.board = BT_BOARD_PICO, .firmware_version = {1, 2, 3}, .boot_id = 0xB0071D};
     memcpy(identity.board_serial, "ABCDEFGHIJKL", 12);
     host_reset();
-    bt_session_init(&session, &identity, host_write, 0);
+    bt_session_init(&session, &identity, host_write, NULL, 0);
     return 0;
 }
 

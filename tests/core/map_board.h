@@ -18,16 +18,18 @@ static bool worn; // programs nothing
 static bt_map_place record[BT_MAX_FINGERS];
 static uint8_t refused_finger; // whose record is not kept
 
-static inline bool erase(uint32_t offset)
+static inline bool erase(void *context, uint32_t offset)
 {
+    (void)context;
     assert_true(offset % BT_FLASH_SECTOR_BYTES == 0 && offset < BT_MAPS_BYTES);
     memset(slots + offset, 0xFF, BT_FLASH_SECTOR_BYTES);
     erases++;
     return true;
 }
 
-static inline bool program(uint32_t offset, const uint8_t *page)
+static inline bool program(void *context, uint32_t offset, const uint8_t *page)
 {
+    (void)context;
     assert_true(offset % BT_FLASH_PAGE_BYTES == 0 && offset < BT_MAPS_BYTES);
     programs++;
     for (int k = 0; k < BT_FLASH_PAGE_BYTES && !worn; k++) {
@@ -37,10 +39,11 @@ static inline bool program(uint32_t offset, const uint8_t *page)
 }
 
 static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-static const bt_map_flash map_flash = {erase, program, slots, map_ram};
+static const bt_map_flash map_flash = {NULL, erase, program, slots, map_ram};
 
-static inline uint8_t save_map(uint8_t finger, const bt_map_place *place)
+static inline uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
 {
+    (void)context;
     if (finger == refused_finger) {
         return BT_ERROR_NOT_STORED;
     }

@@ -1,6 +1,6 @@
 #include "fake_port.h"
 
-#include "port.h"
+#include "only_board.h"
 #include "spi_word_by_word.h"
 #include "wire/messages_gen.h"
 
@@ -39,7 +39,7 @@ bool fake_next_interrupt(void)
         return false;
     }
     // The alarm's time in 64 bits, from a difference modulo 2^32 as port.h defines it.
-    int32_t ahead_us = (int32_t)(alarm_us - port_now_us());
+    int32_t ahead_us = (int32_t)(alarm_us - port_now_us(ONLY_BOARD));
     uint64_t at_ns = ahead_us > 0 ? (fake.now_ns / 1000 + (uint64_t)ahead_us) * 1000 : fake.now_ns;
     if (fake.latency_ns > 0) {
         seed ^= seed << 13;
@@ -69,23 +69,23 @@ void fake_host_sends(const uint8_t *data, size_t bytes)
 
 // ---- port.h ------------------------------------------------------------------------------------
 
-uint32_t port_now_us(void)
+uint32_t port_now_us(bt_port *port)
 {
     return (uint32_t)(fake.now_ns / 1000);
 }
 
-void port_delay_us(uint32_t us)
+void port_delay_us(bt_port *port, uint32_t us)
 {
     fake.now_ns += (uint64_t)us * 1000;
 }
 
-void port_alarm_at(uint32_t at_us)
+void port_alarm_at(bt_port *port, uint32_t at_us)
 {
     alarm_us = at_us;
     armed = true;
 }
 
-void port_spi_select(uint8_t mask)
+void port_spi_select(bt_port *port, uint8_t mask)
 {
     uint8_t selected = fake.bus.selected;
     if (selected == 0 && mask != 0 && released && fake.now_ns - released_ns < fake.shortest_gap_ns) {
@@ -98,7 +98,7 @@ void port_spi_select(uint8_t mask)
     bt_emu_bus_select(&fake.bus, mask, fake.now_ns);
 }
 
-uint16_t port_spi_transfer16(uint16_t mosi)
+uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
     uint8_t selected = fake.bus.selected;
     if (mosi & 0x8000) {
@@ -114,7 +114,7 @@ uint16_t port_spi_transfer16(uint16_t mosi)
     return miso;
 }
 
-uint8_t port_spi_transfer8(uint8_t mosi)
+uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     uint8_t miso = bt_emu_bus_transfer8(&fake.bus, mosi, fake.now_ns);
     fake.now_ns += TRANSFER_NS / 2;
@@ -122,12 +122,12 @@ uint8_t port_spi_transfer8(uint8_t mosi)
     return miso;
 }
 
-bool port_link_write(const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
 {
     return fake_host_takes(data, bytes);
 }
 
-size_t port_link_read(uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
 {
     size_t n = incoming_bytes < bytes ? incoming_bytes : bytes;
     memcpy(data, incoming, n);
@@ -136,24 +136,22 @@ size_t port_link_read(uint8_t *data, size_t bytes)
     return n;
 }
 
-bool port_link_up(void)
+bool port_link_up(bt_port *port)
 {
     return fake.link_up;
 }
 
-void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
 {
-    (void)bits_per_s;
-    (void)pins;
 }
 
-bool port_flash_erase(uint32_t sector_offset)
+bool port_flash_erase(bt_port *port, uint32_t sector_offset)
 {
     flash_erase(&fake.flash, sector_offset);
     return true;
 }
 
-bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page)
 {
     if (fake.flash_broken) {
         return false;
@@ -162,43 +160,24 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     return true;
 }
 
-void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes)
 {
     memcpy(data, fake.kept + offset, bytes);
 }
 
-const uint8_t *port_flash_maps(void)
+const uint8_t *port_flash_maps(bt_port *port)
 {
     return fake.kept + BT_STORAGE_BYTES;
 }
 
-bool port_reboot_bootloader(void)
+bool port_reboot_bootloader(bt_port *port)
 {
     fake.reboots++;
     return fake.has_loader;
 }
 
-uint16_t port_board(void)
+port_identity port_identify(bt_port *port)
 {
-    return BT_BOARD_POSIX_SIM;
-}
-
-void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
-{
-    memcpy(serial, "fake-board-1", PORT_SERIAL_BYTES);
-}
-
-uint32_t port_boot_id(void)
-{
-    return 42;
-}
-
-uint16_t port_started_by(void)
-{
-    return 0;
-}
-
-uint32_t port_image_crc32(void)
-{
-    return UINT32_MAX;
+    return (port_identity){
+        .board = BT_BOARD_POSIX_SIM, .serial = "fake-board-1", .boot_id = 42, .image_crc32 = UINT32_MAX};
 }

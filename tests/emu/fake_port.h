@@ -7,7 +7,7 @@
 
 #include "bus.h"
 #include "map/store.h"
-#include "port.h"
+#include "only_board.h"
 #include "wire/sensor_gen.h"
 
 #include <stdbool.h>

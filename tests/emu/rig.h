@@ -93,7 +93,7 @@ static inline void boot(uint64_t start_ns)
     fake_reset(source, start_ns);
     fake_host_takes = take;
     fake.bus.sensor[trouble.finger].present = !trouble.absent;
-    bt_gateway_init(&gateway);
+    bt_gateway_init(&gateway, ONLY_BOARD);
     t0_ns = (uint64_t)gateway.sampler.slot_start_us * 1000;
     bt_msg_start_pack(&msg, payload);
     fake_host_sends(encoded, bt_frame_encode(BT_START_ID, payload, sizeof payload, encoded));

@@ -7,7 +7,7 @@
 #include "bus.h"
 #include "gateway.h"
 #include "map/store.h"
-#include "port.h"
+#include "only_board.h"
 #include "spi_word_by_word.h"
 #include "talk/host.h"
 #include "wire/framing.h"
@@ -87,7 +87,7 @@ static void start_stream(void)
     bt_msg_start start = {1, BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC, 0x1F, 0};
     bt_msg_start_pack(&start, payload);
     size_t bytes = bt_frame_encode(BT_START_ID, payload, sizeof payload, encoded);
-    bt_session_receive(&gateway.session, encoded, bytes, port_now_us());
+    bt_session_receive(&gateway.session, encoded, bytes, port_now_us(ONLY_BOARD));
 }
 
 int main(int argc, char **argv)
@@ -96,7 +96,7 @@ int main(int argc, char **argv)
     uint32_t looked = 0;
     memset(flash, 0xFF, sizeof flash);
     bt_emu_bus_init(&bus, BT_MAX_FINGERS, "", count, NULL);
-    bt_gateway_init(&gateway);
+    bt_gateway_init(&gateway, ONLY_BOARD);
     start_stream();
     pthread_t thread;
     if (pthread_create(&thread, NULL, interrupts, NULL) != 0) {
@@ -116,34 +116,34 @@ int main(int argc, char **argv)
 
 // ---- port.h ----------------------------------------------------------------------------------------------
 
-uint32_t port_now_us(void)
+uint32_t port_now_us(bt_port *port)
 {
     return (uint32_t)(now() / 1000);
 }
 
-void port_delay_us(uint32_t us)
+void port_delay_us(bt_port *port, uint32_t us)
 {
     pass((uint64_t)us * 1000);
 }
 
-void port_alarm_at(uint32_t at_us)
+void port_alarm_at(bt_port *port, uint32_t at_us)
 {
     alarm_us = at_us;
 }
 
-void port_spi_select(uint8_t mask)
+void port_spi_select(bt_port *port, uint8_t mask)
 {
     bt_emu_bus_select(&bus, mask, now());
 }
 
-uint16_t port_spi_transfer16(uint16_t mosi)
+uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
     uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, now());
     pass(TRANSFER_NS);
     return miso;
 }
 
-uint8_t port_spi_transfer8(uint8_t mosi)
+uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     uint8_t miso = bt_emu_bus_transfer8(&bus, mosi, now());
     asked = asked || now() > AWAY_FROM * ROUND_NS;
@@ -151,7 +151,7 @@ uint8_t port_spi_transfer8(uint8_t mosi)
     return miso;
 }
 
-bool port_link_write(const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
 {
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(&deframer, data[k]);
@@ -161,71 +161,48 @@ bool port_link_write(const uint8_t *data, size_t bytes)
     return true;
 }
 
-size_t port_link_read(uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
 {
-    (void)data, (void)bytes;
     return 0;
 }
 
-bool port_link_up(void)
+bool port_link_up(bt_port *port)
 {
     return true;
 }
 
-void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
 {
-    (void)bits_per_s;
-    (void)pins;
 }
 
-bool port_flash_erase(uint32_t sector_offset)
+bool port_flash_erase(bt_port *port, uint32_t sector_offset)
 {
     memset(flash + sector_offset, 0xFF, BT_FLASH_SECTOR_BYTES);
     return true;
 }
 
-bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page)
 {
     memcpy(flash + page_offset, page, BT_FLASH_PAGE_BYTES);
     return true;
 }
 
-void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes)
 {
     memcpy(data, flash + offset, bytes);
 }
 
-const uint8_t *port_flash_maps(void)
+const uint8_t *port_flash_maps(bt_port *port)
 {
     return flash + BT_STORAGE_BYTES;
 }
 
-bool port_reboot_bootloader(void)
+bool port_reboot_bootloader(bt_port *port)
 {
     return false;
 }
 
-uint16_t port_board(void)
+port_identity port_identify(bt_port *port)
 {
-    return BT_BOARD_POSIX_SIM;
-}
-
-void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
-{
-    memset(serial, 0, PORT_SERIAL_BYTES);
-}
-
-uint32_t port_boot_id(void)
-{
-    return 1;
-}
-
-uint16_t port_started_by(void)
-{
-    return 0;
-}
-
-uint32_t port_image_crc32(void)
-{
-    return UINT32_MAX;
+    return (port_identity){.board = BT_BOARD_POSIX_SIM, .boot_id = 1, .image_crc32 = UINT32_MAX};
 }

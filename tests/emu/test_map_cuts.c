@@ -42,7 +42,7 @@ static void power_on(void)
 {
     memset(&gateway, 0, sizeof gateway);
     bt_deframer_reset(&host.deframer);
-    bt_gateway_init(&gateway);
+    bt_gateway_init(&gateway, ONLY_BOARD);
     command(BT_STOP_ID, "\1");
 }
 

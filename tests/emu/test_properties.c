@@ -30,7 +30,7 @@ static void all_are_read_with_gaps_between_the_bytes(void **state)
 {
     (void)state;
     bt_msg_sensor_info info;
-    bt_properties_read(0, &info);
+    bt_properties_read(ONLY_BOARD, 0, &info);
     assert_int_equal(info.present, 1);
     assert_memory_equal(info.serial, "BTEMU00000000001", 16);
     assert_memory_equal(info.software_version, "0301", 4);
@@ -57,7 +57,7 @@ static void one_flipped_bit_anywhere_changes_nothing(void **state)
         bt_msg_sensor_info info;
         (void)new_bus(NULL);
         line = one_bit;
-        bt_properties_read(0, &info);
+        bt_properties_read(ONLY_BOARD, 0, &info);
         assert_memory_equal(info.serial, "BTEMU00000000001", 16);
         assert_memory_equal(info.software_version, "0301", 4);
         assert_memory_equal(info.flex_version, "BD", 2);
@@ -76,7 +76,7 @@ static void an_error_word_is_no_value(void **state)
     (void)state;
     bt_msg_sensor_info info;
     line = error_words; // from the property behind the serial number on
-    bt_properties_read(0, &info);
+    bt_properties_read(ONLY_BOARD, 0, &info);
     assert_int_equal(info.present, 1);
     assert_int_equal(info.cpu_khz, 0);
     assert_int_equal(info.sampling_hz, 0);
@@ -89,7 +89,7 @@ static void a_line_that_is_stuck_is_nobody(void **state)
     (void)state;
     bt_msg_sensor_info info;
     fake.bus.sensor[0].present = false;
-    bt_properties_read(0, &info);
+    bt_properties_read(ONLY_BOARD, 0, &info);
     static const uint8_t none[16];
     assert_int_equal(info.present, 0);
     assert_memory_equal(info.serial, none, 16);
@@ -103,7 +103,7 @@ static void a_sensor_of_another_type_is_named_and_never_sure(void **state)
     for (int k = 0; k < 2; k++) {
         bt_msg_sensor_info info;
         memcpy(fake.bus.sensor[k].serial, serial[k], 16);
-        bt_properties_read((uint8_t)k, &info);
+        bt_properties_read(ONLY_BOARD, (uint8_t)k, &info);
         assert_int_equal(info.present, 0);
         assert_memory_equal(info.serial, serial[k], 16);
     }
@@ -126,7 +126,7 @@ static void a_mute_sensor_finds_its_voice(void **state)
     (void)state;
     bt_msg_sensor_info info;
     fake.bus.sensor[0].mute = true;
-    bt_properties_read(0, &info);
+    bt_properties_read(ONLY_BOARD, 0, &info);
     assert_int_equal(info.present, 1);
     assert_false(fake.bus.sensor[0].mute);
 }

@@ -43,7 +43,7 @@ static uint8_t plain(uint8_t id)
 static void power_cycle(void)
 {
     memset(&gateway, 0, sizeof gateway);
-    bt_gateway_init(&gateway);
+    bt_gateway_init(&gateway, ONLY_BOARD);
 }
 
 static void saved_settings_are_in_force_after_the_next_boot(void **state)

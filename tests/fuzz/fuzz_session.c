@@ -24,8 +24,9 @@ enum step { RAW, COMMAND, DAMAGED, ROUND, TICK, UNPLUG, LINK_ROOM, UPLOAD, STEPS
 static _Alignas(4) uint8_t slots[BT_MAPS_BYTES];
 static int erases;
 
-static bool erase(uint32_t offset)
+static bool erase(void *context, uint32_t offset)
 {
+    (void)context;
     if (offset % BT_FLASH_SECTOR_BYTES != 0 || offset >= BT_MAPS_BYTES) {
         FAIL("bad erase at %u", offset);
     }
@@ -34,8 +35,9 @@ static bool erase(uint32_t offset)
     return true;
 }
 
-static bool program(uint32_t offset, const uint8_t *page)
+static bool program(void *context, uint32_t offset, const uint8_t *page)
 {
+    (void)context;
     if (offset % BT_FLASH_PAGE_BYTES != 0 || offset >= BT_MAPS_BYTES) {
         FAIL("bad program at %u", offset);
     }
@@ -45,13 +47,14 @@ static bool program(uint32_t offset, const uint8_t *page)
     return true;
 }
 
-static uint8_t save_map(uint8_t finger, const bt_map_place *place)
+static uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
 {
+    (void)context;
     return finger < BT_MAX_FINGERS && place->slot < BT_MAP_SLOTS ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
 }
 
 static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-static const bt_map_flash map_flash = {erase, program, slots, map_ram};
+static const bt_map_flash map_flash = {NULL, erase, program, slots, map_ram};
 static const bt_board_actions actions = {.save_settings = keep_settings,
                                          .save_calibration = keep_calibration,
                                          .save_map = save_map,
@@ -63,8 +66,9 @@ static struct {
     int messages;
 } host;
 
-static bool host_write(const uint8_t *data, size_t bytes)
+static bool host_write(void *context, const uint8_t *data, size_t bytes)
 {
+    (void)context;
     if (host.full) {
         return false;
     }
@@ -237,7 +241,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     fuzz_input in = {data, bytes};
     uint32_t now_us = take_u32(&in);
     memset(&host, 0, sizeof host);
-    bt_session_init(&session, &identity, host_write, now_us);
+    bt_session_init(&session, &identity, host_write, NULL, now_us);
     bt_session_use_board(&session, &actions);
     while (in.left > 0) {
         uint8_t what = take_u8(&in);

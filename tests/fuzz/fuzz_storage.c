@@ -19,8 +19,9 @@
 static uint8_t flash_bytes[BT_STORAGE_BYTES];
 static uint32_t bytes_left; // until power fails
 
-static bool erase(uint32_t offset)
+static bool erase(void *context, uint32_t offset)
 {
+    (void)context;
     if (offset % BT_FLASH_SECTOR_BYTES != 0 || offset >= BT_STORAGE_BYTES) {
         FAIL("bad erase at %u", (unsigned)offset);
     }
@@ -30,8 +31,9 @@ static bool erase(uint32_t offset)
     return bytes_left > 0;
 }
 
-static bool program(uint32_t offset, const uint8_t *page)
+static bool program(void *context, uint32_t offset, const uint8_t *page)
 {
+    (void)context;
     if (offset % BT_FLASH_PAGE_BYTES != 0 || offset >= BT_STORAGE_BYTES) {
         FAIL("bad page program at %u", (unsigned)offset);
     }
@@ -41,15 +43,16 @@ static bool program(uint32_t offset, const uint8_t *page)
     return bytes_left > 0;
 }
 
-static void read_flash(uint32_t offset, uint8_t *data, size_t bytes)
+static void read_flash(void *context, uint32_t offset, uint8_t *data, size_t bytes)
 {
+    (void)context;
     if (offset + bytes > BT_STORAGE_BYTES) {
         FAIL("bad read of %zu bytes at %u", bytes, (unsigned)offset);
     }
     memcpy(data, flash_bytes + offset, bytes);
 }
 
-static const bt_flash flash = {erase, program, read_flash};
+static const bt_flash flash = {NULL, erase, program, read_flash};
 
 typedef struct {
     int bytes; // -1: none

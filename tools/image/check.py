@@ -36,15 +36,15 @@ COMMANDS = (ROOT / "firmware" / "core" / "talk" / "commands.c").read_text(encodi
 
 # The functions that each call through a pointer in the source may reach.
 POINTERS = {
-    "session->write(": ("port_link_write",),
+    "session->write(": ("write_link",),
     "board->save_settings(": ("save_settings",),
     "board.save_calibration(": ("save_calibration",),
     "board.save_map(": ("save_map",),
     "board.reboot_bootloader(": ("reboot_bootloader",),
-    "board.now_us(": ("port_now_us",),
-    "flash->erase(": ("port_flash_erase", "erase_map_sector"),
-    "flash->program(": ("port_flash_program", "program_map_page"),
-    "flash->read(": ("port_flash_read",),
+    "board.now_us(": ("now_us",),
+    "flash->erase(": ("erase_sector", "erase_map_sector"),
+    "flash->program(": ("program_page", "program_map_page"),
+    "flash->read(": ("read_flash",),
     "commands[k].run(": tuple(re.findall(r"^    {BT_\w+_ID, .*, (\w+)},$", COMMANDS, re.MULTILINE)),
     "rom.": (ROM,),
     "boot2_copy": (ROM,),

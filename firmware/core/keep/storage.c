@@ -58,14 +58,14 @@ static uint32_t page_offset(int sector, int page)
 
 static void read_page(const bt_flash *flash, int sector, int page, uint8_t out[BT_FLASH_PAGE_BYTES])
 {
-    flash->read(page_offset(sector, page), out, BT_FLASH_PAGE_BYTES);
+    flash->read(flash->context, page_offset(sector, page), out, BT_FLASH_PAGE_BYTES);
 }
 
 // Programs a page and reads it back.
 static bool keep_page(const bt_flash *flash, int sector, int page, const uint8_t data[BT_FLASH_PAGE_BYTES])
 {
     uint8_t back[BT_FLASH_PAGE_BYTES];
-    if (!flash->program(page_offset(sector, page), data)) {
+    if (!flash->program(flash->context, page_offset(sector, page), data)) {
         return false;
     }
     read_page(flash, sector, page, back);
@@ -129,7 +129,7 @@ static bool move_on(const bt_flash *flash, int from, uint32_t generation, uint16
     int at = 1;
     uint8_t page[BT_FLASH_PAGE_BYTES];
     uint8_t data[4];
-    if (!flash->erase(page_offset(to, 0)) || !keep_page(flash, to, at++, record)) {
+    if (!flash->erase(flash->context, page_offset(to, 0)) || !keep_page(flash, to, at++, record)) {
         return false;
     }
     for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {

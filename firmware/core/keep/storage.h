@@ -29,9 +29,10 @@ enum bt_record {
 // Offsets are bytes from the start of the two sectors. erase and program return false if the flash failed;
 // its contents are then unknown.
 typedef struct {
-    bool (*erase)(uint32_t sector_offset);
-    bool (*program)(uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
-    void (*read)(uint32_t offset, uint8_t *data, size_t bytes);
+    void *context; // the first argument of all three
+    bool (*erase)(void *context, uint32_t sector_offset);
+    bool (*program)(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
+    void (*read)(void *context, uint32_t offset, uint8_t *data, size_t bytes);
 } bt_flash;
 
 // Read the latest record of this id: as much of its data as fits max_bytes, and its version. Returns the size

@@ -19,8 +19,9 @@
 // Offsets are bytes from the first slot. erase and program: as in bt_flash. bytes: all slots as memory, which
 // changes with the flash. ram: room for each finger's map in force, aligned to 4 bytes.
 typedef struct {
-    bool (*erase)(uint32_t sector_offset);
-    bool (*program)(uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
+    void *context;
+    bool (*erase)(void *context, uint32_t sector_offset);
+    bool (*program)(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
     const uint8_t *bytes;
     uint8_t (*ram)[BT_MAP_MAX_BYTES];
 } bt_map_flash;

@@ -36,14 +36,15 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     const uint32_t at = (uint32_t)(upload->place.slot * BT_MAP_SLOT_BYTES + offset);
     if (!(upload->erased & sector)) {
         // Even if it reads as erased: after an erase cut short by a power failure, that may not last.
-        if (!flash->erase(at - at % BT_FLASH_SECTOR_BYTES)) {
+        if (!flash->erase(flash->context, at - at % BT_FLASH_SECTOR_BYTES)) {
             return BT_ERROR_NOT_STORED;
         }
         upload->erased |= sector;
     }
     memset(page, 0xFF, sizeof page); // programming 0xFF changes nothing
     memcpy(page + at % BT_FLASH_PAGE_BYTES, data, bytes);
-    if (!flash->program(at - at % BT_FLASH_PAGE_BYTES, page) || memcmp(there, data, bytes) != 0) {
+    if (!flash->program(flash->context, at - at % BT_FLASH_PAGE_BYTES, page)
+        || memcmp(there, data, bytes) != 0) {
         return BT_ERROR_NOT_STORED;
     }
     upload->written[part / 8] |= (uint8_t)(1u << part % 8);

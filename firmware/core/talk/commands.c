@@ -287,7 +287,7 @@ static uint8_t save_calibrations(bt_session *session)
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         // The others stay as stored, maybe by newer firmware with records that this one cannot read.
         if (session->calibration[f].unsaved) {
-            uint8_t error = session->board.save_calibration(f, &session->calibration[f]);
+            uint8_t error = session->board.save_calibration(session->context, f, &session->calibration[f]);
             if (error != BT_ERROR_OK) {
                 return error;
             }
@@ -304,7 +304,7 @@ static uint8_t save(bt_session *session, const uint8_t *payload)
     if (board->save_settings == NULL || board->save_calibration == NULL || board->save_map == NULL) {
         return BT_ERROR_NOT_HERE;
     }
-    uint8_t error = board->save_settings(&session->settings);
+    uint8_t error = board->save_settings(session->context, &session->settings);
     if (error == BT_ERROR_OK) {
         error = save_calibrations(session);
     }
@@ -318,7 +318,8 @@ static uint8_t reboot(bt_session *session, const uint8_t *payload)
     if (msg.magic != BT_BOOTLOADER_MAGIC) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE : session->board.reboot_bootloader();
+    return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE
+                                                    : session->board.reboot_bootloader(session->context);
 }
 
 enum check {

@@ -108,7 +108,7 @@ uint8_t bt_save_maps(bt_session *session)
         bt_finger_map *map = &session->map[f];
         // The others stay as stored, maybe by newer firmware with records that this one cannot read.
         if (map->unsaved) {
-            uint8_t error = session->board.save_map(f, &map->place);
+            uint8_t error = session->board.save_map(session->context, f, &map->place);
             if (error != BT_ERROR_OK) {
                 return error;
             }

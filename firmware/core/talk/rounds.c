@@ -15,13 +15,15 @@ void bt_session_begin(bt_session *session, uint32_t t_us)
 void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
 {
     uint32_t touched = 0; // bit mask
-    for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_sensors_word(session, f, count[f] != BT_INVALID_COUNT);
+    bt_sensors_slot(session, count);
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (bt_finger_put(&session->finger[f], slot, count[f])) {
             touched |= 1u << f;
         }
     }
-    bt_streams_slot(session, slot, touched, t_us);
+    if (touched | session->events_due[slot]) {
+        bt_streams_slot(session, slot, touched, t_us);
+    }
 }
 
 // Returns whether the finger's sensor answered in this round.

@@ -16,17 +16,19 @@ void bt_sensors_doubt(bt_session *session, unsigned f)
     }
 }
 
-void bt_sensors_word(bt_session *session, unsigned f, bool good)
+void bt_sensors_slot(bt_session *session, const uint16_t count[BT_MAX_FINGERS])
 {
-    bt_sensor_query *query = &session->query[f];
-    if (session->asked >> f & 1) {
-        return;
-    }
-    if (good) {
-        query->bad_words = 0;
-    } else if (query->bad_words < BT_AWAY_WORDS && ++query->bad_words == BT_AWAY_WORDS) {
-        bt_sensors_doubt(session, f);
-        query->bad_words = BT_AWAY_WORDS;
+    for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_sensor_query *query = &session->query[f];
+        if (session->asked >> f & 1) {
+            continue;
+        }
+        if (count[f] != BT_INVALID_COUNT) {
+            query->bad_words = 0;
+        } else if (query->bad_words < BT_AWAY_WORDS && ++query->bad_words == BT_AWAY_WORDS) {
+            bt_sensors_doubt(session, f);
+            query->bad_words = BT_AWAY_WORDS;
+        }
     }
 }
 

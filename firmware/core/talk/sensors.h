@@ -16,8 +16,8 @@
 // This finger's serial number is unknown, or may have changed.
 void bt_sensors_doubt(bt_session *session, unsigned f);
 
-// A finger's word in a slot; good: it decoded.
-void bt_sensors_word(bt_session *session, unsigned f, bool good);
+// The words of a slot; BT_INVALID_COUNT: it did not decode.
+void bt_sensors_slot(bt_session *session, const uint16_t count[BT_MAX_FINGERS]);
 
 // After a round: bit mask of the fingers to ask for their serial number in one of the next rounds, in which
 // they are not sampled (bt_session.asked).

@@ -2,11 +2,13 @@
 
 #include <string.h>
 
-void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us)
+void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, void *context,
+                     uint32_t now_us)
 {
     memset(session, 0, sizeof *session);
     session->identity = *identity;
     session->write = write;
+    session->context = context;
     session->status_us = now_us;
     session->second_us = now_us;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
@@ -75,7 +77,7 @@ void bt_session_use_settings(bt_session *session)
 void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame)
 {
     size_t bytes = bt_frame_seal(id, (size_t)bt_wire_payload_bytes(id), frame);
-    if (session->write(frame, bytes)) {
+    if (session->write(session->context, frame, bytes)) {
         session->messages_sent++;
     } else {
         session->messages_dropped++;

@@ -25,16 +25,16 @@ typedef struct {
 typedef bt_msg_sensor_info bt_sensor_info;
 
 // Takes all bytes or none; false: no room, or no host.
-typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
+typedef bool (*bt_link_write)(void *context, const uint8_t *data, size_t bytes);
 
 // What the session needs from its board. The actions return an enum bt_error.
 typedef struct {
-    uint8_t (*save_settings)(const bt_settings *settings);
-    uint8_t (*save_calibration)(uint8_t finger, const bt_calibration *calibration);
-    uint8_t (*save_map)(uint8_t finger, const bt_map_place *place);
-    uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
-    const bt_map_flash *maps;           // where wrench maps are kept; NULL: nowhere
-    uint32_t (*now_us)(void);           // device time; NULL: the board is never short of time
+    uint8_t (*save_settings)(void *context, const bt_settings *settings);
+    uint8_t (*save_calibration)(void *context, uint8_t finger, const bt_calibration *calibration);
+    uint8_t (*save_map)(void *context, uint8_t finger, const bt_map_place *place);
+    uint8_t (*reboot_bootloader)(void *context); // OK: it happens once the reply is out
+    const bt_map_flash *maps;                    // where wrench maps are kept; NULL: nowhere
+    uint32_t (*now_us)(void *context);           // device time; NULL: the board is never short of time
 } bt_board_actions;
 
 // Finger-rounds of FRAME streams in which something was skipped because nobody needed it; wrap at 2^32.
@@ -75,6 +75,7 @@ typedef struct {
     uint16_t idle_rounds;
     bt_identity identity;
     bt_link_write write;
+    void *context;
     bt_board_actions board;
     bt_deframer deframer;
 
@@ -101,7 +102,9 @@ typedef struct {
     uint32_t finger_faults[BT_MAX_FINGERS]; // BT_FRAME_FLAG_*, likewise (faults.h)
 } bt_session;
 
-void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us);
+// context: the first argument of `write` and of the board's actions.
+void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, void *context,
+                     uint32_t now_us);
 
 // Until this is called, or where an action is NULL, its commands are answered NOT_HERE.
 void bt_session_use_board(bt_session *session, const bt_board_actions *actions);

@@ -147,7 +147,7 @@ static int32_t late_us(const bt_session *session, const bt_finger *finger)
     if (session->board.now_us == NULL) {
         return 0;
     }
-    return (int32_t)(session->board.now_us() - (finger->round.t_us + BT_FRAME_MS * 1000));
+    return (int32_t)(session->board.now_us(session->context) - (finger->round.t_us + BT_FRAME_MS * 1000));
 }
 
 static void send_frame(bt_session *session, bt_finger *finger)

@@ -1,7 +1,7 @@
 #define _DEFAULT_SOURCE
 #include "flash.h"
 
-#include "port.h"
+#include "only_board.h"
 
 #include "map/store.h"
 
@@ -43,13 +43,13 @@ const char *flash_open(const char *path)
     return NULL;
 }
 
-bool port_flash_erase(uint32_t sector_offset)
+bool port_flash_erase(bt_port *port, uint32_t sector_offset)
 {
     memset(flash + sector_offset, 0xFF, BT_FLASH_SECTOR_BYTES);
     return true;
 }
 
-bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page)
 {
     for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
         flash[page_offset + (uint32_t)k] &= page[k];
@@ -57,12 +57,12 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     return true;
 }
 
-void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes)
 {
     memcpy(data, flash + offset, bytes);
 }
 
-const uint8_t *port_flash_maps(void)
+const uint8_t *port_flash_maps(bt_port *port)
 {
     return flash + BT_STORAGE_BYTES;
 }

@@ -8,7 +8,7 @@
 // --flash: where saved settings and maps are kept; without it they are gone with the process.
 // --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
 #define _DEFAULT_SOURCE
-#include "port.h"
+#include "only_board.h"
 #include "spi_word_by_word.h"
 
 #include "bus.h"
@@ -68,7 +68,7 @@ static void load_tape(const char *path)
     (void)close(fd);
 }
 
-void port_init(int argc, char **argv)
+bt_port *port_init(int argc, char **argv)
 {
     const char *tape_path = NULL;
     double pace = 1.0;
@@ -112,21 +112,22 @@ void port_init(int argc, char **argv)
     }
     printf("pty %s\n", path);
     (void)fflush(stdout);
+    return ONLY_BOARD;
 }
 
 // ---- time -------------------------------------------------------------------------------------
 
-uint32_t port_now_us(void)
+uint32_t port_now_us(bt_port *port)
 {
     return (uint32_t)(clock_now_ns() / 1000);
 }
 
-void port_delay_us(uint32_t us)
+void port_delay_us(bt_port *port, uint32_t us)
 {
     clock_advance_ns((uint64_t)us * 1000);
 }
 
-void port_alarm_at(uint32_t at_us)
+void port_alarm_at(bt_port *port, uint32_t at_us)
 {
     alarm_us = at_us;
     armed = true;
@@ -166,7 +167,7 @@ static void stand_still(void)
     read_control();
 }
 
-void port_idle(void)
+void port_idle(bt_port *port)
 {
     if (!armed) {
         return;
@@ -197,19 +198,19 @@ void port_idle(void)
 
 // ---- SPI --------------------------------------------------------------------------------------
 
-void port_spi_select(uint8_t mask)
+void port_spi_select(bt_port *port, uint8_t mask)
 {
     bt_emu_bus_select(&bus, mask, clock_now_ns());
 }
 
-uint16_t port_spi_transfer16(uint16_t mosi)
+uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
     uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, clock_now_ns());
     clock_advance_ns(TRANSFER_NS);
     return miso;
 }
 
-uint8_t port_spi_transfer8(uint8_t mosi)
+uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     uint8_t miso = bt_emu_bus_transfer8(&bus, mosi, clock_now_ns());
     clock_advance_ns(TRANSFER_NS / 2);
@@ -218,12 +219,12 @@ uint8_t port_spi_transfer8(uint8_t mosi)
 
 // ---- link -------------------------------------------------------------------------------------
 
-bool port_link_write(const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
 {
     return pty_write(data, bytes);
 }
 
-size_t port_link_read(uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
 {
     if (!link_due) {
         return 0; // a system call per half slot would cost more than all else
@@ -244,7 +245,7 @@ size_t port_link_read(uint8_t *data, size_t bytes)
     return n;
 }
 
-bool port_link_up(void)
+bool port_link_up(bt_port *port)
 {
     static bool up;
     if (link_due) {
@@ -253,41 +254,24 @@ bool port_link_up(void)
     return up;
 }
 
-void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
 {
-    (void)bits_per_s;
-    (void)pins;
 }
 
-bool port_reboot_bootloader(void)
+bool port_reboot_bootloader(bt_port *port)
 {
     return false; // a process has no loader
 }
 
 // ---- identity ---------------------------------------------------------------------------------
 
-uint16_t port_board(void)
+port_identity port_identify(bt_port *port)
 {
-    return BT_BOARD_POSIX_SIM;
-}
-
-void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
-{
-    memset(serial, 0, PORT_SERIAL_BYTES);
-    memcpy(serial, "posix-sim", 9);
-}
-
-uint32_t port_boot_id(void)
-{
-    return boot_id;
-}
-
-uint16_t port_started_by(void)
-{
-    return BT_FAULT_FLAG_STARTED;
-}
-
-uint32_t port_image_crc32(void)
-{
-    return UINT32_MAX;
+    return (port_identity){
+        .board = BT_BOARD_POSIX_SIM,
+        .serial = "posix-sim",
+        .boot_id = boot_id,
+        .started_by = BT_FAULT_FLAG_STARTED,
+        .image_crc32 = UINT32_MAX,
+    };
 }

@@ -1,7 +1,7 @@
 // The flash chip itself: settings in its last two sectors, wrench maps before them, and its unique number.
 // While it erases, programs or answers commands it is no memory. The program is in SRAM and does not mind;
 // that interrupts are off all the same keeps a handler that might one day read flash from a fault.
-#include "port.h"
+#include "only_board.h"
 
 #include "map/store.h"
 
@@ -74,7 +74,7 @@ static uint32_t on_chip(uint32_t offset)
     return offset < BT_STORAGE_BYTES ? STORAGE_OFFSET + offset : MAPS_OFFSET + (offset - BT_STORAGE_BYTES);
 }
 
-bool port_flash_erase(uint32_t sector_offset)
+bool port_flash_erase(bt_port *port, uint32_t sector_offset)
 {
     if (!usable || sector_offset >= BT_KEPT_BYTES) {
         return false;
@@ -87,7 +87,7 @@ bool port_flash_erase(uint32_t sector_offset)
 }
 
 // page must not be in flash.
-bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page)
 {
     if (!usable || page_offset >= BT_KEPT_BYTES) {
         return false;
@@ -98,12 +98,12 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     return true;
 }
 
-void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes)
 {
     memcpy(data, (const uint8_t *)(uintptr_t)(XIP_BASE + on_chip(offset)), bytes);
 }
 
-const uint8_t *port_flash_maps(void)
+const uint8_t *port_flash_maps(bt_port *port)
 {
     return (const uint8_t *)(uintptr_t)(XIP_BASE + MAPS_OFFSET);
 }

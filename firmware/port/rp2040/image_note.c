@@ -3,7 +3,7 @@
 #include "image_note.h"
 
 #include "pins.h"
-#include "port.h"
+#include "system.h"
 
 #include "wire/crc32.h"
 
@@ -15,7 +15,7 @@ __attribute__((section(".image_note"), used)) static const volatile bt_image_not
 
 #define FLASH_MAX_BYTES (2u * 1024 * 1024)
 
-uint32_t port_image_crc32(void)
+uint32_t image_crc32(void)
 {
     const uint8_t *image = (const uint8_t *)(uintptr_t)XIP_BASE;
     const uint32_t crc_at = (uint32_t)(uintptr_t)&note.crc32 - XIP_BASE;

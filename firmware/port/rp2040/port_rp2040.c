@@ -1,5 +1,5 @@
 // The RP2040 without a vendor's SDK: start-up in order, identity, and the main loop's rest.
-#include "port.h"
+#include "only_board.h"
 
 #include "pins.h"
 #include "system.h"
@@ -75,10 +75,8 @@ static void note_start(void)
     WATCHDOG_SCRATCH1 = RUNNING;
 }
 
-void port_init(int argc, char **argv)
+bt_port *port_init(int argc, char **argv)
 {
-    (void)argc;
-    (void)argv;
     note_start();
     flash_start();
     has_id = flash_unique_id(unique_id);
@@ -88,14 +86,15 @@ void port_init(int argc, char **argv)
     bus_start();
     timer_start();
     usb_start(serial_text);
+    return ONLY_BOARD;
 }
 
-void port_idle(void)
+void port_idle(bt_port *port)
 {
     if (usb_touched()) {
-        (void)port_reboot_bootloader();
+        (void)port_reboot_bootloader(port);
     }
-    uint32_t since_us = port_now_us() - leave_us;
+    uint32_t since_us = port_now_us(port) - leave_us;
     bool all_sent = usb_all_sent() && uart_all_sent();
     if (leaving && since_us >= LEAVE_AFTER_US && (all_sent || since_us >= LEAVE_LATEST_US)) {
         WATCHDOG_SCRATCH1 = 0;
@@ -107,39 +106,27 @@ void port_idle(void)
     timer_sleep();
 }
 
-bool port_reboot_bootloader(void)
+bool port_reboot_bootloader(bt_port *port)
 {
     if (!rom_has_loader()) {
         return false;
     }
     if (!leaving) {
         leaving = true;
-        leave_us = port_now_us();
+        leave_us = port_now_us(port);
     }
     return true;
 }
 
-uint16_t port_board(void)
+port_identity port_identify(bt_port *port)
 {
-    return IMAGE_BOARD;
-}
-
-void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
-{
-    memset(serial, 0, PORT_SERIAL_BYTES);
-    if (has_id) {
-        memcpy(serial, unique_id, FLASH_ID_BYTES);
-    } else {
-        memcpy(serial, no_id, sizeof no_id - 1);
-    }
-}
-
-uint32_t port_boot_id(void)
-{
-    return boot_id;
-}
-
-uint16_t port_started_by(void)
-{
-    return started_by;
+    port_identity identity = {
+        .board = IMAGE_BOARD,
+        .boot_id = boot_id,
+        .started_by = started_by,
+        .image_crc32 = image_crc32(),
+    };
+    memcpy(identity.serial, has_id ? (const void *)unique_id : no_id,
+           has_id ? FLASH_ID_BYTES : sizeof no_id - 1);
+    return identity;
 }

@@ -5,7 +5,7 @@
 // The dealer is paced by a DMA timer and by nothing else: a word is fetched when it must have come, and not
 // because it has. One that is late shows itself at the end, when the interface is busy or has a word too
 // many; no word of that slot counts then, for none can be told from its neighbour's.
-#include "port.h"
+#include "only_board.h"
 
 #include "dma.h"
 #include "pins.h"
@@ -82,7 +82,7 @@ void bus_start(void)
                            | DMA_HIGH_PRIORITY | DMA_CHANNEL_EN;
 }
 
-uint32_t port_spi_slot_begin(uint16_t mosi, uint8_t mask)
+uint32_t port_spi_slot_begin(bt_port *port, uint16_t mosi, uint8_t mask)
 {
     command = mosi;
     if (mask != read_mask) {
@@ -100,7 +100,7 @@ uint32_t port_spi_slot_begin(uint16_t mosi, uint8_t mask)
     return SLOT_US;
 }
 
-void port_spi_slot_end(uint16_t *word)
+void port_spi_slot_end(bt_port *port, uint16_t *word)
 {
     bool in_time = !(DMA_CTRL_TRIG(DMA_DEALER) & DMA_BUSY) && !(SPI0_SSPSR & (SSPSR_RNE | SSPSR_BSY));
     if (!in_time) {

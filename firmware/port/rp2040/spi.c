@@ -1,5 +1,5 @@
 // The sensors' bus: SPI0, 16-bit frames, mode 0, with the chip selects as plain outputs.
-#include "port.h"
+#include "only_board.h"
 
 #include "pins.h"
 #include "selects.h"
@@ -70,7 +70,7 @@ void spi_select_at_once(uint8_t mask)
     SIO_GPIO_OUT_CLR = low;
 }
 
-void port_spi_select(uint8_t mask)
+void port_spi_select(bt_port *port, uint8_t mask)
 {
     wait_short_ns(SELECT_HOLD_NS); // whatever was selected; its last word is out
     spi_select_at_once(mask);
@@ -97,13 +97,13 @@ static uint32_t end(void)
     return done ? SPI0_SSPDR : 0;
 }
 
-uint16_t port_spi_transfer16(uint16_t mosi)
+uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
     begin(mosi);
     return (uint16_t)end();
 }
 
-uint8_t port_spi_transfer8(uint8_t mosi)
+uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     // The width changes while the block is off (PL022 manual, 3.3.1); the clock stays low.
     SPI0_SSPCR1 = 0;

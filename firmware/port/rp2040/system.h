@@ -41,6 +41,9 @@ static inline void interrupts_restore(uint32_t primask)
 // ---- startup.c: who takes an interrupt, beside the timer's and the USB's
 void use_interrupt(uint32_t number, void (*handler)(void));
 
+// ---- image_note.c: of the image in flash; see port.h
+uint32_t image_crc32(void);
+
 // ---- system.c: clocks, watchdog, reset
 // CLK_SYS_HZ from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
 bool clocks_start(void);

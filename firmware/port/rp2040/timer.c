@@ -1,5 +1,5 @@
 // Time, the sampler's alarm, and sleep.
-#include "port.h"
+#include "only_board.h"
 
 #include "system.h"
 #include "wait.h"
@@ -14,14 +14,14 @@ void timer_start(void)
     NVIC_ISER = 1u << TIMER_IRQ_0;
 }
 
-uint32_t port_now_us(void)
+uint32_t port_now_us(bt_port *port)
 {
     return TIMER_TIMERAWL;
 }
 
 #define SHORT_US 10 // the gap between two reads of the bus, four times a slot
 
-void port_delay_us(uint32_t us)
+void port_delay_us(bt_port *port, uint32_t us)
 {
     if (us <= SHORT_US) {
         wait_short_us(us);
@@ -30,7 +30,7 @@ void port_delay_us(uint32_t us)
     }
 }
 
-void port_alarm_at(uint32_t at_us)
+void port_alarm_at(bt_port *port, uint32_t at_us)
 {
     TIMER_ALARM0 = at_us;
     // It fires when the clock is equal to it: one that is already past would wait for 71 minutes.

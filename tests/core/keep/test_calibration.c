@@ -248,8 +248,9 @@ static void every_end_of_a_stream_counts(void **state)
 
 static uint8_t saved_fingers;
 
-static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
+static uint8_t save_calibration(void *context, uint8_t finger, const bt_calibration *calibration)
 {
+    (void)context;
     (void)calibration;
     saved_fingers |= (uint8_t)(1u << finger);
     return finger == 4 ? BT_ERROR_NOT_STORED : BT_ERROR_OK;

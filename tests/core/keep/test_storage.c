@@ -13,27 +13,30 @@
 static uint8_t bytes_of_flash[BT_STORAGE_BYTES];
 static failing_flash nor;
 
-static bool erase(uint32_t offset)
+static bool erase(void *context, uint32_t offset)
 {
+    (void)context;
     assert_true(offset % BT_FLASH_SECTOR_BYTES == 0 && offset < BT_STORAGE_BYTES);
     flash_erase(&nor, offset);
     return true;
 }
 
-static bool program(uint32_t offset, const uint8_t *page)
+static bool program(void *context, uint32_t offset, const uint8_t *page)
 {
+    (void)context;
     assert_true(offset % BT_FLASH_PAGE_BYTES == 0 && offset < BT_STORAGE_BYTES);
     flash_program(&nor, offset, page);
     return true;
 }
 
-static void read_flash(uint32_t offset, uint8_t *data, size_t bytes)
+static void read_flash(void *context, uint32_t offset, uint8_t *data, size_t bytes)
 {
+    (void)context;
     assert_true(offset + bytes <= BT_STORAGE_BYTES);
     memcpy(data, bytes_of_flash + offset, bytes);
 }
 
-static const bt_flash flash = {erase, program, read_flash};
+static const bt_flash flash = {NULL, erase, program, read_flash};
 
 static int new_flash(void **state)
 {

@@ -153,15 +153,17 @@ static void errors_are_told_by_name(void **state)
 static bt_settings saved;
 static int saves, reboots;
 
-static uint8_t save(const bt_settings *settings)
+static uint8_t save(void *context, const bt_settings *settings)
 {
+    (void)context;
     saved = *settings;
     saves++;
     return BT_ERROR_OK;
 }
 
-static uint8_t reboot(void)
+static uint8_t reboot(void *context)
 {
+    (void)context;
     reboots++;
     return BT_ERROR_OK;
 }

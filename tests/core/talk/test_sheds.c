@@ -8,8 +8,9 @@
 static uint32_t late_us[BT_MAX_FINGERS];
 static int asked; // of the clock, once for each FRAME
 
-static uint32_t clock_us(void)
+static uint32_t clock_us(void *context)
 {
+    (void)context;
     return ON_TIME + late_us[asked++ % BT_MAX_FINGERS];
 }
 

@@ -119,8 +119,9 @@ static void what_is_not_cobs_has_no_length(void **state)
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7\1", 3, out), 2);
 }
 
-static bool discard(const uint8_t *data, size_t bytes)
+static bool discard(void *context, const uint8_t *data, size_t bytes)
 {
+    (void)context;
     (void)data;
     (void)bytes;
     return true;
@@ -135,7 +136,7 @@ static void chunks_of_any_size_give_the_same(void **state)
     for (int c = 0; c < case_count; c++) {
         const framing_case *now = &cases[c];
         for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
-            bt_session_init(&session, &identity, discard, 0);
+            bt_session_init(&session, &identity, discard, NULL, 0);
             for (size_t at = 0; at < now->wire_bytes; at += sizes[s]) {
                 size_t rest = now->wire_bytes - at;
                 // A copy of exactly the chunk: the sanitizer sees a read beyond it.

@@ -1,5 +1,5 @@
 // The USB device controller in device mode: its interrupt, and a start over when it hears nothing any more.
-#include "port.h"
+#include "only_board.h"
 
 #include "rp2040_regs.h"
 #include "system.h"
@@ -95,7 +95,7 @@ void usb_watch(void)
 {
     static uint32_t frame, since_us;
     static bool off;
-    uint32_t now_us = port_now_us();
+    uint32_t now_us = port_now_us(ONLY_BOARD);
     if (off) {
         if (now_us - since_us >= OFF_THE_BUS_US) {
             off = false;
