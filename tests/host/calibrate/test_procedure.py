@@ -266,11 +266,10 @@ def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedur
     assert loaded.joined is not None and loaded.joined.on_skin_share > 0.99
     assert loaded.run.axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
     origin = loaded.provenance(1_700_000_000)
-    assert origin.serial == "BTSIM00000000006"
-    assert origin.files == ("walk.mcap", "walk.csv")
-    assert origin.reference == "walk.csv emulated Nano17"
-    assert origin.mounting is not None and origin.mounting["offset_mm"] == [-5.0, 1.5, 10.0]
-    assert origin.alignment is not None and origin.alignment["peak"] > 0.9
+    assert (origin["serial"], origin["files"]) == ("BTSIM00000000006", ["walk.mcap", "walk.csv"])
+    assert origin["reference"] == "walk.csv emulated Nano17"
+    assert origin["mounting"]["offset_mm"] == [-5.0, 1.5, 10.0]
+    assert origin["alignment"]["peak"] > 0.9
     with pytest.raises(InputError, match="is of sensor BTSIM00000000006, but this is BT0000000000000A"):
         load(places.recording, (places.reference, reference), serial="BT0000000000000A")
     assert load(places.recording, (places.reference, reference), serial="BT0000000000000A", force=True).run.serial

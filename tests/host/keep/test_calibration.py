@@ -24,7 +24,6 @@ from biotac.recording.facts import Facts
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
-from biotac.wire.framing import encode
 
 SERIAL = "BTEMU00000000042"
 ODD = Calibration(PocWeights.ABS_N2, (1, -2, 3), (-4, 5), -600, SERIAL, 1_763_731_310, 9_500_000)
@@ -260,15 +259,6 @@ def test_a_recording_knows_the_calibrations_and_is_checked_by_them(two_gains: Pa
     assert swapped.violations > 2 * blind.violations - 10
 
 
-def test_a_recording_of_before_there_were_any_is_still_checked(monkeypatch, capsys, tmp_path: Path) -> None:
-    now = Facts.metadata
-    monkeypatch.setattr(Facts, "metadata", lambda *a: {k: v for k, v in now(*a).items() if k != "calibrations"})
-    path = tmp_path / "old.mcap"
-    assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
-    assert Recording(path).calibrations == {}
-    assert main(["check", str(path)]) == 0
-
-
 def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path: Path) -> None:
     now = Facts.metadata
     monkeypatch.setattr(Facts, "metadata", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
@@ -276,20 +266,6 @@ def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path:
     assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
     with pytest.raises(biotac.RecordingError, match="damaged metadata"):
         Recording(path)
-
-
-def test_a_calibration_that_a_newer_board_tells_out_of_range_is_no_crash(scripted_board, hello) -> None:
-    def answer(message_id: int, payload: bytes) -> bytes:
-        if message_id == wire.GetCalibration.ID:
-            told = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 0, (9, 0, 0, 0, 0, 0, 0, 0))
-            return encode(wire.Calibration.ID, told.pack())
-        return hello(payload) if message_id == wire.HelloRequest.ID else b""
-
-    with (
-        biotac.open(scripted_board(answer).path) as hand,
-        pytest.raises(biotac.WireVersionError, match="poc_weights is 9"),
-    ):
-        hand.calibration(0)
 
 
 # ---- command line --------------------------------------------------------------------------------
@@ -335,14 +311,6 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     assert states == {"0": "NONE", "1": "IN_FORCE", "2": "NONE", "3": "NONE", "4": "NONE"}
     assert main(["info", port, "--json"]) == 0
     assert list(json.loads(capsys.readouterr().out)["calibrations"]) == ["1"]
-
-
-@pytest.mark.parametrize("what", ["show", "get", "put", "clear", "store", "load"])
-def test_every_part_of_the_verb_has_an_example(what: str, capsys) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["calibration", what, "--help"])
-    assert end.value.code == 0
-    assert capsys.readouterr().out.rstrip().splitlines()[-1].startswith(f"example: biotac calibration {what} ")
 
 
 def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
