@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from courses import PAD, Course, Script, Sensor, resting, script
 
 from biotac import Finger, FrameFlags, Setting, TareReason, TareState
-from stability.courses import PAD, Course, Script, Sensor, resting, script
 
 FULL_N = 5.0
 SLEW_PER_S = 0.5005  # counts; SPEC.md: drift is followed at 0.5 count/s at most, 328/65536 in every frame

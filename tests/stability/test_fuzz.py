@@ -1,49 +1,59 @@
-"""A few random courses of those that tools/stress draws for hours, and the proof that its verdicts can fail."""
+"""Random courses of loads, a few by day and hundreds nightly, and the proof that their verdicts can fail."""
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
+import random_courses
 
 from biotac import TareReason, TareState
-from stability import fuzz
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_random_course_breaks_nothing(seed: int) -> None:
-    recipe = fuzz.draw(seed)
-    assert fuzz.judge(recipe).broken == [], recipe
+    recipe = random_courses.draw(seed)
+    assert random_courses.judge(recipe).broken == [], recipe
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("number", range(300))
+def test_hundreds_of_other_courses_each_night(number: int) -> None:
+    seed = int(os.environ.get("BIOTAC_SEED", "1")) * 1000 + number
+    test_a_random_course_breaks_nothing(seed)
+    assert random_courses.rest(seed, 600.0, worn=False) == 0
 
 
 @pytest.mark.parametrize("seed", [33, 58, 75, 123, 214])
 def test_courses_that_once_broke_something_do_not_again(seed: int) -> None:
     # 33, 214: a press tared by its sudden release; the others: a light contact ended by one lost pressure word.
-    assert fuzz.judge(fuzz.draw(seed)).broken == []
+    assert random_courses.judge(random_courses.draw(seed)).broken == []
 
 
 @pytest.mark.parametrize("seed", [8, 37])
 def test_what_comes_back_of_an_undershoot_is_no_touch(seed: int) -> None:
-    assert fuzz.judge(fuzz.draw(seed)).idle_touches == 0
+    assert random_courses.judge(random_courses.draw(seed)).idle_touches == 0
 
 
 def test_hours_of_rest_without_glitches_have_no_contact() -> None:
-    assert sum(fuzz.rest(seed, 600.0, worn=False) for seed in range(12)) == 0
+    assert sum(random_courses.rest(seed, 600.0, worn=False) for seed in range(12)) == 0
 
 
 def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
     """What is said of a course when the board's rows are changed on their way to the verdict."""
 
-    class Spoilt(fuzz.Finger):
+    class Spoilt(random_courses.Finger):
         def feed(self, *words, **named):
             rows = super().feed(*words, **named)
             change(rows)
             return rows
 
-    monkeypatch.setattr("stability.courses.Finger", Spoilt)
-    return fuzz.judge(next(filter(is_plain, map(fuzz.draw, range(200))))).broken
+    monkeypatch.setattr("courses.Finger", Spoilt)
+    return random_courses.judge(next(filter(is_plain, map(random_courses.draw, range(200))))).broken
 
 
-def is_plain(recipe: fuzz.Recipe) -> bool:
+def is_plain(recipe: random_courses.Recipe) -> bool:
     """A quiet sensor with pressure, and a load that must be held."""
     return recipe.pdc and recipe.profile == "new" and any(how.get("force_n", 0) > 3 for _, how in recipe.steps)
 

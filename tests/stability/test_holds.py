@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from courses import Course, script
 
 from biotac import Finger, FrameFlags, TareReason, TareState
 from biotac.sim.timeline import Pose
 from biotac.wire import messages_gen as wire
-from stability.courses import Course, script
 
 NIGHTLY = bool(os.environ.get("BIOTAC_NIGHTLY"))
 HOLD_S = 600.0 if NIGHTLY else 60.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from courses import Course, script
 
 from biotac import Finger, FrameFlags, Setting
 from biotac.wire import messages_gen as wire
-from stability.courses import Course, script
 
 LEAD_S, HELD_S = 3.0, 6.0
 SETTLED = 5  # rounds, 50 ms

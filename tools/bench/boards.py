@@ -41,10 +41,10 @@ def of_room(source: Path) -> str:
 
 APART = [path for path in (FIRMWARE / "core").rglob("*.c") if of_room(path) in OPTIONS]
 CORE = sorted(set((FIRMWARE / "core").rglob("*.c")) - set(APART))
-JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(ROOT / "tools/bench/variants").glob("*.c")])
+JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(ROOT / "tools/bench/kernels").glob("*.c")])
 SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).rglob("*.c"))
 INCLUDE = [f"-I{FIRMWARE / room}" for room in ("core", "reference", "sensor", "port", "app")] + [
-    f"-I{ROOT / 'tools/bench/variants'}",
+    f"-I{ROOT / 'tools/bench/kernels'}",
     f"-I{HERE}",
 ]
 PACKAGES = {

@@ -1,29 +1,27 @@
-// What is counted on the emulated boards: each kernel variant over the same frames, once per scene, and
-// whole frames beside them. BENCH_FRAMES per weighting, given by the build.
-#include "keep/settings.h"
+// What is counted on the emulated boards: each kernel over the same frames, the shipped one once per scene,
+// and whole frames beside them. BENCH_FRAMES per weighting, given by the build.
+#include "kernels.h"
 #include "mark.h"
 #include "scenes.h"
-#include "variants.h"
 
 static const struct {
     const char *name;
-    unsigned wanted;
+    uint32_t wanted;
     int32_t scale;
 } asked[] = {
-    {"everything", VARIANT_ALL, 1},
-    {"everything, doubled", VARIANT_ALL, 2}, // the ADC's whole range: where a kernel may need longer
-    {"PoC only", VARIANT_POC, 1},
-    {"force only", VARIANT_FORCE, 1},
-    {"torque only", VARIANT_TORQUE, 1},
+    {"everything", BT_WANT_ALL, 1},
+    {"everything, doubled", BT_WANT_ALL, 2}, // the ADC's whole range: where a kernel may need longer
+    {"PoC only", BT_WANT_POC, 1},
+    {"force only", BT_WANT_FORCE, 1},
+    {"torque only", BT_WANT_TORQUE, 1},
 };
 
 // What keeps the compiler from dropping a result.
-static variant_output output;
+static kernel_output output;
 static volatile bool has_poc;
 
-__attribute__((noipa)) static bool nothing(const int32_t e_q4[BT_ELECTRODES],
-                                           const variant_settings *settings, unsigned wanted,
-                                           variant_output *out)
+__attribute__((noipa)) static bool nothing(const int32_t e_q4[BT_ELECTRODES], const kernel_settings *settings,
+                                           uint32_t wanted, kernel_output *out)
 {
     (void)e_q4;
     (void)settings;
@@ -41,8 +39,8 @@ static void next_frame(uint32_t *seed, int32_t e_q4[BT_ELECTRODES])
     }
 }
 
-static void count(const char *name, const char *scene, variant_run *run, unsigned wanted,
-                  const variant_settings *settings, const int32_t e_q4[BT_ELECTRODES])
+static void count(const char *name, const char *scene, kernel_run *run, uint32_t wanted,
+                  const kernel_settings *settings, const int32_t e_q4[BT_ELECTRODES])
 {
     bench_name(name, scene);
     bench_mark();
@@ -50,17 +48,16 @@ static void count(const char *name, const char *scene, variant_run *run, unsigne
     bench_mark();
 }
 
-static void one_frame(const int32_t e_q4[BT_ELECTRODES], const variant_settings *settings)
+static void one_frame(const int32_t e_q4[BT_ELECTRODES], const kernel_settings *settings)
 {
-    count("nothing", "", nothing, VARIANT_ALL, settings, e_q4);
-    for (int v = 0; v < VARIANTS; v++) {
-        int scenes = variants[v].in_parts ? (int)(sizeof asked / sizeof *asked) : 1;
-        for (int s = 0; s < scenes; s++) {
+    count("nothing", "", nothing, BT_WANT_ALL, settings, e_q4);
+    for (int k = 0; k < KERNELS; k++) {
+        for (size_t s = 0; s < (k == KERNEL_SHIPPED ? sizeof asked / sizeof *asked : 2); s++) {
             int32_t scaled_q4[BT_ELECTRODES];
             for (int i = 0; i < BT_ELECTRODES; i++) {
                 scaled_q4[i] = asked[s].scale * e_q4[i];
             }
-            count(variants[v].name, asked[s].name, variants[v].run, asked[s].wanted, settings, scaled_q4);
+            count(kernels[k].name, asked[s].name, kernels[k].run, asked[s].wanted, settings, scaled_q4);
         }
     }
     bt_solve_settings by_default = settings->shipped;
@@ -75,17 +72,10 @@ static void one_frame(const int32_t e_q4[BT_ELECTRODES], const variant_settings 
 
 int main(void)
 {
-    bt_settings defaults;
-    bt_settings_reset(&defaults);
-    int32_t force_nn[3] = {bt_settings_get(&defaults, BT_SETTING_FORCE_GAIN_X_NN),
-                           bt_settings_get(&defaults, BT_SETTING_FORCE_GAIN_Y_NN),
-                           bt_settings_get(&defaults, BT_SETTING_FORCE_GAIN_Z_NN)};
-    int32_t torque_nn[2] = {bt_settings_get(&defaults, BT_SETTING_TORQUE_GAIN_Y_NN),
-                            bt_settings_get(&defaults, BT_SETTING_TORQUE_GAIN_Z_NN)};
     bench_scenes_init();
     for (int weights = 0; weights <= 2; weights++) {
-        variant_settings settings;
-        variant_settings_init(&settings, weights, force_nn, torque_nn);
+        static kernel_settings settings;
+        kernel_settings_init(&settings, weights);
         uint32_t seed = 1;
         for (int k = 0; k < BENCH_FRAMES; k++) {
             int32_t e_q4[BT_ELECTRODES];

@@ -176,6 +176,18 @@ static void corners_of_the_box(void **state)
     }
 }
 
+static void every_third_of_all_corners(void **state)
+{
+    (void)state;
+    for (uint32_t signs = 0; signs < 1u << BT_ELECTRODES; signs += 3) {
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = signs >> i & 1 ? BT_E_MAX_Q4 : -BT_E_MAX_Q4;
+        }
+        check_all_weights(e, &largest_gains);
+    }
+}
+
 static void corners_that_make_every_sum_largest(void **state)
 {
     (void)state;
@@ -347,6 +359,7 @@ int main(void)
         cmocka_unit_test(single_electrodes_at_every_size),
         cmocka_unit_test(all_electrodes_equal),
         cmocka_unit_test(corners_of_the_box),
+        cmocka_unit_test(every_third_of_all_corners),
         cmocka_unit_test(corners_that_make_every_sum_largest),
         cmocka_unit_test(signals_of_one_lsb),
         cmocka_unit_test(contacts_at_the_seam_with_linear_weights),

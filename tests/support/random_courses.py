@@ -1,24 +1,22 @@
 """Random tare courses, and the invariants that must hold in every frame of each.
 
-A course is a list of steps, so that a failing one can be shortened to the steps that matter.
+A course is a list of steps that its seed decides.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
+from courses import LEAD_S, Course, Script, Sensor, resting
 
 from biotac import FrameFlags, Setting, TareReason, TareState
 from biotac.core.finger import Finger
-from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
+from biotac.recording.crosscheck import CrossCheck
 from biotac.sim import sampling
 from biotac.sim.timeline import Pose
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import StructArray
-
-from .courses import LEAD_S, Course, Script, Sensor, resting
 
 # With pressure, after a release: at rest within a second, or in doubt while the press's residue still shows; and at
 # rest within ten seconds of the residue falling below what counts as a touch.
@@ -34,7 +32,7 @@ Step = tuple[str, dict[str, float]]
 
 @dataclass(frozen=True)
 class Recipe:
-    """All that makes a course; printed if the course fails."""
+    """All that makes a course; a test that fails shows it."""
 
     seed: int
     profile: str
@@ -257,23 +255,3 @@ def rest(seed: int, seconds: float, *, worn: bool) -> int:
     rows = Finger().feed(**resting(sensor, seconds, seed))
     changed = (rows["flags"] & FrameFlags.TARE_CHANGED) != 0
     return int((changed & (rows["tare_reason"] == TareReason.ROLL_BACK)).sum())
-
-
-def shortest(recipe: Recipe) -> Recipe:
-    """The recipe with steps left out and random parts calmed down, as long as it still breaks something."""
-    calm: list[dict[str, Any]] = [{"lost_share": 0.0}, {"drift_scale": 0.0}, {"profile": "new"}, {"settings": {}}]
-    for change in calm:
-        tried = replace(recipe, **change)
-        recipe = tried if judge(tried).broken else recipe
-    left_out = True
-    while left_out:  # a step that was needed before may not be needed now
-        left_out = False
-        for k in reversed(range(len(recipe.steps))):
-            tried = replace(recipe, steps=recipe.steps[:k] + recipe.steps[k + 1 :])
-            if judge(tried).broken:
-                recipe, left_out = tried, True
-    return recipe
-
-
-BOUNDS = {"poc_um": POC_BOUND_UM, "force_mn": FORCE_BOUND_MN, "torque_share": 1.0, "let_go_frames": LET_GO_WITHIN,
-          "tared_frames": TARED_WITHIN}  # fmt: skip
