@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import os
 import signal
 import sys
@@ -11,7 +12,7 @@ import threading
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from ..errors import BiotacError, InputError
+from ..errors import BiotacError, InputError, printable
 
 #: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
 VERBS = {
@@ -124,6 +125,7 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
+    _make_streams_usable()
     words = sys.argv[1:] if argv is None else argv
     args = parser(words[:1]).parse_args(words)
     if threading.current_thread() is threading.main_thread():
@@ -143,9 +145,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        print(f"biotac: {one_line(error)}; check the path and the free disk space", file=sys.stderr)
+        print(f"biotac: {printable(one_line(error))}; check the path and the free disk space", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return InputError.exit_code
+
+
+def _make_streams_usable() -> None:
+    """Let printing neither fail on a name that is not UTF-8, nor on a stream that the shell has closed (``>&-``)."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, it stays open
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def one_line(error: Exception) -> str:

@@ -68,14 +68,18 @@ def write_labelled(
         )
     schema = pa.schema(fields, metadata=dict(metadata))
     sorting = [(name, "ascending") for name in ("t_us", *(["finger"] if fingers is not None else []))]
-    with pq.ParquetWriter(
-        place,
-        schema,
-        compression="zstd",
-        use_dictionary=[*(its.name for its in labels), *(f.name for f in fields if pa.types.is_floating(f.type))],
-        column_encoding={f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
-        sorting_columns=pq.SortingColumn.from_ordering(schema, sorting),
-    ) as out:
+    # Opened here: pyarrow takes no path that is not UTF-8.
+    with (
+        place.open("wb") as file,
+        pq.ParquetWriter(
+            file,
+            schema,
+            compression="zstd",
+            use_dictionary=[*(its.name for its in labels), *(f.name for f in fields if pa.types.is_floating(f.type))],
+            column_encoding={f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
+            sorting_columns=pq.SortingColumn.from_ordering(schema, sorting),
+        ) as out,
+    ):
         for begin in range(0, len(order), _ROWS):
             chosen = order[begin : begin + _ROWS]
             columns = list(_columns(made, labels, fingers, of_table, chosen))

@@ -23,6 +23,7 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     connection = duckdb.connect(":memory:")
     connection.execute("SET TimeZone = 'UTC'")
     try:
+        str(lake.folder.absolute()).encode()
         for topic, files in topics.items():
             paths = ", ".join("'" + str(path.absolute()).replace("'", "''") + "'" for path in files)
             connection.execute(

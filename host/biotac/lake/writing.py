@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import tempfile
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..errors import InputError
+from ..errors import InputError, printable
 from ..export.columns import EXPORTED, HEARTBEATS, Table, tables
 from ..export.messages import message_tables
 from ..export.parquet import Label, frame_ids, write_labelled
@@ -101,8 +102,10 @@ def put(lake: str, force: bool, source: str) -> Written:
 
 def _source_bytes(file: Path) -> int:
     """Size in bytes of the source of a recording in the lake; -1 if it is not there."""
+    if not file.is_file():
+        return -1
     try:
-        return int((pq.read_metadata(file).metadata or {}).get(SIZE, 0)) if file.is_file() else -1
+        return int((pq.read_metadata(io.BytesIO(file.read_bytes())).metadata or {}).get(SIZE, 0))
     except (OSError, ValueError, pa.ArrowException):
         return -1
 
@@ -125,18 +128,20 @@ def _write(path: Path, made: list[Table], recording: Recording, name: str) -> No
 
 
 def _write_facts(path: Path, recording: Recording, name: str, size: int) -> None:
+    source = printable(recording.path.name)
     row = {
         "recording": name,
-        "source": recording.path.name,
+        "source": source,
         "begin_ns": recording.begin_ns,
         "duration_s": (recording.end_us - recording.begin_us) / 1e6,
         "size_bytes": size,
         "frames_lost": recording.frames_lost,
         "pac_lost": recording.pac_lost,
-        "problems": [text.replace(str(recording.path), recording.path.name) for text in recording.problems],
+        "problems": [printable(text.replace(str(recording.path), source)) for text in recording.problems],
         "sensors": list(ids.sensors(recording).items()),
         "calibrations": list(ids.calibrations(recording).items()),
         "metadata": sorted((key, value) for key, value in recording.metadata.items() if key != CHECKSUM),
     }
     schema = _RECORDINGS.with_metadata({SIZE: str(size).encode()})
-    pq.write_table(pa.Table.from_pylist([row], schema=schema), path, compression="zstd")
+    with path.open("wb") as file:  # pyarrow takes no path that is not UTF-8
+        pq.write_table(pa.Table.from_pylist([row], schema=schema), file, compression="zstd")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, printable
 from ..keep import Calibration
 from ..keep.calibration_file import from_dict, to_dict
 from ..map.board_map import as_blob
@@ -66,7 +66,7 @@ class Facts:
         return {
             "format": layout.FORMAT_VERSION,
             "software": __version__,
-            "port": port,
+            "port": printable(port),
             "wire": f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}",
             "firmware": version_text(self.info),
             "hello": json.dumps(asdict(self.info)),

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import InputError, taken
+from ..errors import InputError, printable, taken
 from ..hand.gap import Gap
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
@@ -67,7 +67,7 @@ class Recorder:
         frames, lost = self.frames, self.frames_lost
         first = self.paths[0]
         path = first.with_name(f"{first.stem}.{len(self.paths) + 1}{first.suffix}")
-        metadata = facts.metadata(self._port) | {layout.CONTINUES: self.path.name}
+        metadata = facts.metadata(self._port) | {layout.CONTINUES: printable(self.path.name)}
         self._file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
         self._frames_before, self._lost_before = frames, lost
         self._skip_to_delimiter = False

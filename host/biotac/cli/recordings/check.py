@@ -8,6 +8,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from ...errors import printable
 from ...recording.crosscheck import CrossCheck
 from .loading import load
 
@@ -44,14 +45,15 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(facts))
         return 0 if good else 1
     for problem in recording.problems:
-        print(f"biotac: {problem}", file=sys.stderr)
+        print(f"biotac: {printable(problem)}", file=sys.stderr)
     for finding in outcome.findings:
         print(finding)
     verdict = "good" if good else f"{outcome.violations} violation(s), {damaged} damaged part(s)"
     verdict += f", {len(recording.gaps)} gap(s)" if recording.gaps else ""
     verdict += ", cut off" if recording.cut_off else ""
+    name = printable(str(args.recording))
     print(
-        f"{args.recording}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
+        f"{name}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
         f"PoC {outcome.poc_um_max:.3f} um, force {outcome.force_mn_max:.4f} mN, "
         f"torque {outcome.torque_nmm_max:.5f} N*mm, pressure {outcome.pressure.force_n_max * 1e3:.4f} mN"
     )

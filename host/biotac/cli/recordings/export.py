@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ...documents import read_json
-from ...errors import InputError
+from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
 from ...partial_file import whole
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
             with _recording_at(out, args.force, written) as place:
                 notes = recompute(recording, place, changes, keep_tare=args.keep_tare, show=show)
             for note in notes:
-                print(f"biotac: {note}", file=sys.stderr)
+                print(f"biotac: {printable(note)}", file=sys.stderr)
             made = {"frames": len(recording.frames), "pac": len(recording.pac), "notes": notes}
             changed = ", ".join(setting_text(s, value) for s, value in changes.items()) or "no setting changed"
             text = f"{made['frames']} frames, {changed},"
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
     names = [str(path) for path in written]
-    print(json.dumps({"written": names} | made) if args.json else f"{text} to {', '.join(names)}")
+    print(json.dumps({"written": names} | made) if args.json else printable(f"{text} to {', '.join(names)}"))
     return 0
 
 

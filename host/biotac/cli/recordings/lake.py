@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ...errors import BiotacError, InputError
+from ...errors import BiotacError, InputError, printable
 from .. import values
 from ..progress import Progress
 
@@ -88,10 +88,11 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
         "failed": failed,
         "rows": sum(new.values()),
     }
+    folder = printable(str(args.lake))
     print(
         json.dumps(facts)
         if args.json
-        else f"{args.lake}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already "
+        else f"{folder}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already "
         f"there, {len(failed)} failed"
     )
     return InputError.exit_code if failed else 0
@@ -125,11 +126,12 @@ def run_check(args: argparse.Namespace) -> int:
         print(json.dumps(facts | largest))
         return 0 if good else 1
     for text in wrong:
-        print(text)
+        print(printable(text))
     verdict = "good" if good else f"{len(wrong) + len(failed)} problem(s)" if done else "empty"
     poc_um, force_mn, torque_nmm = largest.values()
+    folder = printable(str(args.folder))
     print(
-        f"{args.folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
+        f"{folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
         f"PoC {poc_um:.3f} um, force {force_mn:.4f} mN, torque {torque_nmm:.5f} N*mm"
     )
     return 0 if good else 1
