@@ -29,10 +29,10 @@ static bool point_of_contact(const int32_t e_q4[BT_ELECTRODES], const kernel_set
     if (sums.total == 0) {
         return false;
     }
-    // Halves, which fit in a signed number.
-    const int32_t x = (int32_t)(sums.ahead >> 1) - (int32_t)(BT_SUMS_X_UNIT_UM / 2 * sums.behind);
+    // Quarters, which fit in a signed number.
+    const int32_t x = (int32_t)(sums.ahead >> 2) - (int32_t)(BT_SUMS_X_UNIT_UM / 4 * sums.behind);
     const bool tip = x > 0;
-    const uint32_t size[3] = {tip ? (uint32_t)x : 0, bt_abs32(sums.y) >> 1, sums.z >> 1};
+    const uint32_t size[3] = {tip ? (uint32_t)x : 0, bt_abs32(sums.y) >> 2, sums.z >> 2};
     const int down = bt_bit_length(size[0] | size[1] | size[2]) - COMPONENT_BITS;
     uint32_t component[3];
     for (int d = 0; d < 3; d++) {
@@ -41,7 +41,7 @@ static bool point_of_contact(const int32_t e_q4[BT_ELECTRODES], const kernel_set
     const uint32_t length = length_of(length_of(component[1], component[2]), component[0]);
     const uint32_t scale = BT_DIVIDE_U32((uint32_t)BT_CORE_RADIUS_UM << COMPONENT_BITS, length);
     poc_um[0] = (int16_t)(tip ? (int32_t)(component[0] * scale >> COMPONENT_BITS)
-                              : -(int32_t)(2 * BT_DIVIDE_U32(bt_abs32(x), sums.total)));
+                              : -(int32_t)(4 * BT_DIVIDE_U32(bt_abs32(x), sums.total)));
     poc_um[1] = (int16_t)bt_with_sign(component[1] * scale >> COMPONENT_BITS, sums.y);
     poc_um[2] = (int16_t)-(int32_t)(component[2] * scale >> COMPONENT_BITS);
     return true;
