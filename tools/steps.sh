@@ -14,13 +14,13 @@ step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells how lon
 }
 
 both() { # both "WHAT" FUNCTION "WHAT ELSE" FUNCTION: two steps at once, each of which keeps one core busy
-    local said result=0
-    said=$(mktemp)
-    step "$3" "$4" >"$said" 2>&1 &
+    local output result=0
+    output=$(mktemp)
+    step "$3" "$4" >"$output" 2>&1 &
     step "$1" "$2"
     wait $! || result=$?
-    cat "$said"
-    rm "$said"
+    cat "$output"
+    rm "$output"
     return $result
 }
 

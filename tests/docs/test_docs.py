@@ -64,10 +64,10 @@ def test_the_notebook_runs_and_is_the_one_on_the_page(tmp_path: Path, monkeypatc
     cells = ["".join(cell["source"]) for cell in json.loads(NOTEBOOK.read_text())["cells"]]
     assert len([line for cell in cells for line in cell.splitlines() if line]) <= 10
     assert "\n\n".join(cells) in (ROOT / "host/docs/quickstart.md").read_text()
-    place: dict[str, object] = {}
+    names: dict[str, object] = {}
     for cell in cells[:-1]:
-        exec(compile(cell, NOTEBOOK.name, "exec"), place)
-    axes = eval(compile(cells[-1], NOTEBOOK.name, "eval"), place)
+        exec(compile(cell, NOTEBOOK.name, "exec"), names)
+    axes = eval(compile(cells[-1], NOTEBOOK.name, "eval"), names)
     frames = biotac.load("press.mcap")
     for line, force_n in zip(axes.lines, frames["force_n"].T, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), force_n)

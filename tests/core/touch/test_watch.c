@@ -17,13 +17,13 @@ typedef struct {
 // Every electrode read 3000 counts after the silence, away_q3 more than where it was watched.
 static hold after(const int16_t away_q3[BT_ELECTRODES], int pressure_q3)
 {
-    hold its = {.watch = {.level_q3 = REST_Q3, .level_sweeps = LEVEL_SINCE}, .silence = {.sweeps = SWEEPS}};
+    hold one = {.watch = {.level_q3 = REST_Q3, .level_sweeps = LEVEL_SINCE}, .silence = {.sweeps = SWEEPS}};
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        its.watch.base.electrode_q16[i] = (uint32_t)(8 * 3000 - away_q3[i]) << 13;
-        its.silence.sum.lane[i] = 3000 * BT_SILENCE_ROUNDS;
+        one.watch.base.electrode_q16[i] = (uint32_t)(8 * 3000 - away_q3[i]) << 13;
+        one.silence.sum.lane[i] = 3000 * BT_SILENCE_ROUNDS;
     }
-    its.silence.sum.lane[BT_LANE_PDC] = (uint16_t)((REST_Q3 + pressure_q3) / 8 * BT_SILENCE_ROUNDS);
-    return its;
+    one.silence.sum.lane[BT_LANE_PDC] = (uint16_t)((REST_Q3 + pressure_q3) / 8 * BT_SILENCE_ROUNDS);
+    return one;
 }
 
 static hold after_even(int16_t each_q3, int pressure_q3)
@@ -35,9 +35,9 @@ static hold after_even(int16_t each_q3, int pressure_q3)
     return after(away_q3, pressure_q3);
 }
 
-static int32_t resumed(hold its)
+static int32_t resumed(hold one)
 {
-    return bt_watch_resume(&its.watch, &its.silence, SPAN_Q3);
+    return bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
 }
 
 static void what_all_electrodes_share_is_followed_by_its_mean(void **state)
@@ -56,7 +56,7 @@ static void what_is_no_drift_is_not_followed(void **state)
     assert_in_range(most, 1, 7 * COUNT_Q16);
     assert_int_equal(resumed(after_even(100, 0)), most);
     assert_int_equal(resumed(after_even(-100, 0)), -most);
-    assert_int_equal(resumed(after_even(8, 30 * 8)), 0); // nor is a load, by its pressure
+    assert_int_equal(resumed(after_even(8, 30 * 8)), 0); // nor is a load, by one pressure
     int16_t away_q3[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         away_q3[i] = i % 2 ? 8 : -8;
@@ -78,18 +78,18 @@ static void what_is_no_drift_is_not_followed(void **state)
 static void the_sweep_under_way_counts_from_there(void **state)
 {
     (void)state;
-    hold its = after_even(8, 0);
-    its.watch.side = 5;
-    its.watch.away_q3 = 100;
-    its.watch.shared_q16 = 1000;
-    (void)bt_watch_resume(&its.watch, &its.silence, SPAN_Q3);
-    assert_int_equal(its.watch.side, 0);
-    assert_int_equal(its.watch.away_q3, 0);
-    assert_int_equal(its.watch.shared_q16, 0);
-    its = after_even(8, 11 * 8); // a load: nothing was followed
-    its.watch.side = 5;
-    (void)bt_watch_resume(&its.watch, &its.silence, SPAN_Q3);
-    assert_int_equal(its.watch.side, 5);
+    hold one = after_even(8, 0);
+    one.watch.side = 5;
+    one.watch.away_q3 = 100;
+    one.watch.shared_q16 = 1000;
+    (void)bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
+    assert_int_equal(one.watch.side, 0);
+    assert_int_equal(one.watch.away_q3, 0);
+    assert_int_equal(one.watch.shared_q16, 0);
+    one = after_even(8, 11 * 8); // a load: nothing was followed
+    one.watch.side = 5;
+    (void)bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
+    assert_int_equal(one.watch.side, 5);
 }
 
 static void what_is_watched_are_the_means_of_lanes_that_are_known(void **state)
@@ -103,8 +103,8 @@ static void what_is_watched_are_the_means_of_lanes_that_are_known(void **state)
     for (unsigned gone = 0; gone < BT_LANES; gone++) {
         bt_watch_take(&watch, &sweep, 1u << gone);
         for (unsigned lane = 0; lane < BT_LANES; lane++) {
-            uint32_t its = lane == BT_LANE_PDC ? watch.base.pdc_q16 : watch.base.electrode_q16[lane];
-            assert_int_equal(its, lane == gone ? BT_TARE_UNKNOWN : (20000 + 100 * lane) << 13);
+            uint32_t one = lane == BT_LANE_PDC ? watch.base.pdc_q16 : watch.base.electrode_q16[lane];
+            assert_int_equal(one, lane == gone ? BT_TARE_UNKNOWN : (20000 + 100 * lane) << 13);
         }
     }
     assert_int_equal(watch.wait_sweeps, 0);
