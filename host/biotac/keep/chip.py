@@ -43,7 +43,7 @@ QUESTIONS = 1000
 NOT_ACKNOWLEDGED = {errno.ENXIO, errno.EREMOTEIO, errno.EIO}
 
 
-def parse_place(text: str) -> tuple[int, int]:
+def parse_address(text: str) -> tuple[int, int]:
     """Bus and address from text such as ``1:0x50``. Raises PortError for anything else."""
     match = re.fullmatch(r"(\d{1,3}):(0[xX][0-9a-fA-F]{1,2}|\d{1,3})", text, re.ASCII)
     if match is None:
@@ -60,19 +60,19 @@ class Chip:
     Raises PortError when its bus cannot be opened, InputError for a kind below 256 bytes.
     """
 
-    def __init__(self, place: str, kind: str) -> None:
-        self.place = f"EEPROM {place}"
+    def __init__(self, address: str, kind: str) -> None:
+        self.name = f"EEPROM {address}"
         self.kind = KINDS[kind]
         if self.kind.size_bytes < REACH_BYTES:
             raise InputError(
-                f"{self.place}: a {kind} has {self.kind.size_bytes} bytes, expected {REACH_BYTES} or more; use a 24c02"
+                f"{self.name}: a {kind} has {self.kind.size_bytes} bytes, expected {REACH_BYTES} or more; use a 24c02"
             )
-        bus, self._address = parse_place(place)
+        bus, self._address = parse_address(address)
         try:
             import smbus2
         except ImportError as error:
             raise PortError(
-                f"{self.place} needs smbus2 ({error}); on Linux, pip install 'biotac-gateway[i2c]'"
+                f"{self.name} needs smbus2 ({error}); on Linux, pip install 'biotac-gateway[i2c]'"
             ) from error
         self._message: Any = smbus2.i2c_msg
         try:
@@ -110,10 +110,10 @@ class Chip:
         except OSError as error:
             if error.errno in NOT_ACKNOWLEDGED:
                 raise PortError(
-                    f"{self.place}: no acknowledge ({error.strerror}); check power, SDA, SCL and the address "
+                    f"{self.name}: no acknowledge ({error.strerror}); check power, SDA, SCL and the address "
                     "(see i2cdetect)"
                 ) from error
-            raise PortError(f"{self.place}: the bus failed ({error}); check its wires and try again") from error
+            raise PortError(f"{self.name}: the bus failed ({error}); check its wires and try again") from error
 
     def _wait(self) -> None:
         """Wait until a write is stored. It polls with reads, which change nothing whatever the chip is."""
@@ -122,11 +122,11 @@ class Chip:
                 self._bus.i2c_rdwr(self._message.read(self._address, 1))
             except OSError as error:
                 if error.errno not in NOT_ACKNOWLEDGED:
-                    raise PortError(f"{self.place}: the bus failed ({error}); check its wires and try again") from error
+                    raise PortError(f"{self.name}: the bus failed ({error}); check its wires and try again") from error
             else:
                 return
         raise PortError(
-            f"{self.place} did not acknowledge any of {QUESTIONS} polls after a page write; check its power and "
+            f"{self.name} did not acknowledge any of {QUESTIONS} polls after a page write; check its power and "
             "store again; the previous calibration is intact"
         )
 

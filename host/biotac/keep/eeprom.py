@@ -1,8 +1,8 @@
-"""A calibration in an EEPROM: two places, written in turn, so that an interrupted write never destroys the old one.
+"""A calibration in an EEPROM: two slots, written in turn, so that an interrupted write never destroys the old one.
 
-Each place holds a CRC-32 over the rest of it, a generation, and the record as in a board's flash (protocol/SPEC.md,
-Calibrations). The valid place with the later generation counts. A write goes to the other place, whose CRC is wrong
-until its last byte is stored. The places have the same addresses in every chip, so naming a wrong size does not move
+Each slot holds a CRC-32 over the rest of it, a generation, and the record as in a board's flash (protocol/SPEC.md,
+Calibrations). The valid slot with the later generation counts. A write goes to the other slot, whose CRC is wrong
+until its last byte is stored. The slots have the same addresses in every chip, so naming a wrong size does not move
 them.
 """
 
@@ -17,31 +17,31 @@ from . import flash_record
 from .calibration import Calibration
 from .chip import Chip
 
-PLACE_BYTES = 128
-PLACES = 2
+SLOT_BYTES = 128
+SLOTS = 2
 CRC = struct.Struct("<I")
 GENERATION = struct.Struct("<I")
 
 
 class Kept(NamedTuple):
-    """Contents of one place."""
+    """Contents of one slot."""
 
-    place: int
+    slot: int
     generation: int
     record: bytes  # followed by 0xFF
 
 
 def load(chip: Chip) -> Calibration:
     """The calibration in this chip. Raises InputError when there is none that can be used."""
-    raw = [_read(chip, place) for place in range(PLACES)]
+    raw = [_read(chip, slot) for slot in range(SLOTS)]
     newest = _newest(raw)
     if newest is None:
         if all(set(data) == {0xFF} for data in raw):
-            raise InputError(f"{chip.place} is blank; `biotac calibration store` writes to it")
+            raise InputError(f"{chip.name} is blank; `biotac calibration store` writes to it")
         raise InputError(
-            f"{chip.place} holds no calibration: the CRCs of both copies are wrong; check --chip, or store it again"
+            f"{chip.name} holds no calibration: the CRCs of both copies are wrong; check --chip, or store it again"
         )
-    return flash_record.unpack(newest.record, chip.place)
+    return flash_record.unpack(newest.record, chip.name)
 
 
 def store(chip: Chip, calibration: Calibration) -> bool:
@@ -49,34 +49,34 @@ def store(chip: Chip, calibration: Calibration) -> bool:
 
     Raises PortError when it is not stored.
     """
-    newest = _newest([_read(chip, place) for place in range(PLACES)])
-    body = flash_record.pack(calibration).ljust(PLACE_BYTES - CRC.size - GENERATION.size, b"\xff")
+    newest = _newest([_read(chip, slot) for slot in range(SLOTS)])
+    body = flash_record.pack(calibration).ljust(SLOT_BYTES - CRC.size - GENERATION.size, b"\xff")
     if newest is not None and newest.record == body:
         return False
-    place = 0 if newest is None else 1 - newest.place
+    slot = 0 if newest is None else 1 - newest.slot
     generation = 1 if newest is None else (newest.generation + 1) % 2**32
     covered = GENERATION.pack(generation) + body
     whole = CRC.pack(zlib.crc32(covered)) + covered
-    chip.write(place * PLACE_BYTES, whole)
-    if _read(chip, place) != whole:
+    chip.write(slot * SLOT_BYTES, whole)
+    if _read(chip, slot) != whole:
         raise PortError(
-            f"{chip.place} does not read back the bytes written; check --chip and the chip's write protection (WP)"
+            f"{chip.name} does not read back the bytes written; check --chip and the chip's write protection (WP)"
         )
     return True
 
 
-def _read(chip: Chip, place: int) -> bytes:
-    return chip.read(place * PLACE_BYTES, PLACE_BYTES)
+def _read(chip: Chip, slot: int) -> bytes:
+    return chip.read(slot * SLOT_BYTES, SLOT_BYTES)
 
 
 def _newest(raw: list[bytes]) -> Kept | None:
     newest: Kept | None = None
-    for place, data in enumerate(raw):
+    for slot, data in enumerate(raw):
         covered = data[CRC.size :]
         if CRC.unpack_from(data) != (zlib.crc32(covered),):
             continue
         (generation,) = GENERATION.unpack_from(covered)
         # Modulo 2^32: a generation is later if it is less than 2^31 ahead.
         if newest is None or 0 < (generation - newest.generation) % 2**32 < 2**31:
-            newest = Kept(place, generation, covered[GENERATION.size :])
+            newest = Kept(slot, generation, covered[GENERATION.size :])
     return newest

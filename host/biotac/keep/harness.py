@@ -8,13 +8,13 @@ from __future__ import annotations
 from ..errors import PortError
 from . import eeprom
 from .calibration import Calibration
-from .chip import KINDS, Chip, parse_place
+from .chip import KINDS, Chip, parse_address
 
 FORM = "spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c02"
 
 
 def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
-    """The port without its option, and each finger's EEPROM as (place, kind). Raises PortError for anything else.
+    """The port without its option, and each finger's EEPROM as (address, kind). Raises PortError for anything else.
 
     EEPROMs are listed in the order of the fingers; an empty entry is a finger without one.
     """
@@ -22,19 +22,19 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
     key, _, texts = option.partition("=")
     if option and key != "calibration":
         raise PortError(f"{port}: option {key!r} is unknown; expected {FORM}")
-    places: dict[int, tuple[str, str]] = {}
+    eeproms: dict[int, tuple[str, str]] = {}
     for finger, text in enumerate(texts.split(",")):
         if not text:
             continue
-        place, _, kind = text.rpartition(":")
+        address, _, kind = text.rpartition(":")
         if kind not in KINDS:
             raise PortError(f"{port}: {text!r} names no known EEPROM ({', '.join(KINDS)}); expected {FORM}")
-        parse_place(place)
-        places[finger] = (place, kind)
+        parse_address(address)
+        eeproms[finger] = (address, kind)
     fingers = bare.count(",") + 1
-    if places and max(places) >= fingers:
-        raise PortError(f"{port}: {max(places) + 1} EEPROMs for {fingers} finger(s); expected at most one per finger")
-    return bare, places
+    if eeproms and max(eeproms) >= fingers:
+        raise PortError(f"{port}: {max(eeproms) + 1} EEPROMs for {fingers} finger(s); expected at most one per finger")
+    return bare, eeproms
 
 
 def load(port: str) -> tuple[str, dict[int, Calibration]]:
@@ -42,9 +42,9 @@ def load(port: str) -> tuple[str, dict[int, Calibration]]:
 
     Raises PortError for an EEPROM that cannot be reached, InputError for one without a calibration.
     """
-    bare, places = parse(port)
+    bare, eeproms = parse(port)
     own = {}
-    for finger, (place, kind) in places.items():
-        with Chip(place, kind) as chip:
+    for finger, (address, kind) in eeproms.items():
+        with Chip(address, kind) as chip:
             own[finger] = eeprom.load(chip)
     return bare, own

@@ -112,7 +112,7 @@ def test_a_write_that_is_torn_at_any_byte_leaves_the_old_one(monkeypatch, kind: 
                 store(kind, NEW)  # what is left there is no obstacle
                 assert load(kind) == NEW
                 cuts += 1
-        assert cuts == eeprom.PLACE_BYTES
+        assert cuts == eeprom.SLOT_BYTES
         made.bytes_left = None
 
 
@@ -241,13 +241,13 @@ def test_without_smbus2_the_cure_is_named(monkeypatch) -> None:
 )
 def test_a_place_that_is_none(place: str) -> None:
     with pytest.raises(PortError, match=r"BUS:ADDRESS|is at 0x50 to 0x57"):
-        chips.parse_place(place)
+        chips.parse_address(place)
 
 
 def test_places() -> None:
-    assert chips.parse_place("1:0x50") == (1, 0x50)
-    assert chips.parse_place("10:0X57") == (10, 0x57)
-    assert chips.parse_place("0:80") == (0, 80)
+    assert chips.parse_address("1:0x50") == (1, 0x50)
+    assert chips.parse_address("10:0X57") == (10, 0x57)
+    assert chips.parse_address("0:80") == (0, 80)
 
 
 def test_the_command_line_stores_shows_and_loads(monkeypatch, capsys, tmp_path: Path) -> None:

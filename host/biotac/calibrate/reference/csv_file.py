@@ -37,10 +37,10 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
     Raises RecordingError for what cannot be read or is not plausible, InputError for a wrong mounting in the file.
     """
     own, head, read = open_table(path)
-    its_mounting = mounting
-    if its_mounting is None and "mounting" in own:
-        its_mounting = from_json(own["mounting"], f"{path}: line '# mounting:'")
-    if its_mounting is None:
+    chosen = mounting
+    if chosen is None and "mounting" in own:
+        chosen = from_json(own["mounting"], f"{path}: line '# mounting:'")
+    if chosen is None:
         raise RecordingError(
             f"{path}: does not say how the sensor is mounted on the finger: expected --mounting FILE.toml, or "
             "--mounting lin if axes and origin are already Lin's"
@@ -49,7 +49,7 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
     table = read(use)
     samples = Samples(table[:, 0], table[:, 1:] * scale)
     check(str(path), samples)
-    return Reference(path.name, samples, its_mounting, own.get("sensor", ""))
+    return Reference(path.name, samples, chosen, own.get("sensor", ""))
 
 
 def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequence[int]], Floats]]:
@@ -68,11 +68,11 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
         raise RecordingError(f"{path}: no header line: expected one that names every column")
     separator = max(",;\t", key=head.count)
 
-    def read(places: Sequence[int]) -> Floats:
+    def read(indices: Sequence[int]) -> Floats:
         if not body.strip():
-            return np.empty((0, len(places)))
+            return np.empty((0, len(indices)))
         try:
-            return np.loadtxt(io.StringIO(body), delimiter=separator, usecols=places, ndmin=2, dtype=np.float64)
+            return np.loadtxt(io.StringIO(body), delimiter=separator, usecols=indices, ndmin=2, dtype=np.float64)
         except ValueError as error:
             raise RecordingError(
                 f"{path}: {error}: expected a number in every column; save it with decimal points"
@@ -102,7 +102,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
     unit.
     """
     found: dict[str, tuple[int, float]] = {}
-    for place, cell in enumerate(names):
+    for index, cell in enumerate(names):
         match = _COLUMN.match(cell)
         if match is None:
             continue
@@ -116,7 +116,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
             raise RecordingError(f"{path}: column {cell!r} is in {unit!r}: expected {_WANTED}; convert it")
         if name in found:
             raise RecordingError(f"{path}: column {cell!r} is there twice: expected once; remove one")
-        found[name] = (place, factor)
+        found[name] = (index, factor)
     torques = torque and [name for name in _NAMES[4:] if name in found]
     wanted = _NAMES if torques else _NAMES[:4]
     missing = [COLUMNS[_NAMES.index(name)] for name in wanted if name not in found]

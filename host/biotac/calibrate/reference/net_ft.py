@@ -43,12 +43,12 @@ class Address:
 
 def parse_address(text: str) -> Address:
     """The address in ``netft:HOST[:PORT][?cpf=...&cpt=...&rate=...]``. Raises InputError for anything else."""
-    place, _, query = text.removeprefix(PREFIX).partition("?")
-    match = re.fullmatch(r"([^:\s]+)(?::(\d{1,5}))?", place)
+    host, _, query = text.removeprefix(PREFIX).partition("?")
+    match = re.fullmatch(r"([^:\s]+)(?::(\d{1,5}))?", host)
     options = dict(parse_qsl(query, keep_blank_values=True))
     unknown = sorted(set(options) - set(OPTIONS))
     if match is None or unknown:
-        seen = f"option {unknown[0]!r}" if unknown else repr(place)
+        seen = f"option {unknown[0]!r}" if unknown else repr(host)
         raise InputError(f"{text}: {seen} is not valid: expected {_FORM}")
     try:
         numbers = {key: float(value) for key, value in options.items()}

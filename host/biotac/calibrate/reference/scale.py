@@ -41,14 +41,14 @@ class Scale:
     """
 
     def __init__(self, port: str, patience_s: float = PATIENCE_S) -> None:
-        place, _, query = port.partition("?")
+        device, _, query = port.partition("?")
         options = _OPTIONS | dict(parse_qsl(query))
-        self._port, self._patience_s = place, patience_s
+        self._port, self._patience_s = device, patience_s
         try:
             if set(options) != set(_OPTIONS):
                 raise ValueError(f"unknown option {', '.join(set(options) - set(_OPTIONS))}")
             baud, bits, stop = (int(options[key]) for key in ("baud", "bits", "stop"))
-            self._serial = serial.serial_for_url(place, do_not_open=True, timeout=0.05, write_timeout=1.0)
+            self._serial = serial.serial_for_url(device, do_not_open=True, timeout=0.05, write_timeout=1.0)
             self._serial.baudrate, self._serial.bytesize, self._serial.stopbits = baud, bits, stop
             self._serial.parity = options["parity"].upper()
         except ValueError as error:
@@ -56,7 +56,7 @@ class Scale:
         try:
             self._serial.open()
         except (serial.SerialException, OSError) as error:
-            raise open_error(place, error) from error
+            raise open_error(device, error) from error
 
     def __enter__(self) -> Scale:
         return self
