@@ -21,7 +21,7 @@ from ...map.columns import Signals, columns, with_one
 from ...map.fitted import WrenchMap
 from . import models
 from .lag import Lags
-from .models import GATED, LAMBDAS, LIN, MODELS, POOL, POOLED, Model
+from .models import GATED, LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums
 from .run import Run
 from .splits import BLOCKS, Blocks
@@ -267,7 +267,7 @@ class _Trainer:
         rows = sum(one.rows for one in tested)
         inner = [np.array(one) for one in zip(*(self._pulled(one, MODELS) for one in kept), strict=True)]
         alone = self._pulled(total, MODELS)
-        by_model = {LIN: models.lin(total, offset=False)}
+        by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)}
         for model, fits, whole in zip(MODELS, inner, alone, strict=False):
             mse = np.sum([out.errors(fit) for fit, out in zip(fits, tested, strict=True)], axis=0) / rows
             # for comparison: one lambda for all axes

@@ -76,13 +76,14 @@ JOINED = Model(
 )
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
-LIN = "lin-scales"
+LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
 # The best model and lambda change from axis to axis and from block to block: choosing one is worse than a weighted mean
 # of all (F2, x: 0.43 N instead of 0.35 N).
 POOL = (QUADRATIC, CONDUCTANCE, JOINED)
 POOLED = "pooled"
 TEXTS = {
     LIN: "Lin's sums, one scale per axis",
+    LIN_OFFSET: "the same, with an offset per axis",
     **{model.name: model.text for model in MODELS},
     POOLED: "weighted mean of " + ", ".join(model.name for model in POOL),
 }
