@@ -26,5 +26,6 @@ make_venv() {
     [ -x .venv/bin/python ] || python3 -m venv .venv
     echo "installing the package into .venv"
     # Python compiles what it imports; of all that is installed here that is the smaller part.
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile ".${1:+[$1]}"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile ".${1:+[$1]}" \
+        ${1:+"./host/biotac-lab[bench]"}
 }

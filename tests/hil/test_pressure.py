@@ -13,12 +13,12 @@ from rig import Rig
 import biotac
 from biotac import Calibration, QuantityFlags, Setting
 from biotac.core.compiled import default_settings
-from biotac.lab.experiments import navarro
 from biotac.recording import Recording
 from biotac.recording.crosscheck import CrossCheck
 from biotac.sim.physics import Profile
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
+from biotac_lab.experiments import navarro2015 as navarro
 
 GAIN_NN = 12_345_678
 

@@ -17,7 +17,7 @@ from ..errors import BiotacError, InputError, printable
 #: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
 VERBS = {
     "demo": (
-        "biotac.cli.lab.demo",
+        "biotac.cli.live.demo",
         "Run the whole chain once: simulated board, stream, recording, cross-check, picture.",
     ),
     "list": (
@@ -56,20 +56,12 @@ VERBS = {
         "biotac.cli.boards.wrench_map",
         "Show, get, put or clear the wrench map that a board computes a finger's force by.",
     ),
-    "experiment": (
-        "biotac.cli.lab.experiment",
-        "Repeat a paper's experiment: figure, table against the paper, JSON.",
-    ),
     "sim": ("biotac.cli.live.sim", "Run a simulated or emulated board on a pty that any serial program can open."),
     "sensor": (
         "biotac.cli.live.sensor",
         "Let a Pico that is wired to a gateway play scenarios and recordings as its sensors.",
     ),
     "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
-    "bench": (
-        "biotac.cli.lab.bench",
-        "Measure batch maths, decoding, start-up, the live path, an idle link, recording sizes.",
-    ),
     "udev-setup": ("biotac.cli.boards.udev_setup", "Install the Linux rule that lets you open boards (needs root)."),
     "version": ("biotac.cli.version", "Print the release, the wire version and the schema hash."),
 }

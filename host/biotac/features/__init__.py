@@ -1,6 +1,10 @@
-"""Features of a touch: its place, sharpness, direction and number of contacts, by formula and by learning (seed 000).
+"""Features of a touch by formula: its place, number of contacts, temperature, and whether the grip holds.
 
-Each module has one idea: paf, smooth, scores, roc, force, several, edge, grip, texture, thermal. ``levenberg`` is the
-neural net and ``inputs`` prepares its inputs. The extra `features` is needed by scores, roc, force, edge, levenberg and
-inputs, and by smooth.lowess() and texture.classifier().
+Only NumPy is needed. What is learnt (curvature, edges, force by nets, textures) is in biotac_lab.
 """
+
+from __future__ import annotations
+
+from . import grip, paf, several, signals, thermal
+
+__all__ = ["grip", "paf", "several", "signals", "thermal"]

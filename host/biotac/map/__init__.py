@@ -7,3 +7,10 @@
 - ``file``: the JSON file, with either or both
 - ``population``: the map of other fingers that every board has
 """
+
+from __future__ import annotations
+
+from .file import dumps_fitted, load_fitted
+from .fitted import WrenchMap
+
+__all__ = ["WrenchMap", "dumps_fitted", "load_fitted"]

@@ -9,8 +9,10 @@ host/docs/recording.md describes the format.
 
 from __future__ import annotations
 
+from .crosscheck import CrossCheck
+from .npz_file import counts_field, read_npz, to_lin_frame
 from .reader import Recording
 from .selection import load
 from .writer import Recorder
 
-__all__ = ["Recorder", "Recording", "load"]
+__all__ = ["CrossCheck", "Recorder", "Recording", "counts_field", "load", "read_npz", "to_lin_frame"]

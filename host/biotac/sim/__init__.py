@@ -1,6 +1,18 @@
 """Sources of counts for the emulated sensor: scenarios through a physics model, and recordings."""
 
-from .loading import bundled_scenarios, load_source
-from .source import Source, Truth
+from __future__ import annotations
 
-__all__ = ["Source", "Truth", "bundled_scenarios", "load_source"]
+from .gains import fit_gains
+from .loading import bundled_scenarios, load_source
+from .physics import GAP_MM, PROFILES, Finger, Footprints, Profile, States, deform
+from .random_loads import plate_recording, random_loads
+from .sampling import sample, tdc_counts
+from .scenario import FLAT_MM
+from .source import Source, Truth
+from .timeline import Pose, Track
+
+__all__ = [
+    "FLAT_MM", "GAP_MM", "PROFILES", "Finger", "Footprints", "Pose", "Profile", "Source", "States", "Track", "Truth",
+    "bundled_scenarios", "deform", "fit_gains", "load_source", "plate_recording", "random_loads", "sample",
+    "tdc_counts",
+]  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +16,12 @@ from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_F
 from biotac.calibrate.press.pressure_procedure import Plan, calibrate
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
-from biotac.lab.experiments import navarro
-from biotac.lab.experiments.outcome import Options
-from biotac.picture import picture
 from biotac.recording import Recording
 from biotac.sim.loading import load_source
+from biotac.sim.play import play
 from biotac.sim.process import SimBoard
+from biotac.sim.scenario import parse_scenario
+from biotac_lab.experiments import navarro2015 as navarro
 
 FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
 FINGERS = range(5)
@@ -64,7 +63,8 @@ def test_the_bundled_scenario_is_the_experiments() -> None:
         *navarro.presses(FINGERS, CALIBRATION_FORCES_N, [navarro.PLACE] * 3),
         *navarro.presses(FINGERS, VERIFICATION_FORCES_N, [navarro.PLACE]),
     ]
-    wanted = navarro.emulated_hand("fingers", [1, 2, 3, 4, 5], "new", steps)
+    text = navarro.scenario("fingers", [1, 2, 3, 4, 5], "new", steps)
+    wanted = play(parse_scenario(text.encode(), file="fingers.toml"))
     np.testing.assert_array_equal(load_source("fingers.toml").samples, wanted.samples)
 
 
@@ -303,47 +303,6 @@ def test_the_gain_of_a_file_recomputes_a_recording(pressed: Path, tmp_path: Path
     np.testing.assert_array_equal(kept.frames["pressure_force_n"], ran.frames["pressure_force_n"])
     np.testing.assert_array_equal(kept.frames["pdc_filtered"], ran.frames["pdc_filtered"])
     assert main(["check", str(tmp_path / "run.mcap")]) == 0
-
-
-# ---- experiment ----------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def result() -> navarro.Result:
-    return navarro.run(Options(seed=21))
-
-
-def test_the_verification_press_is_within_what_is_asked_on_both_profiles(result: navarro.Result) -> None:
-    facts = json.loads(json.dumps(navarro.facts(result)))
-    assert len(facts["checks"]) == 4 and all(check["met"] for check in facts["checks"])
-    assert [one.seed for its in result.hands for one in its.fingers] == list(range(21, 31))
-    page = "\n".join(navarro.page(facts))
-    assert "| thumb | 10." in page and "5.91 %" in page
-
-
-def test_a_board_that_is_off_is_seen(result: navarro.Result) -> None:
-    (first, second) = result.hands
-    facts = navarro.facts(replace(result, hands=(replace(first, frames_checked=0), replace(second, violations=1))))
-    assert [check["met"] for check in facts["checks"]] == [True, False, True, False]
-
-
-def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law(result: navarro.Result) -> None:
-    """The law is physics' own: what a K is worth at another place follows from it without the code under test."""
-    places = result.places
-    errors = np.array(places["errors"]) / 100
-    law = 1 + 0.15 * np.tanh(np.array(places["x_mm"]) / 8)
-    off = np.array(places["gain_n"]) / 1e3 * 100 * law - 1
-    assert (off >= -K_LOW).all() and (off <= K_HIGH).all()
-    wanted = np.abs(law[None, :] / law[:, None] - 1)
-    # K of the one place and what pressure says at the other are each off by the lags
-    assert (np.abs(errors - wanted) <= (K_HIGH + K_LOW) * (1 + wanted)).all()
-    assert np.diag(errors).max() < 0.01 < 0.2 < errors.max()
-
-
-def test_the_picture_is_drawn(result: navarro.Result, tmp_path: Path) -> None:
-    with picture(tmp_path / "navarro.png") as figure:
-        navarro.draw(result, figure)
-    assert (tmp_path / "navarro.png").read_bytes()[:4] == b"\x89PNG"
 
 
 @pytest.mark.parametrize(

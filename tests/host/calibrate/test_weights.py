@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import population_map, training
+from biotac.calibrate.population import population_map
 from biotac.calibrate.population.population_map import Population
 from biotac.calibrate.press import few_shot, weights
 from biotac.calibrate.press.known_force import Held, found
@@ -21,6 +21,7 @@ from biotac.errors import InputError
 from biotac.map.file import load_fitted
 from biotac.sim.loading import load_source
 from biotac.sim.physics import Finger, States
+from biotac_lab.calibrate import training
 
 G = 9.80665
 

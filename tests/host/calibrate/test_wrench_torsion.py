@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,10 @@ from biotac.calibrate.wrench.run import Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, Blocks
 from biotac.core import geometry as surface
 from biotac.errors import RecordingError
-from biotac.lab.experiments import random_loads, shear_torsion
-from biotac.lab.experiments.outcome import Options
 from biotac.map import columns
 from biotac.map.columns import Signals
-from biotac.picture import picture
 from biotac.sim.physics import Finger
+from biotac.sim.random_loads import plate_recording, random_loads
 from biotac.wire.map_gen import KINDS
 
 FRAMES = 4000
@@ -31,19 +28,12 @@ FRAMES = 4000
 @pytest.fixture(scope="module")
 def arrays() -> dict[str, Any]:
     """A calibration recording of random loads."""
-    return random_loads.recording(Finger(2), *random_loads.states(FRAMES, 2), 2)
+    return plate_recording(Finger(2), *random_loads(FRAMES, 2), 2)
 
 
 @pytest.fixture(scope="module")
 def run(arrays: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Run:
     return load_run(wrench_run.save(tmp_path_factory.mktemp("loads") / "loads.npz", arrays))
-
-
-@pytest.fixture(scope="module")
-def result() -> shear_torsion.Result:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(shear_torsion, "FRAMES", FRAMES)
-        return shear_torsion.run(Options(seed=3))
 
 
 def loaded(folder: Path, arrays: dict[str, Any]) -> Run:
@@ -70,7 +60,7 @@ def test_a_contact_is_held_out_whole(run: Run) -> None:
 
 
 def test_blocks_are_not_regions_of_the_finger(run: Run, arrays: dict[str, Any]) -> None:
-    along = random_loads.states(FRAMES, 2)[0].contact_mm[:, 0]
+    along = random_loads(FRAMES, 2)[0].contact_mm[:, 0]
     blocks = Blocks(run.rest, run.contact)
     middles = [along[blocks.rows(k)].mean() for k in range(BLOCKS)]
     # a cut by place alone would spread them over the pad's 16 mm
@@ -130,54 +120,6 @@ def test_wrenches_that_press_nowhere_leave_torsion_out(arrays: dict[str, Any], t
 def test_torsion_that_is_no_number_a_row_is_refused(bad: np.ndarray, arrays: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"field torsion is .* finite numbers in N mm about the outward normal"):
         loaded(tmp_path, arrays | {"torsion": bad})
-
-
-def test_a_row_of_its_own_beats_taking_the_lever_away(result: shear_torsion.Result) -> None:
-    its, both = result.validation.predicted[0], result.both
-    truth = result.validation.run.truth
-    own = figures.rmse(its[both, 6:], truth[both, 6:])[0]
-    # even at the true contact, which no map knows
-    states = random_loads.states(FRAMES, 3)[0]
-    normal = surface.normals_at(states.contact_mm)
-    lever = ((its[:, 3:6] - np.cross(states.contact_mm, its[:, :3])) * normal).sum(axis=1)
-    assert own < 0.5 * figures.rmse(lever[both, None], truth[both, 6:])[0]
-
-
-def test_shear_and_torsion_at_once(result: shear_torsion.Result, tmp_path: Path) -> None:
-    facts = shear_torsion.facts(result)
-    assert json.loads(json.dumps(facts)) == facts
-    assert len(facts["checks"]) == 5
-    assert all(check["met"] for check in facts["checks"]), facts["checks"]
-    page = "\n".join(shear_torsion.page(facts))
-    assert f"{facts['rmse']['calibrated'][1]:.2f}" in page
-    with picture(tmp_path / "its.png") as figure:
-        shear_torsion.draw(result, figure)
-    assert (tmp_path / "its.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_the_papers_model_is_given_its_due(result: shear_torsion.Result) -> None:
-    run = result.validation.run
-    # no scale could be better in sample, and held out it is hardly worse
-    sums = (run.counts - run.tare) @ surface.ELECTRODE_NORMAL
-    best = (sums * run.truth[:, :3]).sum(axis=0) / (sums**2).sum(axis=0)
-    in_sample = figures.rmse(sums * best, run.truth[:, :3])
-    held_out = figures.rmse(result.paper[:, :3], run.truth[:, :3])
-    assert (held_out >= in_sample).all()
-    np.testing.assert_allclose(held_out, in_sample, rtol=0.02)
-
-
-# ---- warmth ------------------------------------------------------------------------------------
-
-
-def test_a_tare_that_follows_the_thermometer_is_all_a_map_needs(result: shear_torsion.Result) -> None:
-    ways = list(result.warm.values())
-    still, stays, default, own, tared = (way[[1, 2, 6]] for way in ways)
-    # Fx: without it, eight degrees are seen as force
-    assert (stays > 1.05 * still).all()
-    # tared at each temperature nothing is left of it, so no term in the map could gain more
-    np.testing.assert_allclose(tared, still, rtol=0.05)
-    assert (default < 1.15 * still).all()
-    assert (own < 1.15 * still).all()
 
 
 # ---- air ---------------------------------------------------------------------------------------

@@ -200,11 +200,8 @@ def test_usage_errors_exit_2() -> None:
         assert "expected" in done.stderr
 
 
-@pytest.mark.parametrize(
-    "words", [("stream", "sim:press.toml", "--rate", "1e-308"), ("bench", "batch", "--frames", "1" + "0" * 14)]
-)
-def test_absurd_numbers_are_refused_at_the_door(words: tuple[str, ...]) -> None:
-    done = run(*words)
+def test_absurd_numbers_are_refused_at_the_door() -> None:
+    done = run("stream", "sim:press.toml", "--rate", "1e-308")
     assert done.returncode == 2
     assert "expected" in done.stderr.splitlines()[-1]
 
@@ -273,7 +270,6 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
     [
         "calibration get PORT out.json --finger nose",
         "map clear PORT --finger 5",
-        "experiment poke rec.mcap --finger 7",
         "calibrate wrench rec.mcap --finger nose",
         "calibrate press PORT --scale --finger nose",
         "calibrate press PORT --pressure --finger thumb,9",
@@ -290,9 +286,6 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("calibrate contact --contacts many", "--contacts: seen 'many'; expected a whole number, 1 to 100000"),
-        ("calibrate contact --contacts 100001", "--contacts: seen '100001'; expected a whole number, 1 to 100000"),
-        ("bench live --rounds 0", "--rounds: seen '0'; expected a whole number, 1 to 1000000"),
         ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
         ("calibrate press P --scale --readings 1,x", "--readings: seen '1,x'; expected numbers, separated by commas"),
         (

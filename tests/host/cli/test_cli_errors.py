@@ -121,22 +121,6 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected", "check @text.mcap"),
     (2, "record it again", "check @cut.mcap"),
     (2, "check the path", "calibrate wrench +no.npz"),
-    (2, "expected 0 to 2147483647", "experiment poke --seed -1"),
-    (2, "check the path", "experiment poke +no.npz"),
-    (2, "save z_dir too", "experiment plate-normal @rec.mcap"),
-    (2, "choose one with --finger", "experiment poke @rec.mcap --finger thumb"),
-    (2, "0 contacts above 1 N: expected 19", "experiment poke @rest.npz --out +out"),
-    (2, "save M too", "experiment torsion @rest.npz"),
-    (2, "force never exceeds 0.00 N", "experiment shear @rest.npz"),
-    (2, "add E_base", "experiment shear @brief.npz"),
-    (2, "drop one of them", "experiment shear @rest.npz --seed 2"),
-    (2, "drop --map", "experiment poke --map +no.wrench.json"),
-    (2, "drop them", "experiment poke --quick"),
-    (2, "as `biotac calibrate wrench --out`", "experiment shear --map +no.wrench.json"),
-    (2, "rename the file", "experiment shear --map +paper.wrench.json"),
-    (2, "give --map FILE", "experiment torsion-shear --check --out +out"),
-    (2, "overwrite it (--force", "experiment shear --out @done"),
-    (2, "choose another name", "experiment shear --out @list.json"),
     (3, "`biotac list`", f"calibrate press {NO_PORT} --pressure"),
     (2, "check the path", "calibrate press +no.mcap --pressure"),
     (2, "expected a reference file", "calibrate press @rec.mcap --pressure"),
@@ -234,8 +218,6 @@ CASES: list[tuple[int, str, str]] = [
     (2, "use the build's .uf2", f"flash {NO_PORT} @text.uf2"),
     (2, "kinds are none", "sensor /dev/null press.toml --fault 2=loose"),
     (2, "name an IMAGE", "flash"),
-    (2, "expected 500 to", "bench decode --frames 1"),
-    (2, "expected a scenario's path or one of", "bench idle --source nowhere.toml"),
 ]
 
 
@@ -418,20 +400,6 @@ def test_a_simulator_that_does_not_start(capsys, monkeypatch, tmp_path) -> None:
     broken.chmod(0o755)
     monkeypatch.setenv("BIOTAC_SIM", str(broken))
     assert "it is broken" in line_of(capsys, 3, ["info", "sim:press.toml"])
-
-
-def test_bench_recording_without_its_extra(capsys, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "biotac.lab.bench.protobuf_mcap", None)
-    monkeypatch.delattr("biotac.lab.bench.protobuf_mcap", raising=False)
-    assert "pip install 'biotac-gateway[bench]'" in line_of(capsys, 2, ["bench", "recording"])
-
-
-def test_bench_recording_names_a_package_as_pip_does(capsys, monkeypatch) -> None:
-    monkeypatch.delitem(sys.modules, "biotac.lab.bench.protobuf_mcap", raising=False)
-    monkeypatch.delattr("biotac.lab.bench.protobuf_mcap", raising=False)
-    monkeypatch.setitem(sys.modules, "google", None)
-    monkeypatch.setitem(sys.modules, "google.protobuf", None)
-    assert "biotac: protobuf is not installed" in line_of(capsys, 2, ["bench", "recording"])
 
 
 def test_an_inventory_of_no_lake_does_not_ask_for_duckdb(capsys, monkeypatch, tmp_path) -> None:

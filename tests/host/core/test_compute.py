@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from core_in_units import on_board, reference
@@ -13,13 +11,10 @@ from hypothesis.extra.numpy import arrays
 
 import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
-from biotac.cli import main
 from biotac.core.compiled import default_settings
 from biotac.core.compute import per_frame
-from biotac.lab.bench import batch as bench
 from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.wire import messages_gen as wire
-from biotac.wire.dtypes_gen import DTYPES
 
 MISSING = 0xFFFF
 WEIGHTS = list(PocWeights)
@@ -284,38 +279,3 @@ def test_one_frame_per_call() -> None:
     counts[0, 0] = 4096
     with pytest.raises(ValueError, match="E1 = 4096"):
         results(counts[0])
-
-
-def test_the_contestants_of_the_benchmark_agree(capsys) -> None:
-    """measure() refuses contestants that differ; here it is only run, its times are not looked at."""
-    outcome = bench.measure(bench.SINGLE_FRAMES, rounds=1)
-    assert {name for fast, slow, _ in bench.ASKED for name in (fast, slow)} <= {row.name for row in outcome.rows}
-    assert main(["bench", "batch", "--json", "--frames", "1000"]) == 0
-    assert json.loads(capsys.readouterr().out)["frames"] == 1000
-    assert main(["bench", "batch", "--frames", "1000"]) == 0
-    assert "ns per frame" in capsys.readouterr().out
-
-
-def test_the_link_of_an_untouched_finger_is_measured(capsys) -> None:
-    assert main(["bench", "idle", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["saved_percent"] >= 80
-    # A FRAME a round, and a heartbeat in ten of them.
-    frame_bytes = DTYPES[wire.Frame.ID].itemsize + 7
-    assert told["contact"]["bytes_per_s"] >= 100 * frame_bytes
-    assert told["rest_with_heartbeats"]["heartbeats"] >= 9 * told["rest_with_heartbeats"]["seconds"]
-    assert main(["bench", "idle"]) == 0
-    assert "fewer bytes per second" in capsys.readouterr().out
-
-
-def test_an_unknown_benchmark_is_a_wrong_argument(capsys) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        main(["bench", "boards"])
-    assert stopped.value.code == 2
-    capsys.readouterr()
-
-
-@pytest.mark.parametrize(("what", "frames"), [("batch", "3"), ("batch", "10000001")])
-def test_recordings_of_no_use_are_refused(what, frames, capsys) -> None:
-    assert main(["bench", what, "--frames", frames]) == 2
-    assert f"--frames is {frames}, expected" in capsys.readouterr().err

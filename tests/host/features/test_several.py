@@ -1,4 +1,4 @@
-"""Clusters on the skin's graph: by hand, and on presses whose number and places are known."""
+"""Clusters on the skin's graph, by hand."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ import pytest
 from biotac.core import geometry as surface
 from biotac.features import several
 from biotac.features.signals import ELECTRODE_DR_MM
-from biotac.lab.experiments import seed000_more
-from biotac.sim.physics import Finger
 
 
 def signals(**electrodes: float) -> np.ndarray:
@@ -44,10 +42,3 @@ def test_two_far_ones_are_two_and_a_bridge_makes_them_one() -> None:
     assert first.share + second.share == pytest.approx(1.0) and first.share > second.share
     assert len(several.contacts(signals(E18=900, E17=850))) == 2, "7 mm apart: not neighbours"
     assert len(several.contacts(signals(E18=900, E19=850))) == 1
-
-
-def test_two_simulated_contacts() -> None:
-    """From 8 mm on mostly two, and each within 2 mm; at 6 mm most share an electrode. One is mostly one."""
-    rows = {row["apart_mm"]: row for row in seed000_more.pairs(Finger(1), 40, 1)}
-    assert rows[0.0]["right"] > 0.85
-    assert all(rows[apart]["right"] > 0.6 and rows[apart]["poc_rmse_mm"] < 2.0 for apart in (8.0, 10.0, 12.0, 14.0))

@@ -1,8 +1,28 @@
 """Force for a finger without its own calibration: a population map, fitted to other fingers.
 
 - ``population_map``: the map, its file, and the one that comes with the package
-- ``training``, ``held_out_error``: fits the map to force-plate recordings, and judges it
 
 ``biotac.calibrate.press.few_shot`` improves it with five presses on a scale, or known weights. A file holds
 coefficients and their provenance, never recordings.
 """
+
+from __future__ import annotations
+
+from .population_map import (
+    AXES,
+    COLUMNS,
+    PARTS,
+    ROWS_AT_ONCE,
+    Population,
+    Sums,
+    Trained,
+    columns,
+    dumps,
+    load,
+    provenance_of,
+)
+
+__all__ = [
+    "AXES", "COLUMNS", "PARTS", "ROWS_AT_ONCE", "Population", "Sums", "Trained", "columns", "dumps", "load",
+    "provenance_of",
+]  # fmt: skip

@@ -5,3 +5,29 @@
 - ``pressure``: K of a finger's pressure (Navarro et al. 2015); ``pressure_procedure``: on a board and from a recording
 - ``known_force``: the population map fitted to presses by ``few_shot``; ``weights``: forces of masses on tilted blocks
 """
+
+from __future__ import annotations
+
+from .detector import Press, Procedure
+from .few_shot import Scale, pulled, scale_of
+from .force_source import Truth
+from .guide import Unattended, guide
+from .pressure import (
+    CALIBRATION_FORCES_N,
+    PAPER_ERROR,
+    VERIFICATION_FORCES_N,
+    Fit,
+    Verification,
+    fit,
+    relative_error,
+    verify,
+    with_board_force,
+)
+from .pressure_procedure import put, with_gain
+from .rows import rows_of
+
+__all__ = [
+    "CALIBRATION_FORCES_N", "PAPER_ERROR", "VERIFICATION_FORCES_N", "Fit", "Press", "Procedure", "Scale", "Truth",
+    "Unattended", "Verification", "fit", "guide", "pulled", "put", "relative_error", "rows_of", "scale_of", "verify",
+    "with_board_force", "with_gain",
+]  # fmt: skip

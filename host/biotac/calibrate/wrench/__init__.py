@@ -12,3 +12,19 @@
 
 Not to be confused with ``biotac.keep``, which stores the gains and maps that boards use.
 """
+
+from __future__ import annotations
+
+from .contact import MESH_STEP_MM, locate, locate_on_mesh, moment
+from .crossvalidation import Validation, validate
+from .figures import rmse
+from .lag import Lags
+from .moments import DRIFT_NODES
+from .run import Run, load_run
+from .sources import load
+from .splits import Blocks
+
+__all__ = [
+    "DRIFT_NODES", "MESH_STEP_MM", "Blocks", "Lags", "Run", "Validation", "load", "load_run", "locate",
+    "locate_on_mesh", "moment", "rmse", "validate",
+]  # fmt: skip

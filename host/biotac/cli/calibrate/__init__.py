@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from . import contact, normal, population, press, train, wrench
+from . import population, press, wrench
 
 EXAMPLE = wrench.EXAMPLE
 
-WHATS = (wrench, press, population, train, normal, contact)
+WHATS = (wrench, press, population)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,1 @@
+"""The benchmarks of `biotac-lab bench`, and the code they are compared with."""

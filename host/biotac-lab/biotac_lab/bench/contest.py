@@ -1,0 +1,52 @@
+"""Contestants against each other in one run: interleaved rounds, warmed buffers, medians."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..report import Table
+
+#: (faster, slower, smallest ratio of their times); None where there is no requirement.
+Asked = Sequence[tuple[str, str, float | None]]
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """What to run, and how many frames or messages one run handles."""
+
+    name: str
+    count: int
+    run: Callable[[], Any]
+
+
+def timed(
+    contestants: Sequence[Contestant], rounds: int, clock_ns: Callable[[], int] = time.perf_counter_ns
+) -> dict[str, float]:
+    """Median ns per frame or message, each timed right after an untimed run, which brings in its pages and caches."""
+    times: dict[str, list[float]] = {one.name: [] for one in contestants}
+    for _ in range(rounds):
+        for one in contestants:
+            one.run()
+            start = clock_ns()
+            one.run()
+            times[one.name].append((clock_ns() - start) / one.count)
+    return {name: statistics.median(ns) for name, ns in times.items()}
+
+
+def tables(title: str, per: str, times: dict[str, float], best: dict[str, float], asked: Asked) -> list[Table]:
+    """``times`` in ns, and the ratios of ``best``, the slower ones' times, to them."""
+    ratios = [[fast, slow, best[slow] / times[fast], least, met(best[slow] / times[fast], least)] for fast, slow, least
+              in asked]  # fmt: skip
+    return [
+        Table(title, ["", f"median ns per {per}"], [[name, ns] for name, ns in times.items()], digits=1),
+        Table(f"{title}: ratios", ["", "against", "times", "at least", ""], ratios, digits=1),
+    ]
+
+
+def met(seen: float, least: float | None) -> str:
+    """Whether a requirement of at least that is met, in words."""
+    return "" if least is None else "met" if seen >= least else "NOT met"

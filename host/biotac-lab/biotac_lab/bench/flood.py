@@ -1,0 +1,142 @@
+"""A board that floods a pty with FRAMEs, in its own process: the producer of `biotac-lab bench live`.
+
+    python -m biotac_lab.bench.flood MASTER_FD RATE FRAMES TIMES_FILE
+
+It answers commands. START makes it send FRAMES frames of five fingers, RATE a second, through a ring of 16 KiB that
+drops whole frames when full, as on real boards. TIMES_FILE gets the time at which each burst entered the ring (int64
+ns, CLOCK_MONOTONIC); afterwards a line goes to stdout. It is Python because the simulator's executable is the
+firmware, which should not grow a flood mode. Frames are made beforehand: sending is a slice and a system call.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import select
+import sys
+import time
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from biotac.wire import DTYPES, Decoder, encode
+from biotac.wire import messages as wire
+
+FINGERS = 5
+RING_BYTES = 16_384
+MOST_BURSTS_HZ = 5_000  # USB would not deliver more often
+SPIN_NS = 150_000  # a sleeper wakes up to this much late
+
+
+def burst_frames(rate: int) -> int:
+    """Frames per burst."""
+    return max(1, rate // MOST_BURSTS_HZ)
+
+
+def frames(count: int) -> list[bytes]:
+    """``count`` encoded FRAMEs: finger k % 5, seq k // 5."""
+    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
+    noise = np.random.default_rng(1).integers(1900, 3200, (256, 19))
+    three: dict[str, Any] = {"poc_um": (-5497, 1667, -4799), "force_100un": (120, -340, 9000)}
+    three |= {"torque_mnmm": (8, 134, 29), "force_sigma_100un": (20, 20, 20)}
+    out = []
+    for k in range(count):
+        counts = tuple(noise[k % 256].tolist())
+        now = {"finger": k % FINGERS, "seq": k // FINGERS % 65536, "t_us": k // FINGERS * 10_000 % 2**32}
+        row = values | three | now | {"counts": counts, "tare_q4": tuple(c * 16 for c in counts)}
+        out.append(encode(wire.Frame.ID, wire.Frame(**row).pack()))
+    return out
+
+
+class Board:
+    """The board's end of the pty."""
+
+    def __init__(self, master: int) -> None:
+        self._master = master
+        self._decoder = Decoder()
+        os.set_blocking(master, False)
+
+    def serve(self, ring: bytearray) -> bool:
+        """Put the answers to commands received into the ring; return true if START was among them.
+
+        Written past the ring, an answer could land inside a frame, or end the flood when the pty is full.
+        """
+        try:
+            heard = self._decoder.feed(os.read(self._master, 4096))
+        except BlockingIOError:
+            return False
+        started = False
+        for message_id, payload in heard.others:
+            message = wire.MESSAGES[message_id].unpack(payload)
+            started |= isinstance(message, wire.Start)
+            ring += answer(message)
+        return started
+
+    def send(self, ring: bytearray) -> None:
+        """Write as much of the ring as the pty takes."""
+        with suppress(BlockingIOError):
+            del ring[: os.write(self._master, ring)]
+
+    def wait(self) -> None:
+        """Block until something arrives."""
+        select.select([self._master], [], [])
+
+
+def answer(message: Any) -> bytes:
+    """The encoded answer: HELLO, or a Reply of success."""
+    if isinstance(message, wire.HelloRequest):
+        versions = (wire.WIRE_MAJOR, wire.WIRE_MINOR, wire.SCHEMA_HASH, 0, 0, 0)
+        hello = wire.Hello(
+            message.req_id, message.nonce, *versions, wire.Board.POSIX_SIM, (1,) * 12, 1, 4400, 31, 0xFFFFFFFF
+        )
+        return encode(hello.ID, hello.pack())
+    return encode(wire.Reply.ID, wire.Reply(message.req_id, message.ID, 0).pack())
+
+
+def flood(board: Board, packets: list[bytes], rate: int, times: Any, ring: bytearray) -> None:
+    """Send all packets on time; drop those that find the ring full."""
+    burst = burst_frames(rate)
+    begin_ns = time.monotonic_ns() + 10_000_000
+    for number, first in enumerate(range(0, len(packets), burst)):
+        due_ns = begin_ns + first * 1_000_000_000 // rate
+        while (left_ns := due_ns - time.monotonic_ns()) > 0:
+            if left_ns > SPIN_NS:
+                time.sleep((left_ns - SPIN_NS) / 1e9)
+        times[number] = time.monotonic_ns()
+        for packet in packets[first : first + burst]:
+            if len(ring) + len(packet) <= RING_BYTES:
+                ring += packet
+        board.send(ring)
+        if number % 512 == 0:
+            board.serve(ring)
+    while ring:
+        board.send(ring)
+
+
+def main() -> None:
+    """Run the board; see the module's docstring."""
+    master, rate, count, path = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+    packets = frames(count)
+    bursts = -(-count // burst_frames(rate))
+    with open(path, "wb+") as file:
+        file.truncate(8 * bursts)
+        times = memoryview(mmap.mmap(file.fileno(), 8 * bursts)).cast("q")
+    board = Board(master)
+    ring = bytearray()
+    print("ready", flush=True)
+    while True:
+        board.wait()
+        try:
+            started = board.serve(ring)
+            board.send(ring)
+            if started:
+                flood(board, packets, rate, times, ring)
+                print("sent", flush=True)
+        except OSError:  # nobody has the port open for a while, between two rounds
+            ring.clear()
+            time.sleep(0.001)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,264 @@
+"""The trade-off that matters: a force's cycles on the board against its error on real fingers in newtons.
+
+Every error is on data held out. A finger's own map is judged block by block, as in `biotac calibrate wrench`; a map of
+other fingers is judged on a finger that was not in its training. Cycles are those that `tools/bench/run --keep` counted
+on emulated cores.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+import biotac
+from biotac import InputError
+from biotac.calibrate.population import Population
+from biotac.calibrate.population import load as load_population
+from biotac.calibrate.wrench import Run, Validation, load, rmse, validate
+
+from ..calibrate import held_out_error, training
+from ..report import Show, Table
+from ..report import picture as drawn
+from .batch import LIN
+
+Floats = NDArray[np.float64]
+
+CYCLES = "cycles.json"
+OWN = "its own force plate"
+#: Model of a finger's own map, what the board runs for it, and its label.
+OWN_MODELS = (
+    ("lin-scales", "Lin's scales", "Lin's scales"),
+    ("affine", "signals and offset, 3 axes", "affine"),
+    ("joined", "population and a scale, 3 axes", "joined map"),  # on the same blocks
+    ("pooled", "pooled, 3 axes", "large map"),
+)
+PANELS = (("Cortex-M0+", "m0plus_divider", "with the RP2040's divider"), ("Cortex-M4F", "m4f", ""))
+#: By what is known about the finger.
+COLORS = {"nothing": "#c2410c", OWN: "#1d4ed8"}
+LITTLE = "#15803d"
+# Labels stand to the right of their points and above, except these.
+LEFT = ("affine", "population map")
+BELOW = ("Lin's scales, the firmware's", "joined map", "population map, pulled")
+FLOORS = (("repeatability_n", "the plate, same pattern again", "--"), ("noise_n", "electrode noise, one frame", ":"))
+NEAREST = 0.05  # share of the rows, those with the most similar counts, that stand for "the same pattern"
+EVERY_ROW = 4  # one row in this many is looked at for that
+GUARD_ROWS = 1000
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way to compute force: ``knows`` about the finger; ``cycles`` by core; ``rmse_n`` by recording, for x y z."""
+
+    name: str
+    knows: str
+    cycles: dict[str, int]
+    rmse_n: dict[str, list[float]]
+
+    @property
+    def error_n(self) -> float:
+        """Error over all recordings and axes."""
+        return _pooled(self.rmse_n)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All points, and two limits of the data, by recording for x y z.
+
+    ``noise_n`` is the effect of one frame's electrode noise through the large map. ``repeatability_n`` is how much the
+    plate's force differs when the same counts recur, less what the large map explains. ``cores`` has titles and sources
+    of the cycles.
+    """
+
+    points: list[Point]
+    noise_n: dict[str, list[float]]
+    repeatability_n: dict[str, list[float]]
+    cores: dict[str, dict[str, str]]
+    notes: list[str]
+
+
+def measure(files: Sequence[Path], picture: Path | None = None, show: Show = lambda text: None) -> list[Table]:
+    """Tables of all points, on recordings as for `biotac calibrate wrench`. Raises InputError and RecordingError."""
+    outcome = points_of(files, show)
+    if picture is not None:
+        draw(outcome, picture)
+    cores, names = outcome.cores, list(outcome.noise_n)
+    rows = [
+        [one.name, one.knows, *[one.cycles[k] for k in cores], one.error_n, *[_three(one.rmse_n, k) for k in names]]
+        for one in outcome.points
+    ]
+    floors = [[text, *[_three(getattr(outcome, field), name) for name in names]] for field, text, _ in FLOORS]
+    titles = [f"cycles, {about['title']}" for about in cores.values()]
+    text = "; ".join([f"{about['title']}: {about['cycles_by']}" for about in cores.values()] + outcome.notes)
+    return [
+        Table("Cycles against newtons", ["", "known about the finger", *titles, "error [N]", *names], rows,
+              f"RMSE in x/y/z in N, held out. {text}."),
+        Table("Floors", ["", *names], floors),
+    ]  # fmt: skip
+
+
+def _three(rmse_n: dict[str, list[float]], name: str) -> str:
+    return "/".join(f"{value:.2f}" for value in rmse_n[name]) if name in rmse_n else "-"
+
+
+def points_of(files: Sequence[Path], show: Show) -> Outcome:
+    """All points and floors."""
+    if not files:
+        raise InputError("no recording given: name one or more with counts and force, such as F1.npz")
+    names = [path.name for path in files]
+    if len(set(names)) < len(names):
+        raise InputError(f"{', '.join(names)}: two have the same name; rename one")
+    kept = json.loads(resources.files(__package__).joinpath(CYCLES).read_text(encoding="utf-8"))
+    runs = {path.name: load(path).run for path in files}
+    with threadpool_limits(limits=1, user_api="blas"):
+        others, notes = _of_others(files, list(runs.values()))
+    found: dict[str, dict[str, list[float]]] = {}
+    noise, repeats = {}, {}
+    for name, run in runs.items():
+        show(f"{name}: maps from other fingers")
+        if name in others:
+            for key, error in _untrained(others[name], run).items():
+                found.setdefault(key, {})[name] = error
+        by_lin = biotac.compute(run.counts.astype(np.uint16), run.tare, LIN)["force_n"]
+        found.setdefault(LINS, {})[name] = rmse(by_lin, run.truth[:, :3]).tolist()
+        validation = validate(run, show=show)
+        for model, _, _ in OWN_MODELS:
+            found.setdefault(model, {})[name] = validation.by_model[model][0][:3].tolist()
+        noise[name], repeats[name] = _noise(validation), _repeatability(validation)
+    listed = [*UNTRAINED, *((model, OWN, called, scene) for model, scene, called in OWN_MODELS)]
+    points = [
+        Point(called, knows, {core: about["cycles"][scene] for core, about in kept.items()}, found[key])
+        for key, knows, called, scene in listed
+        if key in found
+    ]
+    cores = {core: {what: about[what] for what in ("title", "cycles_by")} for core, about in kept.items()}
+    return Outcome(points, noise, repeats, cores, notes)
+
+
+LINS, POPULATION, PRESSES, MINUTE = "default", "population", "presses", "minute"
+UNTRAINED = (
+    (LINS, "nothing", "Lin's scales, the firmware's", "Lin's scales"),
+    (POPULATION, "nothing", "population map", "population"),
+    (PRESSES, "five presses on a scale", "population map, scaled", "population and a scale, 3 axes"),
+    (MINUTE, "a minute of force plate", "population map, pulled", "population and a scale, 3 axes"),
+)
+
+
+def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Population], list[str]]:
+    """For each recording the map of the others; for a single one the package's map, if not trained on it."""
+    if len(runs) > 1:
+        fingers = [training.sums_of(training.aligned(run)) for run in runs]
+        return {
+            path.name: training.train([its for j, its in enumerate(fingers) if j != k], symmetric=True)
+            for k, path in enumerate(files)
+        }, ["population maps are trained on the other recordings, symmetric like the package's"]
+    kept = load_population(None)
+    path = files[0]
+    if kept.made_of([path]):
+        return {}, [f"the package's population map was made from {path.name}: name another finger's recording too"]
+    return {path.name: kept.population}, ["the population map is the package's"]
+
+
+def _untrained(its: Population, run: Run) -> dict[str, list[float]]:
+    found = held_out_error.worth(its, training.aligned(run))
+    all_three = {POPULATION: found.rmse_n, PRESSES: found.rmse_scale5_n, MINUTE: found.rmse_60s_n}
+    return {key: rmse.tolist() for key, rmse in all_three.items() if rmse is not None}
+
+
+def _noise(its: Validation) -> list[float]:
+    """RMS effect, N, of electrode noise through the map of the whole run. Second differences leave out slow loads."""
+    run, rng = its.run, np.random.default_rng(0)
+    curve = np.diff(run.counts, n=2, axis=0)
+    sigma = np.median(np.abs(curve), axis=0) / 0.6745 / np.sqrt(6.0)
+    rows = rng.integers(0, len(run.counts), 2000)
+    pdc = None if run.pdc is None else run.pdc[rows]
+    map_of_all = its.wrench_map
+    counts = run.counts[rows]
+    noisy = counts + rng.normal(size=counts.shape) * sigma
+    there, here = (map_of_all.predict(its, pdc)[:, :3] for its in (noisy, counts))
+    noise_n: list[float] = rmse(there, here).tolist()
+    return noise_n
+
+
+def _repeatability(its: Validation) -> list[float]:
+    """Differences of held-out errors between rows of nearly equal counts seconds apart, which no map could explain."""
+    run = its.run
+    error = its.predicted[0][:, :3] - run.truth[:, :3]
+    rows = np.arange(0, len(run.counts), EVERY_ROW)
+    near, distance = _nearest(run.counts - run.tare, rows)
+    same = distance <= np.quantile(distance, NEAREST)
+    apart_n: list[float] = (rmse(error[rows[same]], error[near[same]]) / np.sqrt(2.0)).tolist()
+    return apart_n
+
+
+def _nearest(e: Floats, rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+    """For each of ``rows`` the row nearest in counts that is at least GUARD_ROWS away, and its squared distance."""
+    size, every = (e**2).sum(axis=1), np.arange(len(e))
+    near, distance = np.zeros(len(rows), np.intp), np.zeros(len(rows))
+    for start in range(0, len(rows), 500):
+        some = rows[start : start + 500]
+        squares = size[some][:, None] + size - 2.0 * e[some] @ e.T
+        squares[np.abs(some[:, None] - every) < GUARD_ROWS] = np.inf
+        near[start : start + 500], distance[start : start + 500] = squares.argmin(axis=1), squares.min(axis=1)
+    return near, distance
+
+
+def _pooled(rmse_n: dict[str, list[float]]) -> float:
+    """RMS length over x y z, then the geometric mean over the recordings."""
+    return float(np.exp(np.mean([np.log(np.linalg.norm(three)) for three in rmse_n.values()])))
+
+
+def draw(outcome: Outcome, path: Path) -> None:
+    """Write a PNG."""
+    with drawn(path) as figure:
+        figure.set_size_inches(13, 6)
+        files = ", ".join(outcome.noise_n)
+        figure.suptitle(f"Force on real fingers: cycles against held-out error ({files})")
+        axes = figure.subplots(1, 2, sharey=True)
+        for panel, (title, core, words) in zip(axes, PANELS, strict=True):
+            _panel(panel, outcome, core)
+            panel.set(title=title, xlabel=f"cycles per force{', ' if words else ''}{words}")
+        axes[0].set_ylabel("RMS length of the force error [N]")
+        figure.legend(*axes[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3)
+
+
+def _panel(axes: Any, outcome: Outcome, core: str) -> None:
+    for field, words, style in FLOORS:
+        level = _pooled(getattr(outcome, field))
+        axes.axhline(level, color="#334155", linestyle=style, linewidth=1, label=f"{words}: {level:.2f} N")
+    seen = set()
+    for point in outcome.points:
+        color = COLORS.get(point.knows, LITTLE)
+        words = point.knows if point.knows in COLORS else "a little"
+        label = None if words in seen else f"known about the finger: {words}"
+        seen.add(words)
+        x = point.cycles[core]
+        axes.plot(x, point.error_n, "o", color=color, markersize=9, label=label)
+        for three in point.rmse_n.values():
+            axes.plot(x, np.linalg.norm(three), "_", color=color, markersize=9, alpha=0.6)
+        _name(axes, point, x, color)
+    axes.set(xscale="log", yscale="log")
+    cycles = [point.cycles[core] for point in outcome.points]
+    axes.set_xlim(min(cycles) / 1.6, max(cycles) * 14)
+    axes.grid(alpha=0.25, which="both")
+
+
+def _name(axes: Any, point: Point, x: int, color: str) -> None:
+    below, left = point.name in BELOW, point.name in LEFT
+    axes.annotate(
+        f"{point.name}: {x:,}, {point.error_n:.2f} N",
+        (x, point.error_n),
+        xytext=(-8 if left else 8, -12 if below else 4),
+        textcoords="offset points",
+        fontsize=8,
+        color=color,
+        ha="right" if left else "left",
+        va="top" if below else "bottom",
+    )

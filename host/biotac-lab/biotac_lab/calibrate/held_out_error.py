@@ -1,0 +1,141 @@
+"""The population map's error on a finger that it has not seen, as it is and with a little data of that finger."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from biotac.calibrate.population import Population
+from biotac.calibrate.press import Scale, pulled, scale_of
+from biotac.calibrate.wrench import Run
+
+from .training import FingerSums, Floats, mirrored, sums, train
+
+ROWS_PER_S = 100  # taken for all recordings: they need not have times
+PRESSES = 5
+DRAWS = 200
+PRESS_ROWS = 75
+STRAIGHT = 0.08  # of F_z: shear that a person pressing on a scale does not notice
+FIRM_N = 1.5
+APART_ROWS = 100
+MINUTE_S = 60
+MINUTES = 4  # number tried, each alone, spread over the recording
+SIGMAS = (1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Worth:
+    """RMSE (3,) in N of the map as it is, after five straight presses, and after a minute on a plate.
+
+    It is None where the run has no such presses or is too short. ``said_n`` (n, 3) is the force by the map as it is,
+    ``truth_n`` (n, 3) the plate's; ``scales`` are from the draws of presses.
+    """
+
+    rmse_n: Floats
+    rmse_scale5_n: Floats | None
+    rmse_60s_n: Floats | None
+    said_n: Floats
+    truth_n: Floats
+    scales: tuple[Scale, ...]
+
+
+def worth(its: Population, run: Run) -> Worth:
+    """The errors of a map on an aligned run whose finger is new to it."""
+    truth = run.truth
+    said = its.force(run.counts, run.tare)
+    scales, scale5 = _scaled(said, truth)
+    return Worth(_rms(said - truth), scale5, _minute(its, run), said, truth, scales)
+
+
+def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
+    """One sigma (3,) in N of a new finger's force, by the map as it is and after five presses; ``runs`` are aligned.
+
+    With several fingers it is the error on each of the map of the others. With one it is the error of its map on its
+    own mirror image, the only other finger there is. Presses cannot correct a mirror image's F_x, but the second sigma
+    is never above the first: presses do not make a finger less known.
+    """
+    if len(fingers) == 1:
+        alone = train(fingers, mirror=False)
+        found = [worth_of_force(alone, mirrored(runs[0]))]
+    else:
+        found = []
+        for k, run in enumerate(runs):
+            others = [finger for j, finger in enumerate(fingers) if j != k]
+            found.append(worth_of_force(train(others, symmetric=symmetric), run))
+    raw, scaled = (np.sqrt(np.mean([one[k] ** 2 for one in found], axis=0)) for k in (0, 1))
+    return raw, np.minimum(raw, scaled)
+
+
+def worth_of_force(its: Population, run: Run) -> tuple[Floats, Floats]:
+    """RMSE (3,) in N as the map is and after five presses; the former twice where the run has no such presses."""
+    truth = run.truth
+    said = its.force(run.counts, run.tare)
+    raw = _rms(said - truth)
+    _, scale5 = _scaled(said, truth)
+    return raw, raw if scale5 is None else scale5
+
+
+def coverage(error_n: Floats, sigma_n: Floats) -> list[float]:
+    """Shares of errors (n, 3) within one and two sigma (3,), all axes together."""
+    return [float((np.abs(error_n) <= sigmas * sigma_n).mean()) for sigmas in SIGMAS]
+
+
+def facts(its: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
+    """The errors and coverages as JSON types."""
+    result: dict[str, Any] = {
+        "rmse_n": its.rmse_n.tolist(),
+        "rmse_scale5_n": None if its.rmse_scale5_n is None else its.rmse_scale5_n.tolist(),
+        "rmse_60s_n": None if its.rmse_60s_n is None else its.rmse_60s_n.tolist(),
+        "coverage": coverage(its.said_n - its.truth_n, sigma[0]),
+    }
+    if its.scales:
+        each = [coverage(scale.applied(its.said_n) - its.truth_n, sigma[1]) for scale in its.scales]
+        result["coverage_scale5"] = np.mean(each, axis=0).tolist()
+    return result
+
+
+def _scaled(said: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | None]:
+    """Scales from draws of five presses, each a firm and straight stretch of the run, and the RMSE with them."""
+    ends = np.arange(PRESS_ROWS, len(truth) + 1)
+    total = np.concatenate([np.zeros((1, 6)), np.cumsum(np.column_stack([said, truth]), axis=0)])
+    mean = (total[ends] - total[ends - PRESS_ROWS]) / PRESS_ROWS
+    shear = np.hypot(mean[:, 3], mean[:, 4])
+    good = np.flatnonzero((mean[:, 5] > FIRM_N) & (shear < STRAIGHT * mean[:, 5]))
+    rng = np.random.default_rng(0)
+    result = []
+    for _ in range(DRAWS):
+        chosen: list[int] = []
+        for at in rng.permutation(good):
+            if all(abs(int(at) - other) >= APART_ROWS for other in chosen):
+                chosen.append(int(at))
+            if len(chosen) == PRESSES:
+                result.append(scale_of(mean[chosen, :3], mean[chosen, 5]))
+                break
+        else:
+            return (), None  # the run has no five presses
+    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in result]
+    return tuple(result), np.sqrt(np.mean(each, axis=0))
+
+
+def _minute(its: Population, run: Run) -> Floats | None:
+    """RMSE (3,) in N after a minute of the run, over rows at least a second away from it; None for less than two."""
+    rows, n = MINUTE_S * ROWS_PER_S, len(run.counts)
+    if n < 2 * rows:
+        return None
+    found = []
+    for start in np.linspace(0, n - rows, MINUTES).astype(int):
+        minute = slice(start, start + rows)
+        part = replace(run, counts=run.counts[minute], truth=run.truth[minute])
+        moved = pulled(its, sums(part), MINUTE_S)
+        rest = np.r_[: max(start - ROWS_PER_S, 0), min(start + rows + ROWS_PER_S, n) : n]
+        found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest]) ** 2).mean(axis=0))
+    result: Floats = np.sqrt(np.mean(found, axis=0))
+    return result
+
+
+def _rms(error: Floats) -> Floats:
+    result: Floats = np.sqrt((error**2).mean(axis=0))
+    return result

@@ -1,0 +1,95 @@
+"""biotac-lab population REC..."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from biotac import InputError
+from biotac.calibrate.population import COLUMNS, Trained, dumps, provenance_of
+from biotac.calibrate.wrench import Run, load
+
+from ..report import Show
+from . import held_out_error, training
+from .normal_command import check_free
+
+ABOUT = "A force map for uncalibrated fingers, trained on other fingers on a force plate."
+EXAMPLE = "biotac-lab population F1.npz F2.npz --out population.json"
+# The fit is a few products of large matrices; threads beyond the free cores only wait for each other.
+THREADS = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the training recordings, the test recording, and where the map goes."""
+    parser.add_argument(
+        "files", metavar="REC", nargs="+", type=Path, help="one finger per file, as for calibrate wrench"
+    )
+    parser.add_argument("--test", metavar="REC", type=Path, help="a finger to test the map on; not used for training")
+    parser.add_argument(
+        "--symmetric", action="store_true", help="F_y too from mirrored fingers: for use on another rig than theirs"
+    )
+    parser.add_argument("--out", metavar="FILE", type=Path, help="the map goes here (.json)")
+    parser.add_argument(
+        "--source", metavar="TEXT", default="not stated", help="origin and licence of the data, stored in the map"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
+
+
+def run(args: argparse.Namespace, show: Show) -> int:
+    """Train the map, judge it, write it."""
+    if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
+        raise InputError(f"{args.test} is both a training file and --test: expected another finger; drop it from one")
+    check_free(args.out, overwrite=args.force)
+    with threadpool_limits(limits=THREADS, user_api="blas"):
+        runs = [training.aligned(load(path).run) for path in args.files]
+        tested = None if args.test is None else training.aligned(load(args.test).run)
+        facts, trained = _calibrated(args, runs, tested)
+    if args.out is not None:
+        args.out.write_text(dumps(trained), encoding="utf-8")
+        facts["written"] = str(args.out)
+    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
+    return 0
+
+
+def _calibrated(args: argparse.Namespace, runs: list[Run], tested: Run | None) -> tuple[dict[str, Any], Trained]:
+    fingers = [training.sums_of(run) for run in runs]
+    population = training.train(fingers, symmetric=args.symmetric)
+    sigma = held_out_error.sigma_of(fingers, runs, symmetric=args.symmetric)
+    facts: dict[str, Any] = {
+        "files": [path.name for path in args.files],
+        "symmetric": args.symmetric,
+        "columns": COLUMNS,
+        "sigma_n": sigma[0].tolist(),
+        "sigma_scale5_n": sigma[1].tolist(),
+    }
+    if tested is not None:
+        facts["test"] = args.test.name
+        facts |= held_out_error.facts(held_out_error.worth(population, tested), sigma)
+    source = provenance_of(args.files, args.source, symmetric=args.symmetric)
+    return facts, Trained(population, sigma[0], sigma[1], source)
+
+
+def _lines(facts: dict[str, Any]) -> list[str]:
+    def numbers(values: list[float] | None) -> str:
+        return "    -" if values is None else "  ".join(f"{value:5.3f}" for value in values)
+
+    lines = [
+        f"{', '.join(facts['files'])}: {facts['columns']} columns per axis",
+        f"  a new finger, one sigma, x y z:   {numbers(facts['sigma_n'])} N",
+        f"  after five presses on a scale:    {numbers(facts['sigma_scale5_n'])} N",
+    ]
+    if "test" in facts:
+        within = ", ".join(f"{share:.0%}" for share in facts["coverage"])
+        lines += [
+            f"{facts['test']}, RMSE uncorrected:       {numbers(facts['rmse_n'])} N",
+            f"  five straight presses on a scale: {numbers(facts['rmse_scale5_n'])} N",
+            f"  a minute on a force plate:        {numbers(facts['rmse_60s_n'])} N",
+            f"  within one and two sigma:         {within}",
+        ]
+    if "written" in facts:
+        lines.append(f"  written: {facts['written']}")
+    return lines

@@ -1,0 +1,31 @@
+"""How Wettels and Loeb 2011 judge an estimate: RMSE, SMSE, R2 and the percent error of their Eq 6."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import trapezoid
+from sklearn.metrics import mean_squared_error
+
+from ..report import Facts, plain
+from .trial import Floats
+
+
+def score(estimate: Floats, truth: Floats, *, least: float = 0.0) -> Facts:
+    """Scores of an estimate (n,) against the truth (n,), over the rows where both are finite.
+
+    ``smse`` is the mean squared error over the truth's variance, ``r2`` the squared correlation: in the paper's Table
+    3, R2 exceeds 1 - SMSE, which only that can. Eq 6 divides by the truth and diverges where it is 0, so ``percent`` is
+    100 times the integral of ``abs(estimate - truth)`` over that of ``abs(truth)``, only over rows with ``abs(truth)``
+    above ``least``. With fewer than two rows all are None.
+    """
+    good = np.isfinite(estimate) & np.isfinite(truth)
+    y, t = estimate[good], truth[good]
+    if len(t) < 2:
+        return dict.fromkeys(("rmse", "smse", "r2", "percent"))
+    mse = float(mean_squared_error(t, y))
+    far = np.abs(t) > least
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r2 = np.corrcoef(y, t)[0, 1] ** 2
+        percent = 100.0 * trapezoid(np.abs(y - t)[far]) / np.float64(trapezoid(np.abs(t[far])))
+        smse = mse / t.var()
+    return {"rmse": plain(mse**0.5), "smse": plain(smse), "r2": plain(r2), "percent": plain(percent)}

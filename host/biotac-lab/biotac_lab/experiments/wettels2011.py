@@ -1,0 +1,168 @@
+"""Every table and figure of Wettels and Loeb 2011, on an emulated finger and on recordings with their force.
+
+The paper's probes, places and presses are drawn by learn/stimulations.py. Models are judged on contacts that were not
+in training. Beside that stands the paper's own split, rows at random, which puts neighbours in time on both sides: what
+it gains over held-out contacts is leakage, not a finding.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from sklearn.exceptions import ConvergenceWarning
+from threadpoolctl import threadpool_limits
+
+from biotac.sim import Finger
+
+from ..learn.probes import PROBES
+from ..report import Facts, Options, Report, check, claim
+from . import wettels_force as force
+from . import wettels_more as more
+from . import wettels_paf as paf
+from . import wettels_roc as roc
+from .trial import Floats
+from .wettels_tables import EQUATION, PAPER_PLACES, details, overview, paf_row, text
+
+RECORDING = ""
+TAKES = frozenset({"real", "quick"})
+
+ROC_ASKED, D_ASKED_MM, R_ASKED_MM, BAR_ASKED_DEG = 0.947, 2.3, 2.2, 5.0
+
+
+@dataclass(frozen=True)
+class Size:
+    """The size of a run: contacts per probe, rows, and training steps of a net."""
+
+    places: tuple[int, ...] = (400, 400, 400, 400)
+    paf_places: tuple[int, ...] = PAPER_PLACES
+    frames: int = 6000
+    steps: int = 1000
+    force_places: tuple[int, ...] = (150, 150, 150, 150)
+    force_steps: int = 400
+    reduced_places: tuple[int, ...] = (60, 60, 60, 60)
+    reduced_steps: int = 200
+    bars: int = 6000
+    pairs: int = 200
+
+
+QUICK = Size((8, 8, 8, 8), (3, 3, 3, 3), 300, 20, (6, 6, 6, 6), 20, (6, 6, 6, 6), 10, 200, 20)
+
+
+@dataclass(frozen=True)
+class Result:
+    """``paf`` is what figure 8 draws: truth, raw and smoothed (n, 2); ``force`` is truth and estimate (n, 3)."""
+
+    source: str
+    parts: Facts
+    notes: list[str]
+    paf: Any = field(repr=False)
+    force: tuple[Floats, Floats] = field(repr=False)
+
+
+def run(options: Options) -> Report:
+    """Run it, for minutes, as host/docs/lab/learning.md says."""
+    size = QUICK if options.quick else Size()
+    # the nets are many small systems, on which BLAS's own threads would only wait for each other
+    with threadpool_limits(limits=1, user_api="blas"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # the steps are a limit, as they are in the paper
+        with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
+            result = _run(options, size, pool)
+    return Report(
+        result.source, [overview(result.parts), *details(result.parts)], _checks(result.parts), result.notes,
+        lambda figure: _draw(result, figure), result.parts,
+    )  # fmt: skip
+
+
+def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
+    finger, seed = Finger(options.seed), options.seed
+    rows = force.load(finger, size.force_places, seed)
+    less = force.load(finger, size.reduced_places, seed)
+    steps = size.force_steps
+    options.show("simulating presses and training nets")
+    nets = pool.submit(force.networks, rows, steps, seed)
+    by_contact = pool.submit(roc.frames, finger, size.places, True, seed, size.steps, size.frames)
+    by_row = pool.submit(roc.frames, finger, PAPER_PLACES, False, seed, size.steps, size.frames)
+    grown = pool.submit(roc.trajectories, finger, size.places, seed, size.steps)
+    bars = pool.submit(more.bars, finger, size.bars, seed, size.steps)
+    reduced = pool.submit(force.reductions, less, size.reduced_steps, seed)
+    pairs = pool.submit(more.pairs, finger, size.pairs, seed)
+    real = [pool.submit(force.recorded, path, steps, seed, options.show) for path in options.real]
+    table3, drawn = paf.run(finger, size.paf_places, seed)
+    said = nets.result()
+    parts = {
+        "paf": table3,
+        "impedance": paf.impedance(finger),
+        "correlations": paf.correlations(finger, PAPER_PLACES, seed),
+        "roc": [by_row.result(), by_contact.result(), *grown.result()],
+        "force": [{"how": how} | force.scores(one, rows.force_n) for how, one in said.items()],
+        "force_places": list(size.force_places),
+        "classes": force.by_class(said[force.A_PRIORI], rows),
+        "reductions": reduced.result(),
+        "pairs": pairs.result(),
+        "bars": bars.result(),
+        "real": [one.result() for one in real],
+    }
+    notes = [
+        f"emulated finger, seed {seed}: Hertzian footprints, like a BioTac but no particular one",
+        f"contacts of five presses per probe, 30 to 40 N (paper: {PAPER_PLACES}): {size.paf_places} for PAF, "
+        f"{size.places} for curvature, {size.force_places} for force, {size.reduced_places} for figure 10",
+        "no filter: the paper's 3-pole 5 Hz low-pass lags by about 0.1 s; R2 is the squared correlation, as its "
+        "table 3 needs; Eq 6 only where the force is above 1 N",
+        "rear or forward by the true place, the probe known, as in the paper; one row uses PAF's own d instead",
+    ]
+    if options.quick:
+        notes.append("--quick: far too few rows for the figures to mean anything")
+    return Result(f"emulated finger, seed {seed}", parts, notes, drawn, (rows.force_n, said[force.A_PRIORI]))
+
+
+def _checks(parts: Facts) -> list[Facts]:
+    firm = paf_row(parts, EQUATION, "force threshold")
+    best = max(parts["roc"][1:], key=lambda one: one["correct"])
+    one, four = parts["force"][0]["pooled_n"], parts["force"][1]["pooled_n"]
+    return [
+        check("PAF d above 1 N, the paper's loads", firm["d"]["rmse"], D_ASKED_MM, "mm"),
+        check("PAF r above 1 N, the paper's loads", firm["r"]["rmse"], R_ASKED_MM, "mm"),
+        check(f"probes misclassified, held out, by {best['what']}", 1 - best["correct"], 1 - ROC_ASKED, "of all"),
+        claim(f"nets by class beat one net, pooled RMSE {text(four)} against {text(one)} N", four < one),
+        check("direction of a bar, RMSE", parts["bars"]["rmse_deg"], BAR_ASKED_DEG, "deg"),
+    ]
+
+
+def _draw(result: Result, figure: Any) -> None:
+    """Figures 6, 7, 8 and 12."""
+    figure.set_size_inches(15, 11)
+    grid = figure.add_gridspec(3, 2)
+    truth, raw, smooth = result.paf
+    for k, name in enumerate(("d", "r")):
+        axes = figure.add_subplot(grid[0, k])
+        axes.plot(raw[:, k], ".", markersize=1.5, color="#93c5fd", label="Eq 5")
+        axes.plot(smooth[:, k], ".", markersize=1.5, color="#1d4ed8", label="above 1 N, LOWESS")
+        axes.plot(truth[:, k], color="#dc2626", linewidth=0.8, label="true")
+        axes.set(title=f"figures 8 and 9: {name} [mm]", xlabel="row")
+        axes.legend(fontsize=7, loc="lower right")
+    axes = figure.add_subplot(grid[1, 0])
+    found = np.array(result.parts["correlations"], dtype=float)
+    for k, (name, color) in enumerate(zip(("x", "y", "z"), ("#dc2626", "#15803d", "#1d4ed8"), strict=True)):
+        axes.bar(np.arange(1, 20) + 0.27 * (k - 1), found[:, k], 0.27, color=color, label=f"F{name}")
+    axes.set(title="figure 6: Spearman coefficient of each electrode", xticks=range(1, 20))
+    axes.legend(fontsize=7)
+    axes = figure.add_subplot(grid[1, 1])
+    confusion = np.array(result.parts["roc"][-1]["confusion"])
+    axes.imshow(confusion, cmap="Blues")
+    for (row, column), value in np.ndenumerate(confusion):
+        axes.text(column, row, str(value), ha="center", va="center", fontsize=8)
+    names = [probe.name for probe in PROBES]
+    axes.set(xticks=range(4), yticks=range(4), xticklabels=names, yticklabels=names, xlabel="true", ylabel="found")
+    axes.set_title(f"figure 7: by {result.parts['roc'][-1]['what']}, held out")
+    inner = grid[2, :].subgridspec(1, 3)
+    true, said = result.force
+    for k, name in enumerate(("x", "y", "z")):
+        axes = figure.add_subplot(inner[0, k])
+        axes.plot(true[:, k], said[:, k], ".", markersize=1, color="#1d4ed8")
+        axes.axline((0, 0), slope=1, color="#dc2626", linewidth=0.8)
+        axes.set(title=f"figure 12: F{name} [N], held out", xlabel="true", ylabel="nets by class")

@@ -1,0 +1,80 @@
+"""Wettels and Loeb 2011, table 3 and figures 4, 6, 8 and 9, emulated: PAF by each technique, and correlations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from biotac.core import geometry as surface
+from biotac.features.paf import THRESHOLD_N, paf
+from biotac.features.signals import skin
+from biotac.sim import Finger, States
+
+from ..learn import inputs
+from ..learn.probes import PROBES, counts_of, footprints
+from ..learn.smooth import causal, lowess
+from ..learn.stimulations import Stimulations, stimulate
+from ..report import Facts, plain
+from .scores import score
+from .trial import Floats
+
+LOADS_N = {"30 to 40 N, as the paper": (30.0, 40.0), "6 to 12 N": (6.0, 12.0)}
+EQUATIONS = {"as printed": True, "rest offset removed": False}
+TECHNIQUES = ("none", "11-point LOWESS", "force threshold", "both", "causal 11 taps and threshold")
+FRAMES = 20
+
+
+def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts], Any]:
+    """A row per load, equation and technique; and for the drawing, true and estimated places of the first load."""
+    rows: list[Facts] = []
+    drawn: Any = None
+    for load, peak_n in LOADS_N.items():
+        pressed = stimulate(finger, places, seed=seed, frames=FRAMES, peak_n=peak_n)
+        truth = skin(pressed.contact_mm)
+        firm = np.linalg.norm(pressed.force_n, axis=1) > THRESHOLD_N
+        for equation, as_printed in EQUATIONS.items():
+            said = paf(pressed.counts - pressed.tare, as_printed=as_printed, threshold_n=0.0)["dr_mm"]
+            for technique in TECHNIQUES:
+                found = _by(technique, said, firm, pressed)
+                row: Facts = {"load": load, "equation": equation, "technique": technique}
+                row["share"] = plain(np.isfinite(found).all(axis=1).mean())
+                for k, name in enumerate("dr"):
+                    row[name] = score(found[:, k], truth[:, k])
+                rows.append(row)
+                if drawn is None and technique == "both" and not as_printed:
+                    drawn = truth, said, found
+    return rows, drawn
+
+
+def _by(technique: str, said: Floats, firm: Any, pressed: Stimulations) -> Floats:
+    """The estimate ``said`` by one technique; each contact is smoothed alone, as nothing lies between two of them."""
+    found = said if technique in TECHNIQUES[:2] else np.where(firm[:, None], said, np.nan)
+    if technique in ("none", "force threshold"):
+        return found
+    smooth = np.full_like(found, np.nan)
+    for contact in np.unique(pressed.contact):
+        rows = np.flatnonzero((pressed.contact == contact) & np.isfinite(found).all(axis=1))
+        if len(rows) >= 11:
+            smooth[rows] = causal(found[rows]) if technique.startswith("causal") else lowess(found[rows])
+    return smooth
+
+
+def correlations(finger: Finger, places: tuple[int, ...], seed: int) -> list[list[float | None]]:
+    """Figure 6: absolute Spearman coefficients (19, 3) of the electrodes with Fx, Fy and Fz."""
+    pressed = stimulate(finger, places, seed=seed, frames=5)
+    found = inputs.correlations(pressed.counts - pressed.tare, pressed.force_n)
+    return [[plain(value) for value in row] for row in found.tolist()]
+
+
+def impedance(finger: Finger) -> list[Facts]:
+    """Figure 4: resistance of E18 over its rest when a 1 mm tip presses with 10 N at these distances along d."""
+    at = np.array([0.0, 1.0, 2.0, 4.0, 6.0])
+    over = surface.ELECTRODE_MM[17]
+    contact = surface.project(np.column_stack([over[0] + at, np.repeat(over[1], 5), np.repeat(over[2], 5)]))
+    none = np.zeros(len(at))
+    states = States(contact, np.full(len(at), 10.0), np.zeros((len(at), 3)), none, none, none)
+    counts = counts_of(finger, [(states, footprints(PROBES[0], contact, states.force_n))])[:, 17]
+    rest = finger.rest_counts(np.zeros(1))[0, 17]
+    ratio = (4095.0 / counts - 1.0) / (4095.0 / rest - 1.0)
+    return [{"mm": float(mm), "ratio": plain(float(one))} for mm, one in zip(at, ratio, strict=True)]

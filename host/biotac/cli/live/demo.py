@@ -1,0 +1,49 @@
+"""biotac demo"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from ...demo.run import run_demo
+from .. import values
+from ..progress import Progress
+
+EXAMPLE = "biotac demo press.toml --out my-demo"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add source, length and folder."""
+    parser.add_argument(
+        "source", metavar="SOURCE", nargs="?", default="press.toml", help="scenario or recorded counts (press.toml)"
+    )
+    parser.add_argument("--seconds", type=values.seconds, help="device time (default: the source's length)")
+    parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
+    parser.add_argument("--out", type=Path, default=Path("biotac-demo"), help="folder for its output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Return 0 if everything arrived and every result is within its bound, else 1."""
+    progress = Progress()
+    demo = run_demo(
+        args.source.removeprefix("sim:"), args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show
+    )
+    progress.done()
+    facts, check = demo.facts, demo.facts["crosscheck"]
+    if args.json:
+        print(json.dumps(facts))
+        return 0 if demo.good else 1
+    print(
+        f"{facts['source']}: {facts['frames']} frames from {facts['fingers']} finger(s), {facts['frames_lost']} lost, "
+        f"{facts['crc_errors']} CRC errors; host CPU {facts['host_cpu_percent']} % of one core"
+    )
+    print(
+        f"on-board against float64: PoC {check['poc_um_max']:.3f} um, force {check['force_mn_max']:.4f} mN, "
+        f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)"
+    )
+    print(f"recording {facts['recording']}, report {facts['report']}")
+    if facts["rows_skipped"]:
+        print(f"{facts['rows_skipped']} incomplete row(s) of the recording skipped")
+    print(f"picture {facts['picture']}")
+    return 0 if demo.good else 1

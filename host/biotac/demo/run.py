@@ -1,0 +1,275 @@
+"""The whole chain in one run: simulated board, stream, recording, cross-check, report, picture."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.wrench.report import AXIS_COLORS
+from ..core.geometry import ELECTRODE_MM
+from ..core.unroll import unroll
+from ..errors import InputError
+from ..hand.opening import shake_hands
+from ..markdown import table
+from ..picture import check_drawable, picture
+from ..recording import Recording
+from ..recording.crosscheck import CrossCheck
+from ..sim.loading import load_source
+from ..sim.process import SimBoard, SimLink
+from ..sim.source import Source
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.batches import Batch, join
+from ..wire.frames import electrode_signals
+from ..wire.slots import FRAME_HZ, PAC_SLOT
+from .answers import Answers, answers_to
+
+Show = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class DemoRun:
+    """What a demo produced: the source it played, everything received, and the facts of its report."""
+
+    source: Source
+    batch: Batch
+    facts: dict[str, Any]
+
+    @property
+    def good(self) -> bool:
+        """Nothing lost, nothing damaged, no result out of bounds, the recording equal to the stream."""
+        return (
+            self.facts["frames_lost"] == 0
+            and self.facts["crc_errors"] == 0
+            and self.facts["crosscheck"]["violations"] == 0
+            and bool(self.facts["recording_matches"])
+        )
+
+
+def run_demo(
+    source_name: str, folder: Path, *, fingers: int | None = None, seconds: float | None = None, show: Show = print
+) -> DemoRun:
+    """Play a source through a simulated board and leave demo.mcap, report.json, report.md and demo.png.
+
+    Raises InputError when the source cannot be played or the folder cannot be written.
+    """
+    check_drawable()
+    source = load_source(source_name, fingers=fingers, seconds=seconds)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot create the folder ({error.strerror}); choose another --out") from error
+    recording_path = folder / "demo.mcap"
+    wall = time.monotonic()
+    # The board's counts are ready; from here on this process is a host with a board, and its cost is measured.
+    with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
+        # The check is on the board's arithmetic with Lin's formulas, to a twentieth of a millinewton. What a calibrated
+        # board would publish is computed below and drawn beside it.
+        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
+        settings = hand.settings()
+        has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
+        recorder = hand.record(recording_path, overwrite=True)
+        cpu = time.process_time()
+        outcome = CrossCheck()
+        batches: list[Batch] = []
+        hand.start(pac=has_pac)
+        for batch in hand.batches():
+            outcome.add(batch.wire, settings)
+            batches.append(batch)
+            show(f"{hand.stats.frames} of {source.samples.shape[0] * source.samples.shape[1]} frames")
+        recorder.close()
+        cpu = time.process_time() - cpu
+        stats = hand.stats
+        status = hand.status()
+    joined = join(batches)
+    answers = answers_to(joined, settings, source)
+    rows, played_fingers = source.samples.shape[:2]
+    device_s = rows / FRAME_HZ
+    recorded = Recording(recording_path)
+    never_came = max(0, expected_frames(source) - len(joined.frames) - stats.frames_lost)
+    same = np.array_equal(recorded.wire, joined.wire) and np.array_equal(recorded.pac, joined.pac)
+    facts: dict[str, Any] = {
+        "source": source.name,
+        "fingers": played_fingers,
+        "rows": rows,
+        "rows_skipped": source.skipped_frames,
+        "frames": len(joined.frames),
+        "frames_lost": stats.frames_lost + never_came,
+        "pac_blocks": len(joined.pac),
+        "crc_errors": stats.crc_errors,
+        "other_errors": stats.other_errors,
+        "board_dropped": status.messages_dropped,
+        "board_slots_late": status.slots_late,
+        "device_seconds": device_s,
+        "wall_seconds": round(time.monotonic() - wall, 3),
+        "host_cpu_seconds": round(cpu, 3),
+        "host_cpu_percent": round(100 * cpu / device_s, 2),
+        "bytes": stats.bytes_received,
+        "recording_bytes": recording_path.stat().st_size,
+        "recording_matches": bool(same),
+        "tare_changes": tare_changes(joined.messages),
+        "force_rmse_n": force_error(source, joined),
+        "lin_rmse_n": force_error(source, joined, answers.lin_n),
+        "calibrated_by": answers.calibrated_by,
+        "calibrated_rmse_n": force_error(source, joined, answers.calibrated_n),
+        "crosscheck": outcome.as_dict(),
+        "recording": str(recording_path),
+        "report": str(folder / "report.md"),
+        "picture": str(folder / "demo.png"),
+    }
+    draw(source, joined, source_rows(source, joined), answers, folder / "demo.png")
+    (folder / "report.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+    (folder / "report.md").write_text(report_text(facts), encoding="utf-8")
+    return DemoRun(source, joined, facts)
+
+
+def expected_frames(source: Source) -> int:
+    """Frames that the board must send: one for each round of a finger with at least one good word."""
+    return int(np.count_nonzero(np.any((source.samples <= 4095), axis=2)))
+
+
+def source_rows(source: Source, batch: Batch) -> NDArray[np.int64]:
+    """The source's row that each frame was sampled from, shape (n,).
+
+    Found by time, because a round in which a finger gave no good word has a row but no seq.
+    """
+    t_us = batch.frames["t_us"]
+    if not len(t_us):
+        return np.empty(0, np.int64)
+    first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
+    rows = first_row + np.rint((t_us - t_us.min()) * FRAME_HZ / 1e6).astype(np.int64)
+    return np.asarray(np.clip(rows, 0, len(source.samples) - 1))
+
+
+def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
+    """When, where and why the tare changed."""
+    return [
+        {"finger": m.finger, "seq": m.seq, "reason": wire.TareReason(m.reason).name}
+        for m in messages
+        if isinstance(m, wire.Tare)
+    ]
+
+
+def force_error(source: Source, batch: Batch, force_n: NDArray[np.float64] | None = None) -> list[float] | None:
+    """RMS difference to the source's own force over contact frames, N per axis; None if the source has no force.
+
+    Judges ``force_n`` (n, 3) if given, else what the board sent.
+    """
+    truth = source.known_force_n
+    if truth is None:
+        return None
+    touched = (batch.frames["flags"] & wire.FrameFlags.CONTACT) != 0
+    if not touched.any():
+        return None
+    frames, rows = batch.frames[touched], source_rows(source, batch)[touched]
+    said = frames["force_n"] if force_n is None else force_n[touched]
+    difference = said - truth[rows, frames["finger"]]
+    return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
+
+
+def report_text(facts: dict[str, Any]) -> str:
+    """The report as Markdown."""
+    check = facts["crosscheck"]
+    lines = [
+        f"# Demo: {facts['source']}",
+        "",
+        f"{facts['rows']} rows on {facts['fingers']} finger(s), {facts['device_seconds']:.2f} s of device time.",
+        "",
+        *table(
+            ["", "seen", "bound"],
+            [
+                ["frames", f"{facts['frames']}", ""],
+                ["frames lost", f"{facts['frames_lost']}", "0"],
+                ["CRC errors", f"{facts['crc_errors']}", "0"],
+                ["cross-check violations", f"{check['violations']}", "0"],
+                ["PoC error, max", f"{check['poc_um_max']:.3f} um", f"{check['poc_um_bound']:.3f} um"],
+                ["force error, max", f"{check['force_mn_max']:.4f} mN", f"{check['force_mn_bound']:.4f} mN"],
+                ["torque error, max", f"{check['torque_nmm_max']:.5f} N*mm", f"{check['torque_nmm_bound']:.5f} N*mm"],
+                ["host CPU", f"{facts['host_cpu_percent']} % of one core", ""],
+            ],
+        ),
+        "These errors compare the board's fixed-point arithmetic with the same formulas in float64. They do not show",
+        "how well the formulas match a real force.",
+    ]
+    if facts["force_rmse_n"] is not None:
+        lines += ["", "RMS error against the source's own force, in contact, in N, x / y / z:", ""]
+        for words, name in (
+            ("the board, with Lin's scales from its settings", "force_rmse_n"),
+            ("the firmware's default scales", "lin_rmse_n"),
+            (facts["calibrated_by"], "calibrated_rmse_n"),
+        ):
+            x, y, z = facts[name]
+            lines.append(f"* {words}: {x:.2f} / {y:.2f} / {z:.2f}")
+    if facts["tare_changes"]:
+        changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
+        lines += ["", *table(["finger", "frame", "reason for the new tare"], changes)[:-1]]
+    return "\n".join(lines) + "\n"
+
+
+def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], answers: Answers, path: Path) -> None:
+    """Write a PNG of finger 0; ``source_rows`` (n,) gives the source's row of each frame."""
+    mine = batch.frames["finger"] == 0
+    frames, messages = batch.frames[mine], batch.wire[mine]
+    with picture(path) as figure:
+        figure.set_size_inches(13, 5.6)
+        axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
+        figure.suptitle(f"{source.name}: finger 0 through the simulated board")
+        draw_fingertip(figure, axes[0], frames, messages)
+        lin_n, calibrated_n = answers.lin_n[mine], answers.calibrated_n[mine]
+        draw_force(axes[1], source, frames, source_rows[mine], replace(answers, lin_n=lin_n, calibrated_n=calibrated_n))
+
+
+def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
+    """Electrodes at the moment of largest force, and every PoC of the contacts."""
+    across, along = unroll(ELECTRODE_MM)
+    signals = np.nan_to_num(electrode_signals(messages)) if len(messages) else np.zeros((1, 19))
+    tared = (frames["flags"] & wire.FrameFlags.UNTARED) == 0
+    energy = np.where(tared, (signals**2).sum(axis=1), 0.0) if len(messages) else np.zeros(1)
+    strongest = int(np.argmax(energy))
+    limit = max(float(np.abs(signals[strongest]).max()), 1.0)
+    dots = axes.scatter(
+        across, along, c=signals[strongest], s=520, cmap="RdBu", vmin=-limit, vmax=limit, edgecolors="#444444"
+    )
+    for name, a, b in zip(sensor.ELECTRODE_NAMES, across, along, strict=True):
+        axes.annotate(name, (a, b), ha="center", va="center", fontsize=7)
+    flags = frames["flags"]
+    contact = ((flags & wire.FrameFlags.CONTACT) != 0) & ((flags & wire.FrameFlags.POC_LOW) == 0)
+    poc_across, poc_along = unroll(frames["poc_mm"][contact])
+    axes.plot(poc_across, poc_along, ".", color="#7c3aed", markersize=3, alpha=0.5, label="point of contact")
+    if len(frames) and contact.any():
+        a, b = unroll(frames["poc_mm"][strongest : strongest + 1])
+        axes.plot(a, b, "x", color="#7c3aed", markersize=13, markeredgewidth=3, label="at peak signal")
+        axes.set_title(f"electrodes at {frames['t_us'][strongest] / 1e6:.2f} s", fontsize=10)
+    axes.set(xlabel="around the finger [mm], + towards E11", ylabel="along the finger [mm], tip up")
+    axes.set_aspect("equal")
+    axes.margins(0.15)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.06), fontsize=8, ncols=2, frameon=False)
+    figure.colorbar(dots, ax=axes, shrink=0.7, label="signal [count]: compressed < 0 < bulged")
+
+
+def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64], answers: Answers) -> None:
+    """Both answers' force on the finger over device time, with the source's own force behind them."""
+    t_s = frames["t_us"] / 1e6
+    truth_n = source.known_force_n
+    for axis, color in enumerate(AXIS_COLORS):
+        if truth_n is not None:
+            truth = truth_n[rows, 0, axis]
+            axes.plot(t_s, truth, color=color, linewidth=4, alpha=0.25, label=f"{'xyz'[axis]}, truth")
+        axes.plot(t_s, answers.lin_n[:, axis], ":", color=color, linewidth=1, label=f"{'xyz'[axis]}, Lin")
+        axes.plot(t_s, answers.calibrated_n[:, axis], color=color, linewidth=1, label=f"{'xyz'[axis]}, calibrated")
+    contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
+    axes.fill_between(
+        t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06, label="contact"
+    )
+    axes.set(xlabel="device time [s]", ylabel="force on the finger [N]")
+    words = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
+    axes.set_title(f"{words}, truth (thick)" if truth_n is not None else words, fontsize=10)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

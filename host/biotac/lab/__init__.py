@@ -1,1 +1,0 @@
-"""Experiments, benchmarks, the demo and the cross-check, which few programs import."""

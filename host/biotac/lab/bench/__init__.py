@@ -1,1 +1,0 @@
-"""The benchmarks of `biotac bench`, and the code they are compared with."""

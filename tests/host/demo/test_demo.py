@@ -1,0 +1,112 @@
+"""The whole chain: what the demo leaves and what it says of itself."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.demo.run import DemoRun, expected_frames, run_demo
+from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
+from biotac.sim.loading import load_source
+
+
+def quiet(text: str) -> None:
+    """No progress line in tests."""
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoRun, Path]:
+    """press.toml, and the folder of what it left."""
+    folder = tmp_path_factory.mktemp("demo")
+    return run_demo("press.toml", folder, show=quiet), folder
+
+
+def test_a_demo_leaves_recording_report_and_picture(pressed) -> None:
+    demo, folder = pressed
+    assert demo.good
+    assert (folder / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert len(biotac.load(folder / "demo.mcap")) == demo.facts["frames"]
+    assert json.loads((folder / "report.json").read_text())["crosscheck"]["violations"] == 0
+    assert "cross-check violations | 0" in (folder / "report.md").read_text()
+    # of loads that it was not made of; x is hardly pressed here, so Lin's error of it is small
+    calibrated, lin = (np.array(demo.facts[name]) for name in ("calibrated_rmse_n", "lin_rmse_n"))
+    assert demo.facts["calibrated_by"] == "finger 0's own wrench map"
+    assert (calibrated < [0.3, 0.3, 0.6]).all() and (calibrated[1:] < lin[1:] / 3.0).all()
+
+
+def test_presses_are_seen_and_released(pressed) -> None:
+    demo, _ = pressed
+    truth = demo.source.truth
+    assert truth is not None
+    frames = demo.batch.frames
+    contact = (frames["flags"] & biotac.FrameFlags.CONTACT) != 0
+    firm = np.linalg.norm(truth.force_n[:, 0], axis=1) > 2.0
+    touched = truth.contact[:, 0]
+    # A contact needs three frames to be believed, a release ten or more.
+    assert contact[firm].mean() > 0.97
+    assert not contact[:100].any()
+    assert contact[~touched].mean() < 0.25
+    reasons = [t["reason"] for t in demo.facts["tare_changes"]]
+    assert reasons.count("ROLL_BACK") == reasons.count("RELEASE") + reasons.count("RESIDUE") == 3
+
+
+def test_five_fingers_with_pac_for_a_minute_lose_nothing(tmp_path) -> None:
+    demo = run_demo("press.toml", tmp_path, fingers=5, seconds=60, show=quiet)
+    facts = demo.facts
+    assert demo.good
+    assert facts["frames"] == facts["pac_blocks"] == 30_000
+    assert facts["board_slots_late"] == facts["board_dropped"] == 0
+    assert facts["host_cpu_percent"] < 25
+    for finger in range(5):
+        mine = demo.batch.frames["finger"] == finger
+        assert np.array_equal(demo.batch.frames["seq"][mine], np.arange(6000))
+        assert np.array_equal(demo.batch.frames["counts"][mine], demo.source.samples[:, finger, 7::2])
+        mine = demo.batch.pac["finger"] == finger
+        assert np.array_equal(demo.batch.pac["pac"][mine], demo.source.samples[:, finger, 0::2])
+    assert facts["crosscheck"]["poc_um_max"] <= POC_BOUND_UM
+    assert facts["crosscheck"]["force_mn_max"] <= FORCE_BOUND_MN
+    assert facts["crosscheck"]["torque_nmm_max"] <= 0.02
+
+
+@pytest.mark.parametrize(
+    "name", ["syntouchcontact/F1.npz", "robotic_finger/trial_15330.npz", "btd_biotacsp/data.btd.gz"]
+)
+def test_every_recorded_row_arrives_in_order(shared_data, tmp_path, name: str) -> None:
+    demo = run_demo(str(shared_data / name), tmp_path, show=quiet)
+    source = load_source(shared_data / name)
+    assert demo.good
+    assert len(demo.batch.frames) == expected_frames(source) == len(source.samples)
+    assert np.array_equal(demo.batch.frames["seq"], np.arange(len(source.samples)))
+    assert np.array_equal(demo.batch.frames["counts"], source.samples[:, 0, 7::2])
+    check = demo.facts["crosscheck"]
+    assert check["frames"] == len(source.samples)
+    assert check["poc_um_max"] <= 1.2
+    assert check["force_mn_max"] <= 1.0
+    assert check["torque_nmm_max"] <= 0.02
+
+
+def test_real_presses_are_released(shared_data, tmp_path) -> None:
+    """Skin keeps signal and pressure after a press; a tare that only returns to its old value locks out."""
+    demo = run_demo(str(shared_data / "robotic_finger/trial_15330.npz"), tmp_path, show=quiet)
+    reasons = [t["reason"] for t in demo.facts["tare_changes"]]
+    assert reasons.count("RELEASE") + reasons.count("RESIDUE") >= 10
+    tared = (demo.batch.frames["flags"] & biotac.FrameFlags.TARE_CHANGED) != 0
+    rest_pdc = np.median(demo.batch.frames["pdc"][:600].astype(float))
+    rezeroed = demo.batch.wire["tare_state"] == 1
+    assert demo.batch.frames["pdc"][tared & rezeroed].max() <= rest_pdc + 60
+
+
+def test_truth_is_matched_by_time_where_rounds_are_missing(tmp_path) -> None:
+    steps = '[[step]]\ndo = "rest"\nseconds = 1.0\n[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 4.0\n'
+    text = f'name = "gap"\ngains = "fit"\n{steps}[[step]]\ndo = "hold"\nseconds = 1.0\n'
+    fault = '[[fault]]\nat_s = 0.5\nseconds = 0.2\nfinger = 0\nkind = "stuck_low"\n'
+    errors = []
+    for name, extra in (("whole", ""), ("gap", fault)):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text + extra)
+        errors.append(run_demo(str(path), tmp_path / name, show=quiet).facts["force_rmse_n"][2])
+    assert errors[1] == pytest.approx(errors[0], rel=0.02)

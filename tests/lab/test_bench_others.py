@@ -1,0 +1,41 @@
+"""biotac-lab bench batch, idle and recording: contestants agree, and sizes are ordered as what they hold is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from biotac_lab.bench import batch, idle, recording
+
+
+def test_the_contestants_of_batch_agree() -> None:
+    times, ratios = batch.measure(batch.SINGLE_FRAMES, rounds=1)
+    named = {name for fast, slow, _ in batch.ASKED for name in (fast, slow)}
+    assert named <= {row[0] for row in times.rows}
+    assert [row[:2] for row in ratios.rows] == [[fast, slow] for fast, slow, _ in batch.ASKED]
+
+
+def test_a_contestant_of_batch_that_is_off_is_named() -> None:
+    result = np.zeros(3, batch.RESULT_DTYPE)
+    off = tuple(result[name] + (name == "force_n") * 1e-6 for name in result.dtype.names or ())
+    with pytest.raises(RuntimeError, match="all frames: two contestants differ in force_n"):
+        batch.check([result, off], "all frames")
+
+
+def test_heartbeats_save_most_of_a_resting_link() -> None:
+    link, skipped = idle.measure("press.toml")
+    bytes_per_s = {row[0]: row[4] for row in link.rows}
+    assert bytes_per_s["at rest"] < 0.2 * bytes_per_s["in contact"]
+    assert bytes_per_s["at rest, REST_FRAMES"] > 0.8 * bytes_per_s["in contact"]
+    assert dict(skipped.rows)["frames_idle"] > 0
+
+
+def test_both_readers_give_back_every_integer() -> None:
+    """measure() checks it and raises."""
+    sizes, load = recording.measure("press.toml", fingers=2, seconds=2.0)
+    mcap, protobuf = (row[1] for row in sizes.rows)
+    assert mcap > 0 and protobuf > 0
+    assert [row[0] for row in load.rows[:4]] == [recording.OURS, recording.PROTOBUF, recording.ALL, recording.FORCE]
+    content = {("frames", 0): {"pdc": np.arange(3)}}
+    with pytest.raises(AssertionError, match="it: finger 0 frames/pdc differs"):
+        recording.check_same({("frames", 0): {"pdc": np.arange(3) + 1}}, content, "it")

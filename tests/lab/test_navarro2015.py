@@ -1,0 +1,62 @@
+"""Navarro's calibration and verification press on emulated hands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biotac.calibrate.press import CALIBRATION_FORCES_N
+from biotac.core import geometry
+from biotac.wire import sensor
+from biotac_lab.experiments import navarro2015 as navarro
+from biotac_lab.report import Options, write
+
+# What two lags of the emulated pressure do to K: see tests/host/calibrate.
+_COUNTS = np.array(CALIBRATION_FORCES_N) * 100 * (1 - 0.15)
+_PER_COUNT = _COUNTS.sum() / (_COUNTS**2).sum()
+K_HIGH = 9 * _PER_COUNT
+K_LOW = 0.15 * 1.8 / 60 + 9 * np.exp(-1.1 / 0.8) * _PER_COUNT
+
+
+@pytest.fixture(scope="module")
+def hands() -> list[navarro.Hands]:
+    return [navarro.calibrate(21, "new"), navarro.calibrate(26, "worn")]
+
+
+def played(hands: list[navarro.Hands], monkeypatch: pytest.MonkeyPatch) -> navarro.Report:
+    """The report on hands that were calibrated before."""
+    rest = iter(hands)
+    monkeypatch.setattr(navarro, "calibrate", lambda seed, profile, show: next(rest))
+    return navarro.run(Options(seed=21))
+
+
+def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, monkeypatch, tmp_path: Path) -> None:
+    report = played(hands, monkeypatch)
+    assert len(report.checks) == 4 and all(check["met"] for check in report.checks)
+    assert [one.seed for hand in hands for one in hand.fingers] == list(range(21, 31))
+    page, picture, _ = write(report, tmp_path, "navarro", "", overwrite=False)
+    assert "| thumb | 10." in page.read_text() and "5.91 %" in page.read_text()
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_board_that_is_off_is_seen(hands, monkeypatch) -> None:
+    first, second = hands
+    report = played([replace(first, frames_checked=0), replace(second, violations=1)], monkeypatch)
+    assert [check["met"] for check in report.checks] == [True, False, True, False]
+
+
+def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
+    """The law is physics' own: what a K is worth at another place follows from it without the code under test."""
+    rows = navarro.places(21).rows
+    errors = np.array([row[2:] for row in rows]) / 100
+    x_mm = geometry.ELECTRODE_MM[[sensor.ELECTRODE_NAMES.index(row[0]) for row in rows], 0]
+    law = 1 + 0.15 * np.tanh(x_mm / 8)
+    off = np.array([row[1] for row in rows]) / 1e3 * 100 * law - 1
+    assert (off >= -K_LOW).all() and (off <= K_HIGH).all()
+    wanted = np.abs(law[None, :] / law[:, None] - 1)
+    # K of the one place and what pressure says at the other are each off by the lags
+    assert (np.abs(errors - wanted) <= (K_HIGH + K_LOW) * (1 + wanted)).all()
+    assert np.diag(errors).max() < 0.01 < 0.2 < errors.max()

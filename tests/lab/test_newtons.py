@@ -1,0 +1,70 @@
+"""biotac-lab bench newtons: what its points are made of, on a finger whose answers are known."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biotac_lab.bench import newtons
+from biotac_lab.cli import main
+
+PACKAGE = "biotac_lab.bench"
+
+
+def kept() -> dict:
+    return json.loads(resources.files(PACKAGE).joinpath(newtons.CYCLES).read_text(encoding="utf-8"))
+
+
+def outcome() -> newtons.Outcome:
+    scenes = [scene for *_, scene in newtons.UNTRAINED] + [scene for _, scene, _ in newtons.OWN_MODELS]
+    points = [
+        newtons.Point(
+            scene, newtons.OWN, {core: its["cycles"][scene] for core, its in kept().items()}, {"a": [3, 0, 4]}
+        )
+        for scene in scenes
+    ]
+    return newtons.Outcome(points, {"a": [0.1] * 3}, {"a": [0.2] * 3}, {}, [])
+
+
+def test_every_point_has_cycles_on_every_core() -> None:
+    """The file is what `tools/bench/run --keep` writes; a scene with another name would be missing here."""
+    its = outcome()
+    assert {"m0plus", "m0plus_divider", "m4f"} == set(kept())
+    for point in its.points:
+        assert all(100 < cycles < 1_000_000 for cycles in point.cycles.values())
+    assert its.points[0].error_n == pytest.approx(5.0)
+
+
+def test_the_picture_is_drawn(tmp_path: Path) -> None:
+    newtons.draw(outcome(), tmp_path / "newtons.png")
+    assert (tmp_path / "newtons.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_nearest_row_is_none_of_the_same_press() -> None:
+    rng = np.random.default_rng(3)
+    e = np.repeat(rng.normal(size=(30, 19)), 100, axis=0)  # thirty presses of a second
+    e[2500:2600] = e[:100]  # one comes back
+    rows = np.arange(0, len(e), 50)
+    near, distance = newtons._nearest(e, rows)
+    assert (np.abs(near - rows) >= newtons.GUARD_ROWS).all()
+    again = rows < 100
+    np.testing.assert_allclose(distance[again], 0.0, atol=1e-9)
+    assert ((near[again] >= 2500) & (near[again] < 2600)).all()
+    assert (distance[(rows >= 100) & (rows < 2500)] > 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["newtons"], "no recording given"),
+        (["batch", "F1.npz"], "does not use a recording"),
+        (["newtons", "/nonexistent/F1.npz"], "F1.npz"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", *words]) == 2
+    assert said in capsys.readouterr().err

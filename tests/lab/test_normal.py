@@ -1,0 +1,81 @@
+"""The corrected normal: what it mends, that contacts are held out whole, and its file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biotac.core import geometry as surface
+from biotac.errors import InputError
+from biotac_lab.calibrate import normal
+from biotac_lab.cli import main
+
+
+def looks(contacts: int = 12, frames: int = 20) -> normal.Looks:
+    """A finger whose published points turn by what its electrodes say."""
+    rng = np.random.default_rng(9)
+    contact = np.repeat(np.arange(contacts), frames)
+    roll = np.repeat(rng.uniform(-0.8, 0.8, contacts), frames)
+    e = rng.normal(-300.0, 100.0, (contacts * frames, 19))
+    pattern = e / np.linalg.norm(e, axis=1, keepdims=True)
+    seen = roll + 0.3 + pattern[:, 4]
+
+    def at(angle: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.zeros_like(angle), np.sin(angle), -np.cos(angle)])
+
+    points = surface.RADIUS_MM * at(seen) + [-5.0, 0.0, 0.0]
+    return normal.Looks(points, e, at(roll), contact)
+
+
+def test_what_the_electrodes_say_of_the_error_is_mended_on_contacts_that_were_not_trained_on() -> None:
+    its = looks()
+    before = np.median(normal.angles_deg(surface.normals_at(its.points_mm), its.normals))
+    after = np.median(normal.angles_deg(normal.held_out(its), its.normals))
+    assert after < 0.25 * before
+    turned = normal.fit(its).point_mm(its.points_mm, its.e)
+    truth = np.column_stack([its.points_mm[:, 0], surface.RADIUS_MM * its.normals[:, 1:]])
+    was, left = (np.median(np.linalg.norm(points - truth, axis=1)) for points in (its.points_mm, turned))
+    assert left < 0.25 * was
+    assert turned[:, 0] == pytest.approx(-5.0)  # a plate says nothing of where along the cylinder
+
+
+def test_nothing_of_a_contact_reaches_its_own_prediction() -> None:
+    its = looks()
+    spoilt = its.normals.copy()
+    spoilt[its.contact == 3] = [1.0, 0.0, 0.0]
+    one, other = normal.held_out(its), normal.held_out(replace(its, normals=spoilt))
+    assert np.array_equal(one[its.contact == 3], other[its.contact == 3])
+    assert not np.allclose(one[its.contact == 4], other[its.contact == 4])
+
+
+def test_a_frame_without_a_point_has_no_normal() -> None:
+    its = looks()
+    points = its.points_mm.copy()
+    points[5] = np.nan
+    found = normal.fit(its).corrected(points, its.e)
+    assert np.isnan(found[5]).all() and np.isfinite(found[6]).all()
+
+
+def test_few_contacts_are_refused() -> None:
+    with pytest.raises(InputError, match="7 contacts with the plate: expected 8"):
+        normal.fit(looks(7))
+
+
+def test_its_file_is_read_back_and_a_damaged_one_refused(tmp_path: Path) -> None:
+    its, place = normal.fit(looks()), tmp_path / "x.normal.json"
+    place.write_text(normal.dumps(its), encoding="utf-8")
+    assert np.array_equal(normal.load(place).coefficients, its.coefficients)
+    for damage in (("biotac-normal/1", "other"), ("[[", "["), ("[[", "[[NaN, ")):
+        place.write_text(normal.dumps(its).replace(*damage), encoding="utf-8")
+        with pytest.raises(InputError, match="biotac-lab normal --out"):
+            normal.load(place)
+
+
+def test_a_file_without_a_plate_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "x.npz"
+    np.savez(place, E=np.zeros((10, 19), np.uint16))
+    assert main(["normal", str(place)]) != 0
+    assert "z_dir" in capsys.readouterr().err
