@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 
 import numpy as np
 import pytest
 import random_courses
+from courses import Course
 
 from biotac import TareReason, TareState
 
@@ -49,8 +51,17 @@ def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
             change(rows)
             return rows
 
+    recipe, course = plain_course()
     monkeypatch.setattr("courses.Finger", Spoilt)
-    return random_courses.judge(next(filter(is_plain, map(random_courses.draw, range(200))))).broken
+    monkeypatch.setattr(random_courses, "make", lambda _: course)
+    return random_courses.judge(recipe).broken
+
+
+@cache
+def plain_course() -> tuple[random_courses.Recipe, Course]:
+    """Made once: what the sensor reads is the same for every verdict."""
+    recipe = next(filter(is_plain, map(random_courses.draw, range(200))))
+    return recipe, random_courses.make(recipe)
 
 
 def is_plain(recipe: random_courses.Recipe) -> bool:

@@ -88,6 +88,7 @@ def errors(name: str, weights: PocWeights, e_q4: Signals) -> Floats:
     return out
 
 
+@cache
 def pressed(whole: bool) -> list[Floats]:
     """Signals in count (n, 19) of simulated fingers under 1 N by a flat of 2 mm at places all over them."""
     along, across = np.meshgrid(np.linspace(-14.0, 4.0, 13), np.linspace(-0.85, 0.85, 13))

@@ -56,7 +56,7 @@ static void what_is_no_drift_is_not_followed(void **state)
     assert_in_range(most, 1, 7 * COUNT_Q16);
     assert_int_equal(resumed(after_even(100, 0)), most);
     assert_int_equal(resumed(after_even(-100, 0)), -most);
-    assert_int_equal(resumed(after_even(8, 30 * 8)), 0); // nor is a load, by one pressure
+    assert_int_equal(resumed(after_even(8, 30 * 8)), 0); // nor is a load, by its pressure
     int16_t away_q3[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         away_q3[i] = i % 2 ? 8 : -8;
