@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hmac
+import ipaddress
 import json
 import os
 import re
@@ -13,6 +15,7 @@ from ..documents import parse_json
 from ..errors import InputError, PortError, printable
 
 ROOT = "biotac"
+LOOPBACK = "127.0.0.1"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 WRITER = re.compile(r"[^\s/*$?#]{1,200}")
 FIND_S = 1.0  # a board that has not replied by then is not there
@@ -20,7 +23,13 @@ FIND_S = 1.0  # a board that has not replied by then is not there
 LEASE_MS = 30_000  # a computer that is silent this long counts as gone; a program that ends is gone at once
 
 INFO_BYTES = 4096  # largest description of a board, which has at least the texts below
-TEXTS = ("name", "board", "serial_number", "firmware", "wire")
+TEXTS = ("name", "epoch", "board", "serial_number", "firmware", "wire")
+MESSAGE_BYTES = 1 << 20  # largest that Zenoh takes from others; a batch of ours has some kilobytes
+CLAIM_BYTES = 200
+COUNT = struct.Struct("<Q")  # of a writer's commands; begins a signature
+SIGNATURE_BYTES = COUNT.size + 32
+SECRET_BYTES = 32
+GRANTED = b"\0"  # begins the answer to a claim, before the secret; no name does
 
 #: Precedes each batch: its number, which tells a reader how many it missed.
 NUMBER = struct.Struct("<Q")
@@ -47,17 +56,26 @@ def open_session(
     """A zenoh.Session. ``connect`` and ``listen`` are Zenoh endpoints (tcp/HOST:7447); either turns off discovery.
 
     ``config`` is a Zenoh configuration file (users and passwords, TLS, access rules); by default the one that
-    ZENOH_CONFIG names. Raises InputError if Zenoh is missing or the file is bad, and PortError, with a text that begins
-    with ``where``, if the network cannot be reached.
+    ZENOH_CONFIG names. Without one, nothing leaves this computer. Raises InputError if Zenoh is missing, the file is
+    bad, or there is none for an endpoint elsewhere, and PortError, with a text that begins with ``where``, if the
+    network cannot be reached.
     """
     zenoh = _zenoh()
+    own = config or os.environ.get("ZENOH_CONFIG")
+    outside = next((e for e in (connect, listen) if e is not None and not _is_loopback(e)), None)
+    if outside is not None and not own:
+        raise InputError(
+            f"{outside} leaves this computer: expected a Zenoh configuration that says who may connect (--config FILE, "
+            "?config=FILE or ZENOH_CONFIG); host/docs/network.md shows one with passwords or TLS"
+        )
     try:
-        if config is not None:
-            facts = zenoh.Config.from_file(str(config))
-        else:
-            facts = zenoh.Config.from_env() if os.environ.get("ZENOH_CONFIG") else zenoh.Config()
+        facts = zenoh.Config.from_file(str(own)) if own else zenoh.Config()
+        if not own:
             # So that a program stopped for a while (debugger, laptop lid) can go on; Zenoh's default 10 s is too short.
             facts.insert_json5("transport/link/tx/lease", str(LEASE_MS))
+            facts.insert_json5("transport/link/rx/max_message_size", str(MESSAGE_BYTES))
+            facts.insert_json5("scouting/multicast/interface", json.dumps(LOOPBACK))
+            facts.insert_json5("listen/endpoints", json.dumps([f"tcp/{LOOPBACK}:0"]))
         for what, endpoint in (("connect", connect), ("listen", listen)):
             if endpoint is not None:
                 facts.insert_json5(f"{what}/endpoints", json.dumps([endpoint]))
@@ -66,7 +84,7 @@ def open_session(
         if connect is not None and listen is None:
             facts.insert_json5("mode", '"client"')
     except zenoh.ZError as error:
-        file = Path(config or os.environ.get("ZENOH_CONFIG", "")).name
+        file = Path(own or "").name
         raise InputError(
             f"Zenoh rejects its endpoint or configuration file {file} ({_short(error)}); see zenoh.io/docs"
         ) from error
@@ -79,21 +97,30 @@ def open_session(
         ) from error
 
 
-def shared(session: Any) -> list[dict[str, Any]]:
-    """Descriptions of all boards shared, sorted by name."""
-    told = []
-    for reply in session.get(key("*", "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
-        if reply.ok is not None:
-            facts = _facts(reply.ok.payload.to_bytes())
-            if facts is not None:
-                told.append(facts)
-    return sorted(told, key=lambda facts: facts["name"])
+def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
+    """Descriptions of the boards shared, all or those of one name, sorted by name."""
+    found = []
+    for reply in session.get(key(name, "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
+        facts = _facts(reply.ok.payload) if reply.ok is not None else None
+        if facts is not None:
+            found.append(facts)
+    return sorted(found, key=lambda facts: facts["name"])
 
 
-def _facts(data: bytes) -> dict[str, Any] | None:
+def signature(secret: bytes, count: int, command: bytes) -> bytes:
+    """What a writer sends with its ``count``-th command. The secret itself goes only from the share to the writer."""
+    return COUNT.pack(count) + hmac.digest(secret, COUNT.pack(count) + command, "sha256")
+
+
+def bytes_of(payload: Any, most: int) -> bytes:
+    """A query's or sample's bytes; none when there are more than ``most``."""
+    return payload.to_bytes() if payload is not None and len(payload) <= most else b""
+
+
+def _facts(payload: Any) -> dict[str, Any] | None:
     """A board's description of itself; None if the reply is invalid, as from another program that uses our key."""
     try:
-        facts = parse_json(data) if len(data) <= INFO_BYTES else None
+        facts = parse_json(bytes_of(payload, INFO_BYTES))
     except ValueError:
         return None
     if not isinstance(facts, dict) or not all(isinstance(facts.get(key), str) for key in TEXTS):
@@ -105,18 +132,20 @@ def _facts(data: bytes) -> dict[str, Any] | None:
     return {key: printable(value) if isinstance(value, str) else value for key, value in facts.items()}
 
 
-def alive(session: Any, name: str) -> set[str]:
-    """Epochs under which boards of that name are shared: normally one or none; two if two boards have the same name."""
-    replies = session.liveliness().get(key(name, "live/*"), timeout=FIND_S)
-    return {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok is not None}
-
-
 def lives(session: Any, name: str, writer: str) -> bool:
     """True if a writer of that name is there, by its token."""
     if not WRITER.fullmatch(writer) or not writer.isprintable():
         return False
     replies = session.liveliness().get(key(name, f"writer/{writer}"), timeout=FIND_S)
     return any(reply.ok is not None for reply in replies)
+
+
+def _is_loopback(endpoint: str) -> bool:
+    host = endpoint.partition("/")[2].partition("?")[0].partition("#")[0].rpartition(":")[0].strip("[]")
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _zenoh() -> Any:

@@ -15,7 +15,7 @@ from ..errors import BiotacError, CommandRefusedError, PortError
 from ..hand.gap import Gap
 from ..hand.hand import Hand
 from ..wire import messages_gen as wire
-from ..wire.framing import encode, open_frame
+from ..wire.framing import ENCODED_MAX_BYTES, encode, open_frame
 from ..wire.identity import board_text, serial_text, version_text
 from . import network, rights
 
@@ -35,14 +35,16 @@ class Share:
         self.writer: str | None = None  #: who may send commands now
         self._hand, self._session = hand, session
         self._board = hand._board  # gives access to the raw bytes and to all commands
-        self._secret = b""
+        self._secret = b""  # the writer's
+        self._count = 0  # of its last command: each is taken once
         self._deciding = threading.Lock()
         self._commanding = threading.Lock()
         self._publishing = threading.Lock()  # Zenoh objects must not be undeclared while in use
         self._paused: threading.Timer | None = None
         self._pauses = 0
         self._tail = b""
-        if network.alive(session, name):
+        self._of_epoch: list[Any] = []
+        if network.shared(session, name):
             raise PortError(f"a board is already shared as {name}; choose another --name, or stop that one")
         self._declared = [
             session.declare_queryable(network.key(name, what), answer)
@@ -51,28 +53,29 @@ class Share:
         self._declared.append(
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
-        self._epoch, self._wire = self._new_epoch()
+        self._new_epoch()
         incoming = self._board.incoming
         incoming.record, incoming.record_gap = self._publish, self._came_back
         hand.start()
         hand.run()
 
-    def _new_epoch(self) -> tuple[Any, Any]:
-        """A new epoch's token and publisher. Readers follow one epoch, so none goes on as if the board were unchanged.
+    def _new_epoch(self) -> None:
+        """Publish under a new key from now on: readers follow one, so none goes on as if the board were unchanged.
 
         The publisher drops batches for readers that are too slow.
         """
-        epoch = secrets.token_hex(8)
-        wire = self._session.declare_publisher(network.key(self.name, f"wire/{epoch}"))
-        return self._session.liveliness().declare_token(network.key(self.name, f"live/{epoch}")), wire
+        before, self._of_epoch = self._of_epoch, []
+        self.epoch = secrets.token_hex(8)
+        self._wire = self._session.declare_publisher(network.key(self.name, f"wire/{self.epoch}"))
+        token = self._session.liveliness().declare_token(network.key(self.name, f"live/{self.epoch}"))
+        self._of_epoch = [self._wire, token]
+        for declared in before:
+            declared.undeclare()
 
     def _came_back(self, gap: Gap) -> None:
         """Begin a new epoch, so that readers connect anew: the board may have restarted."""
         with self._publishing:
-            before = self._epoch, self._wire
-            self._epoch, self._wire = self._new_epoch()
-            for its in before:
-                its.undeclare()
+            self._new_epoch()
 
     # ---- what it sends -------------------------------------------------------------------------
 
@@ -98,6 +101,7 @@ class Share:
         hello = self._hand.info
         facts = {
             "name": self.name,
+            "epoch": self.epoch,
             "board": board_text(hello.board),
             "serial_number": serial_text(hello),
             "firmware": version_text(hello),
@@ -109,18 +113,15 @@ class Share:
         query.reply(network.key(self.name, "info"), json.dumps(facts).encode())
 
     def _claim(self, query: Any) -> None:
-        """Answer a claim to write: its token's name and a secret that its commands will carry.
-
-        The answer is empty if the claim holds, otherwise who may send commands.
-        """
-        who, _, secret = (query.payload.to_bytes() if query.payload else b"").partition(b"\0")
-        name = who.decode(errors="replace")
+        """Answer a claim to write, which is the name of a token: a secret to sign commands with, or who has it."""
+        name = network.bytes_of(query.payload, network.CLAIM_BYTES).decode(errors="replace")
         with self._deciding:
             # Without a token, the writer could never be seen to leave, and nobody else could ever write.
-            if self.writer is None and len(secret) >= 16 and network.lives(self._session, self.name, name):
-                self.writer, self._secret = name, secret
-            mine = hmac.compare_digest(secret, self._secret)
-            answer = b"" if mine else (self.writer or "nobody").encode()
+            if self.writer is None and network.lives(self._session, self.name, name):
+                self.writer, self._secret, self._count = name, secrets.token_bytes(network.SECRET_BYTES), 0
+                answer = network.GRANTED + self._secret
+            else:
+                answer = (self.writer or "nobody").encode()
         query.reply(network.key(self.name, "claim"), answer)
 
     def _writer_changed(self, sample: Any) -> None:
@@ -131,20 +132,31 @@ class Share:
 
     def _command(self, query: Any) -> None:
         """Answer a command. There is no answer while the board is away, so that the reader looks for it again."""
-        frame = open_frame(query.payload.to_bytes()) if query.payload else None
+        command = network.bytes_of(query.payload, ENCODED_MAX_BYTES)
+        frame = open_frame(command)
         if frame is None:
             return
         message_id, payload = frame
-        secret = query.attachment.to_bytes() if query.attachment else b""
         may = message_id in rights.READS
         if rights.needs_writer(message_id):
-            with self._deciding:
-                may = self.writer is not None and hmac.compare_digest(secret, self._secret)
+            may = self._is_signed(command, network.bytes_of(query.attachment, network.SIGNATURE_BYTES))
         try:
             answer = self._asked_for(message_id, payload) if may else _refusal(message_id, payload, wire.Error.NOT_HERE)
         except BiotacError:
             return
         query.reply(network.key(self.name, "command"), answer)
+
+    def _is_signed(self, command: bytes, signature: bytes) -> bool:
+        """True if it is the writer's, and was not taken before."""
+        if len(signature) != network.SIGNATURE_BYTES:
+            return False
+        (count,) = network.COUNT.unpack_from(signature)
+        with self._deciding:
+            expected = network.signature(self._secret, count, command)
+            if self.writer is None or count <= self._count or not hmac.compare_digest(signature, expected):
+                return False
+            self._count = count
+            return True
 
     def _asked_for(self, message_id: int, payload: bytes) -> bytes:
         kind = wire.MESSAGES.get(message_id)
@@ -203,8 +215,8 @@ class Share:
             self._paused.cancel()
         with self._publishing:
             declared, self._declared = self._declared, []
-            for its in [*declared, self._epoch, self._wire] if declared else ():
-                its.undeclare()
+            for one in [*declared, *self._of_epoch] if declared else ():
+                one.undeclare()
 
     def __enter__(self) -> Share:
         return self

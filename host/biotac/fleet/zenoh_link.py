@@ -46,7 +46,7 @@ class ZenohLink(Link):
         self.port = port
         self.batches_lost = 0
         self._session: Any = None
-        self._secret = b""
+        self._secret, self._count = b"", 0  # a writer's, and how many commands it signed
         self._came = threading.Condition()
         self._batches: deque[bytes] = deque()
         self._waiting = 0  # bytes
@@ -64,16 +64,16 @@ class ZenohLink(Link):
         self.close()
         session = network.open_session(self.port, **self._zenoh)
         try:
-            epochs = network.alive(session, self._name)
-            if not epochs:
+            boards = network.shared(session, self._name)
+            if not boards:
                 raise PortError(
                     f"no board is shared as {self._name}; see `biotac list --zenoh`, start `biotac serve PORT "
                     f"--name {self._name}`, or give the address of its computer: "
                     f"zenoh:{self._name}?connect=tcp/HOST:7447"
                 )
-            if len(epochs) > 1:
-                raise PortError(f"{len(epochs)} boards are shared as {self._name}; give them different names")
-            self._listen(session, next(iter(epochs)))
+            if len(boards) > 1:
+                raise PortError(f"{len(boards)} boards are shared as {self._name}; give them different names")
+            self._listen(session, boards[0]["epoch"])
             if self._write:
                 self._claim(session)
         except BaseException:
@@ -101,19 +101,17 @@ class ZenohLink(Link):
 
     def _claim(self, session: Any) -> None:
         who = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}".replace("/", "_")
-        self._secret = secrets.token_bytes(32)
         token = session.liveliness().declare_token(network.key(self._name, f"writer/{who}"))
         self._declared.append(token)
-        replies = session.get(
-            network.key(self._name, "claim"), payload=who.encode() + b"\0" + self._secret, timeout=ANSWER_S
-        )
-        answer = next((reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None), None)
-        if answer != b"":
-            holder = "unknown, as nobody answers" if answer is None else answer.decode(errors="replace")
+        replies = session.get(network.key(self._name, "claim"), payload=who.encode(), timeout=ANSWER_S)
+        answer = next((reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None), b"")
+        if not answer.startswith(network.GRANTED):
+            holder = answer.decode(errors="replace") or "unknown, as nobody answers"
             raise PortError(
                 f"{self.port}: only one program may write at a time (now {holder}); open without write=yes, or "
                 "stop that one"
             )
+        self._secret, self._count = answer.removeprefix(network.GRANTED), 0
 
     def _take(self, sample: Any) -> None:
         data = sample.payload.to_bytes()
@@ -174,9 +172,9 @@ class ZenohLink(Link):
                 f"{'&' if '?' in self.port else '?'}write=yes (one program at a time)",
                 wire.Error.NOT_HERE,
             )
-        replies = session.get(
-            network.key(self._name, "command"), payload=part, attachment=self._secret, timeout=ANSWER_S
-        )
+        self._count += 1
+        signature = network.signature(self._secret, self._count, part)
+        replies = session.get(network.key(self._name, "command"), payload=part, attachment=signature, timeout=ANSWER_S)
         for reply in replies:
             if reply.ok is not None:
                 with self._came:
@@ -191,7 +189,7 @@ class ZenohLink(Link):
         session, self._session = self._session, None
         declared, self._declared = self._declared, []
         if session is not None:
-            for its in declared:
+            for one in declared:
                 with suppress(Exception):  # the network may be gone already
-                    its.undeclare()
+                    one.undeclare()
             session.close()

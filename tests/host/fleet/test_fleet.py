@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import socket
 import subprocess
@@ -20,7 +21,7 @@ from maps import make_map
 
 import biotac
 from biotac.cli.main import main
-from biotac.errors import CommandRefusedError, DeviceLostError, PortError, WireVersionError
+from biotac.errors import CommandRefusedError, DeviceLostError, InputError, PortError, WireVersionError
 from biotac.fleet import network, rights, zenoh_link
 from biotac.fleet.share import Share
 from biotac.view.serving import Viewing
@@ -154,7 +155,7 @@ def test_the_sharing_side_enforces_it(shared) -> None:
         assert refused is not None
         assert wire.Reply.unpack(refused[1]) == wire.Reply(9, wire.Stop.ID, wire.Error.NOT_HERE)
         until(writer, 20)
-        for secret in (b"", b"\0" * 32):
+        for secret in (b"", b"\0" * 32, network.signature(b"", 1, encode(change.ID, change.pack())[:-1])):
             replies = list(
                 session.get(
                     network.key("left", "command"), payload=encode(change.ID, change.pack())[:-1], attachment=secret
@@ -166,6 +167,87 @@ def test_the_sharing_side_enforces_it(shared) -> None:
         for payload in (b"", b"\0", b"no frame", encode(0x89, b"")[:-1]):
             list(session.get(network.key("left", "command"), payload=payload, timeout=0.2))
     assert shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
+
+
+def test_a_stranger_gets_no_secret_and_blocks_nobody(shared) -> None:
+    """Queryables at the writer's keys hear its claim and its commands; what they hear cannot be used again."""
+    heard: list[tuple[bytes, bytes]] = []
+
+    def hear(query: Any) -> None:
+        heard.append((query.payload.to_bytes(), query.attachment.to_bytes() if query.attachment else b""))
+
+    before = shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2)
+    with shared.client() as session:
+        kept = [session.declare_queryable(network.key("left", what), hear) for what in ("claim", "command")]
+        kept.append(session.liveliness().declare_token(network.key("left", "live/feed")))  # of no board
+        with biotac.open(shared.port("&write=yes")) as writer:
+            writer.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, before + 7)
+            assert shared.share._secret and not any(shared.share._secret in data + sent for data, sent in heard)
+            writer.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, before)
+            assert len(heard) > 2
+            for payload, attachment in list(heard):
+                list(session.get(network.key("left", "command"), payload=payload, attachment=attachment, timeout=1.0))
+            assert shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
+            until(writer, 20)
+        for declared in kept:
+            declared.undeclare()
+
+
+def test_nothing_leaves_this_computer_without_a_configuration(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.delenv("ZENOH_CONFIG", raising=False)
+    for endpoint in ("tcp/0.0.0.0:7447", "tcp/192.0.2.1:7447", "tls/[::]:7447", "udp/example.org:7447", "nonsense"):
+        for what in ("connect", "listen"):
+            with pytest.raises(InputError, match="leaves this computer"):
+                network.open_session("left", **{what: endpoint})
+    with closing(network.open_session("left")) as session:
+        assert session.zid()
+        assert {address for address in listening_at() if address != LOOPBACK_HEX} == set()
+
+
+LOOPBACK_HEX = "0100007F"
+
+
+def listening_at() -> set[str]:
+    """IPv4 and IPv6 addresses at which this process listens for TCP, as the kernel writes them."""
+    inodes = {os.readlink(fd) for fd in Path("/proc/self/fd").iterdir() if fd.exists()}
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/self/net/{table}").read_text().splitlines()[1:]:
+            _, local, _, state, *_, inode = line.split()[:10]
+            if state == "0A" and f"socket:[{inode}]" in inodes:
+                found.add(local.partition(":")[0])
+    return found
+
+
+def test_a_client_is_written_from_the_page(shared) -> None:
+    """host/docs/network.md and SPEC.md are all it needs: Zenoh, cobs and zlib, nothing of ours."""
+    import struct
+    import zlib
+
+    import zenoh
+    from cobs import cobs
+
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([shared.endpoint]))
+    batches: list[bytes] = []
+    enough = threading.Event()
+
+    def take(sample: zenoh.Sample) -> None:
+        batches.append(sample.payload.to_bytes())
+        if len(batches) >= 50:
+            enough.set()
+
+    with zenoh.open(config) as session:
+        (info,) = [json.loads(reply.ok.payload.to_bytes()) for reply in session.get("biotac/left/info") if reply.ok]
+        subscriber = session.declare_subscriber(f"biotac/left/wire/{info['epoch']}", take)
+        assert enough.wait(30)
+        subscriber.undeclare()
+    numbers = [struct.unpack_from("<Q", batch)[0] for batch in batches]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    plain = [cobs.decode(frame) for batch in batches for frame in batch[8:].split(b"\0")[:-1]]
+    assert all(zlib.crc32(p[:-4]) == int.from_bytes(p[-4:], "little") for p in plain)
+    assert {p[7] for p in plain if p[0] == wire.Frame.ID} == set(info["fingers"])  # the finger, after id, seq and t_us
 
 
 def garbage(draw: random.Random) -> bytes:
@@ -188,7 +270,7 @@ def test_what_means_nothing_is_left_alone(shared, capfd, tries: int) -> None:
             secret = draw.choice([None, b"", draw.randbytes(32)])
             list(session.get(network.key("left", what), payload=garbage(draw), attachment=secret, timeout=5.0))
         for who in (b"", b"nobody", b"x" * 70_000, b"\xff", b"*", b"a/b"):
-            list(session.get(network.key("left", "claim"), payload=who + b"\0" + bytes(32), timeout=5.0))
+            list(session.get(network.key("left", "claim"), payload=who, timeout=5.0))
         assert [facts["name"] for facts in network.shared(session)] == ["left"]
     assert shared.share.writer is None and shared.hand.settings() == before
     with biotac.open(shared.port("&write=yes")) as writer:
@@ -200,8 +282,7 @@ def test_batches_that_are_not_the_boards_are_left_alone(shared) -> None:
     """Played again, of no number or of a wild one, too long."""
     draw, kept = random.Random(3), []
     with shared.client() as session, biotac.open(shared.port()) as hand:
-        (epoch,) = network.alive(session, "left")
-        place = network.key("left", f"wire/{epoch}")
+        place = network.key("left", f"wire/{shared.share.epoch}")
         listening = session.declare_subscriber(place, lambda sample: kept.append(sample.payload.to_bytes()))
         until(hand, 60)
         listening.undeclare()
@@ -223,7 +304,15 @@ def test_batches_that_are_not_the_boards_are_left_alone(shared) -> None:
 
 
 def test_who_says_nonsense_of_himself_is_not_listed(shared, capsys) -> None:
-    good = {"name": "x", "board": "b", "serial_number": "s", "firmware": "f", "wire": "1.0", "fingers": [0]}
+    good = {
+        "name": "x",
+        "epoch": "0",
+        "board": "b",
+        "serial_number": "s",
+        "firmware": "f",
+        "wire": "1.0",
+        "fingers": [0],
+    }
     said = [b"", b"\xff", b"[]", b"[" * 200_000, b"{}", b'{"name": "x"}', json.dumps(good | {"fingers": 5}).encode()]
     said += [json.dumps(good | {"writer": 5}).encode(), json.dumps(good | {"name": "a\x1b[2J"}).encode()]
     with shared.client() as session:

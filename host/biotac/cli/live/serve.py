@@ -24,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the port, the name to share it under, and where Zenoh is."""
     values.add_port(parser)
     parser.add_argument("--name", required=True, help="others open it as zenoh:NAME")
-    parser.add_argument("--listen", metavar="ENDPOINT", help="such as tcp/0.0.0.0:7447 (default: Zenoh's own way)")
+    parser.add_argument(
+        "--listen", metavar="ENDPOINT", help="such as tcp/0.0.0.0:7447, with --config (default: this computer only)"
+    )
     parser.add_argument("--connect", metavar="ENDPOINT", help="of a Zenoh router, such as tcp/HOST:7447")
     parser.add_argument(
         "--config", metavar="FILE", type=Path, help="Zenoh's: users, TLS, access (default: ZENOH_CONFIG)"
