@@ -99,8 +99,8 @@ static void expect(const uint8_t *bytes, size_t count)
 static void check_rows(void)
 {
     const uint8_t *at = (const uint8_t *)intake.out;
-    for (int k = BT_INTAKE_FRAMES; k <= BT_INTAKE_IDLES; k++) {
-        at += 16 * intake.facts[k];
+    for (int k = 0; k < BT_INTAKE_ROW_KINDS; k++) {
+        at += 16 * intake.facts.rows[k];
     }
     for (int kind = 0; kind <= BT_DECODED_OTHER; kind++) {
         if (memcmp(at, want.data[kind], want.filled[kind]) != 0) {
@@ -108,8 +108,8 @@ static void check_rows(void)
         }
         at += want.filled[kind];
     }
-    if (at - (const uint8_t *)intake.out != intake.facts[BT_INTAKE_OUT_BYTES]) {
-        FAIL("%d bytes handed out", (int)intake.facts[BT_INTAKE_OUT_BYTES]);
+    if (at - (const uint8_t *)intake.out != intake.facts.out_bytes) {
+        FAIL("%d bytes handed out", (int)intake.facts.out_bytes);
     }
 }
 

@@ -60,15 +60,13 @@ static void keep(bt_decoder *decoder, uint8_t id, const uint8_t *payload, size_t
 // What stood between two delimiters.
 static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t bytes)
 {
-    uint8_t zeros_and_plain[BT_CRC_PAD_BYTES + COBS_MAX_BYTES];
-    uint8_t *plain = zeros_and_plain + BT_CRC_PAD_BYTES;
+    uint8_t plain[COBS_MAX_BYTES];
     if (bytes == 0) {
         return BT_DEFRAMED_NOTHING;
     }
     if (bytes > COBS_MAX_BYTES) {
         return BT_DEFRAMED_TOO_LONG;
     }
-    memset(zeros_and_plain, 0, BT_CRC_PAD_BYTES);
     if (!undo_cobs(in, bytes, plain)) {
         return BT_DEFRAMED_BAD_COBS;
     }

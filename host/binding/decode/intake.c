@@ -19,7 +19,7 @@ static const uint32_t row_bytes[BT_INTAKE_ROW_KINDS] = {BT_FRAME_BYTES, BT_PAC_B
 
 void bt_intake_reset(bt_intake *intake)
 {
-    memset(intake->facts, 0, sizeof intake->facts);
+    memset(&intake->facts, 0, sizeof intake->facts);
     bt_decoder_reset(&intake->decoder);
     bt_numbering_reset(&intake->rounds);
     bt_numbering_reset(&intake->pacs);
@@ -119,23 +119,23 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
         last_us = now_us > last_us ? now_us : last_us;
         fingers |= finger_of(row) < 63 ? INT64_C(1) << finger_of(row) : -1;
     }
-    intake->facts[BT_INTAKE_GAPS_FOUND] = found;
-    intake->facts[BT_INTAKE_LAST_T_US] = last_us;
-    intake->facts[BT_INTAKE_FINGERS] = fingers;
+    intake->facts.gaps = found;
+    intake->facts.last_t_us = last_us;
+    intake->facts.fingers = fingers;
 }
 
 size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
 {
     bt_decoder *decoder = &intake->decoder;
-    int64_t *facts = intake->facts;
-    facts[BT_INTAKE_TAKEN] = (int64_t)bt_decode(decoder, data, bytes);
+    bt_intake_facts *facts = &intake->facts;
+    facts->taken = (int64_t)bt_decode(decoder, data, bytes);
 
     int64_t *seq[BT_INTAKE_ROW_KINDS];
     int64_t *t_us[BT_INTAKE_ROW_KINDS];
     int64_t *numbers = intake->out;
     for (int kind = 0; kind < BT_INTAKE_ROW_KINDS; kind++) {
         uint32_t rows = decoder->filled[kind] / row_bytes[kind];
-        facts[BT_INTAKE_FRAMES + kind] = rows;
+        facts->rows[kind] = rows;
         seq[kind] = numbers;
         t_us[kind] = numbers + rows;
         numbers += 2 * rows;
@@ -146,9 +146,9 @@ size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
         at += decoder->filled[kind];
     }
     number(intake, seq, t_us);
-    facts[BT_INTAKE_OTHER_BYTES] = decoder->filled[BT_DECODED_OTHER];
-    facts[BT_INTAKE_OUT_BYTES] = at - (uint8_t *)intake->out;
-    return (size_t)facts[BT_INTAKE_TAKEN];
+    facts->other_bytes = decoder->filled[BT_DECODED_OTHER];
+    facts->out_bytes = at - (uint8_t *)intake->out;
+    return (size_t)facts->taken;
 }
 
 int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)
@@ -157,7 +157,7 @@ int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)
     int64_t got = bt_descriptor_read(fd, timeout_s, intake->in, sizeof intake->in, &arrived_ns);
     if (got > 0) {
         bt_intake_feed(intake, intake->in, (size_t)got);
-        intake->facts[BT_INTAKE_ARRIVED_NS] = arrived_ns;
+        intake->facts.arrived_ns = arrived_ns;
     }
     return got;
 }

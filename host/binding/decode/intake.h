@@ -10,23 +10,20 @@
 #define BT_INTAKE_OUT       (2 * BT_DECODE_ROOM / 8)
 #define BT_INTAKE_ROW_KINDS 3 // the first of enum bt_decoded: FRAME, PAC, IDLE
 
-// What a call completed, as numbers. Int64, so that one read in Python gets them all.
-enum bt_intake_fact {
-    BT_INTAKE_TAKEN,      // bytes of input
-    BT_INTAKE_ARRIVED_NS, // when they were read, by the clock of time.monotonic(); bt_intake_read() only
-    BT_INTAKE_OUT_BYTES,
-    BT_INTAKE_FRAMES, // rows, as the next two
-    BT_INTAKE_PACS,
-    BT_INTAKE_IDLES,
-    BT_INTAKE_OTHER_BYTES,
-    BT_INTAKE_GAPS_FOUND,
-    BT_INTAKE_LAST_T_US, // latest of FRAMEs and IDLEs, if there are any
-    BT_INTAKE_FINGERS,   // of FRAMEs and IDLEs, a bit each; all bits where one has no bit of its own
-    BT_INTAKE_FACTS
-};
+// What a call completed. All are int64, so that one read in Python gets them.
+typedef struct {
+    int64_t taken;      // bytes of input
+    int64_t arrived_ns; // when they were read, by the clock of time.monotonic(); bt_intake_read() only
+    int64_t out_bytes;
+    int64_t rows[BT_INTAKE_ROW_KINDS]; // FRAMEs, PACs, IDLEs
+    int64_t other_bytes;
+    int64_t gaps;
+    int64_t last_t_us; // latest of FRAMEs and IDLEs, if there are any
+    int64_t fingers;   // of FRAMEs and IDLEs, a bit each; all bits where one has no bit of its own
+} bt_intake_facts;
 
 typedef struct {
-    int64_t facts[BT_INTAKE_FACTS];
+    bt_intake_facts facts;
     // What the last call completed, back to back: FRAMEs' seq and t_us, PACs' seq and t_us, IDLEs' seq and
     // t_us; then bytes, as in bt_decoder.data: FRAMEs, PACs, IDLEs, others.
     int64_t out[BT_INTAKE_OUT];

@@ -12,8 +12,7 @@ import struct
 import threading
 import time
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,19 +28,18 @@ from .sensor_gen import SLOT_HZ, SLOTS
 _feed = lib.bt_intake_feed
 _read = lib.bt_intake_read
 _frombuffer = np.frombuffer
-_blank = object.__new__
 _NOTHING, _AGAIN = int(lib.BT_DESCRIPTOR_NOTHING), int(lib.BT_DESCRIPTOR_AGAIN)
 _HUNG_UP = int(lib.BT_DESCRIPTOR_HUNG_UP)
-_FACTS = struct.Struct(f"={int(lib.BT_INTAKE_FACTS)}q").unpack_from
+_facts_of = struct.Struct(f"={ffi.sizeof('bt_intake_facts') // 8}q").unpack_from
 ROUND_US = 1_000_000 * len(SLOTS) // SLOT_HZ
 _WRAP_US = 1 << 32
 _UNSURE_US = 1 << 27  # of a silence: the drift of the clocks, and messages under way
 _INT64 = np.dtype(np.int64)
-_NO_INT64 = np.frombuffer(b"", _INT64)
+_NO_NUMBERS = np.frombuffer(b"", _INT64)
 _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTYPE))
 
 
-@dataclass
+@dataclass(slots=True)
 class Batch:
     """The messages that one chunk of bytes completed.
 
@@ -60,23 +58,14 @@ class Batch:
     messages: list[Any] = field(default_factory=list)
     fingers: int = field(default=-1, repr=False)
     arrived_s: float = math.nan
-    _numbers: bytes = field(default=b"", init=False, repr=False, compare=False)  # begins with seq, then t_us
+    _frames: StructArray | None = field(default=None, init=False, repr=False, compare=False)
 
-    @cached_property
+    @property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,)."""
-        return frames_from_wire(self.wire, self.seq, self.t_us)
-
-    if not TYPE_CHECKING:  # to a type checker, __getattr__ would allow any attribute
-
-        def __getattr__(self, name: str) -> NDArray[np.int64]:
-            # Two columns of StreamDecoder's batches, made on first use: most live programs never use them.
-            if name not in ("seq", "t_us") or "wire" not in self.__dict__:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            n = len(self.wire)
-            column = _frombuffer(self._numbers, _INT64, n, 8 * n * (name == "t_us")) if n else _NO_INT64
-            setattr(self, name, column)
-            return column
+        if self._frames is None:
+            self._frames = frames_from_wire(self.wire, self.seq, self.t_us)
+        return self._frames
 
     def last_t_us(self) -> int | None:
         """Device time of the latest frame or heartbeat; None without any."""
@@ -113,7 +102,7 @@ class StreamDecoder:
         lib.bt_intake_reset(self._state)
         self._alone = threading.Lock()  # needed because the C code runs without Python's lock
         # Views of the state; they do not keep it alive, self._state does.
-        self._facts = ffi.buffer(self._state.facts)
+        self._facts = ffi.buffer(ffi.addressof(self._state, "facts"))
         self._out = ffi.buffer(self._state.out)
         self._in = ffi.buffer(getattr(self._state, "in"))
         #: (finger, seq before the gap, frames lost) of every gap so far.
@@ -228,39 +217,44 @@ class StreamDecoder:
         return bytes(self._in[: self.taken])
 
     def _batch(self) -> Batch:
-        # Copy everything out of the state: the next call overwrites it.
-        self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _FACTS(self._facts)
+        # Copy everything out of the state: the next call overwrites it. The order is that of bt_intake_facts and of
+        # bt_intake.out: numbers of FRAMEs, PACs and IDLEs, then the rows, then the others.
+        self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _facts_of(self._facts)
         self.last_t_us = last_us if n or idles else None
         raw = self._out[:size]
-        at = 16 * (n + pacs + idles)
         if gaps:
             self.lost_after += [(gap.finger, gap.before, gap.missing) for gap in self._state.gaps[0:gaps]]
-        batch = _blank(Batch)
-        batch.wire = _frombuffer(raw, FRAME, n, at) if n else NO_FRAME
-        batch._numbers = raw
-        batch.pac = _NO_PAC
-        batch.idle = _NO_IDLE
-        batch.messages = []
-        batch.fingers = fingers
-        batch.arrived_s = arrived_ns * 1e-9
-        if not (pacs or idles or others):
-            return batch
-        at += n * FRAME.itemsize
+        sent, seq, t_us = NO_FRAME, _NO_NUMBERS, _NO_NUMBERS
+        pac, idle, messages = _NO_PAC, _NO_IDLE, []
+        at = 16 * (n + pacs + idles)
+        if n:
+            seq, t_us = _numbers(raw, n, 0)
+            sent = _frombuffer(raw, FRAME, n, at)
+            at += n * FRAME.itemsize
         if pacs:
-            sent = _frombuffer(raw, PAC, pacs, at)
-            batch.pac = pac = np.empty(pacs, PAC_DTYPE)
-            pac["seq"], pac["t_us"] = _frombuffer(raw, _INT64, 2 * pacs, 16 * n).reshape(2, pacs)
-            pac["finger"], pac["pac"] = sent["finger"], sent["pac"]
+            pac = _numbered(_frombuffer(raw, PAC, pacs, at), PAC_DTYPE, *_numbers(raw, pacs, 16 * n))
             at += pacs * PAC.itemsize
         if idles:
-            sent = _frombuffer(raw, IDLE, idles, at)
-            batch.idle = idle = np.empty(idles, IDLE_DTYPE)
-            idle["seq"], idle["t_us"] = _frombuffer(raw, _INT64, 2 * idles, 16 * (n + pacs)).reshape(2, idles)
-            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "tare_state", "flags"):
-                idle[name] = sent[name]
+            idle = _numbered(_frombuffer(raw, IDLE, idles, at), IDLE_DTYPE, *_numbers(raw, idles, 16 * (n + pacs)))
         if others:
-            batch.messages = known(pairs(raw[size - others :]))
-        return batch
+            messages = known(pairs(raw[size - others :]))
+        return Batch(sent, seq, t_us, pac, idle, messages, fingers, arrived_ns * 1e-9)
+
+
+def _numbers(raw: bytes, n: int, at: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Unwrapped seq and t_us of ``n`` rows."""
+    numbers = _frombuffer(raw, _INT64, 2 * n, at)
+    return numbers[:n], numbers[n:]
+
+
+def _numbered(sent: StructArray, dtype: np.dtype[np.void], seq: NDArray[np.int64], t_us: NDArray[np.int64]) -> Any:
+    """Rows of ``dtype`` from messages whose other fields have the same names and values."""
+    out = np.empty(len(sent), dtype)
+    out["seq"], out["t_us"] = seq, t_us
+    for name in dtype.names or ():
+        if name not in ("seq", "t_us"):
+            out[name] = sent[name]
+    return out
 
 
 def known(others: list[tuple[int, bytes]]) -> list[Any]:
@@ -274,10 +268,9 @@ def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
     pac_now = batch.pac["t_us"] < end_us
     idle_now = batch.idle["t_us"] < end_us
 
-    def rows(mine: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
-        part = Batch(batch.wire[mine], batch.seq[mine], batch.t_us[mine], batch.pac[pac], batch.idle[idle], messages)
-        part.arrived_s = batch.arrived_s
-        return part
+    def rows(frames: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
+        sent, seq, t_us = batch.wire[frames], batch.seq[frames], batch.t_us[frames]
+        return Batch(sent, seq, t_us, batch.pac[pac], batch.idle[idle], messages, batch.fingers, batch.arrived_s)
 
     return rows(now, pac_now, idle_now, batch.messages), rows(~now, ~pac_now, ~idle_now, [])
 

@@ -29,6 +29,7 @@ Q4_PER_COUNT = 16
 #: The marks for a missing value in the wire's integers, by type.
 INVALID_U32 = 0xFFFFFFFF
 WIRE_INVALID = {"u2": INVALID_COUNT, "u4": INVALID_U32, "i2": INVALID_I16, "i4": INVALID_I32}
+_INVALID_BY_CHAR = {np.dtype(kind).char: mark for kind, mark in WIRE_INVALID.items()}  # quicker to look up
 
 
 @dataclass(frozen=True)
@@ -208,8 +209,9 @@ def values_of(field: Field, sent: Any) -> Any:
 
 def to_units(raw: Any, per_unit: int) -> NDArray[np.float64]:
     """Divide integers by ``per_unit``; invalid (the type's minimum, or 0xFFFF unsigned) becomes NaN."""
-    out: NDArray[np.float64] = np.divide(raw, per_unit, dtype=np.float64)
-    out[raw == WIRE_INVALID[raw.dtype.str[1:]]] = np.nan
+    out: NDArray[np.float64] = raw.astype(np.float64)
+    out[out == _INVALID_BY_CHAR[raw.dtype.char]] = np.nan  # exact: a float64 holds every integer of the wire
+    out /= per_unit
     return out
 
 

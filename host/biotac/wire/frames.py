@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .dtypes_gen import DTYPES
-from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of, sent_of, values_of
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of, sent_of
 from .fields import FORCE_LSB_PER_N as FORCE_LSB_PER_N
 from .fields import MNMM_PER_NMM as MNMM_PER_NMM
 from .fields import Q4_PER_COUNT as Q4_PER_COUNT
@@ -81,8 +81,8 @@ class Frame:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frame):
             return NotImplemented
-        pairs = [(getattr(self, its.name), getattr(other, its.name)) for its in fields(self)]
-        return all(np.array_equal(mine, its, equal_nan=np.asarray(mine).dtype.kind == "f") for mine, its in pairs)
+        pairs = [(getattr(self, value.name), getattr(other, value.name)) for value in fields(self)]
+        return all(np.array_equal(one, two, equal_nan=np.asarray(one).dtype.kind == "f") for one, two in pairs)
 
     def __hash__(self) -> int:
         return hash((self.finger, self.seq, self.t_us))
@@ -109,9 +109,10 @@ def _from_wire(
 ) -> StructArray:
     out = np.empty(len(messages), dtype)
     out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
-    for its in of:
-        if its.sent:
-            out[its.name] = values_of(its, messages[its.sent])
+    for column in of:
+        if column.sent:
+            sent = messages[column.sent]
+            out[column.name] = sent if column.per_unit is None else to_units(sent, column.per_unit)
     return out
 
 
@@ -120,9 +121,9 @@ def frames_to_wire(frames: StructArray) -> StructArray:
     out = np.zeros(len(frames), DTYPES[_FrameMessage.ID])
     out["finger"] = frames["finger"]
     out["seq"], out["t_us"] = frames["seq"] & 0xFFFF, frames["t_us"] & 0xFFFFFFFF
-    for its in FRAME_FIELDS:
-        if its.sent:
-            out[its.sent] = sent_of(its, frames[its.name], out.dtype[its.sent].base)
+    for column in FRAME_FIELDS:
+        if column.sent:
+            out[column.sent] = sent_of(column, frames[column.name], out.dtype[column.sent].base)
     return out
 
 
