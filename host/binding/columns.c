@@ -1,34 +1,4 @@
-#include "decode/rebuild.h"
-
-#include "wire/framing.h"
-
-#include <string.h>
-
-#define CODES 64
-
-size_t bt_rebuild(const uint8_t *codes, size_t n, const uint8_t *const *tables, const uint32_t *row_bytes,
-                  const uint8_t *id, const uint8_t *rest, size_t rest_bytes, uint8_t *out)
-{
-    size_t next[CODES] = {0};
-    size_t at = 0, taken = 0;
-    for (size_t k = 0; k < n; k++) {
-        uint8_t code = codes[k];
-        if (code < CODES) {
-            const uint8_t *row = tables[code] + next[code];
-            next[code] += row_bytes[code];
-            at += bt_frame_encode(id[code], row, row_bytes[code], out + at);
-            continue;
-        }
-        while (taken < rest_bytes) {
-            out[at++] = rest[taken];
-            if (rest[taken++] == 0) {
-                break;
-            }
-        }
-    }
-    memcpy(out + at, rest + taken, rest_bytes - taken);
-    return at + (rest_bytes - taken);
-}
+#include "columns.h"
 
 // With a constant size the loops over bytes are none.
 static inline void read_values(const uint8_t *planes, size_t n, size_t parts, size_t size, const uint32_t *at,
