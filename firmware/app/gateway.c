@@ -233,8 +233,8 @@ static void close_round(bt_gateway *gateway)
     bt_session_end_round(session);
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         if (session->asked >> f & 1) {
-            bool told = bt_serial_query_answer(&gateway->sampler.query[f], serial);
-            bt_sensors_answer(session, f, told ? serial : NULL);
+            bool answered = bt_serial_query_answer(&gateway->sampler.query[f], serial);
+            bt_sensors_answer(session, f, answered ? serial : NULL);
         }
     }
     uint8_t ask = bt_sensors_to_ask(session);

@@ -24,24 +24,24 @@ static inline void read_values(const uint8_t *planes, size_t n, size_t parts, si
 void bt_columns(const uint8_t *planes, size_t n, const bt_stored_column *columns, size_t count,
                 const uint32_t *at, uint8_t *out, size_t stride)
 {
-    for (const bt_stored_column *its = columns; its < columns + count; its++) {
-        uint8_t *to = out + its->offset;
-        switch (its->offset < 0 ? 0 : its->size) {
+    for (const bt_stored_column *column = columns; column < columns + count; column++) {
+        uint8_t *to = out + column->offset;
+        switch (column->offset < 0 ? 0 : column->size) {
         case 1:
-            read_values(planes, n, its->parts, 1, at, to, stride);
+            read_values(planes, n, column->parts, 1, at, to, stride);
             break;
         case 2:
-            read_values(planes, n, its->parts, 2, at, to, stride);
+            read_values(planes, n, column->parts, 2, at, to, stride);
             break;
         case 4:
-            read_values(planes, n, its->parts, 4, at, to, stride);
+            read_values(planes, n, column->parts, 4, at, to, stride);
             break;
         case 8:
-            read_values(planes, n, its->parts, 8, at, to, stride);
+            read_values(planes, n, column->parts, 8, at, to, stride);
             break;
         default:
             break;
         }
-        planes += n * its->parts * its->size;
+        planes += n * column->parts * column->size;
     }
 }

@@ -68,18 +68,18 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
 typedef struct {
     uint8_t *next;
     int64_t room;
-    int64_t told;
+    int64_t found;
 } event_list;
 
-static void keep(event_list *list, uint32_t told, bt_finger *finger, uint8_t slot, uint32_t t_us)
+static void keep(event_list *list, uint32_t found, bt_finger *finger, uint8_t slot, uint32_t t_us)
 {
-    for (uint8_t kind = 0; told != 0; kind++, told >>= 1) {
+    for (uint8_t kind = 0; found != 0; kind++, found >>= 1) {
         bt_msg_event msg;
-        if (!(told & 1)) {
+        if (!(found & 1)) {
             continue;
         }
         bt_finger_event(finger, kind, slot, t_us + slot * 1000000u / BT_SLOT_HZ, &msg);
-        if (list->told++ < list->room) {
+        if (list->found++ < list->room) {
             bt_msg_event_pack(&msg, list->next);
             list->next += BT_EVENT_BYTES;
         }
@@ -99,7 +99,7 @@ int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t
         }
         (void)bt_finger_end(finger, &tare_settings);
     }
-    return list.told;
+    return list.found;
 }
 
 int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, uint8_t *events, int64_t room)
@@ -116,12 +116,12 @@ int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, 
             const size_t end = bt_slot_pac[pac_slot[p]] + 1u; // as the words come
             memcpy(finger.round.pac + done, pac + done, (end - done) * sizeof *pac);
             done = end;
-            uint32_t told = bt_finger_events(&finger, pac_slot[p], false);
-            keep(&list, told, &finger, pac_slot[p], (uint32_t)(k * BT_FRAME_MS * 1000));
+            uint32_t found = bt_finger_events(&finger, pac_slot[p], false);
+            keep(&list, found, &finger, pac_slot[p], (uint32_t)(k * BT_FRAME_MS * 1000));
         }
         slips[k] = finger.events.slipping;
     }
-    return list.told;
+    return list.found;
 }
 
 void bt_replay_bands(bt_bands *bands, int64_t n, const uint16_t *pac, uint8_t *good, uint32_t *energy_q4)

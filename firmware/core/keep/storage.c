@@ -85,10 +85,10 @@ static int sector_in_use(const bt_flash *flash, uint32_t *generation)
         if (!bt_storage_page_is(page, IN_USE_ID)) {
             continue;
         }
-        uint32_t its = bt_get_u32(page + BT_STORAGE_HEADER_BYTES);
-        if (found == NO_SECTOR || (int32_t)(its - *generation) > 0) {
+        uint32_t here = bt_get_u32(page + BT_STORAGE_HEADER_BYTES);
+        if (found == NO_SECTOR || (int32_t)(here - *generation) > 0) {
             found = sector;
-            *generation = its;
+            *generation = here;
         }
     }
     return found;

@@ -37,14 +37,14 @@ static uint8_t state_of(const uint8_t *made_for, const bt_sensor_info *info)
 
 static uint8_t calibration_state(const bt_session *session, int f)
 {
-    const bt_calibration *its = &session->calibration[f];
-    return state_of(its->present ? its->serial : NULL, &session->info[f]);
+    const bt_calibration *calibration = &session->calibration[f];
+    return state_of(calibration->present ? calibration->serial : NULL, &session->info[f]);
 }
 
 static uint8_t map_state(const bt_session *session, int f)
 {
-    const bt_finger_map *its = &session->map[f];
-    return state_of(its->place.bytes != 0 ? its->map.serial : NULL, &session->info[f]);
+    const bt_finger_map *map = &session->map[f];
+    return state_of(map->place.bytes != 0 ? map->map.serial : NULL, &session->info[f]);
 }
 
 static void use_finger_settings(bt_session *session, int f)

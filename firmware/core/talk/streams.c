@@ -85,12 +85,12 @@ static void send_events(bt_session *session, uint8_t slot, uint32_t due, uint32_
         }
         bt_finger *finger = &session->finger[f];
         uint8_t watched = finger->events.watched;
-        uint32_t told = bt_finger_events(finger, slot, touched >> f & 1);
+        uint32_t events = bt_finger_events(finger, slot, touched >> f & 1);
         if (finger->events.watched != watched) {
             watch(session, f, watched, finger->events.watched);
         }
-        for (uint8_t event = 0; told != 0; event++, told >>= 1) {
-            if (told & 1) {
+        for (uint8_t event = 0; events != 0; event++, events >>= 1) {
+            if (events & 1) {
                 send_event(session, finger, event, slot, t_us);
             }
         }

@@ -28,12 +28,12 @@ void bt_numbering_rejoin(bt_numbering *numbering)
 // One that is not after the last: late, so it was counted as lost, or here twice.
 static void take_late(bt_numbering *numbering, uint8_t finger, int64_t behind, uint16_t rounds)
 {
-    uint64_t its = behind < RECENT ? newest(rounds) << behind : 0;
+    uint64_t covered = behind < RECENT ? newest(rounds) << behind : 0;
     numbering->disordered++;
-    for (uint64_t late = its & ~numbering->recent[finger]; late != 0; late &= late - 1) {
+    for (uint64_t late = covered & ~numbering->recent[finger]; late != 0; late &= late - 1) {
         numbering->lost--;
     }
-    numbering->recent[finger] |= its;
+    numbering->recent[finger] |= covered;
 }
 
 int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, int64_t unheard,

@@ -233,4 +233,4 @@ def _json_value(value: Any, field: Field) -> Any:
     missing = np.isnan(value) if field.dtype[1] == "f" else value == field.invalid
     if not field.parts:
         return None if missing else value.item()
-    return [None if gone else its for its, gone in zip(value.tolist(), missing.tolist(), strict=True)]
+    return [None if gone else part for part, gone in zip(value.tolist(), missing.tolist(), strict=True)]
