@@ -80,9 +80,9 @@ def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORT
     for finger in recording.fingers:
         for kind, columns in kinds.items():
             rows: StructArray = getattr(recording, kind)
-            mine = rows[rows["finger"] == finger]
-            if len(mine):
-                made.append(Table(kind, finger, columns, _arrays(recording, columns, mine)))
+            of_finger = rows[rows["finger"] == finger]
+            if len(of_finger):
+                made.append(Table(kind, finger, columns, _arrays(recording, columns, of_finger)))
     return made
 
 

@@ -33,14 +33,14 @@ def message_tables(recording: Recording) -> list[Table]:
         groups[message.ID, getattr(message, "finger", None)].append(k)
     return [
         _table(recording, message_id, finger, [timed[k] for k in at], t_us[at])
-        for (message_id, finger), at in sorted(groups.items(), key=lambda its: (its[0][0], its[0][1] or 0))
+        for (message_id, finger), at in sorted(groups.items(), key=lambda group: (group[0][0], group[0][1] or 0))
     ]
 
 
 def _table(
-    recording: Recording, message_id: int, finger: int | None, told: list[Any], t_us: NDArray[np.int64]
+    recording: Recording, message_id: int, finger: int | None, messages: list[Any], t_us: NDArray[np.int64]
 ) -> Table:
-    rows: StructArray = np.concatenate([np.frombuffer(m.pack(), DTYPES[message_id]) for m in told])
+    rows: StructArray = np.concatenate([np.frombuffer(m.pack(), DTYPES[message_id]) for m in messages])
     own = _fields(message_id)
     arrays: dict[str, NDArray[Any]] = {"t_us": t_us, STAMP.name: recording.stamp_ns(t_us)}
     return Table(
@@ -52,7 +52,7 @@ def _table(
 
 
 def _name(message_id: int) -> str:
-    return next(name for name, its in _schema().items() if its["id"] == message_id)
+    return next(name for name, entry in _schema().items() if entry["id"] == message_id)
 
 
 @cache
@@ -66,7 +66,7 @@ def _schema() -> dict[str, Any]:
 def _fields(message_id: int) -> tuple[Field, ...]:
     """A message's fields, with their units and meanings from protocol/link.toml."""
     dtype = DTYPES[message_id]
-    told = {field["name"]: field for field in _schema()[_name(message_id)]["fields"]}
+    described = {field["name"]: field for field in _schema()[_name(message_id)]["fields"]}
     made = []
     for name in dtype.names or ():
         if name in _ITS_OWN:
@@ -74,7 +74,7 @@ def _fields(message_id: int) -> tuple[Field, ...]:
         base, shape = dtype[name].base, dtype[name].shape
         count = shape[0] if shape else 0
         parts = tuple(ELECTRODE_NAMES) if count == len(ELECTRODE_NAMES) else tuple(str(k) for k in range(count))
-        about = told[name]
+        about = described[name]
         # In these messages, all ones means "no value" where the field's text in link.toml says so.
         ones = int(np.iinfo(base).max)
         invalid = ones if f"0x{ones:X} " in about["doc"] else None

@@ -75,7 +75,10 @@ def write_labelled(
             file,
             schema,
             compression="zstd",
-            use_dictionary=[*(its.name for its in labels), *(f.name for f in fields if pa.types.is_floating(f.type))],
+            use_dictionary=[
+                *(label.name for label in labels),
+                *(f.name for f in fields if pa.types.is_floating(f.type)),
+            ],
             column_encoding={f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
             sorting_columns=pq.SortingColumn.from_ordering(schema, sorting),
         ) as out,
@@ -93,9 +96,9 @@ def _columns(
     if fingers is not None:
         yield pa.array(fingers[of_table[chosen]])
     for label in labels:
-        words = sorted({text for text in label.texts if text is not None})
-        code = np.array([-1 if text is None else words.index(text) for text in label.texts], np.int8)[of_table[chosen]]
-        yield pa.DictionaryArray.from_arrays(pa.array(code, mask=code < 0), pa.array(words, pa.string()))
+        texts = sorted({text for text in label.texts if text is not None})
+        code = np.array([-1 if text is None else texts.index(text) for text in label.texts], np.int8)[of_table[chosen]]
+        yield pa.DictionaryArray.from_arrays(pa.array(code, mask=code < 0), pa.array(texts, pa.string()))
     for parts in zip(*(table.flat() for table in made), strict=True):
         column = parts[0][1]
         values = np.concatenate([values for _, _, values in parts])[chosen]

@@ -18,15 +18,15 @@ def recorded_bands(pac: StructArray, messages: list[Any], begin_us: int) -> Stru
 
     Times of messages are unwrapped from ``begin_us`` on. Rows are sorted by finger, and in order within a finger.
     """
-    told = [message for message in messages if isinstance(message, wire.Bands)]
+    bands = [message for message in messages if isinstance(message, wire.Bands)]
     parts = []
-    for finger in sorted({m.finger for m in told} | set(np.unique(pac["finger"]).tolist())):
-        its = [message for message in told if message.finger == finger]
-        parts.append(_of_messages(its, begin_us) if its else bands_of(pac[pac["finger"] == finger]))
+    for finger in sorted({m.finger for m in bands} | set(np.unique(pac["finger"]).tolist())):
+        of_finger = [message for message in bands if message.finger == finger]
+        parts.append(_of_messages(of_finger, begin_us) if of_finger else bands_of(pac[pac["finger"] == finger]))
     return np.concatenate(parts) if parts else np.empty(0, BANDS_DTYPE)
 
 
-def _of_messages(told: list[wire.Bands], begin_us: int) -> StructArray:
-    sent = np.frombuffer(b"".join(message.pack() for message in told), DTYPES[wire.Bands.ID])
+def _of_messages(bands: list[wire.Bands], begin_us: int) -> StructArray:
+    sent = np.frombuffer(b"".join(message.pack() for message in bands), DTYPES[wire.Bands.ID])
     seq = np.unwrap(sent["seq"].astype(np.int64), period=2**16)
     return bands_from_wire(sent, seq, unwrapped_us(begin_us, sent["t_us"]))

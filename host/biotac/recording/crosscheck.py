@@ -107,12 +107,12 @@ class CrossCheck:
         messages = messages[(messages["flags"] & wire.FrameFlags.REPEATED) == 0]
         mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
         for finger in np.unique(messages["finger"][mapped]).tolist():
-            its = messages[mapped & (messages["finger"] == finger)]
+            rows = messages[mapped & (messages["finger"] == finger)]
             if finger not in maps:
-                for k in range(len(its)):
-                    self._find(its, k, "MAPPED is set, but this finger's wrench map is unknown")
+                for k in range(len(rows)):
+                    self._find(rows, k, "MAPPED is set, but this finger's wrench map is unknown")
                 continue
-            self._add(its, own.get(finger, settings), opened(maps[finger]))
+            self._add(rows, own.get(finger, settings), opened(maps[finger]))
         shared = ~mapped
         for finger, its_own in own.items():
             of_finger = ~mapped & (messages["finger"] == finger)
@@ -120,21 +120,21 @@ class CrossCheck:
             shared &= ~of_finger
         self._add(messages[shared], settings)
 
-    def _add(self, messages: StructArray, settings: Settings, its: BoardMap | None = None) -> None:
+    def _add(self, messages: StructArray, settings: Settings, own_map: BoardMap | None = None) -> None:
         if not len(messages):
             return
         untared = (messages["flags"] & wire.FrameFlags.UNTARED) != 0
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
         torsion, torsion_bound = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
-        if its is None and population.in_force(settings):
+        if own_map is None and population.in_force(settings):
             force_bound, torque_bound = _by_population(messages, truth, settings)
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
             self._judge_model(messages)
-        elif its is None:
+        elif own_map is None:
             torque_bound = torque_bound_nmm(messages, truth, settings)
         else:
-            force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, its, truth, settings)
+            force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, own_map, truth, settings)
             self.mapped += len(messages)
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
         for own_bound in (torque_bound, torsion_bound):
@@ -209,7 +209,7 @@ class CrossCheck:
 
 
 def _by_map(
-    messages: StructArray, its: BoardMap, truth: Results, settings: Settings
+    messages: StructArray, own_map: BoardMap, truth: Results, settings: Settings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Replace force and torque in ``truth`` by what the map's integers mean.
 
@@ -217,13 +217,13 @@ def _by_map(
     and 0 for a map without torsion.
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    wrench, off = exact(its, *frames), error_bound(its, None, *frames)
+    wrench, off = exact(own_map, *frames), error_bound(own_map, None, *frames)
     torsion = np.empty((len(messages), 1))
-    replace_gains(its, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
+    replace_gains(own_map, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
-    if its.axes < _map.AXES_TORSION:
+    if own_map.axes < _map.AXES_TORSION:
         torsion_off = np.zeros_like(torsion)
-    if its.axes == 3:
+    if own_map.axes == 3:
         # Mx is derived from this force, with a lever of at most the core's radius
         torque_off = torque_bound_nmm(messages, truth, settings)
         torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
@@ -250,7 +250,7 @@ def _population_map() -> BoardMap:
 def _population_bound_n(signals: Signals, lin_bound_n: float) -> NDArray[np.float64]:
     """Bound (n, 3) of the population map's force in N from its formats; Lin's part is off by up to ``lin_bound_n``."""
     part = (population.share(signals) / population.ALL)[:, None]
-    wanted = {(kind, gate): its * FORCE_LSB_PER_N for kind, gate, its in population.blocks()}
+    wanted = {(kind, gate): factors * FORCE_LSB_PER_N for kind, gate, factors in population.blocks()}
     off = bound_of(_population_map(), wanted, signals) / FORCE_LSB_PER_N
     result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + (1 - part) * lin_bound_n + 0.5 / FORCE_LSB_PER_N
     return result

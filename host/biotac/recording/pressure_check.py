@@ -61,10 +61,10 @@ class PressureCheck:
         pressure = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
         rest = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
         truth = (pressure - rest) * gain_n
-        told = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
-        error = np.abs(told - truth)
+        sent = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
+        error = np.abs(sent - truth)
         self.force_n_max = max(self.force_n_max, float(np.nanmax(error, initial=0.0)))
-        one_sided = np.isnan(told) != np.isnan(truth)
+        one_sided = np.isnan(sent) != np.isnan(truth)
         return [
             (int(k), "force from pressure is valid on one side only")
             if one_sided[k]
@@ -81,14 +81,14 @@ class PressureCheck:
         follows = (rows["seq"] - before["seq"] == 1) & (rows["t_us"] - before["t_us"] < 1.5 * ROUND_US)
         follows[0] &= known
         good, good_before = usable(rows["pdc"]), usable(before["pdc"])
-        told = to_units(rows["pdc_filtered_q4"], Q4_PER_COUNT)
+        sent = to_units(rows["pdc_filtered_q4"], Q4_PER_COUNT)
         told_before = to_units(before["pdc_filtered_q4"], Q4_PER_COUNT)
         truth = np.where(good_before, alpha * rows["pdc"] + (1.0 - alpha) * told_before, rows["pdc"])
-        not_asked = np.isnan(told) & ((rows["flags"] & wire.FrameFlags.NOT_ASKED) != 0)
-        one_sided = (np.isnan(told) == good) & ~not_asked
-        checked = good & follows & ~np.isnan(told) & ~np.isnan(truth)
-        self.starts += int((good & ~np.isnan(told) & ~checked).sum())
-        error = np.where(checked, np.abs(told - truth), 0.0)
+        not_asked = np.isnan(sent) & ((rows["flags"] & wire.FrameFlags.NOT_ASKED) != 0)
+        one_sided = (np.isnan(sent) == good) & ~not_asked
+        checked = good & follows & ~np.isnan(sent) & ~np.isnan(truth)
+        self.starts += int((good & ~np.isnan(sent) & ~checked).sum())
+        error = np.where(checked, np.abs(sent - truth), 0.0)
         bound = filter_bound(alpha)
         if checked.any():
             self.filter_max = max(self.filter_max, float(error.max()))

@@ -75,9 +75,9 @@ def recompute(
     if not len(recording.wire):
         raise InputError(f"{recording.path} holds no frames; there is nothing to recompute")
     settings = recording.settings | changes
-    calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
+    calibrations = {finger: calibration.changed(changes) for finger, calibration in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
-    board_maps = {f: opened(its) for f, its in (recording.maps if maps is None else maps).items()}
+    board_maps = {f: opened(own_map) for f, own_map in (recording.maps if maps is None else maps).items()}
     _check_maps(recording, board_maps)
     notes: list[str] = []
     if keep_tare:
@@ -94,7 +94,7 @@ def recompute(
         "keep_tare": keep_tare,
         "changes": {s.name.lower(): value for s, value in changes.items()},
     }
-    blobs = {finger: its.blob for finger, its in board_maps.items()}
+    blobs = {finger: own_map.blob for finger, own_map in board_maps.items()}
     metadata = recording.metadata | in_force(settings, calibrations, blobs) | {"recomputed": json.dumps(made)}
     _write(recording, out, metadata, new, tares, lambda share: show(0.5 + share / 2))
     return notes
@@ -127,12 +127,12 @@ def _with_kept_tares(
     return new
 
 
-def _recomputed(frames: StructArray, settings: Settings, its: BoardMap | None) -> StructArray:
-    if its is None:
+def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | None) -> StructArray:
+    if own_map is None:
         poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
         frames["torsion_mnmm"] = wire.INVALID_I32
     else:
-        poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(frames, settings, its)
+        poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(frames, settings, own_map)
         frames["torsion_mnmm"] = torsion_mnmm
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
     frames["pressure_force_100un"] = pressure_force_100un(
@@ -141,7 +141,7 @@ def _recomputed(frames: StructArray, settings: Settings, its: BoardMap | None) -
     flags = frames["flags"] & ~np.uint32(
         _KERNEL_FLAGS | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED | wire.FrameFlags.MAPPED
     )
-    flags |= np.uint32(0 if its is None else wire.FrameFlags.MAPPED)
+    flags |= np.uint32(0 if own_map is None else wire.FrameFlags.MAPPED)
     flags |= kernel_flags & np.uint32(_KERNEL_FLAGS)
     flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
     frames["flags"] = flags
@@ -206,7 +206,7 @@ def _through_the_machine(
     return new, tares
 
 
-def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, notes: list[str]) -> Rounds:
+def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | None, notes: list[str]) -> Rounds:
     sent = recording.wire[at]
     finger = int(sent["finger"][0])
     row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
@@ -226,7 +226,9 @@ def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, n
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
-    return Rounds(finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, words, quantities, its)
+    return Rounds(
+        finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, words, quantities, own_map
+    )
 
 
 def _host_words(recording: Recording, sent: StructArray, row_of: Mapping[int, int]) -> dict[int, wire.TareReason]:

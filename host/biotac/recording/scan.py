@@ -191,24 +191,24 @@ class Scan:
                 self.schemas.setdefault(record.topic, self._schema.get(record.schema_id, b""))
             elif isinstance(record, Statistics):
                 self._counted = True
-                seen, told = (self._chunks, self._metadata), (record.chunk_count, record.metadata_count)
-                if seen != told:
+                seen, expected = (self._chunks, self._metadata), (record.chunk_count, record.metadata_count)
+                if seen != expected:
                     self.problems.append(
                         f"{self.path.name} has {seen[0]} chunks and {seen[1]} metadata records, but its statistics say "
-                        f"{told[0]} and {told[1]}: the file is damaged"
+                        f"{expected[0]} and {expected[1]}: the file is damaged"
                     )
                 self._compare(record.channel_message_counts)
             elif isinstance(record, Message) and self._wanted(topic := self._topics.get(record.channel_id, "")):
                 self._messages[record.channel_id] += 1
                 yield topic, record
 
-    def _compare(self, told: dict[int, int]) -> None:
+    def _compare(self, expected: dict[int, int]) -> None:
         """Compare the numbers of messages of wanted topics, unless damaged chunks already explain a difference."""
-        wanted = {channel for channel in {*told, *self._messages} if self._wanted(self._topics.get(channel, ""))}
-        if not self.damaged_chunks and any(told.get(channel, 0) != self._messages[channel] for channel in wanted):
+        wanted = {channel for channel in {*expected, *self._messages} if self._wanted(self._topics.get(channel, ""))}
+        if not self.damaged_chunks and any(expected.get(channel, 0) != self._messages[channel] for channel in wanted):
             self.problems.append(
                 f"{self.path.name} has {sum(self._messages.values())} blocks, but its statistics say "
-                f"{sum(told.get(channel, 0) for channel in wanted)}: the file is damaged"
+                f"{sum(expected.get(channel, 0) for channel in wanted)}: the file is damaged"
             )
 
     def _open(self, stream: BinaryIO, at: int, length: int, *, unwanted: bool) -> Iterator[tuple[str, Message]]:
@@ -230,10 +230,10 @@ class Scan:
         size = chunk.uncompressed_size
         if chunk.compression == "zstd" and len(chunk.data) >= 4:
             try:
-                told = zstandard.get_frame_parameters(chunk.data).content_size
+                expected = zstandard.get_frame_parameters(chunk.data).content_size
             except zstandard.ZstdError:
                 return  # unpacking it will fail too
-            size = max(size, told if told != zstandard.CONTENTSIZE_UNKNOWN else 0)
+            size = max(size, expected if expected != zstandard.CONTENTSIZE_UNKNOWN else 0)
         self._unpacked += size
         if size > _CHUNK_MAX_BYTES or self._unpacked > _FREE_BYTES + _RATIO_MAX * self._size:
             raise RecordingError(

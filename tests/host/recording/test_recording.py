@@ -304,6 +304,9 @@ def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
     assert "good, 2 gap(s)" in told.out and told.err.count(gap.words()) == 2
     assert main(["check", str(path), "--json"]) == 0
     assert [Gap(**facts) for facts in json.loads(capsys.readouterr().out)["gaps"]] == [gap, at_the_end]
+    again = tmp_path / "again.mcap"
+    assert main(["export", "--keep-tare", str(path), str(again)]) == 0
+    assert biotac.Recording(again).gaps == [gap, at_the_end]
 
 
 def test_a_stop_over_a_wrap_of_device_time_is_counted_by_the_clock(recorded, tmp_path) -> None:

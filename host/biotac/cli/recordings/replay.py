@@ -62,10 +62,10 @@ def on_pty(args: argparse.Namespace, playback: Playback) -> int:
     name = str(args.recording)
     with until_ctrl_c(board, args.link):
         tell(board, args.link, name, {"recording": name}, as_json=args.json)
-        said = False
+        announced = False
         while True:
             board.turn(1.0)
-            if board.over and not said:
-                said = True
+            if board.over and not announced:
+                announced = True
                 tell_over(name)
     return 0

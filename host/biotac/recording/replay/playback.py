@@ -182,24 +182,24 @@ class Playback:
         return _message(wire.SettingValue(asked.req_id, asked.setting, value))
 
     def _calibration(self, req_id: int, finger: int) -> bytes:
-        its = self.recording.calibrations.get(finger)
-        if its is None:
+        found = self.recording.calibrations.get(finger)
+        if found is None:
             values = tuple(self.recording.settings[setting] for setting in wire.CALIBRATION_SETTINGS)
             return _message(wire.Calibration(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, values))
         state = wire.CalibrationState.IN_FORCE
-        return _message(wire.Calibration(req_id, finger, state, its.wire_serial(), its.made_s, its.wire_values()))
+        return _message(wire.Calibration(req_id, finger, state, found.wire_serial(), found.made_s, found.wire_values()))
 
     def _map(self, req_id: int, finger: int) -> bytes:
-        its = self.recording.maps.get(finger)
-        if its is None:
+        found = self.recording.maps.get(finger)
+        if found is None:
             return _message(wire.MapInfo(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, 0, 0))
-        return _message(maps.info(its, req_id, finger))
+        return _message(maps.info(found, req_id, finger))
 
     def _map_part(self, asked: wire.ReadMap) -> bytes:
-        its = self.recording.maps.get(asked.finger, b"")
-        if asked.offset >= len(its):
+        found = self.recording.maps.get(asked.finger, b"")
+        if asked.offset >= len(found):
             return _reply(asked.req_id, wire.ReadMap.ID, wire.Error.OUT_OF_RANGE)
-        return _message(wire.MapData(asked.req_id, asked.finger, asked.offset, maps.part(its, asked.offset)))
+        return _message(wire.MapData(asked.req_id, asked.finger, asked.offset, maps.part(found, asked.offset)))
 
 
 def _message(message: Any) -> bytes:
