@@ -22,7 +22,7 @@ import biotac
 from biotac.cli.main import main, parser
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted((ROOT / "host/docs").glob("*.md"))
+PAGES = sorted((ROOT / "host/docs").rglob("*.md"))
 NOTEBOOK = ROOT / "host/docs/examples/press.ipynb"
 BLOCKS = [
     pytest.param(page.name, code, id=f"{page.stem}-{k}")

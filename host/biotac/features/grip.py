@@ -1,4 +1,4 @@
-"""Grip state by a particle filter (seed 000, Eq 7), with histograms to relate sensor values to states.
+"""Grip state by a particle filter (Wettels and Loeb 2011, Eq 7), with histograms to relate sensor values to states.
 
 A particle is a guess of the state: the grip holds, it is about to give, or it slips. In each round the particles change
 state as often as the states did in training, are weighted by the histograms' probability of the sensed values, and are
@@ -27,7 +27,7 @@ NAMES = ("shake", "ratio")
 
 
 class GripState(IntEnum):
-    """State of the grip, X in seed 000."""
+    """State of the grip, X in the paper."""
 
     STABLE = 0
     INCIPIENT = 1

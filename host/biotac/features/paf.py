@@ -1,7 +1,7 @@
-"""Point of application of force (PAF) from the three strongest electrodes: seed 000, II.C, Eq 4 and 5.
+"""Point of application of force (PAF) from the three strongest electrodes: Wettels and Loeb 2011, Eq 4 and 5.
 
 As printed, Eq 4 gives 3.08 N for an electrode that nothing touches, so a threshold of 1 N rejects nothing, and an
-electrode at rest weighs as much as one that is pressed with 3 N (numerics.md 1.2). The default here subtracts that
+electrode at rest weighs as much as one that is pressed with 3 N. The default here subtracts that
 offset, so that an electrode at rest weighs nothing. Real presses reach Eq 4's pole at V - V0 = -1.976 V; near it the
 force saturates (EQ4_MAX_N).
 """
@@ -21,7 +21,7 @@ EQ4_N_V, EQ4_V = 6.083, 1.976  # the paper: R^2 0.9615 for a 1 mm probe on one e
 EQ4_REST_N = EQ4_N_V / EQ4_V
 EQ4_MAX_N = 40.0  # the largest force in the paper
 STRONGEST = 3
-THRESHOLD_N = 1.0  # seed 000: "> 1 N"
+THRESHOLD_N = 1.0  # the paper: "> 1 N"
 
 #: ``dr_mm`` is (d, r) on the skin laid flat, NaN unless ``valid``; ``force_n`` is Eq 4's sum over the three strongest.
 PAF_DTYPE = np.dtype([("dr_mm", "<f8", (2,)), ("force_n", "<f8"), ("valid", "?")])

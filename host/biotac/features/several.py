@@ -1,4 +1,4 @@
-"""Several contacts at once, which seed 000, II.C, leaves to others: clusters on a graph of electrodes.
+"""Several contacts at once, which Wettels and Loeb 2011 leave to others: clusters on a graph of electrodes.
 
 Electrodes are neighbours when they are at most REACH_MM apart on the skin laid flat. Each pressed electrode belongs to
 the summit that it climbs to, step by step to its strongest neighbour. Two summits are one contact when the pass between

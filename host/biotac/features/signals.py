@@ -40,7 +40,7 @@ def signals(rows: npt.NDArray[Any]) -> Floats:
 
 
 def skin(points_mm: Floats) -> Floats:
-    """Points on the core (n, 3) in mm as seed 000's (d, r) in mm, (n, 2): its figure 3.
+    """Points on the core (n, 3) in mm as (d, r) in mm, (n, 2): figure 3 of Wettels and Loeb 2011.
 
     d runs along the finger from the proximal end of the pattern, x = -16 mm, to the tip. r is the arc from the ventral
     line, positive on E11's side (the paper's left is negative). On the cap they are like latitude and longitude on a

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
-from biotac.features import texture
+from biotac_lab.learn import texture
 
 SLIDING_M_S = 0.002
 

@@ -11,7 +11,7 @@ import numpy as np
 from biotac import InputError
 
 from ..experiments import laboratory, plate_normal
-from ..report import Show
+from ..report import Show, Table
 from . import normal
 
 ABOUT = "The normal at the point of contact, corrected by a recording of a flat plate whose normal was measured."
@@ -42,13 +42,10 @@ def run(args: argparse.Namespace, show: Show) -> int:
     if args.out is not None:
         args.out.write_text(normal.dumps(fitted), encoding="utf-8")
         facts["written"] = str(args.out)
-    lines = [
-        f"{facts['file']}: {facts['frames']} frames of {facts['contacts']} contacts; median and 90th percentile",
-        "  the formula's normal:           " + "  ".join(f"{angle:5.2f}" for angle in facts["before_deg"]) + " deg",
-        "  each contact held out:          " + "  ".join(f"{angle:5.2f}" for angle in facts["held_out_deg"]) + " deg",
-        *([f"  written: {facts['written']}"] if "written" in facts else []),
-    ]
-    print(json.dumps(facts) if args.json else "\n".join(lines))
+    rows = [["the formula's normal", *facts["before_deg"]], ["each contact held out", *facts["held_out_deg"]]]
+    about = f"{facts['frames']} frames of {facts['contacts']} contacts."
+    table = Table(facts["file"], ["deg", "median", "90th percentile"], rows, about, digits=2)
+    print(json.dumps(facts) if args.json else "\n".join(table.page()))
     return 0
 
 

@@ -13,7 +13,7 @@ from biotac import InputError
 from biotac.calibrate.population import COLUMNS, Trained, dumps, provenance_of
 from biotac.calibrate.wrench import Run, load
 
-from ..report import Show
+from ..report import Show, Table
 from . import held_out_error, training
 from .normal_command import check_free
 
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
     if args.out is not None:
         args.out.write_text(dumps(trained), encoding="utf-8")
         facts["written"] = str(args.out)
-    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
+    print(json.dumps(facts) if args.json else "\n".join(line for table in _tables(facts) for line in table.page()))
     return 0
 
 
@@ -73,23 +73,12 @@ def _calibrated(args: argparse.Namespace, runs: list[Run], tested: Run | None) -
     return facts, Trained(population, sigma[0], sigma[1], source)
 
 
-def _lines(facts: dict[str, Any]) -> list[str]:
-    def numbers(values: list[float] | None) -> str:
-        return "    -" if values is None else "  ".join(f"{value:5.3f}" for value in values)
-
-    lines = [
-        f"{', '.join(facts['files'])}: {facts['columns']} columns per axis",
-        f"  a new finger, one sigma, x y z:   {numbers(facts['sigma_n'])} N",
-        f"  after five presses on a scale:    {numbers(facts['sigma_scale5_n'])} N",
-    ]
-    if "test" in facts:
-        within = ", ".join(f"{share:.0%}" for share in facts["coverage"])
-        lines += [
-            f"{facts['test']}, RMSE uncorrected:       {numbers(facts['rmse_n'])} N",
-            f"  five straight presses on a scale: {numbers(facts['rmse_scale5_n'])} N",
-            f"  a minute on a force plate:        {numbers(facts['rmse_60s_n'])} N",
-            f"  within one and two sigma:         {within}",
-        ]
-    if "written" in facts:
-        lines.append(f"  written: {facts['written']}")
-    return lines
+def _tables(facts: dict[str, Any]) -> list[Table]:
+    rows = [[f"a new finger of {', '.join(facts['files'])}, one sigma", *facts["sigma_n"]]]
+    rows.append(["the same after five presses on a scale", *facts["sigma_scale5_n"]])
+    for what, field in (("RMSE", "rmse_n"), ("five presses", "rmse_scale5_n"), ("a minute of plate", "rmse_60s_n")):
+        if facts.get(field):
+            rows.append([f"{facts['test']}, {what}", *facts[field]])
+    within = "".join(f" {share:.0%}" for share in facts.get("coverage", ()))
+    text = f"Of the test, within one and two sigma:{within}." if within else ""
+    return [Table("Force error [N]", ["", "x", "y", "z"], rows, text)]

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from biotac import PocWeights, RecordingError, Setting
-from biotac.calibrate.wrench import locate, locate_on_mesh
 from biotac.core import geometry as surface
 from biotac.core.unroll import unroll
 from biotac.sim import PROFILES, Pose, Profile
@@ -57,7 +56,6 @@ PAPER_MM = (
     (0.6112, 0.5310, 0.3337, 0.2973, 0.2133, 0.2078, 0.7474, 0.6417, 0.6289, 0.3619, 0.1037, 0.6312, 0.5566, 1.4153,
      0.2669, 0.2760, 0.0965, 3.1193, 0.4673),
 )  # fmt: skip
-PLATE_STEP_N, PLATE_STEP_NMM = 1 / 320, 1 / 64  # the Nano17's resolution
 
 TRUE_MM = surface.project(surface.ELECTRODE_MM)  # where the probe stands: over the electrode, on the core
 
@@ -91,11 +89,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """``plate`` is the force plate's own point for emulated trials, in closed form and on the paper's mesh."""
+    """A case per sensor and kind of weights."""
 
     source: str
     cases: list[Case]
-    plate: dict[str, Spread]
     notes: list[str]
 
 
@@ -152,22 +149,20 @@ def measure(options: Options) -> Result:
     """Cases of an emulated finger, new and worn, twice each; or of a recording."""
     if options.recording is not None:
         trial = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
-        return Result(str(options.recording), _cases("recorded", [trial], trial), {}, list(trial.notes))
+        return Result(str(options.recording), _cases("recorded", [trial], trial), list(trial.notes))
     cases: list[Case] = []
-    plate: dict[str, Spread] = {}
     for profile in PROFILES:
         options.show(f"poking the {profile} sensor")
         trials = [emulated(options.seed, profile, take=take) for take in (0, 1)]
         slow = emulated(options.seed, profile, take=2, slow=True)
         cases += _cases(profile, trials, slow)
-        plate = plate or _plate(trials[0])
     notes = [
         f"emulated sensor, seed {options.seed}: the probe presses with up to {PEAK_N:g} N for half a second; by force: "
         f"it ramps up to {SLOW_PEAK_N:g} N in four seconds, 24 frames per 0.3 N",
         "probe placed exactly; by hand it is not, which adds to the paper's bias but not to its deviation",
         "new: noise 1.5 counts, 3 to 5 kOhm, as in the paper; worn: noise 5 counts, glitches, as in public recordings",
     ]
-    return Result(f"emulated finger, seed {options.seed}", cases, plate, notes)
+    return Result(f"emulated finger, seed {options.seed}", cases, notes)
 
 
 def _cases(profile: str, trials: list[Trial], slow: Trial) -> list[Case]:
@@ -183,21 +178,6 @@ def _cases(profile: str, trials: list[Trial], slow: Trial) -> list[Case]:
         bands = [spread(slow_points, rows) for rows in banded]
         cases.append(Case(profile, weights, spreads, bands, points[0][np.any(firm[0], axis=0)]))
     return cases
-
-
-def _plate(trial: Trial) -> dict[str, Spread]:
-    """Points from a force plate with the Nano17's resolution and no other error."""
-    assert trial.force_n is not None and trial.torque_nmm is not None
-    force = np.rint(trial.force_n / PLATE_STEP_N) * PLATE_STEP_N
-    torque = np.rint(trial.torque_nmm / PLATE_STEP_NMM) * PLATE_STEP_NMM
-    firm = contacts(trial)
-    rows = np.any(firm, axis=0)
-    on_mesh = np.full((len(trial), 3), np.nan)
-    on_mesh[rows] = locate_on_mesh(force[rows], torque[rows])
-    return {
-        "closed form": spread(locate(force, torque).point_mm, firm),
-        "0.5 mm mesh (paper)": spread(on_mesh, firm),
-    }
 
 
 def run(options: Options) -> Report:
@@ -223,9 +203,6 @@ def _tables(result: Result) -> list[Table]:
         ]
         for case in result.cases
         for k, its in enumerate(case.trials, start=1)
-    ]
-    rows += [
-        ["force plate", name, 1, its.std_mm.mean(), None, its.bias_mm.mean()] for name, its in result.plate.items()
     ]
     paper = [float(np.mean(column)) for column in PAPER_MM]
     rows += [["paper", PAPER_TRIALS[k].rstrip("12 "), k % 2 + 1, mean, None, None] for k, mean in enumerate(paper)]
