@@ -96,4 +96,19 @@ static inline uint32_t bt_scale(uint32_t magnitude, uint32_t m_high, uint32_t m_
     return (top + (1u << (bits - 1))) >> bits;
 }
 
+// The largest r with r * r <= n, a bit at a time.
+static inline uint32_t bt_root_u32(uint32_t n)
+{
+    uint32_t r = 0;
+    for (uint32_t bit = 1u << 30; bit != 0; bit >>= 2) {
+        uint32_t trial = r + bit;
+        r >>= 1;
+        if (n >= trial) {
+            n -= trial;
+            r += bit;
+        }
+    }
+    return r;
+}
+
 #endif

@@ -54,10 +54,8 @@ void bt_population_replace(const double coefficient[BT_POPULATION_COLUMNS][3],
         u[i] = known ? conductance(counts[i]) / conductance(tare_q4[i] / 16.0) - 1 : 0;
         u[i] = limited(u[i], -1, BT_MAP_RATIO_MAX);
     }
-    double share = bt_population_share(e_q4) / (double)BT_POPULATION_ALL;
-    if (share == 0) {
-        return;
-    }
+    bt_likeness likeness = bt_population_likeness(e_q4);
+    double share = likeness.share / (double)BT_POPULATION_ALL;
     gates_of(e_q4, gate);
     for (int g = 0; g < 3; g++) {
         double sum[3] = {0, 0, 0};
@@ -78,7 +76,8 @@ void bt_population_replace(const double coefficient[BT_POPULATION_COLUMNS][3],
     const double *poc = results;
     double *made = results + 3, *torque = results + 6;
     for (int d = 0; d < 3; d++) {
-        made[d] = share * force[d] + (1 - share) * made[d];
+        double otherwise = share < 1 ? likeness.otherwise_100un[d] / 1e4 : 0;
+        made[d] = share * force[d] + (1 - share) * otherwise;
     }
     torque[0] = poc[1] * made[2] - poc[2] * made[1];
 }

@@ -10,8 +10,8 @@
 // ones'. N of conductances, then of their products, i <= j.
 #define BT_POPULATION_COLUMNS (6 * BT_ELECTRODES + BT_ELECTRODES + BT_ELECTRODES * (BT_ELECTRODES + 1) / 2)
 
-// results: poc_mm, force_n, torque_nmm of Lin's, of which force becomes the map's in its share, and torque x
-// what follows. counts: 0..4095 or BT_INVALID_COUNT.
+// results: poc_mm, force_n, torque_nmm of Lin's, of which force becomes the published one, and torque x what
+// follows. counts: 0..4095 or BT_INVALID_COUNT.
 void bt_population_replace(const double coefficient[BT_POPULATION_COLUMNS][3],
                            const uint16_t counts[BT_ELECTRODES], const int32_t tare_q4[BT_ELECTRODES],
                            double *results);

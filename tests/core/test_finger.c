@@ -218,6 +218,7 @@ static void a_new_tare_is_told_once_with_the_frame_that_first_uses_it(void **sta
 static void a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on(void **state)
 {
     (void)state;
+    settings.population = false;
     bt_baseline base = {.pdc_q16 = BT_TARE_UNKNOWN};
     for (int i = 0; i < BT_ELECTRODES; i++) {
         base.electrode_q16[i] = (uint32_t)(slot_count(electrode_slot(i)) * 16 + 5)
@@ -234,7 +235,7 @@ static void a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on(void 
     for (int i = 0; i < BT_ELECTRODES; i++) {
         assert_int_equal(frame.tare_q4[i], slot_count(electrode_slot(i)) * 16 + 5);
     }
-    // 12.116 * 5/16 counts * 2.262234 mN: the sum of all normals at a compression of 5/16.
+    // 12.116 * 5/16 counts * 2.262234 mN: Lin's sum of all normals at a compression of 5/16.
     assert_int_equal(frame.force_100un[2], 86);
     rounds(1);
     assert_false(tare_changed);

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import wrench_run
 
+import biotac
+from biotac.calibrate import normal
 from biotac.calibrate.population import population_map
 from biotac.calibrate.population.population_map import Population, Trained
 from biotac.calibrate.press.few_shot import Scale, pulled, scale_of
@@ -19,6 +21,7 @@ from biotac.errors import InputError
 from biotac.map import columns
 from biotac.map.bound import summary
 from biotac.map.columns import Signals
+from biotac.map.population import likeness
 from biotac_lab.calibrate import held_out_error, training
 from biotac_lab.cli import main
 
@@ -76,8 +79,8 @@ def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(its: Popu
     scales = (said * truth).sum(axis=0) / (said**2).sum(axis=0)
     new = runs[2]
     lins = np.sqrt(((lin(new) * scales - new.truth) ** 2).mean(axis=0))
-    found = held_out_error.worth(its, new)
-    assert (found.rmse_n < 0.75 * lins).all()
+    found = np.sqrt(((its.force(new.counts, new.tare) - new.truth) ** 2).mean(axis=0))
+    assert (found < 0.75 * lins).all()
 
 
 def test_the_map_is_one_for_a_board(its: Population, runs: list[Run]) -> None:
@@ -154,7 +157,15 @@ def test_the_command_trains_judges_and_keeps(
     assert "both a training file and --test" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("damage", [("biotac-population-map/1", "/2"), ("[[", "["), ("COMPRESSION", "BULGE")])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        ("biotac-population-map/1", "/2"),
+        ("[[", "["),
+        ("COMPRESSION", "BULGE"),
+        ('"pattern_weights": [[', '"pattern_weights": [[4'),
+    ],
+)
 def test_a_damaged_file_is_refused_in_words(its: Population, damage: tuple[str, str], tmp_path: Path) -> None:
     path = tmp_path / "x.json"
     path.write_text(population_map.dumps(Trained(its, np.ones(3), np.ones(3), {})).replace(*damage))
@@ -182,9 +193,52 @@ def test_a_finger_is_pulled_to_others_and_not_to_itself(its: Population, runs: l
     )
 
 
+def test_a_pattern_of_the_training_is_near_and_one_of_nothing_like_it_is_far(
+    its: training.Population, runs: list[Run]
+) -> None:
+    near = likeness(runs[0].counts - runs[0].tare, its.pattern_weights)
+    poke = likeness(-300.0 * np.eye(19), its.pattern_weights)
+    assert np.mean(near.share > 0) > np.mean(poke.share > 0) == 0.0
+    assert np.abs(its.pattern_weights).max() <= population_map.MAX_WEIGHT
+
+
+def contact_of_another_rig() -> tuple[np.ndarray, np.ndarray]:
+    """Published force (n, 3) and minus the plate's normal (n, 3), where a plate presses a finger of another rig."""
+    path = SHARED.parent / "robotic_finger/trial_15330.npz"
+    if not path.exists():
+        pytest.skip("no ../shared/data: real recordings are not part of the project")
+    fields = np.load(path)
+    rest = slice(400)  # nothing touches it
+    tare, pdc = np.median(fields["E"][rest], axis=0), np.median(fields["PDC"][rest])
+    touched = fields["PDC"] > pdc + 40
+    force = biotac.compute(fields["E"], tare)["force_n"]
+    return force[touched], (fields["z_dir"] * [1.0, -1.0, 1.0])[touched]
+
+
+def test_the_direction_holds_on_a_finger_of_another_rig() -> None:
+    """Issue 30's bars; F1 and F2 are all that the map is trained on."""
+    force, into = contact_of_another_rig()
+    unit = force / np.linalg.norm(force, axis=1, keepdims=True)
+    for axis in (0, 1):
+        side = np.abs(into[:, axis]) > 0.3
+        assert np.mean(force[side, axis] * into[side, axis] > 0.0) >= 0.95
+        assert np.corrcoef(unit[:, axis], into[:, axis])[0, 1] >= 0.8
+    assert np.mean(force[:, 2] < 0.0) <= 0.01
+    off = normal.angles_deg(unit, into)
+    assert np.median(off) <= 12.0 and np.percentile(off, 99) <= 45.0
+
+
+def test_no_finger_that_holds_a_tool_is_pulled() -> None:
+    path = SHARED.parent / "usc_pinch/pinch_2017.npz"
+    if not path.exists():
+        pytest.skip("no ../shared/data: real recordings are not part of the project")
+    for e in (np.load(path)[name].astype(np.int64) for name in "LR"):
+        assert (biotac.compute((2900 + e).astype(np.uint16), np.full(19, 2900.0))["force_n"][:, 2] > 0.0).all()
+
+
 @pytest.mark.nightly
 def test_real_fingers_each_by_the_other() -> None:
-    """The asked figures (issue 15), but for x after five presses: .45 asked of F2, .46 reached."""
+    """A tenth above what was reached when direction across rigs was no goal (population.md)."""
     if not SHARED.exists():
         pytest.skip("no ../shared/data: real recordings are not part of the project")
     runs = [training.aligned(load_run(SHARED / name)) for name in ("F1.npz", "F2.npz")]
@@ -195,8 +249,8 @@ def test_real_fingers_each_by_the_other() -> None:
         facts = held_out_error.facts(held_out_error.worth(training.train([fingers[k]]), new), sigma)
         within.append(facts["coverage"])
         after_presses.append(facts["coverage_scale5"])
-        assert (np.array(facts["rmse_n"]) <= [0.62, 0.39, 0.46]).all()
-        assert (np.array(facts["rmse_scale5_n"]) <= [0.47, 0.39, 0.44]).all()
-        assert (np.array(facts["rmse_60s_n"]) <= [0.44, 0.38, 0.47]).all()
+        assert (np.array(facts["rmse_n"]) <= [0.60, 0.388, 0.46]).all()
+        assert (np.array(facts["rmse_scale5_n"]) <= [0.51, 0.388, 0.47]).all()
+        assert (np.array(facts["rmse_60s_n"]) <= [0.44, 0.41, 0.47]).all()
     for one, two in (np.mean(within, axis=0), np.mean(after_presses, axis=0)):
         assert 0.55 <= one <= 0.80 and 0.90 <= two <= 0.99

@@ -217,14 +217,11 @@ MAP_SCENE(pooled_7)
 
 SCENE(population)
 {
-    int32_t force_100un[3], lin_100un[3], e_q4[BT_ELECTRODES];
+    int32_t force_100un[3], e_q4[BT_ELECTRODES];
     bt_signals_q4(press_whole.round.electrode, press_whole.tare.electrode_q4, e_q4);
     bt_population_force(e_q4, press_whole.round.electrode, press_whole.tare.electrode_q4, force_100un);
-    uint32_t share = bt_population_share(e_q4);
-    if (share < BT_POPULATION_ALL) { // a press is none of these
-        bt_force(e_q4, &settings->gains, lin_100un);
-        bt_population_mix(share, lin_100un, force_100un);
-    }
+    bt_likeness likeness = bt_population_likeness(e_q4);
+    bt_population_mix(&likeness, force_100un);
     sink = (uint32_t)force_100un[0];
 }
 
@@ -255,7 +252,7 @@ const bench_scene bench_scenes[] = {
     {"wrench map", "pooled, 6 axes", map_pooled_6},
     {"wrench map", "pooled, 7 axes", map_pooled_7},
     {"wrench map", "pooled, 3 axes, judged", map_opened},
-    {"population map", "and Lin's, mixed", population},
+    {"population map", "and along normals, mixed", population},
     {"events", "at rest", events_at_rest},
     {"events", "in contact", events_in_contact},
     {"events", "shaken, nothing told", events_shaken},

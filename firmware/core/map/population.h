@@ -1,9 +1,9 @@
 // The population map: a wrench map built into the firmware (population_gen.h), for fingers that nobody has
 // calibrated. It holds what other fingers have in common (host/docs/population.md).
 //
-// It was trained with a flat plate, and is unreliable where few electrodes carry the signal, as when a point
-// or an edge presses. There bt_population_share tells the caller to use Lin's formula instead, which gets the
-// sign and the order of magnitude right.
+// It was trained on fingers of one rig, with a flat plate. A touch that is lighter than those, or whose pattern
+// is unlike theirs, gets a force along the normals of the compressed electrodes instead: the direction that
+// holds on every rig, with a strength that holds roughly.
 #ifndef BIOTAC_POPULATION_H
 #define BIOTAC_POPULATION_H
 
@@ -17,18 +17,22 @@ extern const bt_map bt_population;
 void bt_population_force(const int32_t e_q4[BT_ELECTRODES], const uint16_t counts[BT_ELECTRODES],
                          const uint16_t tare_q4[BT_ELECTRODES], int32_t force_100un[3]);
 
-// How much of the force should come from the map, in 1/256. It depends on how many electrodes the signal
-// spreads over, (sum s)^2 / sum s^2, where s is |e| less its first 8 counts, which are noise: all from 4.5
-// electrodes on, as always under a flat plate (at least 4.8 in 46 000 frames of two fingers); none up to
-// three; in between in proportion.
-uint32_t bt_population_share(const int32_t e_q4[BT_ELECTRODES]);
 #define BT_POPULATION_ALL 256
+typedef struct {
+    uint32_t share;             // of the force that comes from the map, in 1/256
+    bool outside;               // nothing touches, or the pattern is unlike any that was tested
+    uint32_t strength_100un;    // from the sum of all signals
+    int32_t otherwise_100un[3]; // the rest of the force; not written where share is all
+} bt_likeness;
 
-// One sigma, in 100 uN, of the map's force on a finger that it was not trained on: the errors on each finger
-// of a map made of the others, so it includes noise.
-extern const uint16_t bt_population_sigma_100un[3];
+// How like the training the signals are: firm, from a sum of |e| of 1500 to 2524 counts, and near, from a
+// squared distance of 4 to 8 (SPEC.md, Population map).
+bt_likeness bt_population_likeness(const int32_t e_q4[BT_ELECTRODES]);
 
-// Mix the map's force and Lin's in these shares; the result replaces force_100un. share <= BT_POPULATION_ALL.
-void bt_population_mix(uint32_t share, const int32_t lin_100un[3], int32_t force_100un[3]);
+// Mix the map's force with the rest of it; the result replaces force_100un.
+void bt_population_mix(const bt_likeness *its, int32_t force_100un[3]);
+
+// One sigma of the result: in the map's share, the errors on each finger of a map made of the others.
+void bt_population_sigma(const bt_likeness *its, uint16_t sigma_100un[3]);
 
 #endif

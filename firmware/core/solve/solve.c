@@ -73,21 +73,18 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
 }
 
 static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                                 const bt_gains *gains, int32_t force_100un[3])
+                                 int32_t force_100un[3])
 {
-    uint32_t share = bt_population_share(e_q4);
-    int32_t lin_100un[3];
-    if (share == 0) {
-        bt_force(e_q4, gains, force_100un);
-        return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+    bt_likeness likeness = bt_population_likeness(e_q4);
+    if (likeness.share > 0) {
+        bt_population_force(e_q4, frame->counts, frame->tare_q4, force_100un);
+    } else {
+        force_100un[0] = force_100un[1] = force_100un[2] = 0;
     }
-    bt_population_force(e_q4, frame->counts, frame->tare_q4, force_100un);
-    if (share == BT_POPULATION_ALL) {
-        return BT_FRAME_FLAG_POPULATION;
+    if (likeness.share < BT_POPULATION_ALL) {
+        bt_population_mix(&likeness, force_100un);
     }
-    bt_force(e_q4, gains, lin_100un);
-    bt_population_mix(share, lin_100un, force_100un);
-    return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+    return BT_FRAME_FLAG_POPULATION | (likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0);
 }
 
 // Force comes from the gains, or from the population map if `frame` is given; all else is the same.
@@ -102,7 +99,7 @@ static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], cons
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         if (frame != NULL) {
-            flags = population_force(e_q4, frame, &settings->gains, force_100un);
+            flags = population_force(e_q4, frame, force_100un);
         } else {
             bt_force(e_q4, &settings->gains, force_100un);
         }

@@ -15,32 +15,17 @@ static uint16_t saturate(uint64_t value)
     return (uint16_t)(value > TOP ? TOP : value);
 }
 
-// The largest r with r * r <= n, a bit at a time.
-static uint32_t root32(uint32_t n)
-{
-    uint32_t r = 0;
-    for (uint32_t bit = 1u << 30; bit != 0; bit >>= 2) {
-        uint32_t trial = r + bit;
-        r >>= 1;
-        if (n >= trial) {
-            n -= trial;
-            r += bit;
-        }
-    }
-    return r;
-}
-
-// The same for 64 bits, by halves (Zimmermann, Karatsuba Square Root, 1999): the upper half's root, then the
+// The largest r with r * r <= n, by halves (Zimmermann, Karatsuba Square Root, 1999): the upper half's root, then the
 // lower bits by one division, at most one too high. n is first shifted up by an even number of bits.
 static uint32_t root(uint64_t n)
 {
     if (n >> 32 == 0) {
-        return root32((uint32_t)n);
+        return bt_root_u32((uint32_t)n);
     }
     int shift = __builtin_clz((uint32_t)(n >> 32)) & ~1;
     n <<= shift;
     uint32_t high = (uint32_t)(n >> 32), low = (uint32_t)n;
-    uint32_t s = root32(high);              // 2^15 <= s < 2^16
+    uint32_t s = bt_root_u32(high);              // 2^15 <= s < 2^16
     uint32_t rest = high - s * s;           // at most 2 s
     uint32_t half = rest << 15 | low >> 17; // half of (rest << 16 | low >> 16), which itself takes 33 bits
     uint32_t q = BT_DIVIDE_U32(half, s);
@@ -99,7 +84,7 @@ static scaled root_of(uint32_t value)
         return (scaled){0, 0};
     }
     int up = __builtin_clz(value) & ~1;
-    return (scaled){root32(value << up), -up / 2};
+    return (scaled){bt_root_u32(value << up), -up / 2};
 }
 
 // sqrt(a^2 + b^2)
@@ -218,9 +203,8 @@ void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settin
     bool forced = msg->force_100un[0] != BT_INVALID_I32;
     const uint32_t its = BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
     if (forced && (msg->flags & its) == BT_FRAME_FLAG_POPULATION) {
-        msg->force_sigma_100un[0] = bt_population_sigma_100un[0];
-        msg->force_sigma_100un[1] = bt_population_sigma_100un[1];
-        msg->force_sigma_100un[2] = bt_population_sigma_100un[2];
+        bt_likeness likeness = bt_population_likeness(e_q4);
+        bt_population_sigma(&likeness, msg->force_sigma_100un);
     }
     if (noise_count2 == 0) {
         return; // not measured yet

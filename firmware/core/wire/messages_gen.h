@@ -146,8 +146,8 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
 #define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
-#define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map; if OUTSIDE, only partly or not at all
-#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // fewer electrodes carry the signal than on any plate that the population map was trained on: force is mixed with LIN's, or is LIN's
+#define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map, or along the skin's normals where the touch is unlike its training
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
 #define BT_FRAME_FLAGS 0x7FFFFFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.

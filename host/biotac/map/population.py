@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -17,11 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.compiled import FORCE_GAINS
-from ..core.geometry import Floats
+from ..core.geometry import ELECTRODE_MM, Floats
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi
+from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
 from .columns import SIGNAL_COUNTS, Signals, split, summed, tared
 from .float64 import derived_torque_x
@@ -29,10 +31,19 @@ from .quantise import quantise
 
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]
+Integers = npt.NDArray[np.int64]
 
 ALL = 256  # the share 1
+#: Electrodes left and right of each other, and those between; a pattern's halves are in this order.
+LEFT, RIGHT, MIDDLE = [0, 1, 2, 3, 4, 5, 7], [10, 11, 12, 13, 14, 15, 8], [6, 9, 16, 17, 18]
+WEIGHT_BITS = 11
 _NOISE_Q4 = 8 * 16
-_SUM_BITS = 15
+_KNEE_Q4 = 256 * 16
+_SUM_BITS = 14
+_UNIT_BITS = 12
+_LEAST_Q4 = 64 * 16
+_LIGHT_Q4 = 1500 * 16
+_FAR_Q5, _NEAR_Q5, _OUTSIDE_Q5 = 8 << 5, 4 << 5, 48 << 5
 _CHUNK_ROWS = 4096
 _COMPILED = [
     *((kind, gate) for gate in (Gate.ONE, Gate.X, Gate.Y) for kind in (Kind.COMPRESSION, Kind.BULGE)),
@@ -72,35 +83,80 @@ def alone(signals: Signals) -> Floats:
     return summed(blocks(), signals)
 
 
-def share(signals: Signals) -> npt.NDArray[np.int64]:
-    """The share of the force that comes from the map (n,), in 1/256; defined in integers, so that all boards agree.
+def bounded_q4(e: Floats) -> Integers:
+    """Signals (n, 19) in 1/16 count as the pattern has them: less 8 counts, and a quarter of what exceeds 256."""
+    e_q4 = np.rint(16 * e).astype(np.int64)
+    size = np.maximum(np.abs(e_q4) - _NOISE_Q4, 0)
+    return np.where(e_q4 < 0, -1, 1) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
 
-    With s = |e| less 8 counts, (sum s)^2 / sum s^2 says over how many electrodes a signal spreads. The share is all
-    from 4.5 electrodes on, and nothing up to 3.
+
+def halves(x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """What differs between left and right (n, 7), and then what does not (n, 12), of patterns (n, 19)."""
+    return np.concatenate([x[:, LEFT] - x[:, RIGHT], x[:, LEFT] + x[:, RIGHT], x[:, MIDDLE]], axis=1)
+
+
+@cache
+def pattern_weights() -> Integers:
+    """The rows (19, 19) of the distance from the patterns of the package's map."""
+    return np.array(json.loads(shipped())["pattern_weights"], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How like the training n frames are; defined in integers, so that all boards agree (SPEC.md, Population map).
+
+    ``share`` (n,) of the force that comes from the map, in 1/256; ``outside`` (n,); ``otherwise_n`` (n, 3), the rest.
     """
-    size = np.rint(16 * np.abs(signals.e)).astype(np.int64)
-    beyond = np.maximum(size - _NOISE_Q4, 0) >> 3  # half counts
-    total, energy = beyond.sum(axis=1), (beyond**2).sum(axis=1)
-    shift = np.maximum(np.ceil(np.log2(total + 1.0)).astype(np.int64) - _SUM_BITS, 0)
-    square, energy = (total >> shift) ** 2, energy >> 2 * shift
-    divisor = np.maximum((3 * energy + 63) >> 6, 1)
-    part = np.minimum((8 * (square - 3 * energy) + divisor // 2) // divisor, ALL)
-    enough = (square // 2 >= 9 * energy // 4) & (square > 0)
-    return np.where(enough, ALL, np.where(square <= 3 * energy, 0, part))
+
+    share: Integers
+    outside: npt.NDArray[np.bool_]
+    otherwise_n: Floats
+
+    def mixed(self, force_n: Floats) -> Floats:
+        """The map's force (n, 3) in N, mixed with the rest."""
+        part = (self.share / ALL)[:, None]
+        return part * force_n + (1 - part) * self.otherwise_n
+
+
+def likeness(e: Floats, weights: Integers) -> Likeness:
+    """How like the patterns that ``weights`` (19, 19) are of the signals ``e`` (n, 19) in counts are."""
+    q4 = bounded_q4(e)
+    total = np.abs(q4).sum(axis=1)
+    up = (_SUM_BITS - np.ceil(np.log2(total + 1.0)).astype(np.int64))[:, None]
+    size = np.abs(q4) << np.maximum(up, 0) >> np.maximum(-up, 0)
+    x = np.sign(q4) * size
+    rows = halves(x) @ weights.T >> _SUM_BITS + 1
+    far = (rows**2).sum(axis=1) // np.maximum((x**2).sum(axis=1) >> 2 * _SUM_BITS - 4 - WEIGHT_BITS, 1)
+    share = np.clip(np.minimum((_FAR_Q5 - far) * 2, total - _LIGHT_Q4 >> 6), 0, ALL)
+    pressed = -np.minimum(q4, 0).sum(axis=1)
+    outside = (total < _LEAST_Q4) | (far > _OUTSIDE_Q5) | ((far > _NEAR_Q5) & (8 * pressed < total))
+    return Likeness(np.where(total > 0, share, 0), outside, _along_normals(x, size.sum(axis=1), total * 25 >> 5))
+
+
+def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> Floats:
+    place_um = np.rint(1000 * ELECTRODE_MM).astype(np.int64) * [[3, 3, 5]]  # the tilt is .6
+    place_um[:, 0] = np.maximum(place_um[:, 0], 0)  # on the cylinder a normal has no x
+    to = np.minimum(x, 0) @ place_um
+    to[:, 2] += 5 * (CORE_RADIUS_UM // 32) * total
+    down = np.ceil(np.log2(np.abs(to).max(axis=1) + 1.0)).astype(np.int64) - 15
+    size = np.abs(to) >> np.maximum(down, 0)[:, None]
+    length = np.floor(np.sqrt((size**2).sum(axis=1).astype(np.float64))).astype(np.int64)
+    unit = (size << _UNIT_BITS) // np.maximum(length, 1)[:, None]
+    force: Floats = np.sign(to) * (unit * strength_100un[:, None] >> _UNIT_BITS) / FORCE_LSB_PER_N
+    return force
 
 
 def replace_force(
     counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], poc_mm: Floats, force_n: Floats, torque_nmm: Floats
 ) -> None:
-    """Blend the map's force by its share into Lin's ``force_n``, in place, and derive torque x from the result.
+    """Replace Lin's ``force_n`` by the map's and what it is mixed with, and derive torque x from the result.
 
     All arrays have n rows. NaN in ``poc_mm`` makes torque x NaN.
     """
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
         signals = tared(counts[rows], tare_q4[rows])
-        part = (share(signals) / ALL)[:, None]
-        force_n[rows] = part * alone(signals) + (1 - part) * force_n[rows]
+        force_n[rows] = likeness(signals.e, pattern_weights()).mixed(alone(signals))
     torque_nmm[:, 0] = derived_torque_x(poc_mm, force_n)
 
 

@@ -170,10 +170,11 @@ class CrossCheck:
             self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
 
     def _judge_model(self, messages: StructArray) -> None:
-        """With a force POPULATION must be set, and OUTSIDE exactly where the population map did not make all of it."""
+        """With a force POPULATION must be set, and OUTSIDE exactly where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
         signals = tared(messages["counts"], messages["tare_q4"])
-        outside = np.where(population.share(signals) < population.ALL, wire.FrameFlags.OUTSIDE, 0)
+        unlike = population.likeness(signals.e, population.pattern_weights()).outside
+        outside = np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
         wanted = wire.FrameFlags.POPULATION | outside
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
         for k in np.flatnonzero(made & (seen != wanted)):
@@ -235,7 +236,7 @@ def _by_population(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Replace force and torque in ``truth`` by the population map's. Bounds of force, mN, and torque, N*mm, (n, 3)."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    off = _population_bound_n(tared(counts, tare_q4), FORCE_BOUND_MN / 1e3)
+    off = _population_bound_n(tared(counts, tare_q4))
     population.replace_force(counts, tare_q4, truth.poc_mm, truth.force_n, truth.torque_nmm)
     torque_off = torque_bound_nmm(messages, truth, settings)
     torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * off[:, 1:].sum(axis=1)
@@ -247,12 +248,12 @@ def _population_map() -> BoardMap:
     return population.board_map(population.blocks())
 
 
-def _population_bound_n(signals: Signals, lin_bound_n: float) -> NDArray[np.float64]:
-    """Bound (n, 3) of the population map's force in N from its formats; Lin's part is off by up to ``lin_bound_n``."""
-    part = (population.share(signals) / population.ALL)[:, None]
-    wanted = {(kind, gate): factors * FORCE_LSB_PER_N for kind, gate, factors in population.blocks()}
+def _population_bound_n(signals: Signals) -> NDArray[np.float64]:
+    """Bound (n, 3) of the population map's force in N from its formats; what it is mixed with is exact."""
+    part = (population.likeness(signals.e, population.pattern_weights()).share / population.ALL)[:, None]
+    wanted = {(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in population.blocks()}
     off = bound_of(_population_map(), wanted, signals) / FORCE_LSB_PER_N
-    result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + (1 - part) * lin_bound_n + 0.5 / FORCE_LSB_PER_N
+    result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + 0.5 / FORCE_LSB_PER_N
     return result
 
 

@@ -164,8 +164,8 @@ class FrameFlags(IntFlag):
     SHED = 1 << 22  # the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
-    POPULATION = 1 << 25  # force comes from the population map; if OUTSIDE, only partly or not at all
-    OUTSIDE = 1 << 26  # fewer electrodes carry the signal than on any plate that the population map was trained on: force is mixed with LIN's, or is LIN's
+    POPULATION = 1 << 25  # force comes from the population map, or along the skin's normals where the touch is unlike its training
+    OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
 
 
 class FaultFlags(IntFlag):
@@ -331,8 +331,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4194304: "the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent",
     8388608: "the sensor was away and has not given its serial number since: tare, calibration and map may belong to another",
     16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
-    33554432: "force comes from the population map; if OUTSIDE, only partly or not at all",
-    67108864: "fewer electrodes carry the signal than on any plate that the population map was trained on: force is mixed with LIN's, or is LIN's",
+    33554432: "force comes from the population map, or along the skin's normals where the touch is unlike its training",
+    67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma",
 }
 
 

@@ -1,5 +1,5 @@
-// The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and a poke gets
-// Lin's.
+// The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and what is unlike the
+// training goes along the normals.
 #include "keep/settings.h"
 #include "map/population.h"
 #include "map/population_gen.h"
@@ -7,6 +7,8 @@
 #include "solve/solve.h"
 #include "solve/wrench.h"
 #include "support.h"
+
+#include <math.h>
 
 static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7, 9,
                                               0,  1,  2,  3,  4,  5,  16, 17, 18};
@@ -68,7 +70,14 @@ static void extremes_do_not_overflow(void **state)
                                    : draw % 4 == 2 ? draw % 4096
                                                    : 4090);
         }
-        force_of(counts, tares_q4[seed >> 28 < 12 ? (seed >> 28) % 6 : 3], force);
+        uint16_t tare_q4 = tares_q4[seed >> 28 < 12 ? (seed >> 28) % 6 : 3];
+        int32_t e_q4[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e_q4[i] = 16 * counts[i] - tare_q4;
+        }
+        bt_likeness its = bt_population_likeness(e_q4);
+        force_of(counts, tare_q4, force);
+        bt_population_mix(&its, force);
         for (int d = 0; d < 3; d++) {
             assert_true(force[d] > -200000000 && force[d] < 200000000);
         }
@@ -121,61 +130,136 @@ static void a_mirrored_finger_feels_the_mirrored_force(void **state)
     assert_true(most > 10 * ROUNDED_100UN);
 }
 
-static void a_poke_keeps_lins_sign_and_size_and_is_told(void **state)
+static void signals_of(const int32_t e[BT_ELECTRODES], int eighths, int32_t e_q4[BT_ELECTRODES])
+{
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = 2 * eighths * e[i];
+    }
+}
+
+// A flat plate on the middle of the pad, in counts: what lies under it is compressed, the sides bulge.
+static const int32_t plate[BT_ELECTRODES] = {300,  0,   100, 300, 100, 300, -100, -200, -200, -400,
+                                             300,  0,   100, 300, 100, 300, -800, 0,    100};
+
+// As it is defined, by division: the rows' squares over the pattern's, and how much of 1024 counts is there.
+static void the_likeness_is_what_it_is_defined_as(void **state)
 {
     (void)state;
-    bt_settings all;
-    bt_settings_reset(&all);
-    const int32_t gain_nn[3] = {bt_settings_get(&all, BT_SETTING_FORCE_GAIN_X_NN),
-                                bt_settings_get(&all, BT_SETTING_FORCE_GAIN_Y_NN),
-                                bt_settings_get(&all, BT_SETTING_FORCE_GAIN_Z_NN)};
-    const int32_t torque_nn[2] = {0, 0};
-    const bt_gains gains = bt_gains_from(gain_nn, torque_nn);
-    uint32_t seed = 3;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        for (int deep = 50; deep <= 600; deep += 10) {
-            int32_t e_q4[BT_ELECTRODES], lin[3], force[3];
-            uint16_t counts[BT_ELECTRODES];
-            for (int j = 0; j < BT_ELECTRODES; j++) {
-                seed = seed * 1664525u + 1013904223u;
-                int32_t noise = deep >= 100 ? (int32_t)(seed >> 29) - 4 : 0; // a sensor's own
-                counts[j] = (uint16_t)(2800 + noise - (i == j ? deep : 0));
-                e_q4[j] = 16 * ((int32_t)counts[j] - 2800);
+    static const int pair[][2] = BT_POPULATION_PAIR, middle[] = BT_POPULATION_MIDDLE;
+    static const double weight[] = BT_POPULATION_PATTERN;
+    uint32_t seed = 5;
+    int mixed = 0;
+    for (int k = 0; k < 20000; k++) {
+        int32_t e_q4[BT_ELECTRODES];
+        double x[BT_ELECTRODES], part[BT_ELECTRODES], sum = 0, energy = 0, far = 0;
+        signals_of(plate, 1 + k % 12, e_q4);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            seed = seed * 1664525u + 1013904223u;
+            e_q4[i] += ((int32_t)(seed >> 16) - 32768) * (k % 7) / 16;
+            double size = fabs(e_q4[i] / 16.0) - 8;
+            size = size < 0 ? 0 : size > 256 ? 256 + (size - 256) / 4 : size;
+            x[i] = e_q4[i] < 0 ? -size : size;
+            sum += size;
+            energy += size * size;
+        }
+        for (int i = 0; i < BT_POPULATION_PAIRS; i++) {
+            part[i] = x[pair[i][0]] - x[pair[i][1]];
+            part[BT_POPULATION_PAIRS + i] = x[pair[i][0]] + x[pair[i][1]];
+        }
+        for (int i = 2 * BT_POPULATION_PAIRS; i < BT_ELECTRODES; i++) {
+            part[i] = x[middle[i - 2 * BT_POPULATION_PAIRS]];
+        }
+        const double *w = weight;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            double row = 0;
+            for (int j = i; j < (i < BT_POPULATION_PAIRS ? BT_POPULATION_PAIRS : BT_ELECTRODES); j++) {
+                row += *w++ / 2048 * part[j];
             }
-            force_of(counts, 16 * 2800, force);
-            bt_force(e_q4, &gains, lin);
-            uint32_t share = bt_population_share(e_q4);
-            assert_true(share < BT_POPULATION_ALL);
-            bt_population_mix(share, lin, force);
-            assert_true(force[2] > 0 && lin[2] > 0);
-            assert_true(3 * force[2] >= lin[2] && force[2] <= 3 * lin[2]);
+            far += row * row / energy;
+        }
+        double like = (8 - far) / 4, firm = (sum - 1500) / 1024, share = like < firm ? like : firm;
+        share = share < 0 ? 0 : share > 1 ? 1 : share;
+        bt_likeness its = bt_population_likeness(e_q4);
+        assert_true(fabs(its.share / 256.0 - share) < 0.03);
+        assert_true(fabs(its.strength_100un - 12.5 * sum) <= 12.5 * BT_ELECTRODES / 16 + 1);
+        if (fabs(far - 48) > 0.5) {
+            assert_true(far <= 48 || its.outside);
+        }
+        mixed += its.share > 0 && its.share < BT_POPULATION_ALL;
+    }
+    assert_true(mixed > 1000);
+    const int32_t none[BT_ELECTRODES] = {0};
+    bt_likeness at_rest = bt_population_likeness(none);
+    assert_true(at_rest.share == 0 && at_rest.outside && at_rest.strength_100un == 0);
+}
+
+static void a_mirrored_finger_is_as_like(void **state)
+{
+    (void)state;
+    uint32_t seed = 9;
+    for (int k = 0; k < 5000; k++) {
+        int32_t e_q4[BT_ELECTRODES], image_q4[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            seed = seed * 1664525u + 1013904223u;
+            e_q4[i] = ((int32_t)(seed >> 16) - 32768) >> k % 4;
+        }
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            image_q4[i] = e_q4[mirror[i]];
+        }
+        bt_likeness its = bt_population_likeness(e_q4), image = bt_population_likeness(image_q4);
+        assert_in_range(its.share + 2 - image.share, 0, 4); // rows are rounded down
+        assert_int_equal(its.strength_100un, image.strength_100un);
+        if (its.share < BT_POPULATION_ALL && image.share < BT_POPULATION_ALL) {
+            assert_int_equal(its.otherwise_100un[0], image.otherwise_100un[0]);
+            assert_int_equal(its.otherwise_100un[1], -image.otherwise_100un[1]);
+            assert_int_equal(its.otherwise_100un[2], image.otherwise_100un[2]);
         }
     }
 }
 
-// By division, as it is defined: (sum |e|)^2 / sum e^2 from 3 to 4.5.
-static void the_share_is_what_it_is_defined_as(void **state)
+static uint32_t published(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
+{
+    bt_settings all;
+    bt_settings_reset(&all);
+    const bt_solve_settings settings = bt_solve_settings_from(&all);
+    uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+    int16_t poc[3];
+    int32_t torque[3];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        counts[i] = (uint16_t)(2800 + e_q4[i] / 16);
+        tare_q4[i] = 16 * 2800;
+    }
+    const bt_map_input frame = {.counts = counts, .tare_q4 = tare_q4};
+    return bt_solve_uncalibrated(e_q4, &frame, &settings, BT_WANT_FORCE, poc, force_100un, torque);
+}
+
+// Nothing in the training is like a point that presses on one electrode or between two; the skin's normal
+// there, at most 45 degrees off, is what is known.
+static void a_poke_presses_in_along_the_skins_normal(void **state)
 {
     (void)state;
-    uint32_t seed = 5;
-    for (int k = 0; k < 20000; k++) {
-        int32_t e_q4[BT_ELECTRODES];
-        double sum = 0, energy = 0;
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            seed = seed * 1664525u + 1013904223u;
-            int32_t size = i < k % 8 ? 8000 + (int32_t)(seed >> 18) : (int32_t)(seed >> 22);
-            e_q4[i] = seed & 1 << 12 ? size : -size;
-            double beyond = size > 128 ? size - 128 : 0;
-            sum += beyond;
-            energy += beyond * beyond;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int other = 0; other < BT_ELECTRODES; other++) {
+            const int16_t *r = bt_electrode_um[i], *s = bt_electrode_um[other];
+            if (hypot(hypot(r[0] - s[0], r[1] - s[1]), r[2] - s[2]) > 5000) {
+                continue; // too far for a point
+            }
+            for (int deep = 50; deep <= 600; deep += 10) {
+                int32_t e_q4[BT_ELECTRODES] = {0}, force[3];
+                e_q4[i] -= 8 * deep;
+                e_q4[other] -= 8 * deep;
+                uint32_t flags = published(e_q4, force);
+                double n[3] = {0, 0, 0}, along = 0;
+                for (int d = 0; d < 3; d++) {
+                    n[d] = d == 0 ? (r[0] > 0 ? r[0] : 0) + (s[0] > 0 ? s[0] : 0) : r[d] + s[d];
+                    along -= n[d] * force[d];
+                }
+                double size = hypot(hypot(force[0], force[1]), force[2]);
+                assert_true(along > 0.7 * size * hypot(hypot(n[0], n[1]), n[2]) && force[2] > 0);
+                assert_true(flags & BT_FRAME_FLAG_POPULATION);
+            }
         }
-        double wanted = (sum * sum / energy - 3.0) / 1.5;
-        wanted = wanted < 0 ? 0 : wanted > 1 ? 1 : wanted;
-        double got = bt_population_share(e_q4) / 256.0;
-        assert_true(got - wanted < 0.05 && wanted - got < 0.05);
     }
-    const int32_t none[BT_ELECTRODES] = {0};
-    assert_int_equal(bt_population_share(none), 0);
 }
 
 // Whoever gave one axis a gain of his own means Lin's force by his gains, on all axes.
@@ -197,36 +281,48 @@ static void any_gain_of_ones_own_takes_the_population_away(void **state)
     assert_false(bt_solve_settings_from(&all).population);
 }
 
-// A poke of one electrode, of four at different depths, and a plate: Lin's force, some of both, the map's.
-static void what_is_published_is_mixed_by_its_share_and_says_so(void **state)
+// A plate that touches, one between, and one that presses: along the normals, some of both, the map's.
+static void what_is_published_is_mixed_by_its_share(void **state)
 {
     (void)state;
-    static const int deep[3][BT_ELECTRODES] = {
-        {[6] = 300}, {[6] = 300, [7] = 250, [8] = 280, [16] = 120}, {[0 ... BT_ELECTRODES - 1] = 200}};
-    bt_settings all;
-    bt_settings_reset(&all);
-    const bt_solve_settings settings = bt_solve_settings_from(&all);
+    static const int eighths[] = {3, 5, 8};
+    uint16_t sigma[3][3];
     for (int k = 0; k < 3; k++) {
-        uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
-        int32_t e_q4[BT_ELECTRODES], lin[3], map[3], force[3], torque[3];
-        int16_t poc[3];
+        int32_t e_q4[BT_ELECTRODES], map[3], force[3];
+        uint16_t counts[BT_ELECTRODES];
+        signals_of(plate, eighths[k], e_q4);
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            counts[i] = (uint16_t)(2800 - deep[k][i]);
-            tare_q4[i] = 16 * 2800;
+            e_q4[i] -= e_q4[i] % 16;
+            counts[i] = (uint16_t)(2800 + e_q4[i] / 16);
         }
-        bt_signals_q4(counts, tare_q4, e_q4);
-        uint32_t share = bt_population_share(e_q4);
-        assert_int_equal((share > 0) + (share == BT_POPULATION_ALL), k);
-        bt_force(e_q4, &settings.gains, lin);
-        bt_population_force(e_q4, counts, tare_q4, map);
-        const bt_map_input frame = {.counts = counts, .tare_q4 = tare_q4};
-        uint32_t flags = bt_solve_uncalibrated(e_q4, &frame, &settings, BT_WANT_FORCE, poc, force, torque);
-        assert_int_equal(flags, BT_FRAME_FLAG_POPULATION | (k < 2 ? BT_FRAME_FLAG_OUTSIDE : 0));
+        bt_likeness its = bt_population_likeness(e_q4);
+        assert_int_equal((its.share > 0) + (its.share == BT_POPULATION_ALL), k);
+        force_of(counts, 16 * 2800, map);
+        assert_int_equal(published(e_q4, force), BT_FRAME_FLAG_POPULATION);
         for (int d = 0; d < 3; d++) {
-            double expected = lin[d] + share / 256.0 * (map[d] - lin[d]);
-            assert_true(expected - force[d] <= 1.0 && force[d] - expected <= 1.0);
+            double otherwise = its.share == BT_POPULATION_ALL ? 0 : its.otherwise_100un[d];
+            double expected = otherwise + its.share / 256.0 * (map[d] - otherwise);
+            assert_true(fabs(expected - force[d]) <= 1.0);
         }
+        assert_true(force[2] > 0);
+        bt_population_sigma(&its, sigma[k]);
     }
+    static const uint16_t trained[3] = BT_POPULATION_SIGMA_100UN;
+    for (int d = 0; d < 3; d++) {
+        assert_int_equal(sigma[2][d], trained[d]);
+        assert_true(sigma[0][d] > 0);
+    }
+}
+
+// Where nothing is compressed no direction is known: the contact is beyond the electrodes.
+static void what_only_bulges_is_outside(void **state)
+{
+    (void)state;
+    int32_t e_q4[BT_ELECTRODES], force[3];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = i % 2 == 0 ? 16 * 200 : -16 * 12;
+    }
+    assert_true(published(e_q4, force) & BT_FRAME_FLAG_OUTSIDE);
 }
 
 int main(void)
@@ -237,10 +333,12 @@ int main(void)
         cmocka_unit_test(extremes_do_not_overflow),
         cmocka_unit_test(a_missing_electrode_counts_as_rest),
         cmocka_unit_test(a_mirrored_finger_feels_the_mirrored_force),
-        cmocka_unit_test(a_poke_keeps_lins_sign_and_size_and_is_told),
-        cmocka_unit_test(the_share_is_what_it_is_defined_as),
+        cmocka_unit_test(the_likeness_is_what_it_is_defined_as),
+        cmocka_unit_test(a_mirrored_finger_is_as_like),
+        cmocka_unit_test(a_poke_presses_in_along_the_skins_normal),
         cmocka_unit_test(any_gain_of_ones_own_takes_the_population_away),
-        cmocka_unit_test(what_is_published_is_mixed_by_its_share_and_says_so),
+        cmocka_unit_test(what_is_published_is_mixed_by_its_share),
+        cmocka_unit_test(what_only_bulges_is_outside),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def held(its: Population, gain: float, balance: float) -> tuple[Held, Population
     patterns = -np.abs(rng.normal(300.0, 80.0, (6, 19)))
     said = its.force(TARE + patterns, TARE)
     # the tilt is in what the map says, so that it is taken out of presses that were straight
-    tilted = Population(its.coefficients.copy(), its.variance)
+    tilted = replace(its, coefficients=its.coefficients.copy())
     tilted.coefficients[:, 0] = balance * its.coefficients[:, 2]
     return Held(TARE + patterns, TARE, np.arange(6), gain * said[:, 2:] * [0.0, 0.0, 1.0]), tilted
 
@@ -36,7 +37,7 @@ def firm() -> Population:
     its = population_map.load(None).population
     coefficients = np.zeros_like(its.coefficients)
     coefficients[:38, 2] = -5.0  # compressions and bulges
-    return Population(coefficients, its.variance)
+    return replace(its, coefficients=coefficients)
 
 
 def test_presses_are_judged_each_by_the_others(firm: Population) -> None:

@@ -11,7 +11,6 @@ import pytest
 import wrench_run
 
 from biotac.calibrate.population import population_map
-from biotac.calibrate.population.population_map import Population
 from biotac.calibrate.press import few_shot, weights
 from biotac.calibrate.press.known_force import Held, found
 from biotac.calibrate.wrench.run import load_run
@@ -140,7 +139,7 @@ def test_a_recording_says_the_same_and_goes_to_no_board(
 def test_axes_that_are_mixed_are_told_apart() -> None:
     """What nine numbers can say: a finger that answers with its axes turned and stretched."""
     its = population_map.load(None).population
-    firm = Population(100.0 * its.coefficients, its.variance)  # so that the prior says little
+    firm = replace(its, coefficients=100.0 * its.coefficients)  # so that the prior says little
     rng = np.random.default_rng(7)
     counts = 2800.0 - np.abs(rng.normal(200.0, 80.0, (12, 19)))
     tare = np.full(19, 2800.0)

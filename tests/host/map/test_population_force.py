@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from core_in_units import on_board
 
 import biotac
 from biotac.calibrate.population import population_map
 from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.map import population
-from biotac.map.columns import tared
 from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
@@ -20,13 +17,18 @@ LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}
 TARE = np.linspace(2500.0, 3200.0, 19).round()
 
 
+#: A flat plate on the middle of the pad: what lies under it is compressed, the sides bulge.
+PLATE = [300, 0, 100, 300, 100, 300, -100, -200, -200, -400, 300, 0, 100, 300, 100, 300, -800, 0, 100]
+
+
 def pressed(n: int, seed: int) -> np.ndarray:
-    """Counts (n, 19): from a breath to a slam, over one electrode to all of them."""
+    """Counts (n, 19): from a breath to a slam, over one electrode to all of them; every other one by a plate."""
     rng = np.random.default_rng(seed)
     size = 10 ** rng.uniform(0.5, 3.2, (n, 1))
     width = rng.uniform(0.3, 12.0, (n, 1))
     along = np.abs(np.arange(19) - rng.integers(0, 19, (n, 1)))
     e = -size * np.exp(-((along / width) ** 2)) * rng.uniform(-0.3, 1.0, (n, 19))
+    e[::2] = rng.uniform(0.1, 1.3, (len(e[::2]), 1)) * PLATE + rng.normal(0.0, 10.0, e[::2].shape)
     return np.clip(TARE + e, 0, 4095).astype(np.uint16)
 
 
@@ -38,13 +40,13 @@ def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
     return finger.feed(counts)
 
 
-def test_on_plates_it_is_the_trained_map_to_what_16_bits_leave() -> None:
+def test_it_is_the_trained_map_to_what_16_bits_leave_and_along_the_normals() -> None:
     counts = pressed(4000, 1)
-    its = tared(counts, np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape))
-    inside = population.share(its) == population.ALL
-    assert 500 < inside.sum() < 3900
-    got = biotac.compute(counts, TARE, POPULATION)["force_n"][inside]
-    wanted = population_map.load(None).population.force(counts[inside], TARE)
+    its = population.likeness(counts - TARE, population.pattern_weights())
+    assert (its.share == population.ALL).sum() > 20
+    assert ((its.share > 0) & (its.share < population.ALL)).sum() > 20
+    got = biotac.compute(counts, TARE, POPULATION)["force_n"]
+    wanted = population_map.load(None).population.published(counts, TARE)
     np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9)
 
 
@@ -84,24 +86,22 @@ def test_own_gains_take_precedence() -> None:
     )
 
 
-@pytest.mark.parametrize("electrode", range(19))
-def test_a_poke_is_lins(electrode: int) -> None:
-    counts = np.tile(TARE, (20, 1))
-    counts[:, electrode] -= np.linspace(50, 600, 20)
-    counts = counts.astype(np.uint16)
-    lin, new = (on_board(counts, TARE, population_settings() | {wire.Setting.FORCE_MODEL: m}) for m in (0, 1))
-    np.testing.assert_array_equal(new.force_n, lin.force_n)
+def test_sigma_is_what_a_new_finger_leaves_and_grows_away_from_the_training() -> None:
+    counts = pressed(4000, 6)
     rows = rows_of(POPULATION, counts)
-    assert (rows["flags"] & wire.FrameFlags.OUTSIDE).all()
-    assert (rows["force_sigma_100un"] == wire.INVALID_COUNT).all()
-
-
-def test_sigma_is_what_a_new_finger_leaves() -> None:
-    rows = rows_of(POPULATION, pressed(500, 6))
-    inside = rows["flags"] & wire.FrameFlags.OUTSIDE == 0
-    assert inside.any()
-    told, wanted = rows["force_sigma_100un"][inside] / 1e4, population_map.load(None).sigma_n
-    np.testing.assert_allclose(told, np.broadcast_to(wanted, told.shape), rtol=0, atol=5.1e-5)
+    outside = rows["flags"] & wire.FrameFlags.OUTSIDE != 0
+    its = population.likeness(counts - TARE, population.pattern_weights())
+    np.testing.assert_array_equal(outside, its.outside)
+    assert (rows["force_sigma_100un"][outside] == wire.INVALID_COUNT).all()
+    sigma_n, like = rows["force_sigma_100un"] / 1e4, ~outside & (its.share == population.ALL)
+    assert like.any()
+    trained = np.broadcast_to(population_map.load(None).sigma_n, sigma_n.shape)
+    np.testing.assert_allclose(sigma_n[like], trained[like], rtol=0, atol=1.1e-4)
+    unlike = ~outside & (its.share == 0)
+    strength_n = np.linalg.norm(its.otherwise_n, axis=1, keepdims=True)
+    np.testing.assert_allclose(
+        sigma_n[unlike], (strength_n * [0.15, 0.15, 0.3])[unlike], rtol=0, atol=3e-4 + 1e-3 * strength_n.max()
+    )
 
 
 def test_torque_x_follows_the_force_and_the_rest_stays() -> None:

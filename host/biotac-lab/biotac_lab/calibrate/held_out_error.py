@@ -30,24 +30,26 @@ SIGMAS = (1.0, 2.0)
 class Worth:
     """RMSE (3,) in N of the map as it is, after five straight presses, and after a minute on a plate.
 
-    It is None where the run has no such presses or is too short. ``said_n`` (n, 3) is the force by the map as it is,
-    ``truth_n`` (n, 3) the plate's; ``scales`` are from the draws of presses.
+    It is None where the run has no such presses or is too short. ``published_n`` (n, 3) is the force as boards publish
+    it, ``map_n`` (n, 3) the map's alone, which presses correct, ``truth_n`` (n, 3) the plate's; ``scales`` are from the
+    draws of presses.
     """
 
     rmse_n: Floats
     rmse_scale5_n: Floats | None
     rmse_60s_n: Floats | None
-    said_n: Floats
+    published_n: Floats
+    map_n: Floats
     truth_n: Floats
     scales: tuple[Scale, ...]
 
 
-def worth(its: Population, run: Run) -> Worth:
+def worth(population: Population, run: Run) -> Worth:
     """The errors of a map on an aligned run whose finger is new to it."""
     truth = run.truth
-    said = its.force(run.counts, run.tare)
-    scales, scale5 = _scaled(said, truth)
-    return Worth(_rms(said - truth), scale5, _minute(its, run), said, truth, scales)
+    published, by_map = population.published(run.counts, run.tare), population.force(run.counts, run.tare)
+    scales, scale5 = _scaled(by_map, truth)
+    return Worth(_rms(published - truth), scale5, _minute(population, run), published, by_map, truth, scales)
 
 
 def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
@@ -69,12 +71,10 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
     return raw, np.minimum(raw, scaled)
 
 
-def worth_of_force(its: Population, run: Run) -> tuple[Floats, Floats]:
+def worth_of_force(population: Population, run: Run) -> tuple[Floats, Floats]:
     """RMSE (3,) in N as the map is and after five presses; the former twice where the run has no such presses."""
-    truth = run.truth
-    said = its.force(run.counts, run.tare)
-    raw = _rms(said - truth)
-    _, scale5 = _scaled(said, truth)
+    raw = _rms(population.published(run.counts, run.tare) - run.truth)
+    _, scale5 = _scaled(population.force(run.counts, run.tare), run.truth)
     return raw, raw if scale5 is None else scale5
 
 
@@ -83,24 +83,24 @@ def coverage(error_n: Floats, sigma_n: Floats) -> list[float]:
     return [float((np.abs(error_n) <= sigmas * sigma_n).mean()) for sigmas in SIGMAS]
 
 
-def facts(its: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
+def facts(found: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
     """The errors and coverages as JSON types."""
     result: dict[str, Any] = {
-        "rmse_n": its.rmse_n.tolist(),
-        "rmse_scale5_n": None if its.rmse_scale5_n is None else its.rmse_scale5_n.tolist(),
-        "rmse_60s_n": None if its.rmse_60s_n is None else its.rmse_60s_n.tolist(),
-        "coverage": coverage(its.said_n - its.truth_n, sigma[0]),
+        "rmse_n": found.rmse_n.tolist(),
+        "rmse_scale5_n": None if found.rmse_scale5_n is None else found.rmse_scale5_n.tolist(),
+        "rmse_60s_n": None if found.rmse_60s_n is None else found.rmse_60s_n.tolist(),
+        "coverage": coverage(found.published_n - found.truth_n, sigma[0]),
     }
-    if its.scales:
-        each = [coverage(scale.applied(its.said_n) - its.truth_n, sigma[1]) for scale in its.scales]
+    if found.scales:
+        each = [coverage(scale.applied(found.map_n) - found.truth_n, sigma[1]) for scale in found.scales]
         result["coverage_scale5"] = np.mean(each, axis=0).tolist()
     return result
 
 
-def _scaled(said: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | None]:
+def _scaled(felt_n: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | None]:
     """Scales from draws of five presses, each a firm and straight stretch of the run, and the RMSE with them."""
     ends = np.arange(PRESS_ROWS, len(truth) + 1)
-    total = np.concatenate([np.zeros((1, 6)), np.cumsum(np.column_stack([said, truth]), axis=0)])
+    total = np.concatenate([np.zeros((1, 6)), np.cumsum(np.column_stack([felt_n, truth]), axis=0)])
     mean = (total[ends] - total[ends - PRESS_ROWS]) / PRESS_ROWS
     shear = np.hypot(mean[:, 3], mean[:, 4])
     good = np.flatnonzero((mean[:, 5] > FIRM_N) & (shear < STRAIGHT * mean[:, 5]))
@@ -116,11 +116,11 @@ def _scaled(said: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | No
                 break
         else:
             return (), None  # the run has no five presses
-    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in result]
+    each = [((scale.applied(felt_n) - truth) ** 2).mean(axis=0) for scale in result]
     return tuple(result), np.sqrt(np.mean(each, axis=0))
 
 
-def _minute(its: Population, run: Run) -> Floats | None:
+def _minute(population: Population, run: Run) -> Floats | None:
     """RMSE (3,) in N after a minute of the run, over rows at least a second away from it; None for less than two."""
     rows, n = MINUTE_S * ROWS_PER_S, len(run.counts)
     if n < 2 * rows:
@@ -129,7 +129,7 @@ def _minute(its: Population, run: Run) -> Floats | None:
     for start in np.linspace(0, n - rows, MINUTES).astype(int):
         minute = slice(start, start + rows)
         part = replace(run, counts=run.counts[minute], truth=run.truth[minute])
-        moved = pulled(its, sums(part), MINUTE_S)
+        moved = pulled(population, sums(part), MINUTE_S)
         rest = np.r_[: max(start - ROWS_PER_S, 0), min(start + rows + ROWS_PER_S, n) : n]
         found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest]) ** 2).mean(axis=0))
     result: Floats = np.sqrt(np.mean(found, axis=0))

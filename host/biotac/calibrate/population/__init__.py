@@ -8,6 +8,8 @@ coefficients and their provenance, never recordings.
 
 from __future__ import annotations
 
+from ...map.columns import SIGNAL_COUNTS
+from ...map.population import LEFT, WEIGHT_BITS, bounded_q4, halves
 from .population_map import (
     AXES,
     COLUMNS,
@@ -23,6 +25,6 @@ from .population_map import (
 )
 
 __all__ = [
-    "AXES", "COLUMNS", "PARTS", "ROWS_AT_ONCE", "Population", "Sums", "Trained", "columns", "dumps", "load",
-    "provenance_of",
+    "AXES", "COLUMNS", "LEFT", "PARTS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "WEIGHT_BITS", "Population", "Sums", "Trained",
+    "bounded_q4", "columns", "dumps", "halves", "load", "provenance_of",
 ]  # fmt: skip

@@ -23,7 +23,7 @@ from ...documents import parse_document, read_document, sealed
 from ...map import columns as map_columns
 from ...map.columns import ELECTRODES, Signals, split
 from ...map.fitted import WrenchMap
-from ...map.population import SHIPPED, board_map, shipped
+from ...map.population import SHIPPED, Integers, board_map, likeness, shipped
 from ...version import __version__
 from ..wrench.models import CONDUCTANCE_QUADRATIC, GATED
 
@@ -31,6 +31,7 @@ FORMAT = "biotac-population-map/1"
 _CURE = f"expected a {FORMAT}, as `biotac-lab population --out` writes it"
 DIGITS = 7
 NOTHING = 1e-9
+MAX_WEIGHT = 30000  # so that firmware/core/map/population.c cannot overflow
 MODEL = "population"
 AXES = map_columns.AXES[:3]
 ROWS_AT_ONCE = 4096
@@ -59,11 +60,17 @@ class Sums:
 class Population:
     """A population map: ``coefficients`` (323, 3) of columns(), in N.
 
-    ``variance`` (323,) is that of the columns in training, with a floor.
+    ``variance`` (323,) is that of the columns in training, with a floor. ``pattern_weights`` (19, 19) measure how far a
+    pattern is from the training's.
     """
 
     coefficients: Floats
     variance: Floats
+    pattern_weights: Integers
+
+    def published(self, counts: Floats, tare: Floats) -> Floats:
+        """Force (n, 3) in N as a board publishes it: where the pattern is unlike the training's, along the normals."""
+        return likeness(counts - tare, self.pattern_weights).mixed(self.force(counts, tare))
 
     def force(self, counts: Floats, tare: Floats) -> Floats:
         """Force (n, 3) in N on the finger, from counts (n, 19) and their ``tare`` (19,)."""
@@ -145,6 +152,7 @@ def dumps(trained: Trained) -> str:
             "axes": list(AXES),
             "sigma_n": _short(trained.sigma_n),
             "sigma_scale5_n": _short(trained.sigma_scale5_n),
+            "pattern_weights": trained.population.pattern_weights.tolist(),
             "blocks": _BLOCK_NAMES,
             "board_map": base64.b64encode(on_board.blob).decode("ascii"),
             "coefficients_n_and_variance": [_short(row) for row in rows],
@@ -171,11 +179,14 @@ def _trained(content: dict[str, Any]) -> Trained:
         raise ValueError(f"its blocks are {content['blocks']}")
     rows = np.array(content["coefficients_n_and_variance"], dtype=np.float64)
     sigmas = [np.array(content[key], dtype=np.float64) for key in ("sigma_n", "sigma_scale5_n")]
+    weights = np.array(content["pattern_weights"], dtype=np.int64)
+    if weights.shape != (ELECTRODES, ELECTRODES) or (np.abs(weights) > MAX_WEIGHT).any():
+        raise ValueError(f"its pattern weights have shape {weights.shape}, or are above {MAX_WEIGHT}")
     if rows.shape != (COLUMNS, len(AXES) + 1) or any(one.shape != (len(AXES),) for one in sigmas):
         raise ValueError(f"its coefficients have shape {rows.shape}")
     if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
         raise ValueError("a coefficient is not finite, or a variance is not above 0")
-    return Trained(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(content["provenance"]))
+    return Trained(Population(rows[:, :-1], rows[:, -1], weights), sigmas[0], sigmas[1], dict(content["provenance"]))
 
 
 def _short(values: Floats) -> list[float]:
