@@ -26,18 +26,18 @@ void bt_population_force(const int32_t e_q4[BT_ELECTRODES], const uint16_t count
 #define NOISE_Q4 (8 * 16)   // per electrode: not part of the pattern
 #define KNEE_Q4  (256 * 16) // above, a signal counts a quarter: one electrode must not be all of the pattern
 #define MOST_Q4  (KNEE_Q4 + BT_E_MAX_Q4 / 4)
-#define SUM_BITS 14 // what the pattern's sum is shifted to
-#define ROW_CUT  15 // of a row of the distance
+#define SUM_BITS 14   // what the pattern's sum is shifted to
+#define ROW_CUT  15   // of a row of the distance
 #define ENERGY_CUT 13 // weights are in 2^-11: twice 15 - 11, and 5 of the result
 
 #define LEAST_Q4      (64 * 16) // in sum: below, nothing touches
 #define LIGHT_Q4      (1500 * 16)
-#define FIRM_BITS     14                 // the map makes all of the force from LIGHT_Q4 + 2^FIRM_BITS on
-#define NEAR_Q5       (4 << 5)           // squared distance up to which it does,
-#define FAR_Q5        (8 << 5)           // and from which on it makes nothing
+#define FIRM_BITS     14       // the map makes all of the force from LIGHT_Q4 + 2^FIRM_BITS on
+#define NEAR_Q5       (4 << 5) // squared distance up to which it does,
+#define FAR_Q5        (8 << 5) // and from which on it makes nothing
 #define OUTSIDE_Q5    (48 << 5)
-#define FEW_PRESSED   8                  // the share of the pattern, 1/8, below which no direction is known
-#define STRENGTH(sum) ((sum) * 25 >> 5)  // 1.25 mN a count
+#define FEW_PRESSED   8                 // the share of the pattern, 1/8, below which no direction is known
+#define STRENGTH(sum) ((sum) * 25 >> 5) // 1.25 mN a count
 #define UPRIGHT(sum)  ((sum) * (BT_CORE_RADIUS_UM / 32)) // keeps the direction from being that of noise
 #define UNIT_BITS     12
 
@@ -45,7 +45,7 @@ _Static_assert(19ll * (BT_POPULATION_PATTERN_MAX / 2 + 1) * (BT_POPULATION_PATTE
                    && (int64_t)BT_POPULATION_PATTERN_MAX << SUM_BITS <= INT32_MAX && ROW_CUT == SUM_BITS + 1,
                "rows, and the sum of their squares, must fit");
 _Static_assert((5ll * BT_ELECTRODE_MAX_UM << SUM_BITS) <= INT32_MAX, "a direction must fit int32");
-_Static_assert(STRENGTH((int64_t)BT_ELECTRODES * MOST_Q4) << UNIT_BITS <= INT32_MAX, "a force must fit int32");
+_Static_assert(STRENGTH((int64_t)BT_ELECTRODES *MOST_Q4) << UNIT_BITS <= INT32_MAX, "a force must fit int32");
 
 // A frame's bounded signals, shifted so that their sum has SUM_BITS, all positive; in sum_q4 they are not.
 typedef struct {
@@ -166,14 +166,14 @@ void bt_population_mix(const bt_likeness *its, int32_t force_100un[3])
     }
 }
 
-// Away from the training: .15 of the strength across, .3 along z, by which left-out fingers and rigs were off.
+// Away from the training: .15 of the strength across, .3 along z, by which left-out fingers and rigs were
+// off.
 void bt_population_sigma(const bt_likeness *its, uint16_t sigma_100un[3])
 {
     static const uint16_t trained[3] = BT_POPULATION_SIGMA_100UN;
     uint32_t across = its->strength_100un * 3 / 20;
     for (int d = 0; d < 3; d++) {
         uint32_t away = d < 2 ? across : 2 * across;
-        sigma_100un[d] =
-            (uint16_t)((trained[d] * its->share + away * (BT_POPULATION_ALL - its->share)) >> 8);
+        sigma_100un[d] = (uint16_t)((trained[d] * its->share + away * (BT_POPULATION_ALL - its->share)) >> 8);
     }
 }

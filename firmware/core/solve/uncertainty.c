@@ -15,8 +15,8 @@ static uint16_t saturate(uint64_t value)
     return (uint16_t)(value > TOP ? TOP : value);
 }
 
-// The largest r with r * r <= n, by halves (Zimmermann, Karatsuba Square Root, 1999): the upper half's root, then the
-// lower bits by one division, at most one too high. n is first shifted up by an even number of bits.
+// The largest r with r * r <= n, by halves (Zimmermann, Karatsuba Square Root, 1999): the upper half's root,
+// then the lower bits by one division, at most one too high. n is first shifted up by an even number of bits.
 static uint32_t root(uint64_t n)
 {
     if (n >> 32 == 0) {
@@ -25,7 +25,7 @@ static uint32_t root(uint64_t n)
     int shift = __builtin_clz((uint32_t)(n >> 32)) & ~1;
     n <<= shift;
     uint32_t high = (uint32_t)(n >> 32), low = (uint32_t)n;
-    uint32_t s = bt_root_u32(high);              // 2^15 <= s < 2^16
+    uint32_t s = bt_root_u32(high);         // 2^15 <= s < 2^16
     uint32_t rest = high - s * s;           // at most 2 s
     uint32_t half = rest << 15 | low >> 17; // half of (rest << 16 | low >> 16), which itself takes 33 bits
     uint32_t q = BT_DIVIDE_U32(half, s);

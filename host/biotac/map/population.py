@@ -87,7 +87,8 @@ def bounded_q4(e: Floats) -> Integers:
     """Signals (n, 19) in 1/16 count as the pattern has them: less 8 counts, and a quarter of what exceeds 256."""
     e_q4 = np.rint(16 * e).astype(np.int64)
     size = np.maximum(np.abs(e_q4) - _NOISE_Q4, 0)
-    return np.where(e_q4 < 0, -1, 1) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
+    bounded: Integers = np.sign(e_q4) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
+    return bounded
 
 
 def halves(x: npt.NDArray[Any]) -> npt.NDArray[Any]:

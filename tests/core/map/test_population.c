@@ -1,5 +1,5 @@
-// The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and what is unlike the
-// training goes along the normals.
+// The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and what is unlike
+// the training goes along the normals.
 #include "keep/settings.h"
 #include "map/population.h"
 #include "map/population_gen.h"
@@ -138,8 +138,8 @@ static void signals_of(const int32_t e[BT_ELECTRODES], int eighths, int32_t e_q4
 }
 
 // A flat plate on the middle of the pad, in counts: what lies under it is compressed, the sides bulge.
-static const int32_t plate[BT_ELECTRODES] = {300,  0,   100, 300, 100, 300, -100, -200, -200, -400,
-                                             300,  0,   100, 300, 100, 300, -800, 0,    100};
+static const int32_t plate[BT_ELECTRODES] = {300, 0, 100, 300, 100, 300, -100, -200, -200, -400,
+                                             300, 0, 100, 300, 100, 300, -800, 0,    100};
 
 // As it is defined, by division: the rows' squares over the pattern's, and how much of 1024 counts is there.
 static void the_likeness_is_what_it_is_defined_as(void **state)

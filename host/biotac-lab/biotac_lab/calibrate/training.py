@@ -103,7 +103,8 @@ def pattern_weights(fingers: Sequence[FingerSums]) -> Integers:
     rows = np.zeros_like(form)
     for part in (slice(len(LEFT)), slice(len(LEFT), None)):  # a mirror image's halves do not mix
         rows[part, part] = np.linalg.cholesky(form[part, part]).T
-    return np.rint(2.0**WEIGHT_BITS * rows).astype(np.int64)
+    weights: Integers = np.rint(2.0**WEIGHT_BITS * rows).astype(np.int64)
+    return weights
 
 
 def sums(run: Run) -> Sums:
