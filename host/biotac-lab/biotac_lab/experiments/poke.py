@@ -243,14 +243,13 @@ def called(weights: PocWeights) -> str:
 
 
 def _draw(result: Result, figure: Any) -> None:
-    """Figure 7 unrolled for the default and the paper's weights, table 2 as bars, and by force."""
+    """Figure 7 unrolled for the default and the paper's weights, and table 2 as bars."""
     figure.set_size_inches(15, 9.5)
-    grid = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
     first = result.cases[0].profile
     for k, weights in enumerate((SHIPPED, PocWeights.ABS_N2)):
         cases = [case for case in result.cases if case.weights == weights]
         _draw_points(figure.add_subplot(grid[0, k]), next(case for case in cases if case.profile == first))
-    _draw_bands(figure.add_subplot(grid[0, 2]), result)
     _draw_electrodes(figure.add_subplot(grid[1, :]), result)
     figure.suptitle(f"Electrode poking, 2 mm probe, above {FLOOR_N:g} N: {result.source}")
 
@@ -265,21 +264,6 @@ def _draw_points(axes: Any, case: Case) -> None:
     axes.set(xlabel="around the finger [mm], + towards E11", ylabel="along the finger [mm], tip up", aspect="equal")
     axes.set_title(f"{case.profile}: {WORDS[case.weights]}", fontsize=10)
     axes.margins(0.08)
-    axes.grid(alpha=0.25)
-    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
-
-
-def _draw_bands(axes: Any, result: Result) -> None:
-    styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
-    for case in result.cases:
-        axes.plot(range(len(BANDS_N)), [band.std_mm.mean() for band in case.bands], styles[case.profile], marker="o",
-                  markersize=4, color=COLORS[case.weights], label=f"{case.profile}: {WORDS[case.weights]}")  # fmt: skip
-    axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
-    axes.annotate(f"{LIMIT_MM} mm", (0, LIMIT_MM), xycoords=("axes fraction", "data"), xytext=(3, 3),
-                  textcoords="offset points", fontsize=8)  # fmt: skip
-    axes.set_xticks(range(len(BANDS_N)), [f"{low:g} to {high:g}" for low, high in BANDS_N])
-    axes.set(xlabel="force [N]", ylabel="std of the point of contact [mm]", yscale="log")
-    axes.set_title("by force, mean of 19 electrodes", fontsize=10)
     axes.grid(alpha=0.25)
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
 
