@@ -36,7 +36,7 @@ FINGER = """
 age_s counts finger flags force_n force_sigma_n frame name pdc poc_mm poc_sigma_mm pressure_force_n t_us tac tdc
 torque_nmm torsion_nmm touched
 """
-BATCH = "fingers first_t_us frames idle last_t_us messages pac seq t_us wire"
+BATCH = "arrived_s fingers first_t_us frames idle last_t_us messages pac seq t_us wire"
 WAIT_S = 20.0  # only a failing test waits so long
 
 

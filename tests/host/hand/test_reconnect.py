@@ -173,8 +173,6 @@ def test_while_it_is_away_commands_say_so(world) -> None:
 
 
 def test_a_recording_goes_on_and_holds_the_gap(world, tmp_path) -> None:
-    from mcap.reader import make_reader
-
     there = world.plug(boot_id=1)
     hand = world.opened()
     recorder = biotac.recording.Recorder(tmp_path / "a.mcap", Facts(hand.info, [], {}), hand.port)
@@ -189,14 +187,12 @@ def test_a_recording_goes_on_and_holds_the_gap(world, tmp_path) -> None:
     send(back[0], frame(40), frame(41))
     until(hand, lambda: hand[0].t_us == 410_000)
     hand.close()
-    with (tmp_path / "a.mcap").open("rb") as stream:
-        marks = [m for m in make_reader(stream).iter_metadata() if m.name == "biotac.gap"]
-    assert [(m.metadata["reason"], m.metadata["next_t_us"]) for m in marks] == [("unplugged", "400000")]
     recording = biotac.recording.Recording(tmp_path / "a.mcap")
     (gap,) = recording.gaps
     assert gap == biotac.Gap("unplugged", 110_000, 400_000, gap.lost_at_ns, gap.back_at_ns, 1)
     assert gap.words() in recording.problems
-    assert biotac.load(tmp_path / "a.mcap")["seq"].tolist() == [10, 11, 40, 41]
+    with pytest.warns(biotac.RecordingWarning, match=r"has 1 gap\(s\)"):
+        assert biotac.load(tmp_path / "a.mcap")["seq"].tolist() == [10, 11, 40, 41]
 
 
 def test_close_ends_the_search(world) -> None:

@@ -354,7 +354,7 @@ def test_a_full_disk_ends_the_recording_and_is_told_not_the_reading(live: Live, 
     def full(chunk: bytes) -> None:
         raise OSError(28, "No space left on device")
 
-    recorder.write = full
+    recorder.write, recorder.write_gap = full, full
     live.hand.run()
     live.hand._recorded.to(recorder)
     live.send(frame(0), frame(1))
