@@ -61,8 +61,8 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
         return b"\0"
 
     clock = SimpleNamespace(monotonic=lambda: time.monotonic() + ahead_s, time=time.time)
-    for module in ("board", "handshake"):
-        monkeypatch.setattr(f"biotac.hand.{module}.time", clock)
+    monkeypatch.setattr("biotac.hand.handshake.time", clock)
+    monkeypatch.setattr(SerialLink, "patience", 1.0)  # a command's wait is one for a condition, which no clock ends
     return jump
 
 

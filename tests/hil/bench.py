@@ -20,7 +20,6 @@ from biotac.core.compiled import default_settings
 from biotac.doctor.facts import grown
 from biotac.errors import BiotacError
 from biotac.hand.opening import shake_hands
-from biotac.hand.subscription import AT_FIRST
 from biotac.link import open_link
 from biotac.link.serial_port import SerialLink
 from biotac.sim.sensor_board import SensorBoard
@@ -219,7 +218,6 @@ def as_new(hand: biotac.Hand) -> None:
             hand.clear_calibration(finger)
         if hand.map_state(finger) != biotac.CalibrationState.NONE:
             hand.clear_map(finger)
-    hand.subscribe(AT_FIRST)
     hand.clear_faults()
 
 

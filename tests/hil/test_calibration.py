@@ -52,7 +52,7 @@ def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str]
 def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
     hand.set_calibration(0, OWN)
-    hand.start()
+    hand.stream()
     with pytest.raises(CommandRefusedError, match="send STOP first"):
         hand.set_calibration(0, Calibration())
     with pytest.raises(CommandRefusedError, match="send STOP first"):

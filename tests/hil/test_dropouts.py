@@ -42,7 +42,7 @@ def play(rig: Rig, tmp_path: Path, seconds: float, kind: str | None, *, calibrat
     hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # which the emulated finger's physics follow
     if calibrated:
         hand.set_calibration(1, for_finger(hand, 1))
-    return hand.read(100), hand
+    return hand.read_batch(100).frames, hand
 
 
 def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,7 +109,7 @@ def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tm
     path = tmp_path / "held.toml"
     path.write_text(held_press(2) + '[[finger]]\n[[finger]]\nserial = "BTSP050400018017"\n')
     hand = rig.open(str(path))
-    frames = hand.read(100)
+    frames = hand.read_batch(100).frames
     assert hand.fingers == [0]
     told = hand.sensor_info(1)
     assert (told.present, bytes(told.serial)) == (0, b"BTSP050400018017")
@@ -127,7 +127,7 @@ def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
     hand = rig.open(str(path))
     for finger in (0, 1):
         hand.set_calibration(finger, for_finger(hand, finger))
-    frames = hand.read(100)
+    frames = hand.read_batch(100).frames
     for finger in (0, 1):
         _, after = split(of(frames, finger))
         assert np.all(after["flags"] & (FrameFlags.SENSOR_OTHER | FrameFlags.SENSOR_UNSURE))
@@ -144,7 +144,7 @@ def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) 
     path = tmp_path / "rest.toml"
     path.write_text(text)
     hand = rig.open(str(path))
-    frames = hand.read(100)
+    frames = hand.read_batch(100).frames
     assert np.all(frames["flags"] & FrameFlags.CONTACT == 0)
     assert np.count_nonzero(frames["flags"] & FrameFlags.TARE_CHANGED) == 1  # START
     assert hand.sensor_status(0).tare_reason == wire.TareReason.START

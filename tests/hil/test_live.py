@@ -18,8 +18,7 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
     port = rig.facts["port"].format(source="press.toml", options="fingers=2&seconds=600", port=rig.port)
     with biotac.open(port, reconnect=True) as hand:
         hand.set_setting(wire.Setting.IDLE_PERIOD_MS, 70)
-        hand.want("force", "raw")
-        hand.run(queue=True)
+        hand.stream("force", "raw")
         before = hand.info.boot_id
         gap = None
         acted = False
@@ -27,9 +26,8 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
             if not acted and len(batch.wire):
                 for verb in verbs:
                     hand.link.board.say(verb)
-                # From now on silence is what is looked for, and at once: until here a busy computer made none.
+                # From now on silence is what is looked for: until here a busy computer made none.
                 hand.link.patience = 1.0
-                hand._due_s = 0.0
                 acted = True
             gap = gap or next((m for m in batch.messages if isinstance(m, biotac.Gap)), None)
             if gap is not None:
@@ -47,7 +45,7 @@ def test_forces_by_name_follow_the_board(board) -> None:
     hand = board("press.toml?fingers=2&seconds=4")
     touches: list[int] = []
     hand.on_touch(lambda touch: touches.append(touch.finger))
-    hand.run(queue=True)
+    hand.stream()
     most_n = max(batch.frames["force_n"][:, 2].max(initial=0.0) for batch in hand.batches())
     assert hand.stats.frames_lost == 0
     assert set(touches) == {0, 1}

@@ -78,7 +78,7 @@ def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand])
     hand = board("press.toml")
     old, new = make_map(1), make_map(2)
     hand.set_map(0, old)
-    hand.start()
+    hand.stream()
     with pytest.raises(CommandRefusedError, match="send STOP first"):
         hand.set_map(0, new)
     with pytest.raises(CommandRefusedError, match="send STOP first"):

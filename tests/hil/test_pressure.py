@@ -11,7 +11,7 @@ import pytest
 from rig import Rig
 
 import biotac
-from biotac import Calibration, QuantityFlags, Setting
+from biotac import Calibration, Setting
 from biotac.core.compiled import default_settings
 from biotac.recording import Recording
 from biotac.recording.crosscheck import CrossCheck
@@ -69,16 +69,15 @@ def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(
 ) -> None:
     """The same source three times: everything, force alone, and pressure alone with heartbeats at rest."""
 
-    def played(quantities: QuantityFlags | None) -> Batch:
+    def played(*names: str, rest: bool = True) -> Batch:
         hand = board("press.toml")
         hand.set_calibration(0, replace(Calibration(), pressure_gain_nn=GAIN_NN))
-        if quantities is not None:
-            hand.subscribe(quantities)
+        hand.stream(*names, rest=rest)
         return hand.read_batch(2.5)
 
-    full = played(None)
-    force = played(QuantityFlags.FORCE | QuantityFlags.REST_FRAMES)
-    pressure = played(QuantityFlags.PRESSURE)
+    full = played()
+    force = played("force")
+    pressure = played("pressure", rest=False)
     assert np.isnan(force.frames["pdc_filtered"]).all() and np.isnan(force.frames["pressure_force_n"]).all()
     frames = pressure.frames
     assert 50 < len(frames) < len(full.frames) and np.isnan(frames["force_n"]).all()

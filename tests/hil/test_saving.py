@@ -10,7 +10,7 @@ from biotac.errors import CommandRefusedError
 
 def test_saving_is_refused_while_streaming_and_done_when_not(board) -> None:
     hand = board("press.toml")
-    hand.start()
+    hand.stream()
     with pytest.raises(CommandRefusedError, match="send STOP first"):
         hand.save_settings()
     hand.stop()

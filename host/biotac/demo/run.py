@@ -79,7 +79,7 @@ def run_demo(
         cpu = time.process_time()
         outcome = CrossCheck()
         batches: list[Batch] = []
-        hand.start(pac=has_pac)
+        hand.stream("force", "poc", "torque", "pressure", *(["pac"] if has_pac else []))
         for batch in hand.batches():
             outcome.add(batch.wire, settings)
             batches.append(batch)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..clock import Fit
 from ..errors import BiotacError
-from ..hand.compatibility import HandWarning
+from ..hand.handshake import HandWarning
 from ..link.discovery import SerialPort
 from ..link.holders import Holder
 from ..wire import messages_gen as wire

@@ -15,6 +15,7 @@ from ..errors import BiotacError, CommandRefusedError, PortError
 from ..hand.gap import Gap
 from ..hand.hand import Hand
 from ..wire import messages_gen as wire
+from ..wire.batches import Batch
 from ..wire.framing import ENCODED_MAX_BYTES, encode, open_frame
 from ..wire.identity import board_text, serial_text, version_text
 from . import network, rights
@@ -54,10 +55,8 @@ class Share:
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
         self._new_epoch()
-        incoming = self._board.incoming
-        incoming.record, incoming.record_gap = self._publish, self._came_back
-        hand.start()
-        hand.run()
+        self._end_tap = hand.tap(self)
+        hand.stream()
 
     def _new_epoch(self) -> None:
         """Publish under a new key from now on: readers follow one, so none goes on as if the board were unchanged.
@@ -72,17 +71,28 @@ class Share:
         for declared in before:
             declared.undeclare()
 
-    def _came_back(self, gap: Gap) -> None:
+    def _came_back(self) -> None:
         """Begin a new epoch, so that readers connect anew: the board may have restarted."""
         with self._publishing:
             self._new_epoch()
 
     # ---- what it sends -------------------------------------------------------------------------
 
-    def _publish(self, chunk: bytes) -> None:
+    def put(self, batch: Batch) -> None:
+        """See reader.Consumer."""
+        for message in batch.messages:
+            if isinstance(message, Gap) and message.reason in ("unplugged", "silence", "rebooted"):
+                self._came_back()
+
+    def wake(self) -> None:
+        """See reader.Consumer."""
+
+    def is_full(self) -> bool:
+        """See reader.Consumer."""
+        return False
+
+    def put_raw(self, chunk: bytes) -> None:
         """Publish whole messages only, so that no message is lost in part. Answers to requests are left out."""
-        if not chunk:
-            return
         data = self._tail + chunk
         end = data.rfind(b"\0") + 1
         data, self._tail = data[:end], data[end:]
@@ -168,7 +178,7 @@ class Share:
         except struct.error:
             return _refusal(message_id, payload, wire.Error.BAD_LENGTH)
         if isinstance(request, wire.HelloRequest):
-            self._board.check()
+            self._hand.check()
             if not self._hand.connected:
                 return b""
             hello = replace(self._hand.info, req_id=request.req_id, nonce=request.nonce)
@@ -206,11 +216,11 @@ class Share:
                 return  # another command came in between
             self._paused = None
             with suppress(BiotacError):  # a board that is away is started when it is back
-                self._hand.start()
+                self._hand.go()
 
     def close(self) -> None:
         """Take the board off the network. The hand goes on streaming. Safe to call twice."""
-        self._board.incoming.record = None
+        self._end_tap()
         if self._paused is not None:
             self._paused.cancel()
         with self._publishing:

@@ -34,6 +34,7 @@ class ZenohLink(Link):
     batches lost because this side was too slow; their frames also count as lost frames. Raises PortError or InputError.
     """
 
+    owns_stream = False
     patience = 2.0  # answers come through a second program
     max_waiting_bytes = 4 << 20  # of unread batches; about half a minute of five fingers
 
@@ -179,11 +180,6 @@ class ZenohLink(Link):
             if reply.ok is not None:
                 with self._came:
                     self._put(reply.ok.payload.to_bytes())
-
-    def abandon(self) -> None:
-        """Drop the session in a forked child: it has none of the threads, so nothing needs closing."""
-        self._session = None
-        self._declared = []
 
     def close(self) -> None:
         session, self._session = self._session, None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import on_board_q4, pressure_force_100un
 from ..errors import InputError
-from ..hand.subscription import RESULTS
+from ..hand.stream import RESULTS
 from ..keep.calibration import own_settings
 from ..map import board_map
 from ..map.board_map import BoardMap, opened

@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 
 from ..errors import DeviceLostError, PortError
-from ..link.serial_port import SerialLink, nowhere
+from ..link.serial_port import SerialLink
 from .source import Source
 from .tape import write_tape
 
@@ -96,13 +96,6 @@ class SimBoard:
             self.hear()
         return self.over
 
-    def abandon(self) -> None:
-        """Let go of the process and its pipes, in a fork of the process that started it."""
-        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            if pipe is not None and not pipe.closed:
-                nowhere(pipe.fileno())
-        self._process.returncode = 0  # only its parent may wait for it
-
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
         if self._process.poll() is None:
@@ -153,10 +146,6 @@ class SimLink(SerialLink):
             self.board.hear()
         self.ended = self.board.over
         return self._serial.fileno() in ready
-
-    def abandon(self) -> None:
-        super().abandon()
-        self.board.abandon()
 
     def release(self) -> None:
         if self._held:

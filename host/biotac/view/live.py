@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
 from ..errors import CommandRefusedError, InputError
 from ..hand.opening import open as open_hand
 from ..hand.record import Recorder
-from ..hand.subscription import RESULTS
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.identity import version_text
@@ -32,10 +30,7 @@ class LivePlayer(Player):
         # People watch, so simulated boards run in real time.
         self._hand = open_hand(port, pace=1.0)
         try:
-            # The page shows all results, but an earlier program may have left another subscription. For a shared board,
-            # it shows what the writer chose.
-            with suppress(CommandRefusedError):
-                self._hand.subscribe(RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags.EVENTS)
+            self._hand.stream("results", "events")
         except BaseException:
             self._hand.close()
             raise

@@ -112,7 +112,7 @@ def test_invalid_stays_nan_on_the_way(inlet) -> None:
 
 def test_events_are_markers_by_name(inlet) -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand, Outlet(hand) as outlet:
-        hand.subscribe(biotac.QuantityFlags.EVENTS | biotac.QuantityFlags.REST_FRAMES)
+        hand.stream("events", "raw")
         stream = inlet(outlet.infos[2])
         batch = hand.read_batch(3.0)
         outlet.push(batch)

@@ -368,7 +368,7 @@ def test_what_came_before_a_restart_is_not_told_after_it() -> None:
 def test_a_simulated_board_in_real_time_is_a_clock() -> None:
     """However late this computer lets it run: it says nothing ahead of its time, and reads nothing behind it."""
     with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
-        hand.start()
+        hand.stream()
         while not hand.clock.now().known:  # on a busy computer the first reply comes after many frames
             hand.read(0.3)
         for _ in range(3):

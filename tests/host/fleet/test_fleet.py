@@ -373,7 +373,7 @@ def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
 def test_another_wire_version_is_5() -> None:
     its = Shared("old")
     with its.stack:
-        its.hand._board.info = replace(its.hand.info, wire_major=wire.WIRE_MAJOR + 1)
+        its.hand._board.reader.hello = replace(its.hand.info, wire_major=wire.WIRE_MAJOR + 1)
         with pytest.raises(WireVersionError) as error:
             biotac.open(its.port())
         assert error.value.exit_code == 5
@@ -384,7 +384,7 @@ def test_a_board_that_is_taken_off_is_lost_and_found_again(tmp_path: Path) -> No
     with its.stack, biotac.open(its.port(), reconnect=True) as hand, biotac.open(its.port()) as without:
         hand.record(tmp_path / "a.mcap")
         until(hand, 20)
-        without.start()
+        without.stream()
         its.stack.close()
         with pytest.raises(DeviceLostError, match="is no longer shared"):
             until(without, 10_000)
@@ -475,8 +475,8 @@ def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path
         hands = [stack.enter_context(biotac.open(port, reconnect=True)) for _ in range(3)]
         for k, hand in enumerate(hands):
             hand.record(tmp_path / f"{k}.mcap")
-            hand.start()
-            hand.run()
+            hand.stream()
+            hand.stream()
         while any(hand.stats.frames < 200 for hand in hands):
             time.sleep(0.05)
         killed_ns = time.time_ns()

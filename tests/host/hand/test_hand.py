@@ -48,7 +48,7 @@ def test_a_refused_command_names_command_and_reason() -> None:
             hand.set_setting(biotac.Setting.POC_WEIGHTS, 3)
         with pytest.raises(biotac.CommandRefusedError, match="refused GetSensorStatus: NO_SUCH_FINGER"):
             hand.sensor_status(5)
-        hand.start()
+        hand.stream()
         with pytest.raises(biotac.CommandRefusedError, match=r"BUSY.*send STOP first"):
             hand.set_setting(biotac.Setting.POC_WEIGHTS, 0)
 
@@ -110,19 +110,6 @@ def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
         for _ in frames:
             pass
     hand.close()
-
-
-def test_a_silent_board_is_a_lost_board(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.keepalive.SILENCE_S", 0.001)
-
-    def answer(message_id: int, payload: bytes) -> bytes:
-        if message_id == wire.HelloRequest.ID:
-            return hello(payload)
-        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, 0).pack())
-
-    board = scripted_board(answer)
-    with biotac.open(board.path) as hand, pytest.raises(biotac.DeviceLostError, match=r"silent.*check the cable"):
-        hand.read(1.0)
 
 
 def test_a_port_is_opened_once(scripted_board, hello) -> None:

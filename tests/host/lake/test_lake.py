@@ -46,7 +46,7 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     with biotac.open("sim:press.toml?fingers=2&seconds=2") as hand:
         hand.set_calibration(0, biotac.Calibration(force_gain_nn=(1_000_000, 900_000, 800_000)))
         hand.set_map(1, make_map(1))
-        hand.want("force", "pac", rest=False)
+        hand.stream("force", "pac", rest=False)
         hand.record(folder / "own.mcap")
         hand.read_batch(100)
     return [faults, folder / "own.mcap", *copies(biotac.Recording(faults), folder, 2, 86_400.0)[1:]]

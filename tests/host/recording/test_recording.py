@@ -19,7 +19,6 @@ from mcap.writer import Writer
 import biotac
 from biotac.cli.main import main
 from biotac.hand.gap import Gap
-from biotac.hand.subscription import AT_FIRST
 from biotac.recording import layout, writer
 from biotac.recording.facts import Facts
 from biotac.recording.file import RecordingFile
@@ -336,7 +335,7 @@ def test_a_stop_over_a_wrap_of_device_time_is_counted_by_the_clock(recorded, tmp
 def test_events_are_read_and_replayed_as_they_came(tmp_path: Path) -> None:
     path = tmp_path / "events.mcap"
     with biotac.open("sim:press.toml?seconds=3") as hand:
-        hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)
+        hand.stream("results", "events")
         hand.record(path)
         live = [m for m in hand.read_batch(10.0).messages if isinstance(m, biotac.Event)]
     assert live and [m for m in biotac.Recording(path).messages if isinstance(m, biotac.Event)] == live

@@ -83,7 +83,7 @@ def test_it_answers_as_its_board_did(recorded, capsys) -> None:
         (lambda hand: hand.tare(0), "TareNow"),
         (lambda hand: hand.set_tare(0, np.full(19, 3000)), "TareSet"),
         (lambda hand: hand.set_setting(wire.Setting.POC_WEIGHTS, 2), "SetSetting"),
-        (lambda hand: hand.subscribe(wire.QuantityFlags.POC), "Subscribe"),
+        (lambda hand: hand.hold(0), "Hold"),
         (lambda hand: hand.point(0), "GetPoint"),
         (lambda hand: hand.save_settings(), "SaveSettings"),
         (lambda hand: hand.reboot_bootloader(), "RebootBootloader"),
@@ -141,7 +141,7 @@ def test_pace_is_kept_on_the_clock(recorded, pace: float) -> None:
 def test_only_what_start_asks_for_is_played(recorded) -> None:
     path, recording = recorded
     with biotac.open(f"replay:{path}") as hand:
-        hand.start(pac=False, fingers=0b10)
+        hand.stream("force", fingers=[1])
         batch = hand.read_batch(100)
     assert len(batch.pac) == 0
     assert set(batch.frames["finger"]) == {1} and len(batch.frames) == len(recording.frames) // 2

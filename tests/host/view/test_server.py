@@ -278,7 +278,7 @@ def test_rows_hold_the_wires_own_numbers(touch) -> None:
 
 def test_heartbeats_are_frames_without_signals() -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand:
-        hand.subscribe(wire.QuantityFlags.FORCE)
+        hand.stream("force", rest=False)
         batch = hand.read_batch(10)
     assert len(batch.idle)
     rows = [dict(zip(FRAME_ROW, json.loads(text), strict=True)) for text in frame_rows(batch)]

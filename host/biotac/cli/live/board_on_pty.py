@@ -30,8 +30,8 @@ def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
     except KeyboardInterrupt:
         pass
     finally:
-        if link is not None and link.is_symlink():
-            link.unlink()
+        if link is not None and link.is_symlink() and os.readlink(link) == board.path:
+            link.unlink()  # not one that another board has taken since
         board.close()
 
 
@@ -49,8 +49,13 @@ def tell_over(plays: str) -> None:
 
 
 def make_link(link: Path, target: str) -> None:
-    """Make the link; replaces a link left over from before, never anything else."""
+    """Make the link; replaces a link left over from before, never anything else.
+
+    Raises PortError when it leads to a port that is there: that of another simulator.
+    """
     if link.is_symlink():
+        if link.exists():
+            raise PortError(f"{link} leads to {os.readlink(link)}, which another program has; choose another --link")
         link.unlink()
     try:
         os.symlink(target, link)

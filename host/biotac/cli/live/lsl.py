@@ -8,7 +8,6 @@ import sys
 
 import biotac
 
-from ...hand.subscription import AT_FIRST
 from .. import values
 
 EXAMPLE = "biotac lsl 'sim:press.toml?fingers=2'"
@@ -25,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     from ...bridges.lsl import Outlet  # here, because other verbs need no liblsl
 
     with biotac.open(args.port, pace=1.0) as hand, Outlet(hand) as outlet:
-        hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)
+        hand.stream("results", "events")
         streams = [{"name": info.name(), "rate_hz": info.nominal_srate()} for info in outlet.infos]
         if args.json:
             print(json.dumps({"streams": streams}))

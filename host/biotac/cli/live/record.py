@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Any
 
 import biotac
 
@@ -50,12 +52,14 @@ def run(args: argparse.Namespace) -> int:
                 if args.seconds is not None and last_us - first_us >= args.seconds * 1e6:
                     break
         progress.done()
+        recorder.close()
         stats = hand.stats
         faults = [line for line in faults_told(hand) if line not in earlier]
-    facts = {
+    facts: dict[str, Any] = {
         "recording": str(args.out),
-        "frames": stats.frames,
-        "frames_lost": stats.frames_lost,
+        "frames": recorder.frames,
+        "frames_lost": recorder.frames_lost,
+        "gaps": stats.gaps,
         "crc_errors": stats.crc_errors,
         "faults": faults,
         "device_seconds": (last_us - (first_us or 0)) / 1e6,
@@ -63,14 +67,19 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(facts))
     else:
-        print(f"{args.out}: {stats.frames} frames, {stats.frames_lost} lost; `biotac check {args.out}` verifies them")
+        held = f"{args.out}: {recorder.frames} frames, {recorder.frames_lost} lost, {stats.gaps} gap(s)"
+        print(f"{held}; `biotac check {args.out}` verifies them")
         for fault in faults:
             print(f"fault during the recording: {fault}")
+    recorded_s = facts["device_seconds"]
+    if args.seconds is not None and recorded_s < args.seconds:
+        print(
+            f"biotac: {recorded_s:.1f} s were recorded, {args.seconds:g} s asked for: it ended before", file=sys.stderr
+        )
+        return 1
     return 0
 
 
 def faults_told(hand: biotac.Hand) -> list[str]:
-    """The board's latched faults, a line each; none for firmware that latches none."""
-    with suppress(biotac.WireVersionError):
-        return str(hand.faults()).splitlines()
-    return []
+    """The board's latched faults, a line each."""
+    return str(hand.faults()).splitlines()

@@ -8,12 +8,11 @@ import sys
 
 import biotac
 
-from ...hand.subscription import AT_FIRST, RESULTS
 from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
-from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags, QuantityFlags
+from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
 from .. import values
 from .table import LiveTable, is_possible
 
@@ -39,9 +38,7 @@ def run(args: argparse.Namespace) -> int:
     with biotac.open(args.port, pace=1.0) as hand:
         for warning in hand.warnings:
             print(f"biotac: {warning.text}", file=sys.stderr)
-        wanted = RESULTS if args.touched else AT_FIRST
-        if args.touched or args.events:
-            hand.subscribe(wanted | QuantityFlags.EVENTS if args.events else wanted)
+        hand.stream("results", *(["events"] if args.events else []), rest=not args.touched)
         if not args.json and not args.events and is_possible():
             watch(hand, seconds=args.seconds)
         else:

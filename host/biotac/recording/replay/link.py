@@ -66,6 +66,7 @@ class ReplayLink(Link):
     """A Link to a ``playback``. Commands that would change a board raise CommandRefusedError."""
 
     keeps_time = False
+    owns_stream = False
 
     def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: HostClock | None = None) -> None:
         self.port = port
