@@ -44,7 +44,7 @@ def patience() -> Iterator[None]:
 def brief_silence(monkeypatch: pytest.MonkeyPatch) -> None:
     """For boards that say nothing at all, or nothing that matters: waiting longer would not change what is found."""
     monkeypatch.setattr(SerialLink, "patience", 1.0)
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.board.board.REPLY_TIMEOUT_S", 0.02)
 
 
 @pytest.fixture
@@ -61,8 +61,8 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
         return b"\0"
 
     clock = SimpleNamespace(monotonic=lambda: time.monotonic() + ahead_s, time=time.time)
-    for module in ("board", "handshake"):
-        monkeypatch.setattr(f"biotac.hand.{module}.time", clock)
+    monkeypatch.setattr("biotac.board.handshake.time", clock)
+    monkeypatch.setattr(SerialLink, "patience", 1.0)  # a command's wait is one for a condition, which no clock ends
     return jump
 
 

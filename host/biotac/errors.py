@@ -41,6 +41,10 @@ class RecordingWarning(UserWarning):
     """Part of a recording is missing or damaged; the rest was read."""
 
 
+class ReadWarning(UserWarning):
+    """``Hand.read`` returned less than was asked for: its source ended, or there is a Gap."""
+
+
 class PortError(BiotacError):
     """The port does not exist, is busy or cannot be opened."""
 
@@ -67,6 +71,10 @@ class DeviceLostError(BiotacError):
     """The board went away or fell silent while in use."""
 
     exit_code = 6
+
+
+class StreamTakenError(DeviceLostError):
+    """Another program, or the board's other port, took its stream, which is not taken back."""
 
 
 class CommandRefusedError(BiotacError):

@@ -20,7 +20,6 @@ from biotac.core.compiled import default_settings
 from biotac.doctor.facts import grown
 from biotac.errors import BiotacError
 from biotac.hand.opening import shake_hands
-from biotac.hand.subscription import AT_FIRST
 from biotac.link import open_link
 from biotac.link.serial_port import SerialLink
 from biotac.sim.sensor_board import SensorBoard
@@ -197,7 +196,7 @@ def open_bench(port: str, sensor_port: str, source: Source) -> BenchHand:
     try:
         as_new(hand)
         for name, value in source.settings.items():
-            hand.set_setting(wire.Setting[name.upper()], value)
+            hand.board.set_setting(wire.Setting[name.upper()], value)
         if source.tare_q4 is not None:
             for finger, tare_q4 in enumerate(source.tare_q4):
                 hand.set_tare(finger, tare_q4 / 16.0)
@@ -210,17 +209,16 @@ def open_bench(port: str, sensor_port: str, source: Source) -> BenchHand:
 def as_new(hand: biotac.Hand) -> None:
     """No settings, calibrations, maps or subscriptions that a test before has left; what is saved stays."""
     hand.stop()
-    now = hand.settings()
+    now = hand.board.settings()
     for setting, value in default_settings().items():
         if now[setting] != value:
-            hand.set_setting(setting, value)
+            hand.board.set_setting(setting, value)
     for finger in range(MAX_SENSORS):
-        if hand.calibration_state(finger) != biotac.CalibrationState.NONE:
-            hand.clear_calibration(finger)
-        if hand.map_state(finger) != biotac.CalibrationState.NONE:
-            hand.clear_map(finger)
-    hand.subscribe(AT_FIRST)
-    hand.clear_faults()
+        if hand.board.calibration_state(finger) != biotac.CalibrationState.NONE:
+            hand.board.clear_calibration(finger)
+        if hand.board.map_state(finger) != biotac.CalibrationState.NONE:
+            hand.board.clear_map(finger)
+    hand.board.clear_faults()
 
 
 class BenchPty:

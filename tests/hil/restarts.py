@@ -50,6 +50,7 @@ class Restarts:
         if isinstance(self.board, EmulatedBoard):
             self._start_by("cut power")
         else:
+            self.hand._board.reader.close()
             self.link.close()
             self._open()
 
@@ -58,6 +59,7 @@ class Restarts:
         self._start_by("lose interrupts")
 
     def _start_by(self, verb: str) -> None:
+        self.hand._board.reader.close()  # so that the link is read here, and by the next hand
         self.link.release()  # a watchdog's second passes only while time does
         before = self.board.counters()
         self.board.do(verb)

@@ -32,8 +32,8 @@ def play(board, tmp_path: Path):
         path.write_text(text)
         hand = board(str(path))
         # The tare follows the temperature in contact: switched off, results rest on the electrodes alone.
-        hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
-        frames = hand.read(100)
+        hand.board.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
+        frames = hand.read_batch(100).frames
         return frames, [hand.sensor_status(f) for f in range(4)]
 
     return run
@@ -115,7 +115,7 @@ def test_every_slot_of_every_finger_was_read(rig, play) -> None:
 @pytest.mark.long
 def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
     hand = board("faults.toml")
-    frames = hand.read(100)
+    frames = hand.read_batch(100).frames
     assert len(of(frames, 0)) == len(of(frames, 2)) == 1200
     assert len(of(frames, 1)) < 1200
     assert hand.stats.frames_lost == 0
@@ -123,7 +123,7 @@ def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
 
 def test_only_the_named_fingers_are_streamed(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
-    hand.start(pac=False, fingers=0b10010)
+    hand.stream("force", fingers=[1, 4])
     batch = hand.read_batch(100)
     assert set(batch.frames["finger"]) == {1, 4}
     assert len(batch.pac) == 0
@@ -145,9 +145,9 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
 def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
     board = rig.on_a_pty("press.toml", pace=1.0)
     with biotac.open(board.path) as hand:
-        hand.start()
+        hand.stream()
         assert len(hand.read(0.1)) == 10
-        hand._streams.streaming = False  # as if this host had been killed: no STOP is sent
+        hand._stream.on = False  # as if this host had been killed: no STOP is sent
     with biotac.open(board.path) as hand:
         assert hand.status().streams == 0
 
@@ -160,10 +160,10 @@ def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: P
 
     def played(*at_s: float) -> np.ndarray:
         hand = rig.open(str(path))
-        hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
+        hand.board.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
         for t_s in at_s:
             hand.link.board.plan(t_s, "stretch a word")
-        return hand.read(100)
+        return hand.read_batch(100).frames
 
     healthy, hurt = played(), played(0.70011, 0.90023, 1.10037)
     assert len(healthy) == len(hurt)

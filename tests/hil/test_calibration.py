@@ -13,8 +13,8 @@ from rig import Rig
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights
 from biotac.errors import CommandRefusedError
-from biotac.recording import Recording
 from biotac.recording.crosscheck import CrossCheck
+from biotac.recording.reader import Recording
 
 OWN = Calibration(
     PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310, 9_500_000
@@ -29,37 +29,37 @@ def for_finger(hand: biotac.Hand, finger: int) -> Calibration:
 
 def test_a_calibration_is_set_told_and_cleared(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
-    assert [hand.calibration(f) for f in range(5)] == [None] * 5
+    assert [hand.board.calibration(f) for f in range(5)] == [None] * 5
     mine = for_finger(hand, 1)
-    hand.set_calibration(1, mine)
-    assert (hand.calibration(1), hand.calibration_state(1)) == (mine, CalibrationState.IN_FORCE)
-    assert hand.calibration_state(0) == CalibrationState.NONE
-    hand.clear_calibration(1)
-    assert (hand.calibration(1), hand.calibration_state(1)) == (None, CalibrationState.NONE)
+    hand.board.set_calibration(1, mine)
+    assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (mine, CalibrationState.IN_FORCE)
+    assert hand.board.calibration_state(0) == CalibrationState.NONE
+    hand.board.clear_calibration(1)
+    assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (None, CalibrationState.NONE)
 
 
 def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
-        hand.set_calibration(0, for_finger(hand, 1))
+        hand.board.set_calibration(0, for_finger(hand, 1))
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
-        hand.set_calibration(4, for_finger(hand, 1))  # nobody is there
-    assert hand.calibration(0) is None
-    hand.set_calibration(0, OWN)
-    assert hand.calibration_state(0) == CalibrationState.IN_FORCE
+        hand.board.set_calibration(4, for_finger(hand, 1))  # nobody is there
+    assert hand.board.calibration(0) is None
+    hand.board.set_calibration(0, OWN)
+    assert hand.board.calibration_state(0) == CalibrationState.IN_FORCE
 
 
 def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
-    hand.set_calibration(0, OWN)
-    hand.start()
+    hand.board.set_calibration(0, OWN)
+    hand.stream()
     with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.set_calibration(0, Calibration())
+        hand.board.set_calibration(0, Calibration())
     with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.clear_calibration(0)
-    assert hand.calibration(0) == OWN  # asking is allowed
+        hand.board.clear_calibration(0)
+    assert hand.board.calibration(0) == OWN  # asking is allowed
     hand.stop()
-    hand.clear_calibration(0)
+    hand.board.clear_calibration(0)
 
 
 @pytest.mark.long
@@ -67,8 +67,8 @@ def test_frames_of_two_fingers_come_from_each_ones_own_gains(
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:
     hand = board("shear.toml?fingers=2&seconds=3")
-    hand.set_calibration(1, for_finger(hand, 1))
-    settings, own = hand.settings(), hand.finger_settings()
+    hand.board.set_calibration(1, for_finger(hand, 1))
+    settings, own = hand.board.settings(), hand.board.finger_settings()
     hand.record(tmp_path / "two.mcap")
     messages = hand.read_batch(2.5).wire
     hand.close()
@@ -88,10 +88,10 @@ def test_gains_at_their_limits_are_as_exact_as_any_and_beyond_them_refused(board
     hand = board("shear.toml?fingers=2&seconds=2.5")
     for finger, top in enumerate((GAIN_MAX_NN, -GAIN_MAX_NN)):
         its = replace(OWN, force_gain_nn=(top, -top, top), torque_gain_nn=(-top, top), pressure_gain_nn=GAIN_MAX_NN)
-        hand.set_calibration(finger, its)
+        hand.board.set_calibration(finger, its)
     with pytest.raises((CommandRefusedError, ValueError)):
-        hand.set_calibration(0, replace(OWN, force_gain_nn=(GAIN_MAX_NN + 1, 0, 0)))
-    settings, own = hand.settings(), hand.finger_settings()
+        hand.board.set_calibration(0, replace(OWN, force_gain_nn=(GAIN_MAX_NN + 1, 0, 0)))
+    settings, own = hand.board.settings(), hand.board.finger_settings()
     messages = hand.read_batch(100).wire
     touched = (messages["flags"] & biotac.FrameFlags.CONTACT) != 0
     assert {int(f) for f in messages["finger"][touched]} == {0, 1}
@@ -107,16 +107,16 @@ def test_a_saved_calibration_holds_after_power_was_off(rig: Rig) -> None:
     hand.stop()
     hand.link.release()
     mine = for_finger(hand, 0)
-    hand.set_calibration(0, mine)
-    hand.set_calibration(1, OWN)
-    hand.save_settings()
-    hand.clear_calibration(0)  # not saved
+    hand.board.set_calibration(0, mine)
+    hand.board.set_calibration(1, OWN)
+    hand.board.save_settings()
+    hand.board.clear_calibration(0)  # not saved
     reboot(hand, 2)
-    assert hand.calibrations() == {0: mine, 1: OWN}
-    hand.clear_calibration(0)
-    hand.save_settings()
+    assert hand.board.calibrations() == {0: mine, 1: OWN}
+    hand.board.clear_calibration(0)
+    hand.board.save_settings()
     reboot(hand, 3)
-    assert hand.calibrations() == {1: OWN}
+    assert hand.board.calibrations() == {1: OWN}
 
 
 def reboot(hand: biotac.Hand, boots: int) -> None:

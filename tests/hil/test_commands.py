@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from overheard import Overheard
 
 import biotac
 from biotac import FaultFlags, FrameFlags, Setting, TareReason, TareState
@@ -71,16 +72,14 @@ REFUSED = [
 
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes) -> list[Any]:
     """All that comes back for one message and the PING behind it, but not the PING's reply."""
+    overheard = Overheard()
+    hand._reader.add_tap(overheard)
     hand.link.write(encode(message_id, payload))
-    seen: list[Any] = []
-    hand.link.write(encode(wire.Ping.ID, wire.Ping(255).pack()))
-
-    def last(message: Any) -> bool:
-        seen.append(message)
-        return isinstance(message, wire.Reply) and message.req_id == 255
-
-    assert hand._board.next_message(last, time.monotonic() + 60.0) is not None
-    return [m for m in seen[:-1] if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == 7]
+    hand.ping()
+    hand._reader.remove(overheard)
+    seen = [m for m in overheard.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == 7]
+    assert seen.pop().command == wire.Ping.ID
+    return seen
 
 
 def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
@@ -132,7 +131,7 @@ def test_what_is_damaged_on_its_way_is_counted_and_never_obeyed(board) -> None:
     assert after.rx_errors - before.rx_errors >= len(pieces)
     assert after.rx_frames - before.rx_frames == 2  # PING and GET_STATUS
     assert after.faults & FaultFlags.LINK_DAMAGED
-    assert hand.setting(Setting.IDLE_PERIOD_MS) == 100
+    assert hand.board.setting(Setting.IDLE_PERIOD_MS) == 100
 
 
 def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> None:
@@ -143,8 +142,8 @@ def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> No
         hand.link.write(encode(message.ID, message.pack()))
         first, again = replies_to(hand, message.ID, message.pack())
         assert first == again and getattr(first, "error", wire.Error.OK) == wire.Error.OK
-    assert (hand.setting(Setting.IDLE_PERIOD_MS), hand.status().streams) == (250, 0)
-    hand.start(pac=False)
+    assert (hand.board.setting(Setting.IDLE_PERIOD_MS), hand.status().streams) == (250, 0)
+    hand.stream("force", "poc", "torque", "pressure")
     hand.link.write(2 * encode(start.ID, start.pack()))
     frames = hand.read(0.3)
     assert len(np.unique(frames["seq"])) == len(frames) == 30
@@ -153,14 +152,19 @@ def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> No
 
 def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     hand = board("press.toml?seconds=3")
+    frames = 0
+
+    def count(batch: biotac.Batch) -> None:
+        nonlocal frames
+        frames += len(batch.wire)
+
+    hand.on_batch(count)
     hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
     hand.link.release()
-    while hand._board.read(hand.link.patience) and not hand.link.ended:  # an emulator may take long to the first
-        pass
-    assert hand.status().streams == 0  # its reply comes after every frame: a busy computer reads all of them at once
-    frames = 0
-    while (batch := hand._streams._pulled.take()) is not None:
-        frames += len(batch.frames)
+    while hand._board.reader.silent_s < hand.link.patience and not hand.link.ended:  # an emulator is slow to begin
+        time.sleep(0.01)
+    assert hand.status().streams == 0  # its reply comes after every frame
+    hand.close()
     assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
 
 

@@ -38,11 +38,11 @@ def play(rig: Rig, tmp_path: Path, seconds: float, kind: str | None, *, calibrat
     path = tmp_path / "held.toml"
     path.write_text(text)
     hand = rig.open(str(path))
-    hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
-    hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # which the emulated finger's physics follow
+    hand.board.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
+    hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # which the emulated finger's physics follow
     if calibrated:
-        hand.set_calibration(1, for_finger(hand, 1))
-    return hand.read(100), hand
+        hand.board.set_calibration(1, for_finger(hand, 1))
+    return hand.read_batch(100).frames, hand
 
 
 def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +82,7 @@ def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
     assert np.linalg.norm(held, axis=1).min() > 0.5  # it does hold something
     assert np.all(np.linalg.norm(back["force_n"][sure] - held, axis=1) <= 0.05 * np.linalg.norm(held, axis=1))
     assert np.all(back["flags"][sure] & FrameFlags.CONTACT != 0)
-    assert hand.calibration_state(1) == CalibrationState.IN_FORCE
+    assert hand.board.calibration_state(1) == CalibrationState.IN_FORCE
 
 
 @pytest.mark.parametrize("seconds", [0.010, 0.1, 1.0])
@@ -100,7 +100,7 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
     assert np.all(np.isnan(after["force_n"][sure]))
     assert bytes(hand.sensor_info(1).serial).rstrip(b"\0").endswith(b"X")
     hand.stop()
-    assert hand.calibration_state(1) == CalibrationState.OTHER_SENSOR
+    assert hand.board.calibration_state(1) == CalibrationState.OTHER_SENSOR
 
 
 def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tmp_path: Path) -> None:
@@ -109,14 +109,14 @@ def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tm
     path = tmp_path / "held.toml"
     path.write_text(held_press(2) + '[[finger]]\n[[finger]]\nserial = "BTSP050400018017"\n')
     hand = rig.open(str(path))
-    frames = hand.read(100)
+    frames = hand.read_batch(100).frames
     assert hand.fingers == [0]
     told = hand.sensor_info(1)
     assert (told.present, bytes(told.serial)) == (0, b"BTSP050400018017")
     mine, other = of(frames, 1), of(frames, 0)
     assert len(mine) > 200 and np.all(mine["flags"] & FrameFlags.SENSOR_UNSURE)
     assert not np.any(other["flags"] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER))
-    latched = hand.faults().by_index
+    latched = hand.board.faults().by_index
     assert latched[1] & FrameFlags.SENSOR_UNSURE and not latched[0] & FrameFlags.SENSOR_UNSURE
 
 
@@ -126,13 +126,13 @@ def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
     path.write_text(held_press(2, hold_s=0.7) + fault("swapped", 1.6, 0.1, 0) + fault("swapped", 1.6, 0.1, 1))
     hand = rig.open(str(path))
     for finger in (0, 1):
-        hand.set_calibration(finger, for_finger(hand, finger))
-    frames = hand.read(100)
+        hand.board.set_calibration(finger, for_finger(hand, finger))
+    frames = hand.read_batch(100).frames
     for finger in (0, 1):
         _, after = split(of(frames, finger))
         assert np.all(after["flags"] & (FrameFlags.SENSOR_OTHER | FrameFlags.SENSOR_UNSURE))
         assert np.all(np.isnan(after["force_n"][BACK_ROUNDS:]))
-        assert hand.faults().by_index[finger] & FrameFlags.SENSOR_OTHER
+        assert hand.board.faults().by_index[finger] & FrameFlags.SENSOR_OTHER
 
 
 def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) 
     path = tmp_path / "rest.toml"
     path.write_text(text)
     hand = rig.open(str(path))
-    frames = hand.read(100)
+    frames = hand.read_batch(100).frames
     assert np.all(frames["flags"] & FrameFlags.CONTACT == 0)
     assert np.count_nonzero(frames["flags"] & FrameFlags.TARE_CHANGED) == 1  # START
     assert hand.sensor_status(0).tare_reason == wire.TareReason.START

@@ -80,10 +80,10 @@ def noisy(source: Source, a_bit: float) -> tuple[Source, np.ndarray, np.ndarray]
 def run(rig: Rig, source: Path | Source) -> tuple[biotac.Batch, wire.SensorStatus, biotac.Faults]:
     rig.need("scenarios")
     hand = rig.open_with(source) if isinstance(source, Source) else rig.open(str(source))
-    hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)  # results rest on the electrodes alone
+    hand.board.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)  # results rest on the electrodes alone
     batch = hand.read_batch(100)
     assert hand.stats.frames_lost == hand.stats.crc_errors == 0
-    status, latched = hand.sensor_status(HURT), hand.faults()
+    status, latched = hand.sensor_status(HURT), hand.board.faults()
     rig.close()
     return batch, status, latched
 

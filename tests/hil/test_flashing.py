@@ -55,16 +55,16 @@ class Bench:
 
     def set(self, setting: Setting, value: int, *, save: bool) -> None:
         with self.target.open() as hand:
-            hand.set_setting(setting, value)
+            hand.board.set_setting(setting, value)
             if save:
-                hand.save_settings()
+                hand.board.save_settings()
 
     def setting_after_a_power_cut(self, setting: Setting) -> int:
         boots = self.counters()["boots"]
         self.target.board.say("cut power")
         self.target.board.until(5, boots=boots + 1, usb={"state": "configured"})
         with self.target.open() as hand:
-            return hand.setting(setting)
+            return hand.board.setting(setting)
 
 
 @pytest.fixture
@@ -128,15 +128,15 @@ def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> 
     blob = make_map(1, blocks=BIG)
     with bench.target.open() as hand:
         for _ in range(3):  # so that it lies somewhere else than in the first slot
-            hand.set_map(0, blob)
-        hand.save_settings()
+            hand.board.set_map(0, blob)
+        hand.board.save_settings()
     bench.flash(next_release)
     with bench.target.open() as hand:
-        assert hand.maps() == {0: blob}
+        assert hand.board.maps() == {0: blob}
 
 
 def give_map(hand: Hand, finger: int, its: bytes) -> None:
-    hand.set_map(finger, its, force=finger == 1)
+    hand.board.set_map(finger, its, force=finger == 1)
 
 
 @pytest.mark.long
@@ -145,7 +145,7 @@ def give_map(hand: Hand, finger: int, its: bytes) -> None:
     [
         (give_map, "wrench map", "maps", make_map(1), make_map(2, blocks=BIG)),
         (
-            Hand.set_calibration,
+            lambda hand, finger, own: hand.board.set_calibration(finger, own),
             "calibration",
             "calibrations",
             Calibration(thermal_gain_milli=700),
@@ -159,7 +159,7 @@ def test_what_was_in_force_and_not_saved_is_put_back_and_saved(
     with bench.target.open() as hand:
         give(hand, 0, kept)
         give(hand, 1, kept)
-        hand.save_settings()
+        hand.board.save_settings()
         give(hand, 0, new)
     outcome = bench.flash(read_image(BUILT))
     assert outcome.settings is not None and outcome.backup is not None
@@ -232,7 +232,7 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
     outcome = bench.flash(image)
     assert outcome.before is None
     with bench.target.open() as hand:
-        assert hand.setting(Setting.IDLE_PERIOD_MS) == 250
+        assert hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
 
 
 @pytest.mark.long

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from core_in_units import on_board
 
-from biotac import QuantityFlags
 from biotac.wire import messages_gen as wire
 from biotac.wire.sensor_gen import SLOTS
 
@@ -37,19 +36,19 @@ seconds = 0.2
 at = "E10"
 force_n = 2.0
 """
-EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE
+EVERYTHING = ("poc", "force", "torque")
 
 
 @pytest.fixture
 def play(board, tmp_path: Path):
-    """Stream the scenario with a subscription; returns the batch, the link's statistics and the board's status."""
+    """Stream names of the scenario; returns the batch, the link's statistics and the board's status."""
 
-    def run(quantities: QuantityFlags):
+    def run(*names: str, rest: bool = False):
         path = tmp_path / "case.toml"
         path.write_text(TOUCHED_TWICE)
         hand = board(str(path))
-        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # whose sigma is of the noise
-        hand.subscribe(quantities)
+        hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # whose sigma is of the noise
+        hand.stream(*names, rest=rest)
         batch = hand.read_batch(100)
         return batch, hand.stats, hand.status()
 
@@ -58,8 +57,8 @@ def play(board, tmp_path: Path):
 
 @pytest.mark.long
 def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(play) -> None:
-    eager, eager_stats, _ = play(EVERYTHING | QuantityFlags.REST_FRAMES)
-    lazy, lazy_stats, status = play(EVERYTHING)
+    eager, eager_stats, _ = play(*EVERYTHING, rest=True)
+    lazy, lazy_stats, status = play(*EVERYTHING)
     assert (eager_stats.frames_lost, lazy_stats.frames_lost, lazy_stats.disordered) == (0, 0, 0)
     assert len(eager.idle) == 0
     assert int(lazy.idle["frames"].sum()) == status.frames_idle == len(eager.frames) - len(lazy.frames)
@@ -78,8 +77,8 @@ def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(
 
 @pytest.mark.long
 def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
-    full, _, _ = play(EVERYTHING)
-    force, stats, status = play(QuantityFlags.FORCE)
+    full, _, _ = play(*EVERYTHING)
+    force, stats, status = play("force")
     assert stats.frames_lost == 0
     assert np.isnan(force.frames["poc_mm"]).all()
     assert np.isnan(force.frames["torque_nmm"]).all()
@@ -92,7 +91,7 @@ def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
 
 @pytest.mark.long
 def test_a_sigma_comes_with_the_noise_that_was_measured(play) -> None:
-    batch, _, _ = play(EVERYTHING | QuantityFlags.SIGMA | QuantityFlags.REST_FRAMES)
+    batch, _, _ = play(*EVERYTHING, "sigma", rest=True)
     touched = batch.wire["tare_state"] == wire.TareState.CONTACT
     assert np.isfinite(batch.frames["poc_sigma_mm"][touched]).all()
     assert (batch.frames["force_sigma_n"][touched] > 0).all()
@@ -110,5 +109,5 @@ def test_a_point_inside_a_round_is_that_of_the_words_that_have_come(board, tmp_p
     under_way = sent[sent["seq"] == point.seq][0]
     come = np.array([SLOTS.index(f"E{k}") for k in range(1, 20)]) < point.slot
     counts = np.where(come, under_way["counts"], before["counts"])
-    board_computes = on_board(counts[None], before["tare_q4"] / 16.0, hand.settings())
+    board_computes = on_board(counts[None], before["tare_q4"] / 16.0, hand.board.settings())
     assert np.array_equal(board_computes.poc_mm[0], np.array(point.poc_um) / 1000)

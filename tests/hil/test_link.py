@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from overheard import Overheard
 from rig import Rig
 
 import biotac
@@ -116,11 +118,14 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
     hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
     hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
+    standstill = Overheard(still=True)
+    hand._reader.add_tap(standstill)
     hand.link.release()
     while not hand.link.board.wait():
         pass
-    while hand._board.read(0.5):  # there is no room for an answer before, and it would be said again in a minute
-        pass
+    standstill.go_on.set()
+    while hand._board.reader.silent_s < 0.5:  # there is no room for an answer before
+        time.sleep(0.05)
     status = hand.status()
     rounds, others = 100 * seconds, 1 + 3  # a TARE, and answers without room
     assert rounds <= hand.stats.frames + status.messages_dropped <= rounds + others
@@ -177,19 +182,12 @@ def hurt(sent: bytes, draw: random.Random) -> bytes:
 
 
 @pytest.mark.long
-def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board, monkeypatch) -> None:
+def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
-    sent = bytearray()
-    read = hand.link.read
-
-    def overheard(timeout_s: float) -> bytes:
-        chunk = read(timeout_s)
-        sent.extend(chunk)
-        return chunk
-
-    hand.link.fd = None  # so that it is this that reads
-    monkeypatch.setattr(hand.link, "read", overheard)
+    overheard = Overheard()
+    hand._reader.add_tap(overheard)
     hand.read(10)
+    sent = overheard.sent
     truth = StreamDecoder().feed(sent)
     assert len(truth.wire) == 500
     for seed in range(20):

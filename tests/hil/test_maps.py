@@ -18,8 +18,8 @@ from biotac import CalibrationState
 from biotac.cli.main import main
 from biotac.errors import CommandRefusedError
 from biotac.map.board_map import PART_BYTES, for_any_sensor, part
-from biotac.recording import Recording
 from biotac.recording.crosscheck import CrossCheck
+from biotac.recording.reader import Recording
 from biotac.wire import messages_gen as wire
 
 SECTOR = 4096
@@ -37,16 +37,16 @@ def write(hand: biotac.Hand, finger: int, blob: bytes, offset: int) -> None:
 
 def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
-    assert [hand.get_map(f) for f in range(5)] == [None] * 5
+    assert [hand.board.get_map(f) for f in range(5)] == [None] * 5
     for blocks in (1, 4, BIG):
         blob = make_map(blocks, serial=serial_of(hand, 1), blocks=blocks)
-        hand.set_map(1, blob)
-        assert (hand.get_map(1), hand.map_state(1)) == (blob, CalibrationState.IN_FORCE)
+        hand.board.set_map(1, blob)
+        assert (hand.board.get_map(1), hand.board.map_state(1)) == (blob, CalibrationState.IN_FORCE)
     assert len(blob) > 4 * SECTOR  # it has seen every sector of its slot
-    assert hand.maps() == {1: blob}
-    assert hand.map_state(0) == CalibrationState.NONE
-    hand.clear_map(1)
-    assert (hand.get_map(1), hand.map_state(1)) == (None, CalibrationState.NONE)
+    assert hand.board.maps() == {1: blob}
+    assert hand.board.map_state(0) == CalibrationState.NONE
+    hand.board.clear_map(1)
+    assert (hand.board.get_map(1), hand.board.map_state(1)) == (None, CalibrationState.NONE)
     if rig.can("presence"):
         assert hand.sensor_info(1).present  # the sensors were not lost over it
 
@@ -55,38 +55,38 @@ def test_another_sensors_is_refused_and_forced_it_is_for_any(board: Callable[[st
     hand = board("press.toml?fingers=2")
     blob = make_map(1, serial=serial_of(hand, 1))
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
-        hand.set_map(0, blob)
+        hand.board.set_map(0, blob)
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
-        hand.set_map(4, blob)  # nobody is there
-    assert hand.maps() == {}
-    hand.set_map(0, blob, force=True)
-    assert hand.maps() == {0: for_any_sensor(blob)}
+        hand.board.set_map(4, blob)  # nobody is there
+    assert hand.board.maps() == {}
+    hand.board.set_map(0, blob, force=True)
+    assert hand.board.maps() == {0: for_any_sensor(blob)}
 
 
 def test_what_is_no_map_is_refused_and_the_old_one_stays(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
     old, new = make_map(1), make_map(2)
-    hand.set_map(0, old)
+    hand.board.set_map(0, old)
     with pytest.raises(CommandRefusedError, match="OUT_OF_RANGE"):
-        hand.set_map(0, b"\xff" + new[1:])
+        hand.board.set_map(0, b"\xff" + new[1:])
     with pytest.raises(CommandRefusedError, match="OUT_OF_RANGE"):
-        hand.set_map(0, new[:-1])
-    assert hand.maps() == {0: old}
+        hand.board.set_map(0, new[:-1])
+    assert hand.board.maps() == {0: old}
 
 
 def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
     old, new = make_map(1), make_map(2)
-    hand.set_map(0, old)
-    hand.start()
+    hand.board.set_map(0, old)
+    hand.stream()
     with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.set_map(0, new)
+        hand.board.set_map(0, new)
     with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.clear_map(0)
-    assert hand.get_map(0) == old  # asking is allowed
+        hand.board.clear_map(0)
+    assert hand.board.get_map(0) == old  # asking is allowed
     hand.stop()
-    hand.set_map(0, new)
-    assert hand.get_map(0) == new
+    hand.board.set_map(0, new)
+    assert hand.board.get_map(0) == new
 
 
 def test_an_upload_that_is_broken_off_leaves_the_old_map_and_nothing_in_the_way(
@@ -94,26 +94,26 @@ def test_an_upload_that_is_broken_off_leaves_the_old_map_and_nothing_in_the_way(
 ) -> None:
     hand = board("press.toml")
     old, new = make_map(1), make_map(2, blocks=7)
-    hand.set_map(0, old)
+    hand.board.set_map(0, old)
     begin(hand, 0, new)
     write(hand, 0, new, 2 * PART_BYTES)
     write(hand, 0, new, 0)
     write(hand, 0, new, 0)  # as after a lost reply
     with pytest.raises(CommandRefusedError, match="NOT_WHOLE"):
         hand._board.ask(wire.EndMap(0, 0, zlib.crc32(new)), wire.MapInfo)
-    assert hand.get_map(0) == old
+    assert hand.board.get_map(0) == old
     hand.stop()  # as the next program does when it opens the port
     with pytest.raises(CommandRefusedError, match="NOT_BEGUN"):
         write(hand, 0, new, PART_BYTES)
-    hand.set_map(0, new)
-    assert hand.get_map(0) == new
+    hand.board.set_map(0, new)
+    assert hand.board.get_map(0) == new
 
 
 @pytest.mark.long
 def test_a_stream_runs_on_after_an_upload(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     hand.stop()
-    hand.set_map(0, make_map(1, blocks=BIG))
+    hand.board.set_map(0, make_map(1, blocks=BIG))
     frames = hand.read(0.5)
     assert set(frames["finger"]) == {0, 1}
     assert hand.stats.frames_lost == 0
@@ -123,7 +123,7 @@ def test_a_stream_runs_on_after_an_upload(board: Callable[[str], biotac.Hand]) -
 def test_a_recording_holds_the_maps_in_force(board: Callable[[str], biotac.Hand], tmp_path: Path) -> None:
     hand = board("press.toml?fingers=2&seconds=2")
     blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)
-    hand.set_map(1, blob)
+    hand.board.set_map(1, blob)
     hand.record(tmp_path / "one.mcap")
     hand.read(0.5)
     hand.close()
@@ -134,8 +134,8 @@ def test_a_mapped_fingers_frames_come_from_its_map_and_the_others_from_the_gains
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:
     hand = board("shear.toml?fingers=2&seconds=3")
-    hand.set_map(1, make_map(1, serial=serial_of(hand, 1), axes=7))
-    settings, maps = hand.settings(), hand.maps()
+    hand.board.set_map(1, make_map(1, serial=serial_of(hand, 1), axes=7))
+    settings, maps = hand.board.settings(), hand.board.maps()
     hand.record(tmp_path / "two.mcap")
     messages = hand.read_batch(2.5).wire
     hand.close()
@@ -155,10 +155,10 @@ def test_a_mapped_fingers_frames_come_from_its_map_and_the_others_from_the_gains
 
 def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
-    hand.set_map(0, make_map(1))
+    hand.board.set_map(0, make_map(1))
     before = hand.read_batch(0.5).wire
     hand.stop()
-    hand.clear_map(0)
+    hand.board.clear_map(0)
     assert ((before["flags"] & biotac.FrameFlags.MAPPED) != 0).any()
     flags = before["flags"]
     for _ in range(40):  # a board that runs ahead had sent seconds before the stop
@@ -185,25 +185,25 @@ def opened(rig: Rig) -> biotac.Hand:
 def test_a_saved_map_holds_after_power_was_off(rig: Rig) -> None:
     hand = opened(rig)
     mine, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
-    hand.set_map(0, mine)
-    hand.set_map(1, anyones)
-    hand.save_settings()
-    hand.clear_map(0)  # not saved
-    hand.set_map(1, make_map(3, blocks=7))  # nor that
+    hand.board.set_map(0, mine)
+    hand.board.set_map(1, anyones)
+    hand.board.save_settings()
+    hand.board.clear_map(0)  # not saved
+    hand.board.set_map(1, make_map(3, blocks=7))  # nor that
     reboot(hand, 2)
-    assert hand.maps() == {0: mine, 1: anyones}
-    hand.clear_map(0)
-    hand.save_settings()
+    assert hand.board.maps() == {0: mine, 1: anyones}
+    hand.board.clear_map(0)
+    hand.board.save_settings()
     reboot(hand, 3)
-    assert hand.maps() == {1: anyones}
+    assert hand.board.maps() == {1: anyones}
 
 
 @pytest.mark.long
 def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> None:
     hand = opened(rig)
     kept = make_map(1)
-    hand.set_map(0, kept)
-    hand.save_settings()
+    hand.board.set_map(0, kept)
+    hand.board.save_settings()
     size = len(kept)
     written = SECTOR + -(-size // PART_BYTES) * PAGE  # bytes of flash until the map is whole: each part costs a page
     boots = 1
@@ -215,10 +215,10 @@ def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> No
         boots += 1
         hand.link.board.until(PATIENCE_S, boots=boots, usb={"state": "configured"})  # type: ignore[attr-defined]
         hand.ping()
-        assert hand.maps().get(0) in (kept, new), cut
+        assert hand.board.maps().get(0) in (kept, new), cut
         if cut < written:
-            assert hand.maps() == {0: kept}, cut
-        kept = hand.maps()[0]
+            assert hand.board.maps() == {0: kept}, cut
+        kept = hand.board.maps()[0]
     assert hand.link.board.counters()["flash"]["wrong"] == []  # type: ignore[attr-defined]
 
 
@@ -227,12 +227,12 @@ def test_the_slowest_flash_loses_neither_link_nor_sensors(rig: Rig) -> None:
     board = hand.link.board  # type: ignore[attr-defined]
     board.do("wear the flash out")  # 0.4 s for an erase, in which nothing else runs
     blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)
-    hand.set_map(1, blob)
-    hand.save_settings()
+    hand.board.set_map(1, blob)
+    hand.board.save_settings()
     facts = board.counters()
     assert (facts["boots"], facts["watchdog_resets"], facts["flash"]["wrong"]) == (1, 0, [])
     assert facts["flash"]["erases"] == 5 + 1  # the slot's, and the settings' first
-    assert hand.maps() == {1: blob}  # in force: its sensor counts as there
+    assert hand.board.maps() == {1: blob}  # in force: its sensor counts as there
     assert set(hand.read(0.3)["finger"]) == {0, 1}
 
 

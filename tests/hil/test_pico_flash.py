@@ -50,7 +50,7 @@ class Pico:
 
     def save_with_cut(self, value: int, cut: int) -> None:
         """Power fails once so many bytes of flash were erased or programmed."""
-        self.hand.set_setting(Setting.IDLE_PERIOD_MS, value)
+        self.hand.board.set_setting(Setting.IDLE_PERIOD_MS, value)
         self.board.do(f"cut power after {cut} flash bytes")
         self.hand._board.send(wire.SaveSettings(0))
 
@@ -68,16 +68,16 @@ def pico(rig: Rig, tmp_path: Path) -> Iterator[Pico]:
 
 
 def test_saved_settings_are_in_force_after_power_was_off(pico: Pico) -> None:
-    assert pico.hand.setting(Setting.IDLE_PERIOD_MS) == 100
-    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    pico.hand.set_setting(Setting.FORCE_GAIN_X_NN, -7)
-    pico.hand.save_settings()
-    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 260)  # not saved
+    assert pico.hand.board.setting(Setting.IDLE_PERIOD_MS) == 100
+    pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    pico.hand.board.set_setting(Setting.FORCE_GAIN_X_NN, -7)
+    pico.hand.board.save_settings()
+    pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)  # not saved
     first = pico.boot_id()
     pico.board.say("cut power")
     pico.up(2)
-    assert pico.hand.setting(Setting.IDLE_PERIOD_MS) == 250
-    assert pico.hand.setting(Setting.FORCE_GAIN_X_NN) == -7
+    assert pico.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
+    assert pico.hand.board.setting(Setting.FORCE_GAIN_X_NN) == -7
     assert pico.boot_id() != first
 
 
@@ -87,22 +87,22 @@ def cut_at_each(pico: Pico, cuts: tuple[int, ...], saved: int) -> None:
         boots = pico.counters()["boots"]
         pico.save_with_cut(1000 + cut, cut)
         pico.up(boots + 1)
-        found = pico.hand.setting(Setting.IDLE_PERIOD_MS)
+        found = pico.hand.board.setting(Setting.IDLE_PERIOD_MS)
         assert found in (saved, 1000 + cut), cut
         saved = found
 
 
 def test_a_power_cut_while_a_record_is_written_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
-    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 20)
-    pico.hand.save_settings()
+    pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 20)
+    pico.hand.board.save_settings()
     cut_at_each(pico, (0, 1, 15, 16, 65, 66, PAGE - 1), 20)
     assert pico.counters()["flash"]["erases"] == 1
 
 
 def test_a_power_cut_while_the_sector_changes_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
     for value in range(20, 20 + RECORDS):  # the first sector is full then
-        pico.hand.set_setting(Setting.IDLE_PERIOD_MS, value)
-        pico.hand.save_settings()
+        pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, value)
+        pico.hand.board.save_settings()
     assert pico.counters()["flash"]["erases"] == 1
     cuts = (0, 1, SECTOR - 1, SECTOR, SECTOR + 100, SECTOR + PAGE, SECTOR + PAGE + 10, SECTOR + 2 * PAGE - 1)
     cut_at_each(pico, cuts, 20 + RECORDS - 1)
@@ -110,7 +110,7 @@ def test_a_power_cut_while_the_sector_changes_leaves_the_old_settings_or_the_new
 
 
 def test_the_loader_is_entered_by_command_once_the_reply_is_out(pico: Pico) -> None:
-    pico.hand.reboot_bootloader()
+    pico.hand.board.reboot_bootloader()
     facts = pico.until(loaders=1)
     assert facts["usb"]["state"] == "detached"
     assert facts["watchdog_resets"] == 0
@@ -123,16 +123,16 @@ def test_the_loader_is_entered_by_a_touch_at_1200_baud(pico: Pico) -> None:
 
 def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
     first = pico.boot_id()
-    assert pico.hand.clear_faults().board == FaultFlags.STARTED
+    assert pico.hand.board.clear_faults().board == FaultFlags.STARTED
     pico.board.say("lose interrupts")
     facts = pico.until(watchdog_resets=1)
     assert facts["boots"] == 2
     pico.up(2)
     assert pico.boot_id() != first
-    assert pico.hand.clear_faults().board == FaultFlags.HUNG
+    assert pico.hand.board.clear_faults().board == FaultFlags.HUNG
     pico.board.say("cut power")
     pico.up(3)
-    assert pico.hand.faults().board == FaultFlags.STARTED
+    assert pico.hand.board.faults().board == FaultFlags.STARTED
 
 
 def test_the_flashs_number_is_the_boards_and_the_usb_serial(pico: Pico) -> None:
@@ -180,8 +180,8 @@ def test_a_flash_without_quad_reads_is_read_by_its_plain_command(pico: Pico, ver
     pico.board.say("cut power")
     pico.up(boots=2)
     assert pico.counters()["flash"]["misses"] > quick["flash"]["misses"]  # it was read once more
-    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    pico.hand.save_settings()
+    pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    pico.hand.board.save_settings()
     pico.board.say("cut power")
     pico.up(boots=3)
-    assert pico.hand.setting(Setting.IDLE_PERIOD_MS) == 250
+    assert pico.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250

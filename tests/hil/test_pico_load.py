@@ -12,7 +12,7 @@ from maps import BIG, make_map
 from rig import Rig
 
 import biotac
-from biotac import FaultFlags, FrameFlags, QuantityFlags
+from biotac import FaultFlags, FrameFlags
 from biotac.wire.messages_gen import INVALID_COUNT
 from biotac.wire.sensor_gen import SLOT_HZ
 
@@ -25,7 +25,7 @@ def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers={FINGERS}&seconds={SECONDS}&pace=fast")
     for finger in range(FINGERS):
-        hand.set_map(finger, make_map(finger, blocks=BIG))
+        hand.board.set_map(finger, make_map(finger, blocks=BIG))
     assert len(hand.read(100)) == FINGERS * 100 * SECONDS
     status = hand.status()
     assert (status.slots_late, status.messages_dropped) == (0, 0)
@@ -40,8 +40,8 @@ def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(ri
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers={FINGERS}&seconds=20&pace=fast")
     for finger in range(FINGERS):
-        hand.set_map(finger, make_map(finger, blocks=BIG))
-    hand.subscribe(QuantityFlags(0x7F))
+        hand.board.set_map(finger, make_map(finger, blocks=BIG))
+    hand.stream("results", "sigma", "touch")
     board = hand.link.board  # type: ignore[attr-defined]
     before = board.counters()
     hand.read(1.0)

@@ -11,10 +11,10 @@ import pytest
 from rig import Rig
 
 import biotac
-from biotac import Calibration, QuantityFlags, Setting
+from biotac import Calibration, Setting
 from biotac.core.compiled import default_settings
-from biotac.recording import Recording
 from biotac.recording.crosscheck import CrossCheck
+from biotac.recording.reader import Recording
 from biotac.sim.physics import Profile
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
@@ -36,9 +36,9 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:
     hand = board("press.toml?fingers=2")
-    hand.set_calibration(1, replace(Calibration(), pressure_gain_nn=GAIN_NN))
-    hand.set_setting(Setting.PRESSURE_FILTER_MILLI, 300)
-    settings, own = hand.settings(), hand.finger_settings()
+    hand.board.set_calibration(1, replace(Calibration(), pressure_gain_nn=GAIN_NN))
+    hand.board.set_setting(Setting.PRESSURE_FILTER_MILLI, 300)
+    settings, own = hand.board.settings(), hand.board.finger_settings()
     hand.record(tmp_path / "pressed.mcap")
     batch = hand.read_batch(2.5)
     hand.close()
@@ -69,16 +69,15 @@ def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(
 ) -> None:
     """The same source three times: everything, force alone, and pressure alone with heartbeats at rest."""
 
-    def played(quantities: QuantityFlags | None) -> Batch:
+    def played(*names: str, rest: bool = True) -> Batch:
         hand = board("press.toml")
-        hand.set_calibration(0, replace(Calibration(), pressure_gain_nn=GAIN_NN))
-        if quantities is not None:
-            hand.subscribe(quantities)
+        hand.board.set_calibration(0, replace(Calibration(), pressure_gain_nn=GAIN_NN))
+        hand.stream(*names, rest=rest)
         return hand.read_batch(2.5)
 
-    full = played(None)
-    force = played(QuantityFlags.FORCE | QuantityFlags.REST_FRAMES)
-    pressure = played(QuantityFlags.PRESSURE)
+    full = played()
+    force = played("force")
+    pressure = played("pressure", rest=False)
     assert np.isnan(force.frames["pdc_filtered"]).all() and np.isnan(force.frames["pressure_force_n"]).all()
     frames = pressure.frames
     assert 50 < len(frames) < len(full.frames) and np.isnan(frames["force_n"]).all()

@@ -79,7 +79,7 @@ def uploading_a_map(its: Restarts) -> None:
 
 
 def storing(its: Restarts) -> None:
-    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 260)
+    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
     its.hand._board.send(wire.SaveSettings(0))
 
 
@@ -89,23 +89,23 @@ STATES = [idle, taring, streaming, with_a_keep_alive, touched, held, uploading_a
 def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: str, said: FaultFlags) -> None:
     """In a state, and then not: what the board must say, and may not know any more."""
     its = Restarts(rig, folder, WORLD)
-    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    its.hand.set_map(AT_REST, KEPT)
-    its.hand.save_settings()
-    at_first_ms = its.hand.setting(Setting.HOLD_TIMEOUT_MS)
-    its.hand.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
+    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    its.hand.board.set_map(AT_REST, KEPT)
+    its.hand.board.save_settings()
+    at_first_ms = its.hand.board.setting(Setting.HOLD_TIMEOUT_MS)
+    its.hand.board.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
     before = its.hand.info
     state(its)
     getattr(its, how)()
     hand, after = its.hand, its.hand.info
     assert after.boot_id != before.boot_id
     assert after.board_serial == before.board_serial
-    status, faults = hand.status(), hand.faults()
+    status, faults = hand.status(), hand.board.faults()
     assert faults.board == said and not faults.fingers
     assert status.streams == 0 and status.rx_errors == 0
-    found = hand.setting(Setting.IDLE_PERIOD_MS), hand.setting(Setting.HOLD_TIMEOUT_MS)
+    found = hand.board.setting(Setting.IDLE_PERIOD_MS), hand.board.setting(Setting.HOLD_TIMEOUT_MS)
     assert found == (250, at_first_ms) or (state is storing and found == (260, 60_000))
-    assert hand.maps() == {AT_REST: KEPT}
+    assert hand.board.maps() == {AT_REST: KEPT}
     frames = hand.read(0.5)
     flags = frames["flags"]
     tared = flags & FrameFlags.UNTARED == 0
@@ -131,10 +131,10 @@ def test_after_it_hung_it_begins_anew_and_says_so(rig: Rig, tmp_path: Path, stat
 
 def test_saved_settings_that_lose_a_bit_are_told_and_the_ones_before_hold(rig: Rig, tmp_path: Path) -> None:
     its = Restarts(rig, tmp_path, WORLD)
-    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    its.hand.save_settings()
-    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 260)
-    its.flip_saved_bit(its.hand.save_settings)
+    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    its.hand.board.save_settings()
+    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
+    its.flip_saved_bit(its.hand.board.save_settings)
     its.lose_power()
-    assert its.hand.setting(Setting.IDLE_PERIOD_MS) == 250
-    assert its.hand.faults().board == FaultFlags.STARTED | FaultFlags.STORAGE
+    assert its.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
+    assert its.hand.board.faults().board == FaultFlags.STARTED | FaultFlags.STORAGE

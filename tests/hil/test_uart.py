@@ -38,9 +38,9 @@ def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
     rig.opened.append(board)
     board.release()
     with biotac.open(board.path) as hand:
-        hand.set_setting(Setting.UART_BITS_PER_S, BAUD)
-        hand.set_setting(Setting.UART_PINS, wire.UartPins.GPIO_4_5)
-        hand.save_settings()
+        hand.board.set_setting(Setting.UART_BITS_PER_S, BAUD)
+        hand.board.set_setting(Setting.UART_PINS, wire.UartPins.GPIO_4_5)
+        hand.board.save_settings()
         assert board.counters()["uart"] is None  # not before the next start
     board.do("cut power")
     board.until(PATIENCE_S, uart={"sent": 0})
@@ -50,7 +50,7 @@ def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
         assert len(told.wire) == FRAMES and len(told.pac) == 0  # PAC is for who asks for it
         too_much = "carries 400000 bit/s, but FRAME and PAC of 2 fingers take 423820; stream at most 1 "
         with pytest.raises(InputError, match=too_much):
-            hand.start(pac=True)
+            hand.stream("results", "pac")
         with biotac.open(board.path) as other:
             assert other.info.boot_id == hand.info.boot_id
             assert other.status().streams == 0  # USB has the word, and the UART's stream has ended
@@ -58,7 +58,7 @@ def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
     with shake_hands(UartLink(board.uart_path)) as hand:  # which knows no limit
         status = hand.status()
         assert (status.messages_dropped, status.rx_errors, status.slots_late) == (0, 0, 0)
-        hand.start(pac=True)
+        hand.stream("results", "pac")
         hand.read(1.0)
         assert hand.stats.pac_lost > 0
         assert hand.stats.crc_errors == hand.stats.other_errors == 0  # whole messages

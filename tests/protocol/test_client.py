@@ -51,7 +51,7 @@ def test_the_example_prints_the_frames_that_python_reads(tmp_path: Path) -> None
     ]
     assert len(told) == FRAMES
     with biotac.open("sim:press.toml?fingers=2&seconds=30") as hand:
-        hand.start()
+        hand.stream()
         wire = {}
         for batch in hand.batches():
             wire |= {(int(m["finger"]), int(m["t_us"])): m for m in batch.wire}

@@ -1,47 +1,111 @@
-"""A scripted board that streams on demand, can vanish, and come back as another boot; and a clock that tests turn."""
+"""A scripted board that streams on demand, can vanish, and come back as another boot; a hand on it; and a clock that
+tests turn."""
 
 from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from biotac.hand.hand import Hand
+from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
+from biotac.wire.batches import Batch, StreamDecoder
 from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
 
+WAIT_S = 600.0  # only a failing test waits so long
+#: A scripted board with a clock started this long ago, so that frames of the past can be sent.
+AHEAD_S = 40.0
+#: All frames of a board without one are fresh.
+ANY_AGE_S = 1e6
 
-def frame(seq: int, finger: int = 0, force_z_n: float = 0.0) -> bytes:
-    """A FRAME of device time 10 ms * seq."""
+
+def packed(message: Any) -> bytes:
+    """A message as it goes over the link."""
+    return encode(message.ID, message.pack())
+
+
+def frame(seq: int, finger: int = 0, force_z_n: float = 0.0, t_us: int | None = None, flags: int = 0) -> bytes:
+    """A FRAME of device time 10 ms * seq, unless told otherwise."""
     values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
-    values |= {"seq": seq % 65536, "t_us": seq * 10_000, "finger": finger, "counts": (2000,) * 19}
+    values |= {"seq": seq % 65536, "t_us": seq * 10_000 if t_us is None else t_us, "finger": finger, "flags": flags}
     values |= {"tare_q4": (32000,) * 19, "poc_um": (0, 0, 5080), "force_100un": (0, 0, round(force_z_n * 1e4))}
     values |= {"torsion_mnmm": 250 * finger, "torque_mnmm": (0, 0, 0), "force_sigma_100un": (0, 0, 0)}
-    return encode(wire.Frame.ID, wire.Frame(**values).pack())
+    return packed(wire.Frame(**values | {"counts": (2000,) * 19}))
+
+
+def heartbeat(seq: int, finger: int = 0, frames: int = 1) -> bytes:
+    """An IDLE in place of so many frames, the last of device time 10 ms * seq."""
+    return packed(wire.Idle(seq % 65536, seq * 10_000, finger, 0, 0, frames, 0, 2000, 2000))
+
+
+def batch_of(*frames: bytes) -> Batch:
+    """What these bytes are read as, at once."""
+    return StreamDecoder().feed(b"".join(frames), time.monotonic())
 
 
 class Firmware:
-    """What a gateway answers, and all that it was told."""
+    """What a gateway answers, and all that it was told. It streams nothing by itself."""
 
     def __init__(self, hello: Callable[..., bytes], **facts: Any) -> None:
         self._hello = hello
-        self._facts = facts
+        self.facts: dict[str, Any] = {"fingers_present": 0b11111} | facts
+        self.begin_s: float | None = None  # of its clock; without one, its time is that of what it has sent
+        self.t_us = 0
+        self.streams = 0  # that are on
+        self.faults = 0
+        self.idle = True  # all fingers rest: STATUS counts their heartbeats on
+        self.frames_idle = 0
+        self.mute: set[type] = set()  # what it does not answer
+        self.refuses: dict[type, int] = {}  # error, by kind
+        self.before: dict[type, bytes] = {}  # what it sends before its answer to a kind, once
+        self.after: dict[type, bytes] = {}  # and with it
+        self.settings: dict[int, int] = {}
         self.told: list[Any] = []
         self.heard = threading.Condition()
 
+    def now_us(self) -> int:
+        """Its time."""
+        return self.t_us if self.begin_s is None else round((time.monotonic() - self.begin_s) * 1e6)
+
     def __call__(self, message_id: int, payload: bytes) -> bytes:
         message = wire.MESSAGES[message_id].unpack(payload)
+        kind = type(message)
+        if kind is wire.Start:
+            self.streams = message.streams
+        elif kind is wire.Stop:
+            self.streams = 0
         with self.heard:
             self.told.append(message)
             self.heard.notify_all()
+        answer = b"" if kind in self.mute else self._answer(message, payload)
+        return self.before.pop(kind, b"") + answer + self.after.pop(kind, b"")
+
+    def _answer(self, message: Any, payload: bytes) -> bytes:
+        if type(message) in self.refuses:
+            return packed(wire.Reply(message.req_id, message.ID, self.refuses[type(message)]))
         if isinstance(message, wire.HelloRequest):
-            return self._hello(payload, **self._facts)
+            return self._hello(payload, **self.facts)
+        if isinstance(message, wire.GetStatus):
+            return packed(self.status(message.req_id))
         if isinstance(message, wire.SetSetting):
-            answer = wire.SettingValue(message.req_id, message.setting, message.value)
-            return encode(answer.ID, answer.pack())
-        return encode(wire.Reply.ID, wire.Reply(message.req_id, message_id, 0).pack())
+            self.settings[message.setting] = message.value
+        if isinstance(message, (wire.SetSetting, wire.GetSetting)):
+            value = self.settings.get(message.setting, 0)
+            return packed(wire.SettingValue(message.req_id, message.setting, value))
+        return packed(wire.Reply(message.req_id, message.ID, 0))
+
+    def status(self, req_id: int = 0) -> wire.Status:
+        """Its STATUS."""
+        self.frames_idle += self.idle
+        facts = dict.fromkeys((f.name for f in fields(wire.Status)), 0) | {"finger_faults": (0,) * 5}
+        facts |= {"req_id": req_id, "t_us": self.now_us(), "fingers_present": self.facts["fingers_present"]}
+        return wire.Status(**facts | {"streams": self.streams, "faults": self.faults, "frames_idle": self.frames_idle})
 
     def of(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:
         """What it was told of a kind."""
@@ -50,26 +114,55 @@ class Firmware:
     def wait_for(self, kind: type[Any] | tuple[type[Any], ...], count: int = 1) -> None:
         """Until it was told so many of a kind."""
         with self.heard:
-            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 600), f"no {kind}: {self.told}"
+            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, WAIT_S), f"no {kind}: {self.told}"
+
+    def wait_for_looks(self, count: int = 2) -> None:
+        """Until the host has looked so often, from now on; the first may have been under way."""
+        self.wait_for(wire.GetStatus, len(self.of(wire.GetStatus)) + count)
+
+
+class Live:
+    """A hand on a scripted board. Frames are as old as their arrival, unless ``start_clock`` is called first."""
+
+    def __init__(self, board: Any, firmware: Firmware, link: SerialLink | None = None, **how: Any) -> None:
+        self.board = board
+        self.firmware = firmware
+        link = link or SerialLink(board.path)
+        link.keeps_time = False
+        self.hand = Hand(link, **{"max_age_s": ANY_AGE_S} | how)
+
+    def start_clock(self) -> None:
+        """From now on the board's time is a real clock: send frames of its ``now_us``."""
+        self.firmware.begin_s = time.monotonic() - AHEAD_S
+        self.hand.link.keeps_time = True
+        self.hand.sync()
+
+    def send(self, *frames: bytes) -> None:
+        """Let the board send this, in one piece."""
+        self.firmware.t_us = max(self.firmware.t_us, batch_of(*frames).last_t_us() or 0)
+        os.write(self.board._master, b"".join(frames))
+
+
+def until(so: Callable[[], Any]) -> None:
+    """Wait."""
+    end_s = time.monotonic() + WAIT_S
+    while not so():
+        assert time.monotonic() < end_s, "it never came true"
+        time.sleep(0.001)
 
 
 class Clock:
     """A HostClock by hand: ``sleep`` calls ``while_away`` instead of waiting."""
 
     def __init__(self) -> None:
-        self.now_s = 1000.0
         self.pauses = 0
         self.while_away: Callable[[int], None] = lambda n: None
 
-    def monotonic_s(self) -> float:
-        return self.now_s
-
-    def unix_ns(self) -> int:
-        return round(self.now_s * 1e9)
+    monotonic_s = staticmethod(time.monotonic)
+    unix_ns = staticmethod(time.time_ns)
 
     def sleep(self, seconds: float) -> None:
         self.pauses += 1
-        self.now_s += seconds
         self.while_away(self.pauses)
 
     def wake(self) -> None:

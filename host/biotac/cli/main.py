@@ -13,57 +13,33 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from ..errors import BiotacError, InputError, printable
+from ..version import __version__
+from .outputs import note
 
 #: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
 VERBS = {
-    "demo": (
-        "biotac.cli.live.demo",
-        "Run the whole chain once: simulated board, stream, recording, cross-check, picture.",
-    ),
-    "list": (
-        "biotac.cli.boards.list_ports",
-        "List boards and other serial ports, and the scenarios that can be simulated.",
-    ),
-    "doctor": (
-        "biotac.cli.boards.doctor",
-        "Find what is wrong with a board, its sensors or this computer, and the cure.",
-    ),
-    "info": ("biotac.cli.boards.info", "Show what is on a port: board, firmware, sensors, settings, counters."),
-    "view": ("biotac.cli.live.view", "Show a board or a recording live in the browser."),
-    "stream": ("biotac.cli.live.stream", "Print frames as they arrive: one line each, or one JSON object each."),
-    "lsl": ("biotac.cli.live.lsl", "Publish fingers on the Lab Streaming Layer."),
-    "serve": ("biotac.cli.live.serve", "Share a board with other computers, which open it as zenoh:NAME."),
-    "record": ("biotac.cli.live.record", "Record everything a board sends to an MCAP file."),
-    "check": (
-        "biotac.cli.recordings.check",
-        "Check every on-board result of a recording against the float64 reference.",
-    ),
-    "replay": ("biotac.cli.recordings.replay", "Play a recording as the board that made it, here or on a pty."),
+    "demo": ("live.demo", "Run the whole chain once: simulated board, stream, recording, cross-check, picture."),
+    "list": ("boards.list_ports", "List boards and other serial ports, and the scenarios that can be simulated."),
+    "doctor": ("boards.doctor", "Find what is wrong with a board, its sensors or this computer, and the cure."),
+    "info": ("boards.info", "Show what is on a port: board, firmware, sensors, settings, counters."),
+    "view": ("live.view", "Show a board or a recording live in the browser."),
+    "stream": ("live.stream", "Print frames as they arrive: one line each, or one JSON object each."),
+    "share": ("live.share", "Share a board with other programs and computers, by Zenoh or LSL."),
+    "record": ("live.record", "Record everything a board sends to an MCAP file."),
+    "check": ("recordings.check", "Check every on-board result of a recording against the float64 reference."),
+    "replay": ("recordings.replay", "Play a recording as the board that made it, here or on a pty."),
     "export": (
-        "biotac.cli.recordings.export",
+        "recordings.export",
         "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, or recomputed; many to a lake.",
     ),
-    "lake": (
-        "biotac.cli.recordings.lake",
-        "Check a lake of recordings, query it in SQL, or list its boards and sensors.",
-    ),
+    "lake": ("recordings.lake", "Check a lake of recordings, query it in SQL, or list its boards and sensors."),
     "calibrate": (
-        "biotac.cli.calibrate",
-        "Fit a finger's wrench or pressure to a reference, test it on held-out data, upload it.",
+        "calibrate",
+        "Fit a finger's wrench or pressure to a reference, test it on held-out data, and upload.",
     ),
-    "calibration": ("biotac.cli.boards.calibration", "Show, get, put or store a finger's calibration."),
-    "map": (
-        "biotac.cli.boards.wrench_map",
-        "Show, get, put or clear the wrench map that a board computes a finger's force by.",
-    ),
-    "sim": ("biotac.cli.live.sim", "Run a simulated or emulated board on a pty that any serial program can open."),
-    "sensor": (
-        "biotac.cli.live.sensor",
-        "Let a Pico that is wired to a gateway play scenarios and recordings as its sensors.",
-    ),
-    "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
-    "udev-setup": ("biotac.cli.boards.udev_setup", "Install the Linux rule that lets you open boards (needs root)."),
-    "version": ("biotac.cli.version", "Print the release, the wire version and the schema hash."),
+    "calibration": ("boards.calibration", "Show, get, put or clear a finger's calibration or wrench map."),
+    "sim": ("live.sim", "Run a simulated or emulated board on a pty, or let a Pico play a gateway's sensors."),
+    "flash": ("boards.flash", "Write a firmware image to a board, and give it its settings back."),
 }
 
 EPILOG = """\
@@ -86,6 +62,16 @@ class OneLineEach(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 16
 
 
+class Version(argparse.Action):
+    """Prints the release, the wire version and the schema hash, which it imports only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *called: object) -> None:
+        from ..wire import messages_gen as wire
+
+        print(f"biotac-gateway {__version__}, wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}, schema {wire.SCHEMA_HASH:08x}")
+        parser.exit()
+
+
 class Parser(argparse.ArgumentParser):
     """A parser, its subparsers too, that takes no abbreviation of an option: --f would be --force."""
 
@@ -103,15 +89,19 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
         add_help=False,
     )
     top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # who can read its help needs no help line
+    top.add_argument(
+        "--version", action=Version, nargs=0, help="print the release, the wire version and the schema hash"
+    )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, (place, text) in VERBS.items():
         verb = verbs.add_parser(name, help=text, description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")
         if name in called:
-            module = importlib.import_module(place)
+            module = importlib.import_module(f"biotac.cli.{place}")
             verb.epilog = f"example: {module.EXAMPLE}"
-            module.add_arguments(verb)
-            verb.set_defaults(run=module.run)
+            if hasattr(module, "run"):
+                verb.set_defaults(run=module.run)
+            module.add_arguments(verb)  # subverbs have a run() each
     return top
 
 
@@ -126,18 +116,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return int(args.run(args))
     except BiotacError as error:
-        print(f"biotac: {one_line(error)}", file=sys.stderr)
+        note(one_line(error))
         return error.exit_code
     except KeyboardInterrupt as interrupt:
         # The message says what became of a file that was being written.
-        print(f"biotac: interrupted{f'; {interrupt}' if interrupt.args else ''}", file=sys.stderr)
+        note(f"interrupted{f'; {interrupt}' if interrupt.args else ''}")
         return 130
     except BrokenPipeError:
         # The reader of our output closed it; keep Python from complaining while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        print(f"biotac: {printable(one_line(error))}; check the path and the free disk space", file=sys.stderr)
+        note(f"{printable(one_line(error))}; check the path and the free disk space")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return InputError.exit_code
 

@@ -1,11 +1,25 @@
-"""Checks where a verb's results go, before minutes of work and not after."""
+"""What a verb prints, and checks of where its files go: before minutes of work and not after."""
 
 from __future__ import annotations
 
+import argparse
+import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError, taken
+
+
+def say(args: argparse.Namespace, facts: Any, text: str) -> None:
+    """Print a result: its facts for --json, else its text."""
+    print(json.dumps(facts) if args.json else text, flush=True)
+
+
+def note(text: str) -> None:
+    """Print a remark on stderr; stdout is for the result."""
+    print(f"biotac: {text}", file=sys.stderr)
 
 
 def check_file(place: Path | None, *, overwrite: bool) -> None:

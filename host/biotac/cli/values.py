@@ -1,10 +1,16 @@
-"""Argument types that several verbs share."""
+"""Arguments that several verbs share, and their types."""
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..hand.hand import Hand
 
 
 def number(text: str) -> float:
@@ -69,6 +75,45 @@ def fingers(text: str) -> tuple[int, ...]:
     return tuple(finger(part) for part in text.split(","))
 
 
+def add_subverb(
+    what: Any, name: str, run: Callable[[argparse.Namespace], int], text: str, example: str = ""
+) -> argparse.ArgumentParser:
+    """Add ``name`` to ``what``, the subparsers of a verb."""
+    parser: argparse.ArgumentParser = what.add_parser(
+        name,
+        help=text,
+        description=text,
+        epilog=example and f"example: {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    # The verb has --json already; here it is for those who write it last.
+    parser.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_finger(parser: argparse.ArgumentParser, *, required: bool = True, text: str = "name or chip select") -> None:
+    """Add --finger; it has no default, because nobody would notice a wrong one."""
+    parser.add_argument("--finger", metavar="NAME", type=finger, required=required, help=text)
+
+
+def check_answers(hand: Hand, finger: int) -> None:
+    """Raises InputError if the finger does not answer."""
+    if finger not in hand.fingers:
+        raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; check its cable")
+
+
+def add_save(parser: argparse._ActionsContainer) -> None:
+    """Add --save."""
+    text = "save it on the board, with all current settings, so that it survives a restart"
+    parser.add_argument("--save", action="store_true", help=text)
+
+
+def how_long(args: argparse.Namespace) -> str:
+    """How long the board keeps what it was given, by --save."""
+    return "saved" if args.save else "until the next reboot (--save keeps it)"
+
+
 def add_port(parser: argparse.ArgumentParser) -> None:
     """Add PORT, which may be left out."""
     parser.add_argument(
@@ -86,3 +131,11 @@ def numbers(text: str) -> tuple[float, ...]:
     if not all(map(math.isfinite, found)):
         raise argparse.ArgumentTypeError(f"seen {text!r}; expected numbers, separated by commas")
     return found
+
+
+def refuse(args: argparse.Namespace, options: Iterable[str], why: str) -> None:
+    """Raises InputError if one of these options is given: each has the default None, False or []."""
+    for option in options:
+        value = getattr(args, option)
+        if value is not None and value is not False and value != []:
+            raise InputError(f"--{option.replace('_', '-')} {why}")

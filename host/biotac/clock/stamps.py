@@ -14,6 +14,7 @@ from .device_clock import DeviceClock
 
 RENEW_S = 0.5  # between questions for the board's time
 UNKNOWN_S = 0.05  # the same, while the board's time is unknown
+STEP_S = 1e-6  # between stamps; less would be lost in a float64 of Unix time
 
 
 class Board(Protocol):
@@ -34,8 +35,8 @@ class Stamps:
 
     They come from ``board.clock``, which ``keep`` feeds. While that knows nothing, as with a simulated board, whose
     time is not a real clock, rows that came together are stamped by their arrival; ``by_arrival`` counts these. The
-    stamps of one ``stream`` never step back, unless the clock itself does: an estimate that is earlier than the stamp
-    before it is raised to that stamp.
+    stamps of one ``stream`` always grow, by STEP_S at least, unless the clock itself steps back: an estimate that is
+    not later than the stamp before it is raised.
     """
 
     def __init__(self, board: Board, now_s: Callable[[], float]) -> None:
@@ -58,8 +59,10 @@ class Stamps:
         """Stamps (n,) in s for unwrapped device times (n,) in us that came together; the last is the newest."""
         if not len(t_us):
             return np.empty(0)
-        stamps_s: NDArray[np.float64] = np.maximum(self._estimated(t_us), self._last_s.get(stream, -math.inf))
-        np.maximum.accumulate(stamps_s, out=stamps_s)
+        steps_s, estimated_s = STEP_S * np.arange(len(t_us)), self._estimated(t_us)
+        least_s = self._last_s.get(stream, -math.inf) + STEP_S
+        stamps_s: NDArray[np.float64] = np.maximum(estimated_s - steps_s, least_s)
+        stamps_s = np.maximum.accumulate(stamps_s) + steps_s
         self._last_s[stream] = float(stamps_s[-1])
         return stamps_s
 

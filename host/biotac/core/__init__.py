@@ -5,8 +5,9 @@ Its names are imported on first use: the map's room is below this one, and needs
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
+
+import lazy_loader
 
 if TYPE_CHECKING:
     from . import geometry
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BANDS_HZ", "SAMPLES", "geometry", "pac_bands", "to_frames"]
 
-_HOMES = {"BANDS_HZ": ".bands", "SAMPLES": ".bands", "pac_bands": ".bands", "to_frames": ".finger"}
-
-
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = importlib.import_module(_HOMES.get(name, f".{name}"), __name__)
-    return getattr(module, name, module)
+__getattr__, __dir__, _ = lazy_loader.attach(
+    __name__, ["geometry"], {"bands": ["BANDS_HZ", "SAMPLES", "pac_bands"], "finger": ["to_frames"]}
+)

@@ -17,10 +17,9 @@ from ..core.geometry import ELECTRODE_MM
 from ..core.unroll import unroll
 from ..errors import InputError
 from ..hand.opening import shake_hands
-from ..markdown import table
 from ..picture import check_drawable, picture
-from ..recording import Recording
 from ..recording.crosscheck import CrossCheck
+from ..recording.reader import Recording
 from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
 from ..sim.source import Source
@@ -56,7 +55,7 @@ class DemoRun:
 def run_demo(
     source_name: str, folder: Path, *, fingers: int | None = None, seconds: float | None = None, show: Show = print
 ) -> DemoRun:
-    """Play a source through a simulated board and leave demo.mcap, report.json, report.md and demo.png.
+    """Play a source through a simulated board and leave demo.mcap, report.json and demo.png.
 
     Raises InputError when the source cannot be played or the folder cannot be written.
     """
@@ -72,14 +71,14 @@ def run_demo(
     with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
         # The check is on the board's arithmetic with Lin's formulas, to a twentieth of a millinewton. What a calibrated
         # board would publish is computed below and drawn beside it.
-        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
-        settings = hand.settings()
+        hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
+        settings = hand.board.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)
         cpu = time.process_time()
         outcome = CrossCheck()
         batches: list[Batch] = []
-        hand.start(pac=has_pac)
+        hand.stream("force", "poc", "torque", "pressure", *(["pac"] if has_pac else []))
         for batch in hand.batches():
             outcome.add(batch.wire, settings)
             batches.append(batch)
@@ -121,12 +120,11 @@ def run_demo(
         "calibrated_rmse_n": force_error(source, joined, answers.calibrated_n),
         "crosscheck": outcome.as_dict(),
         "recording": str(recording_path),
-        "report": str(folder / "report.md"),
+        "report": str(folder / "report.json"),
         "picture": str(folder / "demo.png"),
     }
     draw(source, joined, source_rows(source, joined), answers, folder / "demo.png")
     (folder / "report.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
-    (folder / "report.md").write_text(report_text(facts), encoding="utf-8")
     return DemoRun(source, joined, facts)
 
 
@@ -172,45 +170,6 @@ def force_error(source: Source, batch: Batch, force_n: NDArray[np.float64] | Non
     said = frames["force_n"] if force_n is None else force_n[touched]
     difference = said - truth[rows, frames["finger"]]
     return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
-
-
-def report_text(facts: dict[str, Any]) -> str:
-    """The report as Markdown."""
-    check = facts["crosscheck"]
-    lines = [
-        f"# Demo: {facts['source']}",
-        "",
-        f"{facts['rows']} rows on {facts['fingers']} finger(s), {facts['device_seconds']:.2f} s of device time.",
-        "",
-        *table(
-            ["", "seen", "bound"],
-            [
-                ["frames", f"{facts['frames']}", ""],
-                ["frames lost", f"{facts['frames_lost']}", "0"],
-                ["CRC errors", f"{facts['crc_errors']}", "0"],
-                ["cross-check violations", f"{check['violations']}", "0"],
-                ["PoC error, max", f"{check['poc_um_max']:.3f} um", f"{check['poc_um_bound']:.3f} um"],
-                ["force error, max", f"{check['force_mn_max']:.4f} mN", f"{check['force_mn_bound']:.4f} mN"],
-                ["torque error, max", f"{check['torque_nmm_max']:.5f} N*mm", f"{check['torque_nmm_bound']:.5f} N*mm"],
-                ["host CPU", f"{facts['host_cpu_percent']} % of one core", ""],
-            ],
-        ),
-        "These errors compare the board's fixed-point arithmetic with the same formulas in float64. They do not show",
-        "how well the formulas match a real force.",
-    ]
-    if facts["force_rmse_n"] is not None:
-        lines += ["", "RMS error against the source's own force, in contact, in N, x / y / z:", ""]
-        for words, name in (
-            ("the board, with Lin's scales from its settings", "force_rmse_n"),
-            ("the firmware's default scales", "lin_rmse_n"),
-            (facts["calibrated_by"], "calibrated_rmse_n"),
-        ):
-            x, y, z = facts[name]
-            lines.append(f"* {words}: {x:.2f} / {y:.2f} / {z:.2f}")
-    if facts["tare_changes"]:
-        changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
-        lines += ["", *table(["finger", "frame", "reason for the new tare"], changes)[:-1]]
-    return "\n".join(lines) + "\n"
 
 
 def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], answers: Answers, path: Path) -> None:

@@ -67,8 +67,9 @@ CATALOGUE: dict[str, Entry] = {
     "no_permission": Entry(
         E,
         "The port belongs to another user or group.",
-        "`sudo biotac udev-setup` installs the rule that gives it to whoever sits at the computer (`biotac udev-setup "
-        "--print` shows it); then plug the board in again. Without root: be added to the port's group, often dialout.",
+        "`sudo biotac doctor --udev-rule install` installs the rule that gives it to whoever sits at the computer "
+        "(`biotac doctor --udev-rule print` shows it); then plug the board in again. Without root: be added to the "
+        "port's group, often dialout.",
     ),
     "port_busy": Entry(
         E,
@@ -84,7 +85,7 @@ CATALOGUE: dict[str, Entry] = {
         W,
         "ModemManager takes a new serial port for a modem and sends it commands for some seconds after it is plugged "
         "in: opening fails with busy, or the first frames are lost.",
-        "`sudo biotac udev-setup` tells it to leave our boards alone; then plug the board in again.",
+        "`sudo biotac doctor --udev-rule install` tells it to leave our boards alone; then plug the board in again.",
     ),
     "port_failed": Entry(
         E,
@@ -219,7 +220,7 @@ CATALOGUE: dict[str, Entry] = {
     "faults_latched": Entry(
         W,
         "The board remembers faults from before this examination, even of a single round, until somebody clears them.",
-        "Look up each flag in MESSAGES.md and safety.md; once you know its cause, call `Hand.clear_faults()`.",
+        "Look up each flag in MESSAGES.md and safety.md; once you know its cause, call `Hand.board.clear_faults()`.",
     ),
     "slots_late": Entry(
         E,

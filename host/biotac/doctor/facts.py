@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..board.handshake import HandWarning
 from ..clock import Fit
 from ..errors import BiotacError
-from ..hand.compatibility import HandWarning
 from ..link.discovery import SerialPort
 from ..link.holders import Holder
 from ..wire import messages_gen as wire

@@ -19,7 +19,7 @@ def rule() -> str:
     return "\n".join(
         [
             "# BioTac gateway boards: for whoever sits at this computer, and not for ModemManager.",
-            "# Written by `biotac udev-setup`.",
+            "# Written by `biotac doctor --udev-rule install`.",
             f'SUBSYSTEM=="tty", {ours}, TAG+="uaccess", {ignore}',
             f'SUBSYSTEM=="usb", {ours}, TAG+="uaccess", {ignore}',
             "# The same boards in their loader.",
@@ -36,4 +36,5 @@ def install(path: Path = RULES) -> None:
     try:
         path.write_text(rule())
     except PermissionError as error:
-        raise PortError(f"no permission to write {path}; run it as root: sudo biotac udev-setup") from error
+        cure = "run it as root: sudo biotac doctor --udev-rule install"
+        raise PortError(f"no permission to write {path}; {cure}") from error

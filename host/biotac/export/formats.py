@@ -20,19 +20,18 @@ Write = Callable[[Path, list[Table], Recording, Show], None]
 
 @dataclass(frozen=True)
 class Format:
-    """An export format. ``module`` is imported when needed; ``extra`` is the extra that must be installed for it."""
+    """An export format. ``module`` is imported when needed; it may need the extra ``export``."""
 
     module: str
     what: str
-    extra: str | None = None
 
 
 FORMATS = {
     ".csv": Format("biotac.export.csv_text", "text, one line per finger and round; PAC and bands in separate files"),
-    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; the same files", "parquet"),
-    ".h5": Format("biotac.export.hdf5", "HDF5, one group per finger, one dataset per column", "hdf5"),
+    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; the same files"),
+    ".h5": Format("biotac.export.hdf5", "HDF5, one group per finger, one dataset per column"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
-    ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
+    ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
 }
 
 
@@ -64,7 +63,7 @@ def writer_for(out: Path) -> ModuleType:
         return import_module(kind.module)
     except ImportError as error:
         raise InputError(
-            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"
+            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[export]'"
         ) from error
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from functools import cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import Field
 from ..wire.frames import StructArray
+from ..wire.native import BUILT
 from ..wire.sensor_gen import ELECTRODE_NAMES
 from .columns import STAMP, Table
 
@@ -57,7 +57,7 @@ def _name(message_id: int) -> str:
 
 @cache
 def _schema() -> dict[str, Any]:
-    text = resources.files("biotac").joinpath("schema.json").read_text(encoding="utf-8")
+    text = (BUILT / "schema.json").read_text(encoding="utf-8")
     messages: dict[str, Any] = json.loads(text)["link"]["message"]
     return messages
 

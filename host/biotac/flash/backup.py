@@ -13,7 +13,6 @@ from typing import Any
 
 from ..documents import read_document, sealed, write_new
 from ..errors import CommandRefusedError, InputError
-from ..hand.compatibility import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..hand.hand import Hand
 from ..keep import Calibration
 from ..keep.calibration_file import from_dict, to_dict
@@ -53,7 +52,7 @@ def read_settings(hand: Hand) -> dict[int, int]:
     values: dict[int, int] = {}
     for setting in range(1, LAST_ID + 1):
         try:
-            values[setting] = hand.setting(setting)
+            values[setting] = hand.board.setting(setting)
         except CommandRefusedError as refused:
             if refused.error != wire.Error.UNKNOWN_SETTING:
                 raise
@@ -73,7 +72,9 @@ def save(hand: Hand, path: Path | None) -> Backup:
     Raises InputError when the file exists or cannot be written.
     """
     hello = hand.info
-    backup = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), hand.maps())
+    backup = Backup(
+        (path or default_path(hello)).resolve(), read_settings(hand), hand.board.calibrations(), hand.board.maps()
+    )
     facts = {
         "format": FORMAT,
         "board": board_text(hello.board),
@@ -115,28 +116,24 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
     values = wanted.values
     changed = [key for key, value in values.items() if key in found and found[key] != value]
     for key in changed:
-        hand.set_setting(key, values[key])
-    knows_calibrations = hand.info.wire_minor >= CALIBRATION_SINCE_MINOR
-    knows_maps = hand.info.wire_minor >= MAP_SINCE_MINOR
-    calibrations = wanted.calibrations if knows_calibrations else {}
-    given = [finger for finger, its in calibrations.items() if hand.calibration(finger) != its]
+        hand.board.set_setting(key, values[key])
+    calibrations = wanted.calibrations
+    given = [finger for finger, its in calibrations.items() if hand.board.calibration(finger) != its]
     for finger in given:
-        hand.set_calibration(finger, calibrations[finger])
-        if hand.calibration(finger) != calibrations[finger]:
+        hand.board.set_calibration(finger, calibrations[finger])
+        if hand.board.calibration(finger) != calibrations[finger]:
             raise InputError(f"{calibration_name(finger)} reads back differently after it was restored; set it by hand")
-    maps = wanted.maps if knows_maps else {}
-    uploaded = [finger for finger, blob in maps.items() if hand.get_map(finger) != blob]
+    maps = wanted.maps
+    uploaded = [finger for finger, blob in maps.items() if hand.board.get_map(finger) != blob]
     for finger in uploaded:
-        hand.set_map(finger, maps[finger])  # which reads it back
+        hand.board.set_map(finger, maps[finger])  # which reads it back
     if changed or given or uploaded:
-        hand.save_settings()
+        hand.board.save_settings()
         found = read_settings(hand)
     for key, value in values.items():
         if found.get(key, value) != value:
             raise InputError(f"{setting_name(key)} reads {found[key]} after {value} was restored; set it by hand")
     unknown = [setting_name(key) for key in wanted.values if key not in found]
-    unknown += [] if knows_calibrations else map(calibration_name, wanted.calibrations)
-    unknown += [] if knows_maps else map(map_name, wanted.maps)
     put_back = (*map(setting_name, changed), *map(calibration_name, given), *map(map_name, uploaded))
     return Restored(put_back, tuple(unknown))
 

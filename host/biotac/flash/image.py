@@ -18,6 +18,10 @@ from .note import Note
 
 BLOCK_BYTES = 512
 HEAD = struct.Struct("<8I")
+FIELDS = (
+    "magic number", "second magic number", "flags", "address", "size", "number", "count of blocks", "family",
+    "last magic number",
+)  # fmt: skip
 PAGE_BYTES = 256
 MAGIC = (0x0A324655, 0x9E5D5157, 0x0AB16F30)
 FLAG_FAMILY = 0x2000
@@ -73,40 +77,27 @@ def split(data: bytes) -> tuple[bytes, ...]:
 
 
 def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
-    """The flash's contents from its first byte on. Raises ValueError for a block that the boot ROM would not write."""
+    """The flash's contents from its first byte on. Raises ValueError for a block that the boot ROM would not write.
+
+    Blocks follow one another without gaps, so each one's head is known beforehand. A gap would be legal UF2, but
+    RP2040-E14 makes the boot ROM erase sectors wrongly around it.
+    """
     end = FLASH_AT + FLASH_BYTES - SETTINGS_BYTES - MAPS_BYTES
+    if FLASH_AT + len(blocks) * PAGE_BYTES > end:
+        raise ValueError(
+            f"its {len(blocks)} blocks reach 0x{end:08X}, where maps and settings begin; use a smaller image"
+        )
     pages = []
     for k, block in enumerate(blocks):
-        first, second, flags, address, size, number, count, family = HEAD.unpack_from(block)
-        if (first, second, *struct.unpack_from("<I", block, BLOCK_BYTES - 4)) != MAGIC:
-            raise ValueError(f"block {k} lacks UF2's magic numbers; use the build's .uf2 file")
-        if flags != FLAG_FAMILY or family != FAMILY_RP2040:
-            seen = f"family 0x{family:08X}, flags 0x{flags:X}" if flags & FLAG_FAMILY else "no family"
-            raise ValueError(
-                f"block {k} has {seen}; expected family "
-                f"0x{FAMILY_RP2040:08X}, the RP2040's flash, flags 0x{FLAG_FAMILY:X}: use a Pico's .uf2 file"
-            )
-        if size != PAGE_BYTES:
-            raise ValueError(
-                f"block {k} carries {size} bytes, expected {PAGE_BYTES} for the RP2040; use the build's .uf2 file"
-            )
-        if (number, count) != (k, len(blocks)):
-            raise ValueError(
-                f"block {k} of {len(blocks)} says it is {number} of {count}: the file is truncated or mixed up, "
-                "get it again"
-            )
-        if not FLASH_AT <= address <= FLASH_AT + FLASH_BYTES - PAGE_BYTES:
-            raise ValueError(f"block {k} goes to 0x{address:08X}, outside this board's flash; use a Pico's .uf2 file")
-        if address + PAGE_BYTES > end:
-            raise ValueError(
-                f"block {k} goes to 0x{address:08X}, but maps and settings begin at 0x{end:08X}; use a smaller image"
-            )
-        if address != FLASH_AT + k * PAGE_BYTES:
-            # A gap would be legal UF2, but RP2040-E14 makes the boot ROM erase sectors wrongly around it.
-            raise ValueError(
-                f"block {k} goes to 0x{address:08X}; expected 0x{FLASH_AT + k * PAGE_BYTES:08X}, without gaps: use the "
-                "build's .uf2 file"
-            )
+        page = (FLASH_AT + k * PAGE_BYTES, PAGE_BYTES, k, len(blocks))
+        expected = (*MAGIC[:2], FLAG_FAMILY, *page, FAMILY_RP2040, MAGIC[2])
+        seen = (*HEAD.unpack_from(block), *struct.unpack_from("<I", block, BLOCK_BYTES - 4))
+        for name, has, wanted in zip(FIELDS, seen, expected, strict=True):
+            if has != wanted:
+                raise ValueError(
+                    f"block {k} of {len(blocks)} has {name} 0x{has:X}, expected 0x{wanted:X}: use the whole .uf2 file "
+                    "of a Pico's build"
+                )
         if any(block[HEAD.size + PAGE_BYTES : -4]):
             raise ValueError(f"block {k} has data after its {PAGE_BYTES} bytes: the file is damaged, get it again")
         pages.append(block[HEAD.size : HEAD.size + PAGE_BYTES])

@@ -135,7 +135,7 @@ def leave(
 def command_loader(hand: Hand) -> bool:
     """Send the board to its loader; return False when its firmware is too old to have a command for that."""
     try:
-        hand.reboot_bootloader()
+        hand.board.reboot_bootloader()
     except CommandRefusedError as refused:
         if refused.error != wire.Error.UNKNOWN_COMMAND:
             raise

@@ -92,7 +92,7 @@ def open_session(
         return zenoh.open(facts)
     except zenoh.ZError as error:
         raise PortError(
-            f"{where}: cannot reach Zenoh ({_short(error)}); check the endpoint, that `biotac serve` is running, and, "
+            f"{where}: cannot reach Zenoh ({_short(error)}); check the endpoint, that `biotac share` is running, and, "
             "if it asks for a password or a certificate, your Zenoh configuration"
         ) from error
 

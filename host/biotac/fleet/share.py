@@ -11,10 +11,11 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+from ..board.gap import Gap
 from ..errors import BiotacError, CommandRefusedError, PortError
-from ..hand.gap import Gap
 from ..hand.hand import Hand
 from ..wire import messages_gen as wire
+from ..wire.batches import Batch
 from ..wire.framing import ENCODED_MAX_BYTES, encode, open_frame
 from ..wire.identity import board_text, serial_text, version_text
 from . import network, rights
@@ -45,7 +46,7 @@ class Share:
         self._tail = b""
         self._of_epoch: list[Any] = []
         if network.shared(session, name):
-            raise PortError(f"a board is already shared as {name}; choose another --name, or stop that one")
+            raise PortError(f"a board is already shared as {name}; choose another name, or stop that one")
         self._declared = [
             session.declare_queryable(network.key(name, what), answer)
             for what, answer in (("info", self._tell), ("claim", self._claim), ("command", self._command))
@@ -54,35 +55,47 @@ class Share:
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
         self._new_epoch()
-        incoming = self._board.incoming
-        incoming.record, incoming.record_gap = self._publish, self._came_back
-        hand.start()
-        hand.run()
+        hand._reader.add_tap(self)
+        hand.stream()
 
     def _new_epoch(self) -> None:
         """Publish under a new key from now on: readers follow one, so none goes on as if the board were unchanged.
 
         The publisher drops batches for readers that are too slow.
         """
-        before, self._of_epoch = self._of_epoch, []
+        self._end_epoch()
         self.epoch = secrets.token_hex(8)
         self._wire = self._session.declare_publisher(network.key(self.name, f"wire/{self.epoch}"))
         token = self._session.liveliness().declare_token(network.key(self.name, f"live/{self.epoch}"))
         self._of_epoch = [self._wire, token]
+
+    def _end_epoch(self) -> None:
+        """Tell readers that the board is gone: what comes later is of another epoch."""
+        before, self._of_epoch = self._of_epoch, []
         for declared in before:
             declared.undeclare()
 
-    def _came_back(self, gap: Gap) -> None:
-        """Begin a new epoch, so that readers connect anew: the board may have restarted."""
-        with self._publishing:
-            self._new_epoch()
-
     # ---- what it sends -------------------------------------------------------------------------
 
-    def _publish(self, chunk: bytes) -> None:
+    def put(self, batch: Batch) -> None:
+        """See reader.Consumer."""
+        for message in batch.messages:
+            if isinstance(message, Gap) and message.reason in ("unplugged", "silence", "rebooted"):
+                with self._publishing:
+                    self._new_epoch()
+
+    def wake(self) -> None:
+        """See reader.Consumer."""
+        if not self._hand.connected:
+            with self._publishing:
+                self._end_epoch()
+
+    def is_full(self) -> bool:
+        """See reader.Consumer."""
+        return False
+
+    def put_raw(self, chunk: bytes) -> None:
         """Publish whole messages only, so that no message is lost in part. Answers to requests are left out."""
-        if not chunk:
-            return
         data = self._tail + chunk
         end = data.rfind(b"\0") + 1
         data, self._tail = data[:end], data[end:]
@@ -91,7 +104,7 @@ class Share:
             part for part in data.split(b"\0") if len(part) > 1 and not (part[1] in rights.ANSWERS and _asked(part))
         ]
         with self._publishing:
-            if kept and self._declared:
+            if kept and self._of_epoch:
                 self._wire.put(network.NUMBER.pack(self.batches) + b"\0".join(kept) + b"\0")
                 self.batches += 1
 
@@ -168,7 +181,7 @@ class Share:
         except struct.error:
             return _refusal(message_id, payload, wire.Error.BAD_LENGTH)
         if isinstance(request, wire.HelloRequest):
-            self._board.check()
+            self._hand.check()
             if not self._hand.connected:
                 return b""
             hello = replace(self._hand.info, req_id=request.req_id, nonce=request.nonce)
@@ -183,14 +196,15 @@ class Share:
 
     def _ask(self, request: Any, answers: type[Any]) -> Any:
         """Ask the board; if it is too busy while streaming (maps, saving), pause the stream for all, for a while."""
-        if self._paused is None:
+        # Readers ask for STATUS all the time, which does not make the pause longer.
+        if self._paused is None or request.ID == wire.GetStatus.ID:
             try:
                 return self._board.ask(request, answers)
             except CommandRefusedError as error:
                 if error.error != wire.Error.BUSY:
                     raise
             self._hand.stop()
-        else:
+        if self._paused is not None:
             self._paused.cancel()
         try:
             return self._board.ask(request, answers)
@@ -206,17 +220,18 @@ class Share:
                 return  # another command came in between
             self._paused = None
             with suppress(BiotacError):  # a board that is away is started when it is back
-                self._hand.start()
+                self._hand._go()
 
     def close(self) -> None:
         """Take the board off the network. The hand goes on streaming. Safe to call twice."""
-        self._board.incoming.record = None
+        self._hand._reader.remove(self)
         if self._paused is not None:
             self._paused.cancel()
         with self._publishing:
             declared, self._declared = self._declared, []
-            for one in [*declared, *self._of_epoch] if declared else ():
+            for one in declared:
                 one.undeclare()
+            self._end_epoch()
 
     def __enter__(self) -> Share:
         return self

@@ -24,7 +24,7 @@ FORM = "zenoh:NAME?connect=tcp/HOST:7447&write=yes&config=FILE"
 REPLAYED, FOREIGN = 1 << 12, 1 << 32  # batches back, or ahead, of the one that is due
 ANSWER_S = 1.0
 # After a cut connection, or a stop shorter than Zenoh's lease, a reader finds the same board again by itself.
-GONE_S = 1.0
+GONE_S = 0.5
 
 
 class ZenohLink(Link):
@@ -34,6 +34,7 @@ class ZenohLink(Link):
     batches lost because this side was too slow; their frames also count as lost frames. Raises PortError or InputError.
     """
 
+    owns_stream = False
     patience = 2.0  # answers come through a second program
     max_waiting_bytes = 4 << 20  # of unread batches; about half a minute of five fingers
 
@@ -67,8 +68,8 @@ class ZenohLink(Link):
             boards = network.shared(session, self._name)
             if not boards:
                 raise PortError(
-                    f"no board is shared as {self._name}; see `biotac list --zenoh`, start `biotac serve PORT "
-                    f"--name {self._name}`, or give the address of its computer: "
+                    f"no board is shared as {self._name}; see `biotac list --zenoh`, start `biotac share PORT "
+                    f"--zenoh {self._name}`, or give the address of its computer: "
                     f"zenoh:{self._name}?connect=tcp/HOST:7447"
                 )
             if len(boards) > 1:
@@ -146,7 +147,7 @@ class ZenohLink(Link):
             self._batches.clear()
             self._waiting = 0
             if not data and time.monotonic() - self._gone_s >= GONE_S:
-                raise DeviceLostError(f"{self.port} is no longer shared; check `biotac serve` there and open it again")
+                raise DeviceLostError(f"{self.port} is no longer shared; check `biotac share` there and open it again")
             return data
 
     def write(self, data: bytes) -> None:
@@ -179,11 +180,6 @@ class ZenohLink(Link):
             if reply.ok is not None:
                 with self._came:
                     self._put(reply.ok.payload.to_bytes())
-
-    def abandon(self) -> None:
-        """Drop the session in a forked child: it has none of the threads, so nothing needs closing."""
-        self._session = None
-        self._declared = []
 
     def close(self) -> None:
         session, self._session = self._session, None

@@ -1,1 +1,5 @@
 """A board and its fingers: commands, streams, reconnection, and the Hand that programs use."""
+
+import lazy_loader
+
+__getattr__, __dir__, _ = lazy_loader.attach(__name__, ["aio"])  # so that biotac.aio is found without an import

@@ -1,6 +1,6 @@
 """The live API for asyncio: ``async with biotac.aio.open(port) as hand: async for batch in hand.batches(): ...``
 
-The Hand's own threads read (reader.py) and wake the event loop; nothing here blocks the loop.
+The Hand's own thread reads (reader.py) and wakes the event loop; nothing here blocks the loop.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NoReturn, TypeVar
 from ..errors import DeviceLostError
 from ..wire.batches import Batch, LinkStats
 from ..wire.frames import Frame
-from .hand import Hand
+from .hand import MAX_AGE_S, Hand
 from .opening import open as open_hand
 from .views import FingerView
 
@@ -88,30 +88,28 @@ class AsyncHand:
         ``stats.batches_skipped`` counts; a simulated board that is not paced waits instead.
         """
         hand = self.hand
-        streams = hand._streams
         loop = asyncio.get_running_loop()
         news = asyncio.Event()
 
         def wake() -> None:
-            # The loop may already be closed while the reading threads are ending.
+            # The loop may already be closed while the reading thread is ending.
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(news.set)
 
-        queue = streams.open_queue(wake)
+        queue = hand._open_queue(wake)
         try:
-            if not hand.ended:
-                await asyncio.to_thread(hand.run)
+            await asyncio.to_thread(hand._go)
             while True:
                 news.clear()
-                ended = hand.ended or not hand.streaming  # before the queue is emptied, so that nothing is left in it
+                over = not hand.streaming  # before the queue is emptied, so that nothing is left in it
                 while (batch := queue.take()) is not None:
                     yield batch
                 hand.check()
-                if ended:
+                if over:
                     return
                 await news.wait()
         finally:
-            streams.close_queue(queue)
+            hand._close_queue(queue)
 
     async def frames(self) -> AsyncIterator[Frame]:
         """Typed frames as they arrive; see ``batches``."""
@@ -126,6 +124,7 @@ def open(
     pace: float = 0.0,
     reconnect: bool = False,
     fingers: Mapping[str, int] | None = None,
+    max_age_s: float = MAX_AGE_S,
 ) -> AsyncHand:
     """Like biotac.open; the board is opened by ``async with``."""
-    return AsyncHand(lambda: open_hand(port, pace=pace, reconnect=reconnect, fingers=fingers))
+    return AsyncHand(lambda: open_hand(port, pace=pace, reconnect=reconnect, fingers=fingers, max_age_s=max_age_s))

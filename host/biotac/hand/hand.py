@@ -4,42 +4,49 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings as python_warnings
 import weakref
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, suppress
-from functools import partial, wraps
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Concatenate, NoReturn, ParamSpec, SupportsIndex, TypeVar, cast
 
+from ..board import handshake
+from ..board.board import Board
+from ..board.consumers import Callbacks, Queue, Troubles, Unsubscribe
+from ..board.gap import Gap
+from ..board.handshake import HandWarning
+from ..board.keeper import SILENCE_S, Keeper
+from ..board.reader import THREADS
+from ..board.stream import ALL_FINGERS, Stream
 from ..clock import DeviceClock
-from ..clock.host_clock import HostClock, SystemClock
+from ..clock.host_clock import HostClock
+from ..errors import DeviceLostError, InputError, ReadWarning
 from ..link import Link
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch, LinkStats
+from ..wire.batches import Batch, LinkStats, join, split
 from ..wire.frames import Frame, StructArray
 from ..wire.sensor_gen import MAX_SENSORS
-from . import compatibility
-from .board import Board
 from .commands import Commands
-from .compatibility import HandWarning
-from .keepalive import SILENCE_S
-from .pull import take
-from .reconnect import Reconnection
-from .record import Recorded, Recorder
-from .streams import Streams
-from .views import FingerView, Latest, checked_names, finger_index
+from .configuration import Configuration
+from .record import Recorder, check_free
+from .views import Fingers, FingerView, Latest, checked_names, finger_index
 
 P = ParamSpec("P")
 R = TypeVar("R")
+#: Values older than this are not shown as a finger's latest.
+MAX_AGE_S = 0.25
 
 
-def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Hand, P], R]:
-    """A method of Hand that calls the same method of one of its parts."""
+def _of(method: Callable[Concatenate[Commands, P], R]) -> Callable[Concatenate[Hand, P], R]:
+    """A method of Hand that calls the same method of its Commands."""
 
     @wraps(method)
     def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        return method(getattr(self, part), *args, **kwargs)
+        return method(self._commands, *args, **kwargs)
 
     return call
 
@@ -53,26 +60,38 @@ class Hand:
         *,
         reconnect: bool = False,
         fingers: Mapping[str, int] | None = None,
+        max_age_s: float = MAX_AGE_S,
         host_clock: HostClock | None = None,
     ) -> None:
-        host_clock = host_clock or SystemClock()
         names = checked_names(fingers)
-        self._board = Board(link, host_clock=host_clock)
-        self._latest = Latest(host_clock, names, device_clock=self._board.incoming.clock)
-        self._latest.is_away = self._board.is_away
-        self._commands = Commands(self._board, self._latest.names)
-        self._streams = Streams(self._board, self._latest)
-        self._recorded = Recorded(self._board, self._commands, self._latest.names)
-        if reconnect:
-            Reconnection(self._board, self._latest.last_t_us, partial(_resume, self._recorded, self._streams))
+        self._board = board = Board(link, host_clock=host_clock)
+        self._reader = reader = board.reader
+        self._troubles = Troubles()
+        self._latest = Latest(reader, names, max_age_s=max_age_s, report=_reporter(board, self._troubles))
+        self._commands = Commands(board, self._latest)
+        #: Settings, calibrations and wrench maps that the board keeps, and its faults.
+        self.board = Configuration(board, self._commands)
+        self._stream = Stream(board)
+        self._callbacks = Callbacks(reader, self._troubles)
+        self._pulled = Queue(reader)
+        self._has_pulled = False
+        self._puller: threading.Thread | None = None  # the thread that reads
+        self._pulling = threading.Lock()
+        self._left = [0, 0]  # batches and frames skipped in queues that are closed
+        self._others: list[Queue] = []  # of biotac.aio
+        self._recorders: list[Recorder] = []  # the open one last
+        self._keeper = Keeper(board, self._stream, self._callbacks, reconnect=reconnect)
+        reader.add(self._latest)
+        reader.add(self._pulled)
+        self._keeper.start()
         # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
-        self._finalizer = weakref.finalize(self, _end, self._board, self._streams, self._recorded)
-        _HANDS.add(self)
+        parts = board, self._stream, self._keeper, self._callbacks, self._recorders
+        self._finalizer = weakref.finalize(self, _end, *parts)
         #: The link that carries the bytes.
         self.link = link
-        #: Converts device time to host time, fed by whatever is read; known after a first ``status`` or ``sync``.
-        #: A simulated board's time is not a real clock: it waits for the computer, which shows up as ``resets``.
-        self.clock: DeviceClock = self._board.incoming.clock
+        #: Converts device time to host time, fed by whatever is read. A simulated board's time is not a real clock: it
+        #: waits for the computer, which shows up as ``resets``.
+        self.clock: DeviceClock = reader.clock
 
     # ---- what it is ----------------------------------------------------------------------------
 
@@ -94,12 +113,18 @@ class Hand:
     @property
     def warnings(self) -> list[HandWarning]:
         """Where this board's firmware and this library do not fit together; empty when they fit."""
-        return compatibility.warnings(self.info, self.port)
+        return handshake.warnings(self.info, self.port)
 
     @property
     def stats(self) -> LinkStats:
         """Counts since the handshake, over reboots too."""
-        return self._streams.stats
+        self._latest.report()
+        queues = [self._callbacks.queue, *self._others, *([self._pulled] if self._has_pulled else [])]
+        return replace(
+            self._reader.stats,
+            batches_skipped=self._left[0] + sum(queue.batches_skipped for queue in queues),
+            frames_skipped=self._left[1] + sum(queue.frames_skipped for queue in queues),
+        )
 
     @property
     def connected(self) -> bool:
@@ -108,20 +133,26 @@ class Hand:
 
     @property
     def streaming(self) -> bool:
-        """Whether the board was told to stream, and has neither ended nor been stopped."""
-        return self._streams.streaming
+        """Whether the board was told to stream, and has neither ended nor been stopped.
+
+        Raises what has failed since the last call, like every other call: see ``check``.
+        """
+        self._latest.report()
+        return self._stream.on and not self._reader.closing.is_set()
 
     @property
     def ended(self) -> bool:
         """Whether a simulated source has played to its end and all of it has arrived."""
-        return self._streams.ended
+        return self._stream.ended
 
     def __getitem__(self, finger: str | SupportsIndex) -> FingerView:
-        """The latest values of one finger, by name or chip select. They follow what is read: see ``run``.
+        """The latest values of one finger, by name or chip select.
 
-        Raises KeyError when there is no such finger.
+        Raises KeyError for an unknown finger, and for one whose sensor has never answered.
         """
-        return FingerView((its := self._latest[finger]).name, its.finger, self._latest, self)
+        number = self._latest.present(finger)
+        self._let_pass()
+        return FingerView(self._latest.name(number), number, self._latest, self)
 
     def __iter__(self) -> Iterator[str]:
         """Names of the fingers whose sensor answered; a chip select without a name is given as text."""
@@ -153,7 +184,7 @@ class Hand:
     ) -> None:
         self._end()
         if error is None:
-            self._streams.report()
+            self._report_at_end()
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
@@ -170,83 +201,124 @@ class Hand:
         garbage-collected, or still open when its program ends, is closed too.
         """
         self._end()
-        self._streams.report()
+        self._report_at_end()
 
     def _end(self) -> None:
-        _end(self._board, self._streams, self._recorded)
+        _end(self._board, self._stream, self._keeper, self._callbacks, self._recorders)
 
-    def _forked(self) -> None:
-        """This process is a child of the one that opened the board."""
-        self._board.forked()
-        self._recorded.forked()
-        self._latest.forked()
+    def _report_at_end(self) -> None:
+        if not self._reader.told:
+            self._reader.check()
+            if self._reader.lost is not None and not self._keeper.reconnect:  # so recently that nobody has failed yet
+                raise self._reader.lost[0]
+        self._troubles.report()
+
+    def check(self) -> None:
+        """Raise what has failed: the board for good, or since the last call a recording or a callback.
+
+        So does every other call on this hand and its fingers.
+        """
+        self._latest.report()
 
     # ---- commands (commands.py) ----------------------------------------------------------------
 
-    ping = _of("_commands", Commands.ping)
-    status = _of("_commands", Commands.status)
-    faults = _of("_commands", Commands.faults)
-    clear_faults = _of("_commands", Commands.clear_faults)
-    sync = _of("_commands", Commands.sync)
-    sensor_status = _of("_commands", Commands.sensor_status)
-    sensor_info = _of("_commands", Commands.sensor_info)
-    point = _of("_commands", Commands.point)
-    tare = _of("_commands", Commands.tare)
-    set_tare = _of("_commands", Commands.set_tare)
-    hold = _of("_commands", Commands.hold)
-    release = _of("_commands", Commands.release)
-    grasp = _of("_commands", Commands.grasp)
-    setting = _of("_commands", Commands.setting)
-    set_setting = _of("_commands", Commands.set_setting)
-    settings = _of("_commands", Commands.settings)
-    save_settings = _of("_commands", Commands.save_settings)
-    calibration = _of("_commands", Commands.calibration)
-    calibration_state = _of("_commands", Commands.calibration_state)
-    set_calibration = _of("_commands", Commands.set_calibration)
-    clear_calibration = _of("_commands", Commands.clear_calibration)
-    calibrations = _of("_commands", Commands.calibrations)
-    finger_settings = _of("_commands", Commands.finger_settings)
-    get_map = _of("_commands", Commands.get_map)
-    map_state = _of("_commands", Commands.map_state)
-    set_map = _of("_commands", Commands.set_map)
-    clear_map = _of("_commands", Commands.clear_map)
-    maps = _of("_commands", Commands.maps)
-    reboot_bootloader = _of("_commands", Commands.reboot_bootloader)
+    ping = _of(Commands.ping)
+    status = _of(Commands.status)
+    sync = _of(Commands.sync)
+    sensor_status = _of(Commands.sensor_status)
+    sensor_info = _of(Commands.sensor_info)
+    point = _of(Commands.point)
+    tare = _of(Commands.tare)
+    set_tare = _of(Commands.set_tare)
+    hold = _of(Commands.hold)
+    release = _of(Commands.release)
+    grasp = _of(Commands.grasp)
 
-    # ---- streams (streams.py) ------------------------------------------------------------------
+    # ---- what arrives --------------------------------------------------------------------------
 
-    start = _of("_streams", Streams.start)
-    stop = _of("_streams", Streams.stop)
-    subscribe = _of("_streams", Streams.subscribe)
-    want = _of("_streams", Streams.want)
-    on_batch = _of("_streams", Streams.on_batch)
-    on_touch = _of("_streams", Streams.on_touch)
-    on_event = _of("_streams", Streams.on_event)
-    on_slip = _of("_streams", Streams.on_slip)
-    on_bands = _of("_streams", Streams.on_bands)
-    on_tare = _of("_streams", Streams.on_tare)
-    on_status = _of("_streams", Streams.on_status)
-    on_gap = _of("_streams", Streams.on_gap)
-    check = _of("_streams", Streams.check)
+    def stream(
+        self, *names: str, fingers: Fingers = ALL_FINGERS, rest: bool = True, rate_hz: float | None = None
+    ) -> None:
+        """Choose what the board computes and sends, and start the stream; again, to choose anew.
 
-    def run(self, *, queue: bool = False) -> Hand:
-        """Read the board in threads from now on, and start the stream if need be; returns this hand.
+        Names are force, poc, torque, pressure, sigma, touch, events, raw, pdc, temperature, pac, bands, status, and
+        ``results``, the default: force, poc, torque and pressure, with pac unless the port is a UART, which is slow.
+        Raw counts, pdc and temperature are in every FRAME, so each of them only asks for frames; status is always sent.
+        What is left out is not computed; it arrives as NaN, with the flag NOT_ASKED. What callbacks wait for is added.
 
-        ``hand["index"]`` and callbacks then follow without further calls, and with ``reconnect`` so does the return of
-        a lost board. The board stops within a second of this process's death. Batches are kept for ``batches``,
-        ``frames`` and ``read`` from their first call on, or from now on with ``queue``. A slow caller loses the oldest
-        (``stats.batches_skipped``); a simulated board that is not paced waits instead.
+        ``fingers`` are names, chip selects, or a bit mask. With ``rest=False`` an untouched finger sends heartbeats
+        (``Batch.idle``) in place of frames; no touch is missed: a frame comes as soon as the signals move. ``rate_hz``,
+        above 0 and up to 100, keeps every n-th frame by seq, with n = 100 / rate_hz rounded. This happens on this side
+        only, because boards cannot leave frames out: a recording has all of them, and PAC and messages are not thinned.
+
+        The board is kept streaming until ``stop`` or ``close``: after a pause of this program, or with ``reconnect`` a
+        loss of the board, it is started again, and a ``Gap`` tells what is missing. It stops within a second of this
+        process's death. Raises InputError for an unknown name, a rate out of range, or more than a UART can carry;
+        KeyError for a finger that is not there.
         """
-        self._streams.run(queue=queue)
-        return self
+        mask = self._latest.mask(fingers)
+        self._stream.start(names, fingers=mask, rest=rest, rate_hz=rate_hz)
+        self._latest.report()
+
+    def stop(self) -> None:
+        """Stop streaming. What was on its way has arrived, and is still delivered."""
+        self._stream.stop()
+        self._latest.report()
+
+    def _go(self) -> None:
+        """Start the stream, with what was chosen last, unless it runs."""
+        self._latest.report()
+        self._stream.go()
 
     def batches(self) -> Iterator[Batch]:
         """Yield batches as they arrive, starting the stream if need be.
 
         Ends when a simulated source ends, and when ``stop`` is called. All iterations of ``batches`` and ``frames``,
-        and ``read``, share one queue. Only one thread at a time may use it; another gets InputError.
+        and ``read``, share one queue, which only one thread at a time may use; another gets InputError. It begins with
+        the stream, or, where a callback or a view was used before, with this call, and holds 16 384 rows, 10 to 20 s.
         """
-        yield from self._streams.batches()  # a generator here, so that this hand lives as long as its iteration
+        queue, stream, closing = self._pulled, self._stream, self._reader.closing
+        with self._by_one_thread():
+            self._begin_to_pull()
+            self._latest.report()
+            stream.go()
+            while True:
+                self._latest.report()
+                over = not stream.on  # before the queue is emptied, so that nothing is left in it
+                batch = queue.take(wait=not (over or closing.is_set()))
+                if batch is not None:
+                    yield batch
+                elif closing.is_set():
+                    self._reader.raise_closed()
+                elif over:
+                    return
+
+    def _let_pass(self) -> None:
+        """What arrives is looked at in another way: it need not be kept until somebody reads."""
+        if not self._has_pulled and not self._pulled.lets_pass:
+            self._pulled.lets_pass = True
+            self._pulled.clear()
+
+    def _begin_to_pull(self) -> None:
+        if not self._has_pulled:
+            self._has_pulled = True
+            self._pulled.begin()
+
+    @contextmanager
+    def _by_one_thread(self) -> Iterator[None]:
+        here = threading.current_thread()
+        with self._pulling:
+            before = self._puller
+            if before is not None and before is not here and before.is_alive():
+                raise InputError(
+                    f"thread {before.name!r} is reading this hand, and {here.name!r} would take part of its data; "
+                    "read in one thread, or give each an on_batch callback"
+                )
+            self._puller = here
+        try:
+            yield
+        finally:
+            self._puller = before
 
     def frames(self) -> Iterator[Frame]:
         """Yield typed frames as they arrive; starts and ends like ``batches``."""
@@ -259,62 +331,190 @@ class Hand:
 
         They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
         reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
-        discarded. The array is shorter when a simulated source ends first, and empty when it had ended before or when
-        no sensor answered in that time. Raises ValueError unless seconds is a number above 0.
+        discarded. A ReadWarning tells of a Gap among them, and when a simulated source ended first: the array is then
+        shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
+        ValueError unless seconds is a number above 0.
         """
-        return self.read_batch(seconds, fresh=fresh).frames
+        batch = self.read_batch(seconds, fresh=fresh)
+        for gap in (m for m in batch.messages if isinstance(m, Gap)):
+            python_warnings.warn(gap.words(), ReadWarning, stacklevel=2)
+        return batch.frames
 
     def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
-        """Like ``read``, but returns the Batch: also the wire messages, PAC and events of the same time."""
-        if fresh:
-            self._streams.skip_old()
-        batch, later = take(self.batches(), seconds, silence_s=SILENCE_S)
-        if later is not None:
-            self._streams.put_back(later)
-        return batch
+        """Like ``read``, but returns the Batch: also the wire messages, PAC, events and Gaps of the same time."""
+        if not 0 < seconds < float("inf"):
+            raise ValueError(f"seconds is {seconds}, expected a number above 0")
+        if fresh and self._stream.on:
+            self.ping()  # a barrier: its reply comes after everything made before
+            self._pulled.clear()
+        taken: list[Batch] = []
+        end_us: int | None = None
+        first_status_us: int | None = None
+        for batch in self.batches():
+            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
+                first_status_us = status.t_us if first_status_us is None else first_status_us
+                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
+                    return join(taken)  # the board is there, its sensors are not
+            first_us, last_us = batch.first_t_us(), batch.last_t_us()
+            if end_us is None and first_us is not None:
+                end_us = first_us + round(seconds * 1e6)
+            if end_us is None or last_us is None or last_us < end_us:
+                taken.append(batch)
+                continue
+            now, later = split(batch, end_us)
+            self._pulled.put_back(later)
+            return join([*taken, now])
+        if self._stream.ended:
+            told = f"the source of {self.port} ended before {seconds:g} s were read"
+            python_warnings.warn(told, ReadWarning, stacklevel=3)
+        return join(taken)
+
+    # ---- callbacks (consumers.py) --------------------------------------------------------------
+
+    def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
+        """Call ``fn`` with every batch; returns a function that ends this.
+
+        Callbacks of a hand run in one thread, in order, and may give commands. While they are slow they lose the oldest
+        batches, counted in ``stats`` and told by a Gap; the link is read on. What one raises is logged, and raised as
+        CallbackError by the next call of any kind on the hand or its fingers. The stream starts with ``stream``, or
+        with the first read.
+        """
+        return self._on(Batch, fn)
+
+    def on_event(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
+        """Call ``fn`` with every EVENT (touch, lift, jolt, slip and its end, see EventKind) as soon as it arrives.
+
+        Adds events to what is streamed. Events older than ``max_age_s`` (biotac.open), which waited somewhere while
+        this program stood still, are left out; batches and recordings have them. The same holds for ``on_touch`` and
+        ``on_slip``.
+        """
+        return self._on(wire.Event, self._if_new(fn))
+
+    def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
+        """Call ``fn`` when what a finger holds begins to slip: with the events of ``on_event`` that are SLIP."""
+        return self.on_event(_only(wire.EventKind.SLIP, fn))
+
+    def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
+        """Call ``fn`` as soon as a resting finger's signals move, within the round: a hint that CONTACT may follow.
+
+        Adds touch to what is streamed.
+        """
+        return self._on(wire.Touch, self._if_new(fn))
+
+    def on_bands(self, fn: Callable[[wire.Bands], Any]) -> Unsubscribe:
+        """Call ``fn`` with how strongly dynamic pressure vibrated, by octave, 100 times a second for each finger.
+
+        Adds bands to what is streamed.
+        """
+        return self._on(wire.Bands, fn)
+
+    def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
+        """Call ``fn`` with every change of a tare."""
+        return self._on(wire.Tare, fn)
+
+    def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
+        """Call ``fn`` with each STATUS, the board's counters, which comes every second by default."""
+        return self._on(wire.Status, fn)
+
+    def on_gap(self, fn: Callable[[Gap], Any]) -> Unsubscribe:
+        """Call ``fn`` when rows are missing and the next ones have come: see Gap."""
+        return self._on(Gap, fn)
+
+    def _on(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
+        self._latest.report()
+        self._let_pass()
+        self._stream.imply(kind)
+        return self._callbacks.add(kind, fn)
+
+    def _if_new(self, fn: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        reader, max_age_s = self._reader, self._latest.max_age_s
+
+        @wraps(fn)
+        def call(message: Any) -> None:
+            if reader.age_s(message.t_us) <= max_age_s:
+                fn(message)
+
+        return call
+
+    def _open_queue(self, on_news: Callable[[], None]) -> Queue:
+        """A queue of one's own for what arrives from now on; ``on_news`` is called on the reading thread."""
+        self._latest.report()
+        self._let_pass()
+        queue = Queue(self._reader, on_news)
+        self._others.append(queue)
+        self._reader.add(queue)
+        return queue
+
+    def _close_queue(self, queue: Queue) -> None:
+        """Close a queue made by _open_queue."""
+        self._reader.remove(queue)
+        if queue in self._others:
+            self._others.remove(queue)
+            self._left = [self._left[0] + queue.batches_skipped, self._left[1] + queue.frames_skipped]
 
     # ---- recording -----------------------------------------------------------------------------
 
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until this hand or the recorder is closed.
 
-        Frames that have arrived but not been read yet are not recorded; to have all, call this before ``start`` or the
+        Frames that have arrived but not been read yet are not recorded; to have all, call this before ``stream`` or the
         first read. When the board restarts (``reconnect``), a new file is begun (``Recorder.paths``). A program that
         ends without ``close`` loses nothing that has arrived; one that is killed loses up to a second.
 
         Raises InputError when the file exists and ``overwrite`` is false, when it cannot be written, or when another
         recording of this hand is still open.
         """
-        return self._recorded.record(Path(path), self.streaming, overwrite=overwrite)
+        self._latest.report()
+        check_free(self._recorders[-1] if self._recorders else None)
+        mid_stream = self._stream.on
+        recorder = Recorder(
+            self._board,
+            self._commands,
+            self.board,
+            self._troubles,
+            Path(path),
+            overwrite=overwrite,
+            mid_stream=mid_stream,
+        )
+        self._recorders[:] = [recorder]
+        return recorder
 
 
-def _resume(recorded: Recorded, streams: Streams, restarted: bool) -> None:
-    """Go on recording and streaming after the board came back."""
-    if restarted:
-        recorded.go_on()
-    streams.resume()
+def _only(kind: wire.EventKind, fn: Callable[[wire.Event], Any]) -> Callable[[wire.Event], Any]:
+    @wraps(fn)
+    def call(event: wire.Event) -> None:
+        if event.kind == kind:
+            fn(event)
+
+    return call
 
 
-def _end(board: Board, streams: Streams, recorded: Recorded) -> None:
+def _reporter(board: Board, troubles: Troubles) -> Callable[[], None]:
+    """Raises what the program has not been told yet; callbacks and recorders are not the program."""
+
+    def report() -> None:
+        board.reader.check()
+        if not board.reader.is_own():
+            troubles.report()
+
+    return report
+
+
+def _end(board: Board, stream: Stream, keeper: Keeper, callbacks: Callbacks, recorders: list[Recorder]) -> None:
     """Close a hand's parts; also called when the hand is garbage-collected or the program ends."""
-    if board.closed:
+    reader = board.reader
+    if board.closed or reader.is_inherited():
         return
-    if streams.is_read_here():  # the garbage collector may run on a reading thread, which cannot wait for itself
-        threading.Thread(target=_end, args=(board, streams, recorded), name="biotac end").start()
+    if threading.current_thread() in THREADS:  # it cannot wait for itself, nor are other hands to wait
+        threading.Thread(target=_end, args=(board, stream, keeper, callbacks, recorders), name="biotac end").start()
         return
-    with ExitStack() as last:  # these run even when streams.close() fails
+    with ExitStack() as last:  # these run even when one of them fails
         last.callback(board.close)
-        last.callback(recorded.close)
-        streams.close()
-
-
-_HANDS: weakref.WeakSet[Hand] = weakref.WeakSet()
-
-
-def _forked() -> None:
-    for hand in list(_HANDS):
-        hand._forked()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forked)
+        for recorder in recorders:
+            last.callback(recorder.close)
+        last.callback(callbacks.close)
+        last.callback(keeper.close)
+        reader.closing.set()
+        with suppress(DeviceLostError):  # a board that is gone does not stream either
+            stream.leave()
+        reader.wake()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import zlib
 
+from ..board.board import Board
 from ..errors import CommandRefusedError, PortError
 from ..map.board_map import PART_BYTES, part
 from ..wire import messages_gen as wire
-from .board import Board
 
 TRIES = 3
 

@@ -11,7 +11,7 @@ from ..link import Link, open_link
 from ..link.discovery import SERIAL_PREFIX, choose
 from ..wire import messages_gen as wire
 from ..wire.frames import Q4_PER_COUNT
-from .hand import Hand
+from .hand import MAX_AGE_S, Hand
 
 
 def open(
@@ -20,8 +20,9 @@ def open(
     pace: float = 0.0,
     reconnect: bool = False,
     fingers: Mapping[str, int] | None = None,
+    max_age_s: float = MAX_AGE_S,
 ) -> Hand:
-    """Open a board and shake hands.
+    """Open a board, shake hands, and read it from now on.
 
     Without ``port``, opens the only board on USB, found by its USB ids; no other port is opened. ``port`` is
     ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
@@ -38,7 +39,8 @@ def open(
     With ``reconnect``, a board that went away is looked for, by its serial number, until it is back. Then what this
     session changed (settings, calibrations, maps, subscriptions) is restored, the stream resumes, and the first batch
     with rows has a ``biotac.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers``
-    names chip selects 0..4 for ``hand["thumb"]``; the default names are index, middle, ring, little, thumb.
+    names chip selects 0..4 for ``hand["thumb"]``; the default names are index, middle, ring, little, thumb. A finger's
+    latest values are shown until they are ``max_age_s`` old, and are NaN from then on.
 
     Raises PortError, NotAGatewayError or WireVersionError; InputError for a source or a recording that cannot be
     played, or an EEPROM without a calibration; CommandRefusedError for a calibration of another sensor.
@@ -48,8 +50,8 @@ def open(
         text = choose(text and text.removeprefix(SERIAL_PREFIX))
     if text.startswith("spidev:"):
         bare, own = harness.load(text)
-        return shake_hands(open_link(bare, pace=pace), fingers=fingers, calibrations=own)
-    return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers)
+        return shake_hands(open_link(bare, pace=pace), fingers=fingers, max_age_s=max_age_s, calibrations=own)
+    return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers, max_age_s=max_age_s)
 
 
 def shake_hands(
@@ -57,6 +59,7 @@ def shake_hands(
     *,
     reconnect: bool = False,
     fingers: Mapping[str, int] | None = None,
+    max_age_s: float = MAX_AGE_S,
     calibrations: Mapping[int, Calibration] | None = None,
 ) -> Hand:
     """Make a Hand from an open link, and give it each finger's calibration.
@@ -64,18 +67,18 @@ def shake_hands(
     A simulated board gets its source's settings (an emulated finger's own gains) and stored tare, as a real one would
     from its user. Closes the link when any of this fails.
     """
-    hand = Hand(link, reconnect=reconnect, fingers=fingers)
+    hand = Hand(link, reconnect=reconnect, fingers=fingers, max_age_s=max_age_s)
     source = link.source
     try:
         if hand.info.board == wire.Board.PICO_SENSOR:
             raise NotAGatewayError(
-                f"{link.port} is a sensor board, not a gateway: feed it with `biotac sensor {link.port} SOURCE`, and "
-                "open the port of the gateway it is wired to"
+                f"{link.port} is a sensor board, not a gateway: feed it with `biotac sim SOURCE --sensor-port "
+                f"{link.port}`, and open the port of the gateway it is wired to"
             )
         for finger, calibration in (calibrations or {}).items():
-            hand.set_calibration(finger, calibration)
+            hand.board.set_calibration(finger, calibration)
         for name, value in source.settings.items() if source else ():
-            hand.set_setting(wire.Setting[name.upper()], value)
+            hand.board.set_setting(wire.Setting[name.upper()], value)
         if source and source.tare_q4 is not None:
             for finger, tare_q4 in enumerate(source.tare_q4):
                 hand.set_tare(finger, tare_q4 / Q4_PER_COUNT)

@@ -1,87 +1,187 @@
-"""Writing what a board sends to a recording, if one is open."""
+"""Recording what a board sends, in a thread of its own: a slow disk makes nobody else wait."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Mapping
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from types import TracebackType
+from typing import TYPE_CHECKING
 
-from ..errors import InputError
-from ..link.serial_port import nowhere
+from ..board.board import Board
+from ..board.consumers import Troubles
+from ..board.gap import Gap
+from ..errors import BiotacError, DeviceLostError, InputError
+from ..wire.batches import Batch
 from ..wire.sensor_gen import MAX_SENSORS
-from .board import Board
 from .commands import Commands
-from .gap import Gap
+from .configuration import Configuration
+
+if TYPE_CHECKING:  # otherwise imported where it is used: not every reader records
+    from ..recording.facts import Facts
+
+# What waits is written this often, or when it is this much: a board that waits for its reader waits for this too.
+WRITE_S = 0.1
+WRITE_BYTES = 8 << 10
+# About a minute of five fingers. A disk that is slower loses the newest bytes, and the file says so.
+LIMIT_BYTES = 8 << 20
 
 
-class Recorder(Protocol):
-    """What Hand.record returns: the part of recording.Recorder that is needed here."""
+class Recorder:
+    """An open recording, made by ``Hand.record``: everything that arrives, until it or the hand is closed.
 
-    path: Path
-    paths: list[Path]
+    ``path`` is the file being written; ``paths`` lists all files so far: when the board restarts, a new one is begun.
+    """
 
-    @property
-    def closed(self) -> bool: ...
-    def write(self, chunk: bytes) -> None: ...
-    def write_gap(self, gap: Gap) -> None: ...
-    def go_on(self, facts: Any) -> None: ...
-    def close(self) -> None: ...
-    def fileno(self) -> int: ...
+    def __init__(self, board: Board, commands: Commands, kept: Configuration, troubles: Troubles, path: Path, *,
+                 overwrite: bool, mid_stream: bool) -> None:  # fmt: skip
+        from ..recording.writer import Writer
 
-
-class Recorded:
-    """Begins a recording of ``board``, continues it after restarts, and ends it."""
-
-    def __init__(self, board: Board, commands: Commands, names: Mapping[str, int]) -> None:
-        self._names = names
         self._board = board
         self._commands = commands
-        self._recorder: Recorder | None = None
+        self._kept = kept
+        self._troubles = troubles
+        self._known = self._facts()
+        self._writer = Writer(path, self._known, board.link.port, overwrite=overwrite, mid_stream=mid_stream)
+        self._boot_id = board.info.boot_id
+        self._waiting: deque[tuple[int, bytes | Gap]] = deque()
+        self._put_bytes = self._taken_bytes = 0  # each counted by one thread
+        self._chunk = b""  # the latest: a Gap that ends with it is written first
+        self._dropped: Gap | None = None
+        self._over = False
+        self._due = threading.Event()
+        self._thread = board.reader.thread(self._run, "recorder")
+        self._thread.start()
+        board.reader.add_tap(self)
 
-    def record(self, path: Path, mid_stream: bool, *, overwrite: bool) -> Recorder:
-        """See Hand.record."""
-        if self._recorder is not None and not self._recorder.closed:
-            raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
-        port = self._board.link.port
-        recorder: Recorder = _writer().Recorder(path, self._facts(), port, overwrite=overwrite, mid_stream=mid_stream)
-        self.to(recorder)
-        return recorder
+    @property
+    def path(self) -> Path:
+        """The file being written."""
+        return self._writer.path
 
-    def to(self, recorder: Recorder) -> None:
-        """Send everything that arrives from now on to ``recorder``."""
-        self._recorder = recorder
-        incoming = self._board.incoming
-        incoming.record = recorder.write
-        incoming.record_gap = recorder.write_gap
+    @property
+    def paths(self) -> list[Path]:
+        """All files so far."""
+        return self._writer.paths
 
-    def go_on(self) -> None:
-        """Begin a new file after the board restarted."""
-        if self._recorder is not None and not self._recorder.closed:
-            try:
-                self._recorder.go_on(self._facts())
-            except (OSError, InputError) as error:
-                incoming = self._board.incoming
-                self._recorder, incoming.record, incoming.trouble = None, None, error
+    @property
+    def frames(self) -> int:
+        """How many frames the files hold; those that wait to be written count when they are."""
+        return self._writer.frames
+
+    @property
+    def frames_lost(self) -> int:
+        """How many frames are missing in the files, by their sequence numbers; see ``frames``."""
+        return self._writer.frames_lost
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing more is written."""
+        return self._writer.closed
 
     def close(self) -> None:
-        """Finish the recording, if there is one."""
-        if self._recorder is not None:
-            self._recorder.close()
+        """Write what has arrived and the file's index. Safe to call twice. Raises OSError when that fails."""
+        reader = self._board.reader
+        if reader.is_inherited():
+            return  # the file is the parent's
+        reader.remove(self)
+        self._append(self._chunk)
+        self._chunk = b""
+        self._over = True
+        self._due.set()
+        self._thread.join()
+        if not self._writer.closed:
+            self._writer.close()
 
-    def forked(self) -> None:
-        """Let go of the file in a forked child: it is the parent's, and what the child still buffers goes nowhere."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is not None and not recorder.closed:
-            nowhere(recorder.fileno())
+    def __enter__(self) -> Recorder:
+        return self
 
-    def _facts(self) -> Any:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- on the reading thread -----------------------------------------------------------------
+
+    def put_raw(self, chunk: bytes) -> None:
+        """See reader.Tap."""
+        if self._put_bytes - self._taken_bytes > LIMIT_BYTES:
+            reader = self._board.reader
+            self._dropped = self._dropped or Gap("slow", reader.last_t_us, None, time.time_ns(), 0, self._boot_id)
+            return
+        if self._dropped is not None:
+            self._append(self._dropped)
+            self._dropped = None
+        self._append(self._chunk)
+        self._chunk = chunk
+
+    def put(self, batch: Batch) -> None:
+        """See reader.Consumer."""
+        for message in batch.messages:
+            if isinstance(message, Gap):
+                self._append(message)
+        self._append(self._chunk)
+        self._chunk = b""
+
+    def _append(self, what: bytes | Gap) -> None:
+        self._waiting.append((self._board.info.boot_id, what))
+        if isinstance(what, bytes):
+            self._put_bytes += len(what)
+            if self.is_full():
+                self._due.set()
+
+    def wake(self) -> None:
+        """See reader.Consumer."""
+
+    def is_full(self) -> bool:
+        """See reader.Consumer."""
+        return self._put_bytes - self._taken_bytes > WRITE_BYTES
+
+    # ---- on its own thread ---------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            while not self._over:
+                self._due.wait(WRITE_S)
+                self._due.clear()
+                self._write()
+            self._write()
+        except (OSError, BiotacError) as error:
+            self._board.reader.remove(self)  # nobody is to wait for what is never written
+            self._troubles.keep(error)
+        except BaseException as error:
+            self._board.reader.fail(error)
+
+    def _write(self) -> None:
+        while self._waiting:
+            boot_id, what = self._waiting.popleft()
+            if boot_id != self._boot_id:
+                self._boot_id = boot_id
+                with suppress(DeviceLostError):  # it is gone again, or closed: what was known before has to do
+                    self._known = self._facts()
+                self._writer.go_on(replace(self._known, info=self._board.info))
+            if isinstance(what, Gap):
+                self._writer.write_gap(what)
+            else:
+                self._writer.write(what)
+                self._taken_bytes += len(what)
+        self._writer.write(b"")  # so that a block is closed in time
+        self._board.reader.room()
+
+    def _facts(self) -> Facts:
         """What a recording says about the board."""
-        its, hello = self._commands, self._board.info
-        sensors = [its.sensor_info(finger) for finger in range(MAX_SENSORS) if hello.fingers_present >> finger & 1]
-        return _writer().Facts(hello, sensors, its.settings(), its.calibrations(), its.maps(), dict(self._names))
+        from ..recording.facts import Facts
+
+        commands, kept, hello = self._commands, self._kept, self._board.info
+        sensors = [commands.sensor_info(f) for f in range(MAX_SENSORS) if hello.fingers_present >> f & 1]
+        settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
+        return Facts(hello, sensors, settings, calibrations, maps, dict(commands.names))
 
 
-def _writer() -> Any:
-    """The module recording.writer, the only one above this folder that is used here; imported when needed."""
-    return importlib.import_module("...recording.writer", __name__)
+def check_free(recorder: Recorder | None) -> None:
+    """Raise InputError while ``recorder`` is open: a hand has one recording at a time."""
+    if recorder is not None and not recorder.closed:
+        raise InputError(f"this hand is being recorded to {recorder.path}; close that recorder first")

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 import threading
-from collections import deque
+import time
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from operator import index
-from typing import Any, NoReturn, SupportsIndex, TypeAlias, TypeVar, cast
+from typing import Any, NoReturn, Protocol, SupportsIndex, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clock import LAST_SAMPLE_US, DeviceClock
-from ..clock.host_clock import HostClock
+from ..board.gap import FINGERS_IN
+from ..board.reader import Reader
 from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.frames import FRAME_DTYPE, Frame, StructArray, frames_from_wire
@@ -60,130 +59,129 @@ def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
     raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
 
 
-# Batches wait until somebody looks at them, or until there are this many.
-UNSEEN_BATCHES = 16
-
-
 class Latest:
-    """The newest frame or heartbeat of each finger, and when it came.
+    """The newest frame or heartbeat of each finger, and how old it is.
 
-    The thread that reads the link only stores the batch: searching each one costs as much as decoding it, and most are
-    never looked at.
+    The reading thread only notes the batch: searching it costs as much as decoding, and most are never looked at.
+    ``max_age_s`` is the age beyond which values are not shown any more. ``report`` raises what the program has not been
+    told yet: the board is lost, or a callback or a recording failed.
     """
 
     def __init__(
-        self, host_clock: HostClock, names: Mapping[str, int] | None = None, *, device_clock: DeviceClock | None = None
+        self, reader: Reader, names: Mapping[str, int], *, max_age_s: float, report: Callable[[], None]
     ) -> None:
-        self._monotonic_s = host_clock.monotonic_s
-        self._device_clock = device_clock or DeviceClock()
-        self.names = checked_names(names)
-        #: Whether the board is being looked for, so that its last values say nothing about now; raises once it is lost.
-        self.is_away: Callable[[], bool] = lambda: False
-        self._unseen: deque[tuple[Batch, float]] = deque()
-        self._unseen_fingers = 0  # bit mask
-        # finger: (batch, row, row is a heartbeat, arrival in s)
-        self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
-        self._looking = threading.Lock()
-
-    def __getitem__(self, key: str | SupportsIndex) -> FingerView:
-        """A finger by name or chip select. Raises KeyError for an unknown one."""
-        finger = finger_index(self.names, key)
-        return FingerView(self.name(finger), finger, self)
+        self.names = names
+        self.max_age_s = max_age_s
+        self.report = report
+        self._reader = reader
+        self._batches: dict[int, Batch] = {}  # by finger: the latest that has it
+        self._news = threading.Condition()
+        self._waiters = 0
 
     def name(self, finger: int) -> str:
         """The name of a chip select, or its number as text if it has no name."""
         return next((name for name, number in self.names.items() if number == finger), str(finger))
 
+    def present(self, key: str | SupportsIndex) -> int:
+        """Chip select of a finger whose sensor answers, or did. Raises KeyError for any other, naming those."""
+        finger = finger_index(self.names, key)
+        if not self._reader.present >> finger & 1:
+            there = [repr(self.name(f)) for f in FINGERS_IN[self._reader.present]]
+            raise KeyError(f"no sensor answers as {key!r}; those that do: {', '.join(there) or 'none'}")
+        return finger
+
     def mask(self, fingers: Fingers) -> int:
-        """Bit mask of several fingers. Raises KeyError for an unknown one."""
+        """Bit mask of several fingers. Raises KeyError for one that is not there."""
         if isinstance(fingers, str):
-            return 1 << finger_index(self.names, fingers)
+            return 1 << self.present(fingers)
         if isinstance(fingers, Iterable):
-            return sum({1 << finger_index(self.names, finger) for finger in fingers})
+            return sum({1 << self.present(finger) for finger in fingers})
         return index(fingers)
 
-    def forked(self) -> None:
-        """Renew the lock in a forked child: its holder may be a thread of the parent process."""
-        self._looking = threading.Lock()
+    def put(self, batch: Batch) -> None:
+        """See reader.Consumer."""
+        for finger in FINGERS_IN[batch.fingers]:
+            self._batches[finger] = batch
+        if self._waiters:
+            self.wake()
 
-    def update(self, batch: Batch, when_s: float) -> None:
-        """Store a batch that has arrived. To be called by one thread at a time."""
-        unseen, fingers = self._unseen, batch.fingers
-        if not unseen or (fingers >= 0 and not self._unseen_fingers & ~fingers):
-            unseen.clear()  # nobody needs the older batches: all their fingers are in this one
-            self._unseen_fingers = fingers
-        else:
-            self._unseen_fingers |= fingers
-        unseen.append((batch, when_s))
-        if len(unseen) >= UNSEEN_BATCHES:
-            self._look()
+    def wake(self) -> None:
+        """See reader.Consumer."""
+        with self._news:
+            self._news.notify_all()
 
-    def _look(self) -> dict[int, tuple[Batch, int, bool, float]]:
-        with self._looking:
-            batches = []
-            while self._unseen:
-                with suppress(IndexError):  # the reading thread may clear it at the same time
-                    batches.append(self._unseen.popleft())
-            seen = 0
-            for batch, when_s in reversed(batches):
-                if not batch.fingers & ~seen:
-                    continue  # later batches had all of these fingers
-                for finger, (row, idle) in _last_of(batch).items():
-                    if not seen >> finger & 1:
-                        self._entries[finger] = (batch, row, idle, when_s)
-                        seen |= 1 << finger
-            return self._entries
+    def is_full(self) -> bool:
+        """See reader.Consumer."""
+        return False
 
-    def last_t_us(self) -> int | None:
-        """Device time of the latest frame or heartbeat of any finger, in us; None before any."""
-        return max((self._t_us(*entry[:3]) for entry in list(self._look().values())), default=None)
+    def state(self, finger: int) -> tuple[StructArray, float, str]:
+        """The latest row, FRAME_DTYPE (1,), its age in s, and why it may not be used; empty when it may.
 
-    @staticmethod
-    def _t_us(batch: Batch, row: int, idle: bool) -> int:
-        return int(batch.idle["t_us"][row] if idle else batch.t_us[row])
+        Without a row, and where it may not be used, all values are invalid and ``t_us`` is -1.
+        """
+        self.report()
+        row, age_s = _EMPTY, math.inf
+        batch = self._batches.get(finger)
+        if batch is not None:
+            row = _latest_row(batch, finger)
+            age_s = self._age_s(int(row["t_us"][0]), batch.arrived_s)
+        why = self._why_stale(age_s)
+        return (_empty(finger, -1, 0, NOTHING_YET) if why else row), age_s, why
 
-    def row(self, finger: int) -> StructArray:
-        """FRAME_DTYPE (1,): the latest frame, or the values of a heartbeat; without either all invalid, t_us -1."""
-        is_away = self.is_away()
-        entry = self._look().get(finger)
-        if entry is None or is_away:
-            return _empty(finger, -1, 0, NOTHING_YET)
-        batch, row, idle, _ = entry
-        if not idle:
-            one = slice(row, row + 1)
-            return frames_from_wire(batch.wire[one], batch.seq[one], batch.t_us[one])
-        beat = batch.idle[row]
-        flags = FrameFlags(int(beat["flags"])) | FrameFlags.POC_INVALID | FrameFlags.NOT_ASKED
-        out = _empty(finger, int(beat["t_us"]), int(beat["seq"]), flags)
-        out["pdc"], out["tdc"] = beat["pdc"], beat["tdc"]
-        return out
+    def _age_s(self, t_us: int, arrived_s: float) -> float:
+        reader = self._reader
+        if reader.link.pace == 0:  # its time stands still while nobody reads
+            return ((reader.last_t_us or t_us) - t_us) * 1e-6
+        return time.monotonic() - reader.taken_s(t_us, arrived_s)
 
-    def age_s(self, finger: int) -> float:
-        """Time since the samples of a finger's latest row were taken, at least since the row came; inf before any."""
-        entry = self._look().get(finger)
-        if entry is None:
-            return math.inf
-        now_s = self._monotonic_s()
-        since_arrival_s = now_s - entry[3]
-        # NaN while the clock knows nothing. A row was taken before it came, whatever the clock's estimate says.
-        taken_s = self._device_clock.estimate_s(self._t_us(*entry[:3]) + LAST_SAMPLE_US)
-        return max(since_arrival_s, now_s - taken_s)  # NaN is never larger
+    def _why_stale(self, age_s: float) -> str:
+        if self._reader.closing.is_set():
+            return "the hand is closed"
+        if self._reader.lost is not None:
+            return "the board is away and being looked for"
+        if age_s <= self.max_age_s:
+            return ""
+        if math.isinf(age_s):
+            return "nothing has arrived; call hand.stream(), or wait for next_frame()"
+        if math.isnan(age_s):
+            return "the board's clock is not known yet"
+        return f"{age_s:.2f} s old, at most {self.max_age_s:g} s is allowed"
+
+    def wait(self, finger: int, timeout_s: float) -> None:
+        """Wait for a row that comes after this call and is not stale. Raises TimeoutError."""
+        before, reader, why = self._batches.get(finger), self._reader, ""
+
+        def is_there() -> bool:
+            nonlocal why
+            if reader.failure is not None or reader.closing.is_set():
+                return True
+            why = self.state(finger)[2]
+            return not why and self._batches.get(finger) is not before
+
+        with self._news:
+            self._waiters += 1
+            try:
+                came = self._news.wait_for(is_there, timeout_s)
+            finally:
+                self._waiters -= 1
+        if reader.closing.is_set():
+            reader.raise_closed()
+        self.report()
+        if not came:
+            raise TimeoutError(f"no new frame of finger {self.name(finger)!r} in {timeout_s:g} s: {why or 'none came'}")
 
 
-def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:
-    """Each finger's latest row, and whether it is a heartbeat."""
-    rows = _last_rows(batch.wire)
-    out = {finger: (row, False) for finger, row in rows.items()}
-    for finger, row in _last_rows(batch.idle).items() if len(batch.idle) else ():
-        # A batch can hold a frame and a heartbeat of one finger: the later in device time counts.
-        if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
-            out[finger] = (row, True)
+def _latest_row(batch: Batch, finger: int) -> StructArray:
+    rows = np.flatnonzero(batch.wire["finger"] == finger)[-1:]
+    beats = np.flatnonzero(batch.idle["finger"] == finger)[-1:]
+    # A batch can hold a frame and a heartbeat of one finger: the later in device time counts.
+    if len(rows) and not (len(beats) and batch.idle["t_us"][beats[0]] > batch.t_us[rows[0]]):
+        return frames_from_wire(batch.wire[rows], batch.seq[rows], batch.t_us[rows])
+    beat = batch.idle[beats[0]]
+    flags = FrameFlags(int(beat["flags"])) | FrameFlags.POC_INVALID | FrameFlags.NOT_ASKED
+    out = _empty(finger, int(beat["t_us"]), int(beat["seq"]), flags)
+    out["pdc"], out["tdc"] = beat["pdc"], beat["tdc"]
     return out
-
-
-def _last_rows(messages: StructArray) -> dict[int, int]:
-    """Each finger's last row."""
-    return {finger: row for row, finger in enumerate(messages["finger"].tolist())}
 
 
 def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
@@ -195,6 +193,9 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
     out["pdc_filtered"] = out["pressure_force_n"] = out["torsion_nmm"] = np.nan
     out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
     return out
+
+
+_EMPTY = _empty(0, -1, 0, NOTHING_YET)
 
 
 def _value(name: str, convert: Callable[[Any], T], doc: str) -> T:
@@ -210,30 +211,54 @@ def _counts(row: Any) -> NDArray[np.uint16]:
     return np.asarray(row, np.uint16)
 
 
+class Streams(Protocol):
+    """What a view needs of its hand."""
+
+    def _go(self) -> None:
+        """Start the stream unless it runs."""
+
+
 class FingerView:
     """The latest values of one finger, ``hand["index"]``, read without waiting.
 
     Values are those of the latest frame, NaN or 65535 where invalid, as in FRAME_DTYPE. For an untouched finger that
-    sends heartbeats they are those of the latest heartbeat: results are NaN, and ``flags`` has NOT_ASKED. Before
-    anything has arrived, and while a lost board is looked for, everything is invalid and ``t_us`` is -1. Two
-    properties may come from different frames; those of ``frame`` come from one. Raises DeviceLostError when the board
-    is lost for good.
+    sends heartbeats they are those of the latest heartbeat: results are NaN, and ``flags`` has NOT_ASKED. Values older
+    than ``max_age_s`` (biotac.open) are never shown: then, before anything has arrived, and while a lost board is
+    looked for, everything is invalid, ``t_us`` is -1, and ``stale`` says why. Two properties may come from different
+    frames; those of ``frame`` come from one. Every property raises DeviceLostError when the board is lost for good, and
+    CallbackError or OSError when a callback or a recording has failed since the last call.
     """
 
-    def __init__(self, name: str, finger: int, latest: Latest, keeps: object = None) -> None:
+    def __init__(self, name: str, finger: int, latest: Latest, hand: Streams) -> None:
         self.name = name
         self.finger = finger
         self._latest = latest
-        self._keeps = keeps  # the Hand, which would be closed with its last reference
+        self._hand = hand  # which would be closed with its last reference
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
 
     def __repr__(self) -> str:
-        return f"<biotac finger {self.name!r}, chip select {self.finger}, {self.age_s:.3f} s old>"
+        return (
+            f"<biotac finger {self.name!r}, chip select {self.finger}, {self._latest.state(self.finger)[2] or 'fresh'}>"
+        )
 
     def _row(self) -> Any:
-        return self._latest.row(self.finger)[0]
+        return self._latest.state(self.finger)[0][0]
+
+    def next_frame(self, timeout_s: float = 1.0) -> Frame:
+        """Wait for the next frame or heartbeat of this finger, starting the stream if need be.
+
+        Raises TimeoutError when none comes in time, DeviceLostError when the board is lost.
+        """
+        self._hand._go()
+        self._latest.wait(self.finger, timeout_s)
+        return self.frame
+
+    @property
+    def stale(self) -> str:
+        """Why the values may not be used, and are NaN; empty when they may be."""
+        return self._latest.state(self.finger)[2]
 
     @property
     def frame(self) -> Frame:
@@ -257,8 +282,9 @@ class FingerView:
 
     @property
     def age_s(self) -> float:
-        """How long ago the round's last sample was taken, in s, by ``Hand.clock``; inf before anything arrived.
+        """How long ago the round's last sample was taken, in s, by ``Hand.clock``.
 
-        While that clock knows nothing, as with a simulated board that is not in real time: how long ago it was read.
+        Infinite before anything arrived, NaN while that clock knows nothing. A simulated board that is not in real
+        time has no such clock: then how long ago it was read, or, unpaced, how far its time has gone on since.
         """
-        return self._latest.age_s(self.finger)
+        return self._latest.state(self.finger)[1]

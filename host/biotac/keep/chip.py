@@ -54,6 +54,15 @@ def parse_address(text: str) -> tuple[int, int]:
     return int(match[1]), address
 
 
+def parse_place(text: str) -> tuple[str, str]:
+    """Address and kind from text such as ``1:0x50:24c32``. Raises PortError for anything else."""
+    address, _, kind = text.rpartition(":")
+    if kind not in KINDS:
+        raise PortError(f"{text!r} names no known EEPROM ({', '.join(KINDS)}); expected one such as 1:0x50:24c32")
+    parse_address(address)
+    return address, kind
+
+
 class Chip:
     """One EEPROM; use it as a context manager.
 
@@ -72,7 +81,7 @@ class Chip:
             import smbus2
         except ImportError as error:
             raise PortError(
-                f"{self.name} needs smbus2 ({error}); on Linux, pip install 'biotac-gateway[i2c]'"
+                f"{self.name} needs smbus2 ({error}); on Linux, pip install 'biotac-gateway[bus]'"
             ) from error
         self._message: Any = smbus2.i2c_msg
         try:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..errors import PortError
 from . import eeprom
 from .calibration import Calibration
-from .chip import KINDS, Chip, parse_address
+from .chip import Chip, parse_place
 
 FORM = "spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c02"
 
@@ -24,13 +24,8 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
         raise PortError(f"{port}: option {key!r} is unknown; expected {FORM}")
     eeproms: dict[int, tuple[str, str]] = {}
     for finger, text in enumerate(texts.split(",")):
-        if not text:
-            continue
-        address, _, kind = text.rpartition(":")
-        if kind not in KINDS:
-            raise PortError(f"{port}: {text!r} names no known EEPROM ({', '.join(KINDS)}); expected {FORM}")
-        parse_address(address)
-        eeproms[finger] = (address, kind)
+        if text:
+            eeproms[finger] = parse_place(text)
     fingers = bare.count(",") + 1
     if eeproms and max(eeproms) >= fingers:
         raise PortError(f"{port}: {max(eeproms) + 1} EEPROMs for {fingers} finger(s); expected at most one per finger")

@@ -10,10 +10,10 @@ from urllib.parse import quote
 
 from ..errors import RecordingError
 from ..keep.calibration_file import to_dict
-from ..recording import Recording
 from ..recording.blocks import Blocks
 from ..recording.facts import Facts
 from ..recording.layout import maps_text
+from ..recording.reader import Recording
 from ..wire.identity import ascii_text, serial_text
 
 NO_BOARD = "none"  # for imported files

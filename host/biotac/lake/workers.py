@@ -32,7 +32,8 @@ def each(
         for done in as_completed(index):
             problem = done.exception()
             if isinstance(problem, ImportError):
-                raise InputError(f"a Dask worker lacks {problem.name}; pip install 'biotac-gateway[lake,dask]' there")
+                cure = "pip install 'biotac-gateway[lake]' distributed"
+                raise InputError(f"a Dask worker lacks {problem.name}; {cure} there")
             if problem is not None:
                 problem = InputError(
                     f"{items[index[done]]}: its worker died before finishing (out of memory?); run again with fewer "
@@ -67,9 +68,7 @@ def _on_dask(address: str) -> Iterator[Executor]:
     try:
         import distributed
     except ImportError as error:
-        raise InputError(
-            f"--dask needs {error.name}, which is not installed; pip install 'biotac-gateway[dask]'"
-        ) from error
+        raise InputError(f"--dask needs {error.name}, which is not installed; pip install distributed") from error
     connect: Any = distributed.Client  # untyped
     try:
         client = connect(address, timeout="10s", set_as_default=False)

@@ -16,8 +16,8 @@ from ..errors import InputError, printable
 from ..export.columns import EXPORTED, HEARTBEATS, Table, tables
 from ..export.messages import message_tables
 from ..export.parquet import Label, frame_ids, write_labelled
-from ..recording import Recording
 from ..recording.layout import CHECKSUM
+from ..recording.reader import Recording
 from . import ids
 from .folder import PARTIAL, RECORDINGS
 

@@ -9,7 +9,7 @@
 ``sim:SOURCE``               a simulated board playing a scenario or a recording
 ``emu:pico?source=SOURCE``   the same, with a board's flash image in an emulator
 ``replay:REC``               a recording, which answers as its board did
-``zenoh:NAME``               a board that another computer shares (biotac serve)
+``zenoh:NAME``               a board that another computer shares (biotac share)
 """
 
 from __future__ import annotations

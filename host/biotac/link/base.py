@@ -58,6 +58,10 @@ class Link(Protocol):
     #: for its reader.
     keeps_time: bool = True
 
+    #: Whether the board streams to this link alone, so that a STATUS tells what was started here. Not so for
+    #: recordings, nor for a board that several share.
+    owns_stream: bool = True
+
     #: The bit rate of a UART. None where everything fits: USB, a network, this computer.
     bits_per_s: int | None = None
 
@@ -75,6 +79,10 @@ class Link(Protocol):
         """Let device time run, if it was held back until the host was ready."""
         return
 
+    def spoilt(self) -> str:
+        """What another program did to the port, when that is why nothing can be read any more; empty otherwise."""
+        return ""
+
     def places(self) -> list[str]:
         """Where the board may be found after it went away, likeliest first; empty when it cannot come back."""
         return []
@@ -82,10 +90,6 @@ class Link(Protocol):
     def reopen(self, place: str) -> None:
         """Open one of ``places`` in place of the lost port. Raises PortError."""
         raise PortError(f"{self.port} cannot be reopened; open a new link")
-
-    def abandon(self) -> None:
-        """In a forked child, let go of what the parent process goes on using, without sending anything."""
-        return
 
     def close(self) -> None:
         """Give the port back. Safe to call twice."""

@@ -35,6 +35,11 @@ class SerialLink(Link):
         self.reopen(path)
         self._usb_serial = usb_serial(path)
 
+    def spoilt(self) -> str:
+        if self.fd is None or not _is_cooked(self.fd):
+            return ""
+        return f"another program changed the settings of {self.port}, as `stty` does; end it and open the port again"
+
     def places(self) -> list[str]:
         """The same path, and wherever a USB device with the same serial number is now. Other ports are left alone."""
         moved = [p.device for p in comports() if self._usb_serial and p.serial_number == self._usb_serial]
@@ -49,6 +54,8 @@ class SerialLink(Link):
             raise open_error(place, error) from error
         if os.name == "posix":
             self.fd = self._serial.fileno()
+            with suppress(OSError):  # not a tty
+                _one_byte_at_least(self.fd)
         if hasattr(select, "poll"):
             self._poll = select.poll()
             self._poll.register(self._serial.fileno(), select.POLLIN)
@@ -71,7 +78,10 @@ class SerialLink(Link):
     def _drain(self) -> bytes:
         # Read the descriptor itself: pyserial's read() and in_waiting would cost as much as all the decoding.
         fd = self._serial.fileno()
-        pieces = [os.read(fd, ONE_READ_BYTES)]
+        try:
+            pieces = [os.read(fd, ONE_READ_BYTES)]
+        except BlockingIOError:
+            return b""  # another program took what was there
         if not pieces[0]:
             raise OSError("it hung up")
         # One tty read gives 4 KiB at most, and a reader that takes only one per wake-up loses data at high rates.
@@ -93,13 +103,7 @@ class SerialLink(Link):
         try:
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
-            raise DeviceLostError(
-                f"cannot write to {self.port} ({error}); plug the board in and open it again"
-            ) from error
-
-    def abandon(self) -> None:
-        with suppress(OSError, serial.SerialException, AttributeError):  # no open port to let go of
-            nowhere(self._serial.fileno())
+            raise went_away(self.port, error) from error
 
     def close(self) -> None:
         self._close_port()
@@ -107,6 +111,28 @@ class SerialLink(Link):
     def _close_port(self) -> None:
         if self._serial is not None:
             self._serial.close()
+
+
+def _one_byte_at_least(fd: int) -> None:
+    """Let a read without data wait, as cfmakeraw does: pyserial's setting, no wait, would stay for the next program."""
+    import termios
+
+    settings = termios.tcgetattr(fd)
+    settings[6][termios.VMIN] = 1
+    try:
+        termios.tcsetattr(fd, termios.TCSANOW, settings)
+    except termios.error as error:
+        raise OSError(*error.args) from error
+
+
+def _is_cooked(fd: int) -> bool:
+    """Whether the terminal takes lines and control characters, which our frames are not."""
+    import termios
+
+    try:
+        return bool(termios.tcgetattr(fd)[3] & termios.ICANON)
+    except termios.error:  # it is gone
+        return False
 
 
 def open_uart(port: str) -> SerialLink:

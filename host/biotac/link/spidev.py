@@ -84,7 +84,7 @@ def open_devices(port: str) -> list[Any]:
     try:
         import spidev
     except ImportError as error:
-        raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[spi]'") from error
+        raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[bus]'") from error
     opened: list[Any] = []
     try:
         for bus, device in places:

@@ -10,7 +10,7 @@ import serial
 
 from ..errors import DeviceLostError, PortError
 from .base import Link
-from .serial_port import READ_BYTES, nowhere, went_away
+from .serial_port import READ_BYTES, went_away
 
 # rfc2217 sends every change of the timeout to its far end, so it stays fixed; a read consists of several such waits.
 WAIT_S = 0.05
@@ -59,10 +59,6 @@ class UrlLink(Link):
             raise DeviceLostError(
                 f"cannot write to {self.port} ({error}); check the network and open it again"
             ) from error
-
-    def abandon(self) -> None:
-        if self.fd is not None:
-            nowhere(self.fd)
 
     def close(self) -> None:
         if self._serial is not None:

@@ -9,13 +9,13 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from ..documents import Provenance, made_text, read_document, sealed, write_new
+from ..documents import Provenance, made_text, parse_document, read_document, sealed, write_new
 from ..errors import InputError
 from .board_map import from_blob, made_s_of, serial_of
 from .fitted import WrenchMap
 
 FORMAT = "biotac-wrench-map/1"
-_CURE = "expected a wrench map, as `biotac calibrate wrench --out` or `biotac map get` writes it"
+_CURE = "expected a wrench map, as `biotac calibrate wrench --out` or `biotac calibration get` writes it"
 _CONTENTS = {3: "force", 6: "force and torque", 7: "force, torque and torsion"}
 
 
@@ -48,6 +48,11 @@ def from_dict(tree: Any) -> bytes:
     return from_blob(blob).blob
 
 
+def loads(text: str, where: str) -> bytes:
+    """The board's map in a file's text. Raises InputError that begins with ``where`` and says what is wrong."""
+    return parse_document(text, where, FORMAT, from_dict, _CURE)
+
+
 def load(path: Path) -> bytes:
     """The board's map in a file. Raises InputError when it cannot be read or used."""
     return read_document(path, FORMAT, from_dict, _CURE)
@@ -63,9 +68,14 @@ def read_provenance(path: Path) -> Provenance:
     return read_document(path, FORMAT, lambda content: dict(content["provenance"]), _CURE)
 
 
+def dumps(blob: bytes, provenance: Provenance | None = None) -> str:
+    """The text of a file with a board's map."""
+    return json.dumps(sealed(to_dict(blob, provenance)), indent=2) + "\n"
+
+
 def save(path: Path, blob: bytes, provenance: Provenance | None = None, *, overwrite: bool = False) -> None:
     """Write a board's map. Raises InputError when the file exists and may not be overwritten, or cannot be written."""
-    write_new(path, json.dumps(sealed(to_dict(blob, provenance)), indent=2) + "\n", overwrite=overwrite)
+    write_new(path, dumps(blob, provenance), overwrite=overwrite)
 
 
 def dumps_fitted(fitted: WrenchMap, *, serial: str = "", made_s: int = 0, provenance: Provenance | None = None) -> str:

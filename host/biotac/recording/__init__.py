@@ -13,6 +13,5 @@ from .crosscheck import CrossCheck
 from .npz_file import counts_field, read_npz, to_lin_frame
 from .reader import Recording
 from .selection import load
-from .writer import Recorder
 
-__all__ = ["CrossCheck", "Recorder", "Recording", "counts_field", "load", "read_npz", "to_lin_frame"]
+__all__ = ["CrossCheck", "Recording", "counts_field", "load", "read_npz", "to_lin_frame"]

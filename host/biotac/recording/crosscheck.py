@@ -98,9 +98,9 @@ class CrossCheck:
     ) -> None:
         """Check FRAME messages (n,) as sent on the wire, live or from a file.
 
-        ``own`` has the settings of fingers with a calibration (Hand.finger_settings, Recording.finger_settings).
-        ``maps`` has the wrench maps in force or their blobs (Hand.maps, Recording.maps). Raises InputError for a map
-        that a board would refuse.
+        ``own`` has the settings of fingers with a calibration (Hand.board.finger_settings, Recording.finger_settings).
+        ``maps`` has the wrench maps in force or their blobs (Hand.board.maps, Recording.maps). Raises InputError for a
+        map that a board would refuse.
         """
         own, maps = own or {}, maps or {}
         # A repeated wrench belongs to an earlier FRAME, and is judged there.

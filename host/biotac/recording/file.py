@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import asdict
-from importlib import resources
 from typing import Any, BinaryIO
 
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
-from ..hand.gap import Gap
+from ..board.gap import Gap
 from ..version import __version__
 from ..wire.batches import StreamDecoder
+from ..wire.native import BUILT
 from . import layout
 from .block import Rest, schema, take_apart
 from .plots import Plots
@@ -53,7 +53,7 @@ class RecordingFile:
         self._decoder.accept_newer_minor()
         self._last_ns: int | None = None  # when the last block's bytes had all arrived
         self.frames = 0  #: FRAMEs written so far
-        wire_schema = resources.files("biotac").joinpath("schema.json").read_bytes()
+        wire_schema = (BUILT / "schema.json").read_bytes()
         self._packets_schema = self._writer.register_schema(
             layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, wire_schema
         )

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mcap.writer import Writer
 
-from ..hand.gap import Gap
+from ..board.gap import Gap
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder
 from ..wire.events import event_age_s, kind_name

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..board.gap import Gap
 from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..errors import RecordingError
-from ..hand.gap import Gap
 from ..keep.calibration import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import StreamDecoder
@@ -127,11 +127,11 @@ class Recording:
         return [b"".join(packet.data for packet in block.packets()) for block in self._blocks]
 
     def to_pandas(self) -> Any:
-        """The frames as a pandas DataFrame (tabular.py), in order of arrival. Needs the extra ``pandas``."""
+        """The frames as a pandas DataFrame (tabular.py), in order of arrival. Needs the extra ``export``."""
         return to_pandas(self.frames, self.stamp_ns(self.frames["t_us"]))
 
     def to_xarray(self) -> Any:
-        """The frames as an xarray Dataset (tabular.py). Needs the extra ``pandas``."""
+        """The frames as an xarray Dataset (tabular.py). Needs the extra ``export``."""
         return to_xarray(self.frames, self.stamp_ns(self.frames["t_us"]))
 
     def stamp_ns(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..board.stream import RESULTS
 from ..core.compiled import on_board_q4, pressure_force_100un
 from ..errors import InputError
-from ..hand.subscription import RESULTS
 from ..keep.calibration import own_settings
 from ..map import board_map
 from ..map.board_map import BoardMap, opened

@@ -1,6 +1,7 @@
 """Scanning an MCAP file from first byte to last, yielding the undamaged parts of the wanted chunks.
 
-Every chunk has a checksum, and so have the file's records and its index. The statistics say how many chunks, metadata
+mcap's own readers end at the first damage, and do not say where; its records and chunks are read by its own code. Every
+chunk has a checksum, and so have the file's records and its index. The statistics say how many chunks, metadata
 records and messages there were. A flipped bit shows in one or the other.
 """
 
@@ -20,10 +21,10 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, DataEnd, Footer, McapRecord, Message, Metadata, Schema, Statistics
+from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
-from .chunk import HEAD, chunk_of, records_of, unpack
 
 # A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to, or less with fingers at rest. In
 # memory the data takes ten times its unpacked size.
@@ -31,11 +32,12 @@ _CHUNK_MAX_BYTES = 1 << 23
 _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
 
+_HEAD_BYTES = 9  # of a record: opcode, length
 _START = struct.Struct("<BQH")  # a record's head, and the channel that a message index begins with
 # As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
 _CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
 _DATA_END, _FOOTER = int(Opcode.DATA_END), int(Opcode.FOOTER)
-_FOOTER_BYTES = HEAD.size + 16  # the part of the footer that its checksum covers, too
+_FOOTER_BYTES = _HEAD_BYTES + 16  # the part of the footer that its checksum covers, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
     Opcode.SCHEMA: Schema,
@@ -106,7 +108,7 @@ class Scan:
             channels: set[int] = set()
             while True:
                 opcode, length, channel = _START.unpack(stream.read(_START.size).ljust(_START.size, b"\0"))
-                at = good_until + HEAD.size
+                at = good_until + _HEAD_BYTES
                 whole = opcode != 0 and length <= self._size - at
                 if opcode == _MESSAGE_INDEX and whole:  # two out of three records
                     channels.add(channel)
@@ -147,9 +149,9 @@ class Scan:
         record = self._read(opcode, _content(stream, at, length))
         if isinstance(record, DataEnd):
             self._data_end = at + length
-            begin, end, expected = 0, at - HEAD.size, record.data_section_crc
+            begin, end, expected = 0, at - _HEAD_BYTES, record.data_section_crc
         elif isinstance(record, Footer):
-            begin, end, expected = record.summary_start, at - HEAD.size + _FOOTER_BYTES, record.summary_crc
+            begin, end, expected = record.summary_start, at - _HEAD_BYTES + _FOOTER_BYTES, record.summary_crc
             if begin != self._data_end:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return
@@ -213,11 +215,12 @@ class Scan:
 
     def _open(self, stream: BinaryIO, at: int, length: int, *, unwanted: bool) -> Iterator[tuple[str, Message]]:
         try:
-            stream.seek(at)
-            chunk = chunk_of(stream.read(length))
+            chunk = Chunk.read(_content(stream, at, length))
             self._weigh(chunk)
-            data = unpack(chunk)
-            records = [] if unwanted else list(records_of(data))
+            if unwanted:
+                get_chunk_data_stream(chunk, validate_crc=True)
+                return
+            records = breakup_chunk(chunk, validate_crc=True)
         except RecordingError:
             raise
         except Exception as error:  # mcap, zstandard and struct raise many types

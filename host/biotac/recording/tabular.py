@@ -51,4 +51,4 @@ def _imported(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise InputError(f"{name} is not installed; pip install 'biotac-gateway[pandas]'") from error
+        raise InputError(f"{name} is not installed; pip install 'biotac-gateway[export]'") from error

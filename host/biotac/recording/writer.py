@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+from ..board.gap import Gap
 from ..errors import InputError, printable, taken
-from ..hand.gap import Gap
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
@@ -24,8 +24,8 @@ FLUSH_S = 0.9
 FINGER_BYTES_PER_S = 100 * sum(DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
 
 
-class Recorder:
-    """An open recording, made by ``Hand.record``. Every chunk from the link is passed to ``write``.
+class Writer:
+    """The files of one recording (hand/record.py). Every chunk from the link is passed to ``write``.
 
     ``path`` is the file being written; ``paths`` lists all files so far. When the board restarts, its clock and
     sequence numbers start over and its sensors may be different ones, so the recording goes on in a new file.

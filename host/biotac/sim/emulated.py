@@ -23,6 +23,9 @@ from ..errors import DeviceLostError, PortError
 from .process import SimBoard
 from .source import Source
 
+# Whoever reads the link hears the board too: an answer may already be there.
+LISTEN_S = 0.005
+
 
 @dataclass(frozen=True)
 class Tools:
@@ -105,7 +108,7 @@ class EmulatedBoard(SimBoard):
 
     def _counted(self) -> tuple[str, Any]:
         while not self._answers:
-            self.hear()
+            self.hear(LISTEN_S)
         word, _, text = self._answers.pop(0).partition(" ")
         return word, json.loads(text)
 

@@ -10,11 +10,12 @@ import os
 import select
 import subprocess
 import tempfile
-from importlib import resources
+import threading
 from pathlib import Path
 
 from ..errors import DeviceLostError, PortError
-from ..link.serial_port import SerialLink, nowhere
+from ..link.serial_port import SerialLink
+from ..wire.native import BUILT
 from .source import Source
 from .tape import write_tape
 
@@ -22,7 +23,7 @@ from .tape import write_tape
 def executable() -> Path:
     """The simulator in this package; the environment variable BIOTAC_SIM names another build."""
     override = os.environ.get("BIOTAC_SIM")
-    path = Path(override) if override else Path(str(resources.files("biotac"))) / "bin" / "biotac-sim"
+    path = Path(override) if override else BUILT / "bin" / "biotac-sim"
     if not path.is_file():
         raise PortError(f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set")
     return path
@@ -37,6 +38,7 @@ class SimBoard:
         self.over = False  # the tape has been played, and everything handed over
         self._heard = b""
         self._answers: list[str] = []
+        self._hearing = threading.Lock()
         self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
         tape = Path(self._folder.name) / "counts.tape"
         write_tape(tape, source)
@@ -67,17 +69,21 @@ class SimBoard:
         assert self._process.stdout is not None
         return self._process.stdout.fileno()
 
-    def hear(self) -> None:
+    def hear(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
-        text = os.read(self.stdout_fd(), 65536)
-        if not text:
-            raise DeviceLostError(f"the simulated board died: {self._last_words() or 'no message'}")
-        *lines, self._heard = (self._heard + text).split(b"\n")
-        for line in lines:
-            if line == b"end":
-                self.over = True
-            else:
-                self._answers.append(line.decode())
+        select.select([self.stdout_fd()], [], [], timeout_s)
+        with self._hearing:  # another thread may have read it meanwhile
+            if not select.select([self.stdout_fd()], [], [], 0)[0]:
+                return
+            text = os.read(self.stdout_fd(), 65536)
+            if not text:
+                raise DeviceLostError(f"the simulated board died: {self._last_words() or 'no message'}")
+            *lines, self._heard = (self._heard + text).split(b"\n")
+            for line in lines:
+                if line == b"end":
+                    self.over = True
+                else:
+                    self._answers.append(line.decode())
 
     def say(self, line: str) -> None:
         """Send a line to the board's process, separately from the link."""
@@ -91,17 +97,8 @@ class SimBoard:
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait at most timeout_s for output of the board; return True when the tape is over."""
-        ready, _, _ = select.select([self.stdout_fd()], [], [], timeout_s)
-        if ready:
-            self.hear()
+        self.hear(timeout_s)
         return self.over
-
-    def abandon(self) -> None:
-        """Let go of the process and its pipes, in a fork of the process that started it."""
-        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            if pipe is not None and not pipe.closed:
-                nowhere(pipe.fileno())
-        self._process.returncode = 0  # only its parent may wait for it
 
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
@@ -150,13 +147,9 @@ class SimLink(SerialLink):
         watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd()])
         ready, _, _ = select.select(watched, [], [], timeout_s)
         if len(watched) > 1 and watched[1] in ready:
-            self.board.hear()
+            self.board.hear(0)
         self.ended = self.board.over
         return self._serial.fileno() in ready
-
-    def abandon(self) -> None:
-        super().abandon()
-        self.board.abandon()
 
     def release(self) -> None:
         if self._held:

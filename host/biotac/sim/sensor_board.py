@@ -14,8 +14,8 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import numpy.typing as npt
 
+from ..board.board import Board
 from ..errors import BiotacError, DeviceLostError, InputError, PortError
-from ..hand.board import Board
 from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor

@@ -1,12 +1,20 @@
-"""The interface that the page needs to whatever it shows, from opening it until it ends or is lost."""
+"""What the page shows: a board, real or simulated, or a recording that answers as its board did."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from datetime import datetime
+from pathlib import Path
 
+from ..errors import CommandRefusedError, InputError
+from ..hand.hand import Hand
+from ..hand.record import Recorder
+from ..recording.replay.link import ReplayLink
+from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
+from ..wire.identity import version_text
 
 
 @dataclass(frozen=True)
@@ -17,38 +25,112 @@ class Recorded:
     seconds: float  # device time since it began
 
 
-class Player(Protocol):
-    """Yields batches and takes commands meanwhile. Used by one thread only."""
+class Player:
+    """Yields what ``hand`` sends, and takes commands from any thread meanwhile; recordings go to ``folder``.
 
-    #: The sender, as text for users: board and firmware.
-    board: str
+    ``board`` is the sender, as text for users. ``live``: a board, which can be tared and recorded; a recording can be
+    paused.
+    """
 
-    #: True for a board, which can be tared and recorded; False for a recording, which can be paused.
-    live: bool
+    def __init__(self, hand: Hand, folder: Path) -> None:
+        self._hand = hand
+        self._folder = folder
+        self._replay = hand.link if isinstance(hand.link, ReplayLink) else None
+        self._recorder: Recorder | None = None
+        self._recording_since_us: int | None = None
+        self._last_us = 0
+        self.live = self._replay is None
+        self.board = f"{wire.BOARD_DOC.get(hand.info.board, f'board {hand.info.board}')}, firmware "
+        self.board += version_text(hand.info)
+        if self._replay is not None:
+            self.board += f", recorded from {self._replay.recording.metadata['port']}"
+        try:
+            hand.stream("results", "events")
+        except BaseException:
+            hand.close()
+            raise
 
-    #: True while paused, until ``resume``.
-    paused: bool
+    @property
+    def paused(self) -> bool:
+        """True from ``pause`` to ``resume``."""
+        return self._replay is not None and self._replay.pacer.paused
 
     def batches(self) -> Iterator[Batch]:
-        """Yield batches as time goes on, at least one per second, if need be an empty one; return at the end."""
+        """Yield batches as they come; return at the end of a recording."""
+        for batch in self._hand.batches():
+            self._last_us = batch.last_t_us() or self._last_us
+            yield batch
 
     def stats(self) -> LinkStats:
         """Health of the link."""
+        return self._hand.stats
 
     def recording(self) -> Recorded | None:
         """The recording being written now, if any."""
+        if self._recorder is None or self._recorder.closed or self._recording_since_us is None:
+            return None
+        return Recorded(str(self._recorder.path), (self._last_us - self._recording_since_us) / 1e6)
 
     def do(self, command: str, finger: int | None) -> str:
         """Carry out a command of ``COMMANDS``; return what was done, in words.
 
         Raises InputError for a command that this player does not support, any BiotacError for one that failed.
         """
+        if self._replay is not None:
+            return self._pause(self._replay, command)
+        if command == "tare":
+            return self._tare(self._hand.fingers if finger is None else [finger])
+        if command == "record":
+            return self._record()
+        if command == "stop":
+            return self._stop()
+        raise InputError(f"a board cannot {command}; it runs until it is unplugged")
+
+    def _pause(self, replay: ReplayLink, command: str) -> str:
+        if command not in ("pause", "resume"):
+            what = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
+            raise InputError(f"a recording cannot be {what}; open a board for that")
+        replay.pacer.paused = command == "pause"
+        return "paused" if replay.pacer.paused else "playing"
+
+    def _tare(self, fingers: list[int]) -> str:
+        refused: list[str] = []
+        for finger in fingers:
+            try:
+                self._hand.tare(finger)
+            except CommandRefusedError as error:
+                refused.append(f"finger {finger}: {error}")
+        if refused:
+            raise CommandRefusedError("; ".join(refused))
+        names = ", ".join(str(f) for f in fingers)
+        return f"tared finger{'' if len(fingers) == 1 else 's'} {names}"
+
+    def _record(self) -> str:
+        name = f"biotac-{datetime.now():%Y%m%d-%H%M%S}.mcap"
+        self._recorder = self._hand.record(self._folder / name)
+        self._recording_since_us = self._last_us
+        return f"recording to {self._recorder.path}"
+
+    def _stop(self) -> str:
+        recorder = self._recorder
+        if recorder is None or recorder.closed:
+            raise InputError("nothing is being recorded; start a recording first")
+        recorder.close()
+        return f"recorded to {recorder.path}"
 
     def close(self) -> None:
-        """Release all resources. Safe to call twice."""
+        """Close the board; a recording in progress is finished and kept. Safe to call twice."""
+        self._hand.close()
 
 
 Opener = Callable[[], Player]
 
 #: Commands of the page. ``again`` replays from the start after the end; it never reaches a Player.
 COMMANDS = ("tare", "record", "stop", "pause", "resume", "again")
+
+
+def writable(folder: Path) -> Path:
+    """``folder``. Raises InputError if recordings cannot be written there."""
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"{folder} is not a writable folder; name another with --folder")
+    return folder

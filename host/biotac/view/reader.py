@@ -1,27 +1,15 @@
-"""The only reading thread: opens the source, plays it, carries out commands, and reopens what went away."""
+"""The thread that opens the source, plays it into the state, and reopens what went away."""
 
 from __future__ import annotations
 
-import queue
 import threading
-from concurrent.futures import Future
-from dataclasses import dataclass, field
 
-from ..errors import BiotacError, InputError
+from ..errors import BiotacError, InputError, StreamTakenError
 from .player import COMMANDS, Opener, Player
 from .state import State
 
 RETRY_S = 1.0
-ANSWER_S = 10.0
-
-
-@dataclass
-class Command:
-    """A command from a browser; ``done`` gets a description of what was done, or the error."""
-
-    name: str
-    finger: int | None
-    done: Future[str] = field(default_factory=Future)
+OPEN_S = 10.0  # that a command waits for the first attempt to open
 
 
 class Reader:
@@ -32,8 +20,12 @@ class Reader:
         self._state = state
         self._again = again
         self._loss = ""  # how the board was lost, while it is lost
-        self._commands: queue.Queue[Command | None] = queue.Queue()
-        self._stop = threading.Event()
+        self._player: Player | None = None
+        self._resting = "it is being opened; try again"  # why there is none
+        self._turn = threading.Lock()  # of commands, and of the player's coming and going
+        self._tried = threading.Event()  # to open it
+        self._go_on = threading.Event()  # ends a rest
+        self._stopping = False
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
         #: Set before ``over`` when nothing can be played at all: the source is malformed or missing.
         self.failure: BaseException | None = None
@@ -44,39 +36,43 @@ class Reader:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the thread and wait for it; it closes what is open."""
-        self._stop.set()
-        self._commands.put(None)
+        """Close what is open, and wait for the thread to end."""
+        self._stopping = True
+        self._go_on.set()
+        if self._player is not None:
+            self._close(self._player)
         self._thread.join()
 
     def ask(self, name: str, finger: int | None) -> str:
-        """Have the thread carry out a command; return what was done, in words.
+        """Carry out a command from a browser; return what was done, in words.
 
-        Raises InputError for an unknown command, when nothing plays, and when the command was not done in time; if it
-        was not even begun, it is cancelled. Otherwise raises what the Player raises.
+        Raises InputError for an unknown command and when nothing plays; otherwise what the Player raises.
         """
         if name not in COMMANDS:
             raise InputError(f"unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
-        command = Command(name, finger)
-        self._commands.put(command)
-        try:
-            return command.done.result(timeout=ANSWER_S)
-        except TimeoutError:
-            if not command.done.cancel():
-                raise InputError(
-                    f"{name} has been running for over {ANSWER_S:.0f} s; check whether it took effect"
-                ) from None
-            raise InputError(f"{name} did not start within {ANSWER_S:.0f} s and was cancelled; try again") from None
+        self._tried.wait(OPEN_S)
+        with self._turn:
+            if name == "again":
+                if self._player is not None:
+                    raise InputError("it is already playing")
+                self._go_on.set()
+                return "trying again"
+            if self._player is None:
+                raise InputError(self._resting)
+            words = self._player.do(name, finger)
+            self._say_playing(self._player)
+            return words
 
     # ---- the thread ----------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
-            while not self._stop.is_set():
+            while not self._stopping:
                 self._once()
         except BaseException as error:
             self.failure = error
         finally:
+            self._tried.set()
             self.over.set()
 
     def _once(self) -> None:
@@ -87,34 +83,32 @@ class Reader:
         except BiotacError as error:
             self._rest("lost", f"{self._loss}No board: {error}. Retrying every second.", RETRY_S)
             return
-        self._loss = ""
+        self._loss, was_taken = "", False
+        self._state.begin(player)
+        with self._turn:
+            self._player = player
+            self._say_playing(player)
+        self._tried.set()
         try:
-            self._state.begin(player)
-            ended = self._play(player)
+            # Without a batch nothing is noticed: ``stop`` sets its flag, then closes the player, which ends them.
+            for batch in player.batches() if not self._stopping else ():
+                self._state.take(batch, player)
+                if self._stopping:
+                    break
         except (BiotacError, OSError) as error:
             # OSError: the disk is full while recording.
             kept = player.recording()
-            self._close(player)
             self._loss = f"Connection lost: {error}. "
             if kept:
                 self._loss += f"The recording {kept.path} is kept up to that point. "
-            self._rest("lost", f"{self._loss}Retrying every second.", RETRY_S)
-            return
+            was_taken = isinstance(error, StreamTakenError)
         self._close(player)
-        if ended and not self._again:
+        if was_taken:  # to open the board again would take it back
+            self._rest("taken", self._loss, None)
+        elif self._loss:
+            self._rest("lost", f"{self._loss}Retrying every second.", RETRY_S)
+        elif not self._again:
             self._rest("over", "Playback finished.", None)
-
-    def _play(self, player: Player) -> bool:
-        self._say_playing(player)
-        for batch in player.batches():
-            self._state.take(batch, player)
-            while not self._commands.empty():
-                command = self._commands.get()
-                if command is not None and command.done.set_running_or_notify_cancel():
-                    self._obey(player, command)
-            if self._stop.is_set():
-                return False
-        return True
 
     def _say_playing(self, player: Player) -> None:
         if player.live:
@@ -124,31 +118,15 @@ class Reader:
         else:
             self._state.say("playing", "Playing a recording.")
 
-    def _obey(self, player: Player, command: Command) -> None:
-        try:
-            if command.name == "again":
-                raise InputError("it is already playing")
-            words = player.do(command.name, command.finger)
-        except (BiotacError, OSError) as error:
-            command.done.set_exception(error)
-        else:
-            command.done.set_result(words)
-            self._say_playing(player)
-
     def _rest(self, link: str, words: str, seconds: float | None) -> None:
-        """Wait, refusing every command but ``again``."""
-        self._state.say(link, words)
-        while not self._stop.is_set():
-            try:
-                command = self._commands.get(timeout=seconds)
-            except queue.Empty:
-                return
-            if command is None or not command.done.set_running_or_notify_cancel():
-                continue
-            if command.name == "again":
-                command.done.set_result("playing again" if link == "over" else "looking again")
-                return
-            command.done.set_exception(InputError(words))
+        """Wait, while every command but ``again`` is refused."""
+        with self._turn:
+            self._player, self._resting = None, words
+            self._go_on.clear()
+        self._tried.set()
+        if not self._stopping:
+            self._state.say(link, words)
+            self._go_on.wait(seconds)
 
     def _close(self, player: Player) -> None:
         try:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from ..errors import PortError
-from ..recording import Recording
+from ..errors import InputError, PortError
+from ..hand.opening import open as open_hand
+from ..hand.opening import shake_hands
+from ..recording.reader import Recording
+from ..recording.replay.link import ReplayLink
+from ..recording.replay.playback import Playback
 from . import DEFAULT_PORT
-from .live import LivePlayer, writable
-from .player import Opener
+from .player import Opener, Player, writable
 from .reader import Reader
-from .recorded import RecordedPlayer
 from .server import ViewServer
 from .state import State
 
@@ -81,9 +83,11 @@ def opener_of(source: str, folder: Path) -> Opener:
     """An opener for ``source``; a recording is read now, only once."""
     if source.endswith(RECORDING_SUFFIX):
         recording = Recording(source)
-        return lambda: RecordedPlayer(recording)
+        if not recording.fingers:
+            raise InputError(f"{source} holds no frames; record it again")
+        return lambda: Player(shake_hands(ReplayLink(source, Playback(recording), pace=1.0)), folder)
     port = lasting(source)
-    return lambda: LivePlayer(port, folder)
+    return lambda: Player(open_hand(port, pace=1.0), folder)  # people watch, so simulated boards run in real time
 
 
 def lasting(port: str) -> str:

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
+from ..board.gap import FINGERS_IN, Gap
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.counters import nearest
@@ -103,7 +104,7 @@ class State:
         """Change the link's state and publish it at once."""
         with self._news:
             self._health.link, self._health.words = link, words
-            if link in ("lost", "opening"):
+            if link in ("lost", "opening", "paused"):
                 self._health.frames_per_s = 0.0
                 self._health.recording = None
                 self._arrived.clear()
@@ -152,6 +153,9 @@ class State:
             t_us, name = nearest(message.t_us, now_us), kind_name(message).lower()
             self._health.events.append({"finger": message.finger, "t_us": t_us, "name": name})
             self._health_due_s = 0.0  # publish at once
+        elif isinstance(message, Gap):
+            for finger in FINGERS_IN[message.fingers]:
+                self._health.events.append({"finger": finger, "t_us": message.next_t_us or now_us, "name": "gap"})
         elif isinstance(message, wire.Tare):
             self._finger(message.finger).update(
                 tare_state=message.tare_state, tare_reason=message.reason, tare_age_ms=0, status_t_us=message.t_us

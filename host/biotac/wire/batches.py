@@ -47,7 +47,8 @@ class Batch:
     numbers and device times in us. ``frames`` are the same rows in user units, converted on first use. ``pac`` is
     PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is the bit mask of the
     fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown. ``arrived_s`` is when the last of its
-    bytes came, by time.monotonic(); NaN where nobody knows, as for a recording.
+    bytes came, by time.monotonic(), and ``taken_s`` when the last of its samples was taken; NaN where nobody knows, as
+    for a recording.
     """
 
     wire: StructArray
@@ -58,6 +59,7 @@ class Batch:
     messages: list[Any] = field(default_factory=list)
     fingers: int = field(default=-1, repr=False)
     arrived_s: float = math.nan
+    taken_s: float = math.nan
     _frames: StructArray | None = field(default=None, init=False, repr=False, compare=False)
 
     @property
@@ -66,6 +68,14 @@ class Batch:
         if self._frames is None:
             self._frames = frames_from_wire(self.wire, self.seq, self.t_us)
         return self._frames
+
+    @property
+    def age_s(self) -> float:
+        """How long ago its last sample was taken, in s; NaN without rows, and while the board's clock is unknown.
+
+        Only the hand that read it can tell: batches that waited while a program stood still are old.
+        """
+        return time.monotonic() - self.taken_s
 
     def last_t_us(self) -> int | None:
         """Device time of the latest frame or heartbeat; None without any."""
@@ -268,9 +278,15 @@ def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
     pac_now = batch.pac["t_us"] < end_us
     idle_now = batch.idle["t_us"] < end_us
 
+    whole_us = batch.last_t_us()
+
     def rows(frames: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
         sent, seq, t_us = batch.wire[frames], batch.seq[frames], batch.t_us[frames]
-        return Batch(sent, seq, t_us, batch.pac[pac], batch.idle[idle], messages, batch.fingers, batch.arrived_s)
+        part = Batch(sent, seq, t_us, batch.pac[pac], batch.idle[idle], messages, batch.fingers, batch.arrived_s)
+        last_us = part.last_t_us()
+        if last_us is not None and whole_us is not None:
+            part.taken_s = batch.taken_s - (whole_us - last_us) * 1e-6
+        return part
 
     return rows(now, pac_now, idle_now, batch.messages), rows(~now, ~pac_now, ~idle_now, [])
 
@@ -287,4 +303,5 @@ def join(batches: list[Batch]) -> Batch:
         np.concatenate([b.idle for b in batches]),
         [m for b in batches for m in b.messages],
         arrived_s=batches[-1].arrived_s,
+        taken_s=batches[-1].taken_s,
     )

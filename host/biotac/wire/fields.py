@@ -75,6 +75,16 @@ def _count(name: str, what: str, parts: tuple[str, ...] = ()) -> Field:
     return Field(name, "<u2", "count", f"{what}, 0 to 4095; 65535 where missing", parts, name, None, INVALID_COUNT)
 
 
+def _real(name: str, what: str, sent: str, per_unit: int, parts: tuple[str, ...] = (), dtype: str = "<f8") -> Field:
+    unit = {"mm": "mm", "n": "N", "nmm": "N*mm"}.get(name.rpartition("_")[2], "count")
+    return Field(name, dtype, unit, what, parts, sent, per_unit)
+
+
+_PRESSURE_FORCE = "magnitude of the force from static pressure, negative below rest; NaN unless calibrated"
+_TORSION = "torque about the outward normal at the contact; NaN unless a wrench map gives it"
+_AGE = "how much older force, torque and torsion are than the row; 0 unless REPEATED"
+_TARE_STATE = Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state")
+
 #: One row per finger and round of slots (10 ms).
 FRAME_FIELDS = (
     _FINGER,
@@ -83,83 +93,18 @@ FRAME_FIELDS = (
     _count("pdc", "static pressure"),
     _count("tac", "thermal flux"),
     _count("tdc", "temperature"),
-    Field(
-        "tare",
-        "<f4",
-        "count",
-        "counts at rest, in steps of 1/16; NaN where unknown",
-        _ELECTRODES,
-        "tare_q4",
-        Q4_PER_COUNT,
-    ),
-    Field(
-        "pdc_tare",
-        "<f8",
-        "count",
-        "pressure at rest, in steps of 1/16; NaN where unknown",
-        (),
-        "pdc_tare_q4",
-        Q4_PER_COUNT,
-    ),
-    Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state"),
-    Field(
-        "poc_mm", "<f8", "mm", "point of contact on the core's surface; NaN where invalid", AXES, "poc_um", UM_PER_MM
-    ),
-    Field("force_n", "<f8", "N", "force on the finger; NaN where invalid", AXES, "force_100un", FORCE_LSB_PER_N),
-    Field(
-        "torque_nmm",
-        "<f8",
-        "N*mm",
-        "torque on the finger about the origin; NaN where invalid",
-        AXES,
-        "torque_mnmm",
-        MNMM_PER_NMM,
-    ),
-    Field("poc_sigma_mm", "<f8", "mm", "one standard deviation; NaN unless enabled", (), "poc_sigma_um", UM_PER_MM),
-    Field(
-        "force_sigma_n",
-        "<f8",
-        "N",
-        "one standard deviation; NaN unless enabled",
-        AXES,
-        "force_sigma_100un",
-        FORCE_LSB_PER_N,
-    ),
-    Field(
-        "pdc_filtered",
-        "<f8",
-        "count",
-        "pressure, filtered by the board; NaN where missing",
-        (),
-        "pdc_filtered_q4",
-        Q4_PER_COUNT,
-    ),
-    Field(
-        "pressure_force_n",
-        "<f8",
-        "N",
-        "magnitude of the force from static pressure, negative below rest; NaN unless calibrated",
-        (),
-        "pressure_force_100un",
-        FORCE_LSB_PER_N,
-    ),
-    Field(
-        "torsion_nmm",
-        "<f8",
-        "N*mm",
-        "torque about the outward normal at the contact; NaN unless a wrench map gives it",
-        (),
-        "torsion_mnmm",
-        MNMM_PER_NMM,
-    ),
-    Field(
-        "wrench_age_ms",
-        "<u2",
-        "ms",
-        "how much older force, torque and torsion are than the row; 0 unless REPEATED",
-        (),
-        "wrench_age_ms",
-    ),
+    _real("tare", "counts at rest, in steps of 1/16; NaN where unknown", "tare_q4", Q4_PER_COUNT, _ELECTRODES, "<f4"),
+    _real("pdc_tare", "pressure at rest, in steps of 1/16; NaN where unknown", "pdc_tare_q4", Q4_PER_COUNT),
+    _TARE_STATE,
+    _real("poc_mm", "point of contact on the core's surface; NaN where invalid", "poc_um", UM_PER_MM, AXES),
+    _real("force_n", "force on the finger; NaN where invalid", "force_100un", FORCE_LSB_PER_N, AXES),
+    _real("torque_nmm", "torque on the finger about the origin; NaN where invalid", "torque_mnmm", MNMM_PER_NMM, AXES),
+    _real("poc_sigma_mm", "one standard deviation; NaN unless enabled", "poc_sigma_um", UM_PER_MM),
+    _real("force_sigma_n", "one standard deviation; NaN unless enabled", "force_sigma_100un", FORCE_LSB_PER_N, AXES),
+    _real("pdc_filtered", "pressure, filtered by the board; NaN where missing", "pdc_filtered_q4", Q4_PER_COUNT),
+    _real("pressure_force_n", _PRESSURE_FORCE, "pressure_force_100un", FORCE_LSB_PER_N),
+    _real("torsion_nmm", _TORSION, "torsion_mnmm", MNMM_PER_NMM),
+    Field("wrench_age_ms", "<u2", "ms", _AGE, (), "wrench_age_ms"),
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),
 )
 
@@ -190,7 +135,7 @@ IDLE_FIELDS = (
     Field("energy_count2", "<u4", "count^2", "sum of squared signals", (), "energy_count2"),
     _count("pdc", "static pressure"),
     _count("tdc", "temperature"),
-    Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state"),
+    _TARE_STATE,
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md", (), "flags"),
 )
 

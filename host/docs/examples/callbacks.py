@@ -22,7 +22,7 @@ def arrived(batch) -> None:
 with biotac.open(sys.argv[1] if len(sys.argv) > 1 else "sim:press.toml") as hand:
     hand.on_touch(touched)
     stop = hand.on_batch(arrived)
-    hand.run(queue=True)
+    hand.stream()
     for _ in hand.batches():  # or any work of your own
         pass
     stop()

@@ -1,4 +1,4 @@
-"""Look at fingers whenever you like; threads read the board. python latest.py [PORT]"""
+"""Look at fingers whenever you like; what is too old is not shown. python latest.py [PORT]"""
 
 import sys
 import threading
@@ -6,9 +6,12 @@ import threading
 import biotac
 
 with biotac.open(sys.argv[1] if len(sys.argv) > 1 else "sim:press.toml?pace=real&seconds=2", reconnect=True) as hand:
-    hand.run()
+    hand.stream()
     tick = threading.Event()
     while hand.streaming:
         tick.wait(0.25)  # your own loop: a controller, a user interface
         finger = hand["index"]
+        if finger.stale:
+            print(f"no force: {finger.stale}")
+            continue
         print(f"force {finger.force_n} N at {finger.poc_mm} mm, {finger.age_s * 1e3:.0f} ms old, {finger.flags!r}")

@@ -5,7 +5,7 @@ import sys
 import biotac
 
 with biotac.open(sys.argv[1] if len(sys.argv) > 1 else "sim:press.toml", fingers={"thumb": 0}) as hand:
-    hand.want("force", rest=False, rate_hz=20)
+    hand.stream("force", rest=False, rate_hz=20)
     for batch in hand.batches():
         for frame in batch.frames:
             print(f"{frame['t_us'] / 1e6:7.3f} s  {frame['force_n']} N")

@@ -112,7 +112,7 @@ def test_invalid_stays_nan_on_the_way(inlet) -> None:
 
 def test_events_are_markers_by_name(inlet) -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand, Outlet(hand) as outlet:
-        hand.subscribe(biotac.QuantityFlags.EVENTS | biotac.QuantityFlags.REST_FRAMES)
+        hand.stream("events", "raw")
         stream = inlet(outlet.infos[2])
         batch = hand.read_batch(3.0)
         outlet.push(batch)
@@ -137,14 +137,14 @@ def test_a_simulated_boards_frames_are_stamped_by_arrival_and_counted(inlet) -> 
 
 
 def test_the_verb_ends_with_its_source_and_says_how_it_stamped(capsys) -> None:
-    assert main(["lsl", "sim:press.toml?seconds=0.3&pace=fast", "--json"]) == 0
+    assert main(["share", "sim:press.toml?seconds=0.3&pace=fast", "--lsl", "--json"]) == 0
     said = capsys.readouterr()
     assert '{"name": "BioTac finger0", "rate_hz": 100.0}' in said.out
     assert "stamped by arrival" in said.err
 
 
 def test_the_verb_tells_rates(capsys) -> None:
-    assert main(["lsl", "sim:press.toml?seconds=0.3&pace=fast", "--seconds", "0.1"]) == 0
+    assert main(["share", "sim:press.toml?seconds=0.3&pace=fast", "--lsl", "--seconds", "0.1"]) == 0
     said = capsys.readouterr()
     assert said.out.splitlines()[0] == "BioTac finger0, 100 samples per second"
     assert "BioTac finger0 events, irregular" in said.out.splitlines()
@@ -153,7 +153,7 @@ def test_the_verb_tells_rates(capsys) -> None:
 
 def test_without_pylsl_the_extra_is_named(capsys, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pylsl", None)
-    assert main(["lsl", "sim:press.toml"]) == biotac.InputError.exit_code
+    assert main(["share", "--lsl", "sim:press.toml"]) == biotac.InputError.exit_code
     assert "pip install 'biotac-gateway[lsl]'" in capsys.readouterr().err
 
 
@@ -168,5 +168,5 @@ def test_without_liblsl_so_too(capsys, monkeypatch) -> None:
 
     monkeypatch.delitem(sys.modules, "pylsl")
     monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
-    assert main(["lsl", "sim:press.toml"]) == 2
+    assert main(["share", "--lsl", "sim:press.toml"]) == 2
     assert "liblsl" in capsys.readouterr().err

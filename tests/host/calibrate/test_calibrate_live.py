@@ -78,7 +78,7 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
     loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))
     its = load_fitted(calibrated / f"{SERIAL}.wrench.json")
     with biotac.open("sim:calibrate.toml") as hand:
-        real = hand.get_map
+        real = hand.board.get_map
 
         def spoilt(finger: int) -> bytes | None:
             blob = real(finger)
@@ -87,6 +87,6 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
             held.blocks[0].coefficients[0, 2] += np.int64(1)
             return type(held)(held.axes, held.blocks, held.serial, held.made_s).blob
 
-        monkeypatch.setattr(hand, "get_map", spoilt)
+        monkeypatch.setattr(hand.board, "get_map", spoilt)
         with pytest.raises(PortError, match=r"the board accepted the map of \d+ bytes, but has another of \d+ bytes"):
             upload.upload(hand, 0, its, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)

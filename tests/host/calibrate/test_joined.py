@@ -17,7 +17,7 @@ from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
 from biotac.calibrate.wrench.sources import check_serial
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
-from biotac.recording import Recording
+from biotac.recording.reader import Recording
 from biotac.sim.nano17 import MOUNTING, Nano17
 from biotac.sim.source import Source
 

@@ -35,8 +35,8 @@ def test_a_map_of_our_own_fingers_gives_the_force(port: str, tmp_path: Path, cap
     facts = json.loads(capsys.readouterr().out)
     assert (facts["finger"], facts["made_of"], facts["saved"]) == (1, "F1.npz, F2.npz", False)
     with biotac.open(port) as hand:
-        blob = hand.get_map(1)
-        assert blob is not None and hand.get_map(0) is None
+        blob = hand.board.get_map(1)
+        assert blob is not None and hand.board.get_map(0) is None
         frames = hand.read_batch(0.5).wire
     frames = frames[(frames["finger"] == 1) & ((frames["flags"] & FrameFlags.MAPPED) != 0)]
     assert len(frames)
@@ -50,15 +50,15 @@ def test_a_map_of_our_own_fingers_gives_the_force(port: str, tmp_path: Path, cap
 def test_the_firmwares_own_map_comes_back_into_force(port: str, capsys: pytest.CaptureFixture) -> None:
     defaults = {s: biotac.Calibration().settings()[s] for s in biotac.Calibration().settings()}
     with biotac.open(port) as hand:
-        hand.set_map(0, population_map.load(None).population.wrench_map(np.zeros(19)).on_board())
-        hand.set_setting(Setting.FORCE_MODEL, ForceModel.LIN)
+        hand.board.set_map(0, population_map.load(None).population.wrench_map(np.zeros(19)).on_board())
+        hand.board.set_setting(Setting.FORCE_MODEL, ForceModel.LIN)
         for setting, value in defaults.items():
-            hand.set_setting(setting, value)
-        hand.set_calibration(1, biotac.Calibration(force_gain_nn=(1, 2, 3)))
+            hand.board.set_setting(setting, value)
+        hand.board.set_calibration(1, biotac.Calibration(force_gain_nn=(1, 2, 3)))
     assert main(["calibrate", "population", port, "--finger", "0"]) == 0
     assert "map of F1.npz, F2.npz, in force, until the next reboot" in capsys.readouterr().out
     assert main(["calibrate", "population", port, "--finger", "1"]) == 2
     assert "force gains of its own, which go before the map" in capsys.readouterr().err
     with biotac.open(port) as hand:
-        assert hand.get_map(0) is None
-        assert hand.setting(Setting.FORCE_MODEL) == ForceModel.POPULATION
+        assert hand.board.get_map(0) is None
+        assert hand.board.setting(Setting.FORCE_MODEL) == ForceModel.POPULATION

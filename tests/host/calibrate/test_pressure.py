@@ -15,7 +15,7 @@ from biotac import InputError
 from biotac.calibrate.press import pressure
 from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
 from biotac.calibrate.press.force_source import MAX_LAG_ROWS, Series, check_alignment, lag_rows
-from biotac.calibrate.press.guide import _ask_forces
+from biotac.calibrate.press.guide import ask_forces
 from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
 from biotac.calibrate.press.rows import ROW_DTYPE
 from biotac.core.compiled import pressure_filtered_q4
@@ -237,19 +237,35 @@ def test_who_presses_faster_than_they_type_is_asked_for_every_press_once() -> No
             return 10.0 * step.press
 
     procedure = Procedure([0], [2.0, 3.5, 5.0], needs_force=False)
-    typed: dict[tuple[int, int], float] = {}
+    typed: list[float] = []
     procedure.feed(changed(GOOD, without_force))
     for _ in range(2):
-        _ask_forces(procedure, typed, Slow())
+        ask_forces(procedure, typed, Slow())
     assert procedure.done
     assert asked == [(0, 1, 2.0), (0, 2, 3.5), (0, 3, 5.0)]
-    assert typed == {(0, 1): 10.0, (0, 2): 20.0, (0, 3): 30.0}
+    assert typed == [10.0, 20.0, 30.0]
 
 
 @pytest.mark.parametrize(("fingers", "forces"), [([], [2.0]), ([1, 1], [2.0]), ([0], []), ([0], [0.0]), ([0], [500.0])])
 def test_no_sequence_without_fingers_or_forces(fingers: list[int], forces: list[float]) -> None:
     with pytest.raises(InputError, match="expected"):
         Procedure(fingers, forces)
+
+
+def test_every_finger_ends_a_series_before_the_next_begins() -> None:
+    procedure = Procedure([3, 1], [2.0, 4.0], [3.0])
+    at_us, turns = 0, []
+    for finger, forces in ((3, (2, 4)), (1, (2, 4)), (3, (3,)), (1, (3,))):
+        rows = course(presses(*forces), finger=finger)
+        rows["t_us"] += at_us
+        at_us = int(rows["t_us"][-1]) + ROUND_US
+        procedure.feed(rows)
+        turns.append(procedure.step and (procedure.step.finger, procedure.step.press, procedure.step.presses))
+    assert turns == [(1, 1, 2), (3, 1, 1), (1, 1, 1), None]
+    assert [press.force_n for press in procedure.presses[3]] == pytest.approx([2.0, 4.0, 3.0], rel=0.01)
+    assert [(press.finger, step.force_n) for press, step in procedure.asked()] == [
+        (3, 2.0), (3, 4.0), (1, 2.0), (1, 4.0), (3, 3.0), (1, 3.0)
+    ]  # fmt: skip
 
 
 # ---- fit -----------------------------------------------------------------------------------------

@@ -16,10 +16,9 @@ from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_F
 from biotac.calibrate.press.pressure_procedure import Plan, calibrate
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
-from biotac.recording import Recording
+from biotac.recording.reader import Recording
 from biotac.sim.loading import load_source
 from biotac.sim.play import play
-from biotac.sim.process import SimBoard
 from biotac.sim.scenario import parse_scenario
 from biotac_lab.experiments import navarro2015 as navarro
 
@@ -110,18 +109,11 @@ def write_patient_scenario(folder: Path) -> Path:
 
 
 def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) -> None:
-    """As a real one: stopped, set and started again, with what each finger has of its own left as it was."""
-    opened = []
-    scenario = write_patient_scenario(tmp_path)
-
-    def opened_once() -> biotac.Hand:
-        hand = biotac.open(f"sim:{scenario}?pace={PACE}")
-        opened.append(hand)
-        hand.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
-        return hand
-
-    outcome = calibrate(opened_once, Plan((0,)), Silent(), made_s=77)
-    assert len(opened) == 1
+    """As a real one: stopped and set, with what each finger has of its own left as it was."""
+    with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
+        hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
+        outcome = calibrate(hand, Plan((0,)), Silent(), made_s=77)
+        assert hand.board.calibration(0) == outcome.calibrations[0]
     its = outcome.calibrations[0]
     assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
     assert outcome.verified[0].board_error <= 0.059
@@ -136,28 +128,19 @@ class Scale(Silent):
 
 def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) -> None:
     """As on a real port: nothing behind it that knows a truth."""
-    board = SimBoard(load_source(str(write_patient_scenario(tmp_path))), pace=PACE, hold=True)
-
-    def opened() -> biotac.Hand:
-        hand = biotac.open(board.path)
-        board.release()
-        return hand
-
-    try:
-        face = Scale()
-        outcome = calibrate(opened, Plan((0,)), face, made_s=1, save=True)
-    finally:
-        board.close()
+    with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
+        hand.link.source = None
+        outcome = calibrate(hand, Plan((0,)), Scale(), made_s=1, save=True)
     assert outcome.verified[0].board_error <= 0.059
     assert outcome.fits[0].press_forces_n == CALIBRATION_FORCES_N
     assert outcome.not_saved is None
 
 
 def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Path, capsys, monkeypatch) -> None:
-    def refuse(self: biotac.Hand) -> None:
+    def refuse(self: object) -> None:
         raise biotac.CommandRefusedError("SaveSettings: NOT_STORED", 10)
 
-    monkeypatch.setattr(biotac.Hand, "save_settings", refuse)
+    monkeypatch.setattr("biotac.hand.configuration.Configuration.save_settings", refuse)
     port = "sim:fingers.toml?fingers=1"
     assert main(["calibrate", "press", port, "--pressure", "--save", "--out", str(tmp_path)]) == 7
     said = capsys.readouterr()
@@ -173,18 +156,19 @@ def test_files_that_are_there_are_seen_before_anybody_presses(tmp_path: Path, ca
 
 
 def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
-    with pytest.raises(biotac.InputError, match=r"no sensor on finger 3 \(0, 1 are there\)"):
-        calibrate(lambda: biotac.open("sim:fingers.toml?fingers=2"), Plan((0, 3)), Silent(), made_s=0)
+    with (
+        biotac.open("sim:fingers.toml?fingers=2") as hand,
+        pytest.raises(biotac.InputError, match=r"no sensor on finger 3 \(0, 1 are there\)"),
+    ):
+        calibrate(hand, Plan((0, 3)), Silent(), made_s=0)
 
 
 def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
-    with pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"):
-        calibrate(
-            lambda: biotac.open("sim:fingers.toml?fingers=1&seconds=9"),
-            Plan((0,)),
-            Silent(),
-            made_s=0,
-        )
+    with (
+        biotac.open("sim:fingers.toml?fingers=1&seconds=9") as hand,
+        pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"),
+    ):
+        calibrate(hand, Plan((0,)), Silent(), made_s=0)
 
 
 # ---- recordings ----------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage
 from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Files, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
-from biotac.recording import Recording
+from biotac.recording.reader import Recording
 from biotac.sim.loading import load_source
 from biotac.sim.nano17 import Nano17
 from biotac.sim.nano17_reader import Nano17Reader
@@ -233,7 +233,7 @@ def walked(
         procedure = Procedure(0, reader.nano17.mounting)
         walk(hand, reader, procedure, places, show=words.append)
         assert not hand.streaming
-        hand.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
+        hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
     return procedure, words, places, reader
 
 

@@ -32,18 +32,21 @@ def fails(capsys, code: int, *words: str) -> str:
 
 def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
     assert parser().format_help().count("\n") <= 40
+    assert len(VERBS) <= 16
     for name, (place, text) in VERBS.items():
-        example = importlib.import_module(place).EXAMPLE
+        example = importlib.import_module(f"biotac.cli.{place}").EXAMPLE
         with pytest.raises(SystemExit):
             main([name, "--help"])
         said = capsys.readouterr().out
         assert text[:40] in said and said.rstrip().endswith(f"example: {example}")
 
 
-def test_version_names_release_and_wire(capsys) -> None:
-    assert main(["version", "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)
-    assert facts["biotac-gateway"] == biotac.__version__
+def test_version_names_release_wire_and_schema(capsys) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["--version"])
+    assert left.value.code == 0
+    versions = f"{biotac.__version__}, wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}, schema {wire.SCHEMA_HASH:08x}"
+    assert capsys.readouterr().out == f"biotac-gateway {versions}\n"
 
 
 def test_list_shows_what_can_be_simulated(capsys) -> None:
@@ -226,7 +229,7 @@ def test_demo_takes_the_ports_that_list_prints(capsys, tmp_path: Path) -> None:
 
 def test_a_simulated_board_has_its_fingers_own_gains(tmp_path: Path) -> None:
     with biotac.open("sim:press.toml") as hand:
-        want = hand.settings()
+        want = hand.board.settings()
     link = tmp_path / "board"
     process = subprocess.Popen(
         [sys.executable, "-m", "biotac", "sim", "press.toml", "--link", str(link)], stdout=subprocess.PIPE, text=True
@@ -235,7 +238,7 @@ def test_a_simulated_board_has_its_fingers_own_gains(tmp_path: Path) -> None:
     try:
         process.stdout.readline()
         with biotac.open(link) as hand:
-            assert hand.settings() == want != biotac.core.compiled.default_settings()
+            assert hand.board.settings() == want != biotac.core.compiled.default_settings()
     finally:
         process.terminate()
         process.wait()
@@ -269,7 +272,7 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
     "command",
     [
         "calibration get PORT out.json --finger nose",
-        "map clear PORT --finger 5",
+        "calibration clear PORT --finger 5",
         "calibrate wrench rec.mcap --finger nose",
         "calibrate press PORT --scale --finger nose",
         "calibrate press PORT --pressure --finger thumb,9",

@@ -33,7 +33,6 @@ NO_PORT = "/dev/ttyNOWHERE7"
 NEVER = {
     "list": "a port that fails is a fact of its own line",
     "doctor": "what fails is a finding",
-    "version": "asks nobody",
 }
 
 
@@ -98,20 +97,21 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected a scenario's path or one of", "info sim:nowhere.toml"),
     (2, "check the path", "info replay:+no.mcap"),
     (2, "expected 0 <= from", "info replay:@rec.mcap?from=99"),
-    (2, "drop one of them", "view sim:press.toml --check"),
     (3, "play it with replay:", "stream @rec.mcap"),
     (3, "play it with sim:", "stream press.toml"),
     (2, "then use `biotac export`", "record sim:press.toml +new.csv"),
-    (2, 'expected "biotac-wrench-map/1"', "map show @none.json"),
+    (2, 'or "biotac-wrench-map/1"', "calibration show @none.json"),
     (2, "expected 0 to 65535", "view sim:press.toml --port 70000"),
     (2, "record it again", "view @empty.mcap --no-browser --json"),
     (2, "name another with --folder", "view sim:press.toml --no-browser --folder +no/where"),
     (3, "`biotac list`", f"stream {NO_PORT}"),
     (3, "an example is sim:", "stream sim:press.toml?pace=quick"),
-    (3, "`biotac list`", f"lsl {NO_PORT}"),
-    (3, "`biotac list`", f"serve {NO_PORT} --name left"),
-    (2, "expected up to 64 letters", "serve sim:press.toml --name left/right"),
-    (2, "already shared; open it directly", "serve zenoh:left --name right"),
+    (3, "`biotac list`", f"share {NO_PORT} --lsl"),
+    (3, "`biotac list`", f"share {NO_PORT} --zenoh left"),
+    (2, "expected up to 64 letters", "share sim:press.toml --zenoh left/right"),
+    (2, "already shared; open it directly", "share zenoh:left --zenoh right"),
+    (2, "--seconds is for --lsl", "share sim:press.toml --zenoh left --seconds 1"),
+    (2, "--listen is for --zenoh", "share sim:press.toml --lsl --listen tcp/0.0.0.0:7447"),
     (3, "`biotac list --zenoh`", "info zenoh:left?write=maybe"),
     (3, "`biotac list`", f"record {NO_PORT} +out.mcap"),
     (2, "overwrite it (--force", "record sim:press.toml @rec.mcap"),
@@ -184,29 +184,27 @@ CASES: list[tuple[int, str, str]] = [
     (2, "`biotac export RECS... --lake", "lake sql SELECT +no"),
     (2, "name the lake's folder", "lake sql SELECT"),
     (2, "`biotac export RECS... --lake", "lake inventory +no"),
-    (3, "`biotac list` shows the ports", "sensor /dev/ttyNOWHERE7"),
+    (3, "`biotac list` shows the ports", f"sim --sensor-port {NO_PORT}"),
     (2, "check the path", "export +no.btd +out.mcap"),
     (2, "expected a SynTouch .btd", "export @none.btd +out.mcap"),
     (2, "overwrite it (--force", "export @none.btd @rec.mcap"),
-    (2, "see `biotac calibration show --help`", "calibration show"),
-    (2, "expected one of 24c01", "calibration show --i2c 1:0x50"),
+    (3, "expected one such as 1:0x50:24c32", "calibration show i2c:1:0x50"),
     (2, "check the path", "calibration show +no.json"),
-    (2, "as `biotac calibration get` writes it", "calibration show @list.json"),
+    (2, "as `biotac calibration get` and", "calibration show @list.json"),
     (3, "`biotac list`", f"calibration show {NO_PORT}"),
     (2, "upload one with `put`", "calibration get sim:drift.toml +out.json --finger index"),
     (3, "`biotac list`", f"calibration get {NO_PORT} +out.json --finger 0"),
     (7, "or send no serial number to force it", "calibration put sim:press.toml @other.json --finger 0"),
     (2, "check the path", "calibration put sim:press.toml +no.json --finger 0"),
-    (3, "expected BUS:ADDRESS", "calibration store --i2c here --chip 24c02 @other.json"),
-    (3, "check its address pins", "calibration load --i2c 1:0x20 --chip 24c02 +out.json"),
-    (2, "use a 24c02", "calibration load --i2c 1:0x50 --chip 24c01 +out.json"),
-    (2, "check the path", "map show +no.json"),
-    (2, "or `biotac map get` writes it", "map show @list.json"),
-    (2, "no wrench map; the recording has none", "map get replay:@rec.mcap +out.json --finger thumb"),
-    (2, "no calibration; the recording has none", "calibration get replay:@rec.mcap +out.json --finger thumb"),
-    (2, "upload one with `put`", "map get sim:drift.toml +out.json --finger index"),
-    (2, "check the path", "map put sim:press.toml +no.json --finger 0"),
-    (7, "or send no serial number to force it", "map put sim:press.toml @map.json --finger 0"),
+    (3, "expected BUS:ADDRESS", "calibration put i2c:here:24c02 @other.json"),
+    (2, "is a wrench map, which no EEPROM holds", "calibration put i2c:1:0x50:24c02 @map.json"),
+    (3, "check its address pins", "calibration get i2c:1:0x20:24c02 +out.json"),
+    (2, "use a 24c02", "calibration get i2c:1:0x50:24c01 +out.json"),
+    (2, "no wrench map; the recording has none", "calibration get @rec.mcap +out.json --finger thumb --kind map"),
+    (2, "no calibration and no wrench map; the", "calibration get replay:@rec.mcap +out.json --finger thumb"),
+    (2, "name one with --finger", "calibration get sim:press.toml +out.json"),
+    (2, "expected JSON of `biotac calibration get`", "calibration put sim:press.toml @broken.json --finger 0"),
+    (7, "or send no serial number to force it", "calibration put sim:press.toml @map.json --finger 0"),
     (2, "expected a scenario's path or one of", "sim nowhere.toml"),
     (2, "expected 1 to 5", "sim press.toml --fingers 0"),
     (2, "--pace is 0, expected above 0", "sim press.toml --pace fast"),
@@ -216,7 +214,10 @@ CASES: list[tuple[int, str, str]] = [
     (2, "drop one of them", f"flash --emulated {NO_PORT} @text.uf2"),
     (2, "expected an image, .uf2", f"flash {NO_PORT} +no.uf2"),
     (2, "use the build's .uf2", f"flash {NO_PORT} @text.uf2"),
-    (2, "kinds are none", "sensor /dev/null press.toml --fault 2=loose"),
+    (2, "no SOURCE is given", "sim"),
+    (2, "kinds are none", "sim press.toml --sensor-port /dev/null --fault 2=loose"),
+    (2, "--link is for a board on a pty", "sim press.toml --sensor-port /dev/null --link +link"),
+    (2, "--fault is for a sensor board", "sim press.toml --fault 2=none"),
     (2, "name an IMAGE", "flash"),
 ]
 
@@ -256,7 +257,7 @@ def test_it_fails_with_its_code_and_the_cure(
 
 
 def test_every_verb_and_every_code_has_a_case() -> None:
-    assert {command.split()[0] for _, _, command in CASES} | {"udev-setup"} == set(VERBS) - set(NEVER)
+    assert {command.split()[0] for _, _, command in CASES} == set(VERBS) - set(NEVER)
     codes = {c.exit_code for c in vars(errors).values() if isinstance(c, type) and issubclass(c, errors.BiotacError)}
     staged = {4, 5, 6}  # below
     with_device = {8}  # test_flash.py
@@ -269,16 +270,14 @@ def test_every_verb_and_every_code_has_a_case() -> None:
 OPENERS = [
     "info PORT",
     "stream PORT",
-    "lsl PORT",
+    "share PORT --lsl",
     "record PORT out.mcap",
     "calibration show PORT",
     "calibration get PORT out.json --finger 0",
     "calibration put PORT OTHER --finger 0",
     "calibration clear PORT --finger 0",
-    "map show PORT",
-    "map get PORT out.json --finger 0",
-    "map put PORT MAP --finger 0",
-    "map clear PORT --finger 0",
+    "calibration put PORT MAP --finger 0",
+    "calibration clear PORT --finger 0 --kind map",
 ]
 Make = Callable[..., object]
 
@@ -328,15 +327,15 @@ def test_a_board_that_falls_silent_is_6(
     assert "check the cable and open it again" in line_of(capsys, 6, opened(command, board.path, files))
 
 
-def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.keepalive.SILENCE_S", 0.001)
-
+def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, brief_silence) -> None:
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:
             return hello(payload)
+        if message_id == wire.GetStatus.ID:
+            return b""
         return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
 
-    assert "silent for" in line_of(capsys, 6, ["stream", scripted_board(answer).path])
+    assert "did not answer GetStatus" in line_of(capsys, 6, ["stream", scripted_board(answer).path])
 
 
 def test_a_board_whose_cable_is_pulled_is_6() -> None:
@@ -376,9 +375,9 @@ def test_view_without_a_port_needs_exactly_one_board(capsys, monkeypatch, number
     assert cure in line_of(capsys, 3, ["view", "--no-browser"])
 
 
-def test_udev_setup_where_there_is_no_udev(capsys, monkeypatch, tmp_path) -> None:
+def test_a_udev_rule_where_there_is_no_udev(capsys, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr("biotac.doctor.udev.install.__defaults__", (tmp_path / "no/where.rules",))
-    assert "rules are for Linux" in line_of(capsys, 2, ["udev-setup"])
+    assert "rules are for Linux" in line_of(capsys, 2, ["doctor", "--udev-rule", "install"])
 
 
 def test_a_recording_on_a_pty_needs_ptys(capsys, files, monkeypatch) -> None:

@@ -19,7 +19,7 @@ def imported(code: str) -> set[str]:
     return set(said.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize("verb", ["--help", "version", "version --json"])
+@pytest.mark.parametrize("verb", ["--help", "--version"])
 def test_help_and_version_import_nothing_heavy(verb: str) -> None:
     code = f"from biotac.cli import main\ntry: main({verb.split()})\nexcept SystemExit: pass"
     assert imported(code) & HEAVY == set()
@@ -42,8 +42,6 @@ def test_biotac_imports_what_is_asked_for() -> None:
 def test_every_name_of_biotac_is_there() -> None:
     assert set(biotac.__all__) <= set(dir(biotac))
     for name in biotac.__all__:
-        value = getattr(biotac, name)
-        assert value is getattr(biotac, name)
-        assert name == "aio" or type(value) is not type(biotac), f"{name} is a module"
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        assert getattr(biotac, name) is getattr(biotac, name)
+    with pytest.raises(AttributeError, match="nothing"):
         _ = biotac.nothing

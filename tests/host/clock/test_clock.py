@@ -18,8 +18,8 @@ import biotac.clock
 from biotac.clock import LAST_SAMPLE_US, Arrivals, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
 from biotac.clock.band import between
 from biotac.clock.segment import WANDER_PER_S
-from biotac.recording import Recorder
 from biotac.recording.facts import Facts
+from biotac.recording.writer import Writer
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
@@ -314,12 +314,12 @@ def test_a_recording_has_a_clock_too(tmp_path: Path) -> None:
     with biotac.open("sim:press.toml") as hand:
         hand.record(tmp_path / "fast.mcap")
         batch = hand.read_batch(5.0)
-        facts = Facts(hand.info, [hand.sensor_info(0)], hand.settings())
+        facts = Facts(hand.info, [hand.sensor_info(0)], hand.board.settings())
     # Written again as if it had come from a board whose time 0 was at second 1000, through a jittery link.
     rng = np.random.default_rng(1)
     at_s = 1000.0
     clocks = {"clock_s": lambda: at_s, "unix_ns": lambda: int(at_s * 1e9)}
-    recorder = Recorder(tmp_path / "real.mcap", facts, "port", **clocks)
+    recorder = Writer(tmp_path / "real.mcap", facts, "port", **clocks)
     for row in batch.wire:
         at_s = 1000.0 + (int(row["t_us"]) + 10_000) / 1e6 + 0.0002 + 0.001 * rng.random()
         recorder.write(encode(wire.Frame.ID, row.tobytes()))
@@ -368,7 +368,7 @@ def test_what_came_before_a_restart_is_not_told_after_it() -> None:
 def test_a_simulated_board_in_real_time_is_a_clock() -> None:
     """However late this computer lets it run: it says nothing ahead of its time, and reads nothing behind it."""
     with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
-        hand.start()
+        hand.stream()
         while not hand.clock.now().known:  # on a busy computer the first reply comes after many frames
             hand.read(0.3)
         for _ in range(3):

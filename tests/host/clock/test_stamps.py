@@ -1,4 +1,4 @@
-"""Stamps for other programs never step back, whatever a clock's estimates and a link's delays do."""
+"""Stamps for other programs always grow, whatever a clock's estimates and a link's delays do."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_batches_that_come_early_and_late_are_stamped_in_order_and_each_stream_b
             t_us = 1e4 * k + np.arange(22) * 455.0 + 5000 * stream
             made[stream] += stamps.of(t_us, stream).tolist()
     for stream in (0, 1):
-        assert np.diff(made[stream]).min() >= 0
+        assert np.diff(made[stream]).min() > 0
     assert stamps.by_arrival == 2 * 500 * 22
 
 
@@ -38,7 +38,7 @@ def test_an_estimate_that_falls_back_is_waited_for() -> None:
     for k in range(10, 20):
         clock.round_trip(k - 0.5, 1_000_000 * k, k - 0.4)  # and now much better: what was told was late
     after = stamps.of(np.array([9.001e6, 9.002e6, 30e6]))
-    assert before[0] <= after[0] <= after[1] < after[2]
+    assert before[0] < after[0] < after[1] < after[2]
 
 
 def test_a_clock_that_is_set_back_is_followed() -> None:

@@ -32,8 +32,8 @@ def test_what_the_board_tells_is_what_is_computed_of_its_pac(tmp_path: Path) -> 
     path, without = tmp_path / "both.mcap", tmp_path / "pac.mcap"
     for place, names in ((path, ("pac", "bands")), (without, ("pac",))):
         with biotac.open("sim:grasp.toml?seconds=3") as hand:
-            hand.want("force", *names)
             recorder = hand.record(place)
+            hand.stream("force", *names)
             hand.read(250)
             recorder.close()
     told, computed = biotac.Recording(path), biotac.Recording(without)

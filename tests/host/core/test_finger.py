@@ -36,8 +36,8 @@ def words_of(name: str, finger: int) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("name", ["press.toml", "shear.toml", "faults.toml"])
 def test_every_bit_is_the_one_that_the_simulated_board_sends(name: str) -> None:
     with biotac.open(f"sim:{name}") as hand:
-        settings = hand.settings()
-        hand.subscribe(ALL_ROUNDS)
+        settings = hand.board.settings()
+        hand.stream("poc", "force", "torque", "sigma", "pac")
         sent = hand.read_batch(60.0)
     tares = [m for m in sent.messages if isinstance(m, wire.Tare)]
     for index in np.unique(sent.wire["finger"]):

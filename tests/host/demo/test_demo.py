@@ -31,7 +31,6 @@ def test_a_demo_leaves_recording_report_and_picture(pressed) -> None:
     assert (folder / "demo.png").read_bytes().startswith(b"\x89PNG")
     assert len(biotac.load(folder / "demo.mcap")) == demo.facts["frames"]
     assert json.loads((folder / "report.json").read_text())["crosscheck"]["violations"] == 0
-    assert "cross-check violations | 0" in (folder / "report.md").read_text()
     # of loads that it was not made of; x is hardly pressed here, so Lin's error of it is small
     calibrated, lin = (np.array(demo.facts[name]) for name in ("calibrated_rmse_n", "lin_rmse_n"))
     assert demo.facts["calibrated_by"] == "finger 0's own wrench map"

@@ -103,13 +103,13 @@ def test_the_rule_has_the_firmwares_ids_and_silences_modem_manager(tmp_path: Pat
     assert 'ENV{ID_MM_DEVICE_IGNORE}="1"' in lines[0]
 
 
-def test_udev_setup_prints_or_says_that_it_takes_root(tmp_path: Path, capsys, monkeypatch) -> None:
-    assert main(["udev-setup", "--print"]) == 0
+def test_the_doctor_prints_the_rule_or_says_that_it_takes_root(tmp_path: Path, capsys, monkeypatch) -> None:
+    assert main(["doctor", "--udev-rule", "print"]) == 0
     assert capsys.readouterr().out == udev.rule()
 
     def forbidden(self: Path, text: str) -> None:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("biotac.doctor.udev.RULES.__class__.write_text", forbidden)
-    with pytest.raises(PortError, match="run it as root: sudo biotac udev-setup"):
+    with pytest.raises(PortError, match="run it as root: sudo biotac doctor --udev-rule install"):
         udev.install(tmp_path / "70-biotac.rules")

@@ -19,11 +19,11 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import biotac
+from biotac.board.gap import Gap
 from biotac.cli.main import main
 from biotac.core.bands import pac_bands
 from biotac.export import BANDS_COLUMNS, COLUMNS, FORMATS, PAC_COLUMNS
 from biotac.export.columns import GAP, STAMP
-from biotac.hand.gap import Gap
 from biotac.recording.file import RecordingFile
 from biotac.wire.batches import StreamDecoder
 from biotac.wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS

@@ -27,7 +27,7 @@ def recorded(tmp_path_factory) -> tuple[np.ndarray, biotac.Recording]:
     path = tmp_path_factory.mktemp("same") / "a.mcap"
     with biotac.open(f"sim:faults.toml?fingers={len(FINGERS)}&seconds=6") as hand:
         hand.record(path)
-        rows = hand.read(100)
+        rows = hand.read_batch(100).frames
     return rows, biotac.Recording(path)
 
 
@@ -108,7 +108,9 @@ def same(got: Numbers, wanted: Numbers) -> None:
 
 def test_what_is_loaded_is_what_was_live(recorded) -> None:
     live, recording = recorded
-    for rows in (biotac.load(recording.path), recording.frames):
+    with pytest.warns(biotac.RecordingWarning, match="gap"):
+        loaded = biotac.load(recording.path)
+    for rows in (loaded, recording.frames):
         assert (rows.dtype, rows.tobytes()) == (live.dtype, live.tobytes())
     for field in ("counts", "poc_mm", "force_n", "tare"):  # some are missing, some not
         some = np.isnan(np.concatenate([its for (_, name), its in of_rows(live).items() if name.startswith(field[:4])]))
@@ -130,6 +132,8 @@ def test_a_ros_2_bag_in_its_own_units_rounded_once(recorded, tmp_path: Path) -> 
     with AnyReader([bag]) as reader:
         for connection, _, data in reader.messages():
             message = reader.deserialize(data, connection.msgtype)
+            if connection.topic.count("/") != 3:
+                continue  # of the whole hand
             _, _, finger, kind = connection.topic.split("/")
             for name, values in {
                 "wrench": lambda m: {"force_n": xyz(m.wrench.force), "torque_nmm": xyz(m.wrench.torque)},

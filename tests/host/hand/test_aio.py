@@ -78,7 +78,7 @@ def test_commands_are_awaited_and_errors_come_up() -> None:
         async with biotac.aio.open("sim:drift.toml?seconds=5") as hand:
             with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
                 await hand.ask(lambda h: h.sensor_status(5))
-            return await hand.ask(lambda h: h.setting(biotac.Setting.POC_WEIGHTS))
+            return await hand.ask(lambda h: h.board.setting(biotac.Setting.POC_WEIGHTS))
 
     assert run(main()) == 1
     with pytest.raises(biotac.DeviceLostError, match="not open yet"):

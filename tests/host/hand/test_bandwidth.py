@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from biotac.hand import bandwidth
+from biotac.board import bandwidth
 from biotac.wire.messages_gen import StreamFlags
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -45,18 +45,18 @@ def test_a_stale_stream_and_an_old_hello_do_not_disturb_the_handshake(scripted_b
 def test_a_refused_command_names_command_and_reason() -> None:
     with biotac.open("sim:press.toml") as hand:
         with pytest.raises(biotac.CommandRefusedError, match="refused SetSetting: OUT_OF_RANGE"):
-            hand.set_setting(biotac.Setting.POC_WEIGHTS, 3)
+            hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 3)
         with pytest.raises(biotac.CommandRefusedError, match="refused GetSensorStatus: NO_SUCH_FINGER"):
             hand.sensor_status(5)
-        hand.start()
+        hand.stream()
         with pytest.raises(biotac.CommandRefusedError, match=r"BUSY.*send STOP first"):
-            hand.set_setting(biotac.Setting.POC_WEIGHTS, 0)
+            hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)
 
 
 def test_settings_are_read_back() -> None:
     with biotac.open("sim:drift.toml?seconds=1") as hand:
-        hand.set_setting(biotac.Setting.FORCE_GAIN_X_NN, -123_456)
-        assert hand.settings()[biotac.Setting.FORCE_GAIN_X_NN] == -123_456
+        hand.board.set_setting(biotac.Setting.FORCE_GAIN_X_NN, -123_456)
+        assert hand.board.settings()[biotac.Setting.FORCE_GAIN_X_NN] == -123_456
 
 
 def test_read_returns_exactly_the_time_that_was_asked_for() -> None:
@@ -110,19 +110,6 @@ def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
         for _ in frames:
             pass
     hand.close()
-
-
-def test_a_silent_board_is_a_lost_board(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.keepalive.SILENCE_S", 0.001)
-
-    def answer(message_id: int, payload: bytes) -> bytes:
-        if message_id == wire.HelloRequest.ID:
-            return hello(payload)
-        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, 0).pack())
-
-    board = scripted_board(answer)
-    with biotac.open(board.path) as hand, pytest.raises(biotac.DeviceLostError, match=r"silent.*check the cable"):
-        hand.read(1.0)
 
 
 def test_a_port_is_opened_once(scripted_board, hello) -> None:
@@ -200,7 +187,7 @@ def test_values_that_no_message_can_hold_are_refused() -> None:
             with pytest.raises(ValueError, match=rf"the tare holds {bad:g}, expected 0\.\.4095 counts"):
                 hand.set_tare(0, np.full(19, 3000.0), bad)
         with pytest.raises(biotac.InputError, match="SetSetting cannot hold"):
-            hand.set_setting(biotac.Setting.POC_WEIGHTS, 10**12)
+            hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 10**12)
         for seconds in (0, -1, float("nan"), float("inf")):
             with pytest.raises(ValueError, match="number above 0"):
                 hand.read(seconds)

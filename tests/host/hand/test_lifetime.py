@@ -35,7 +35,7 @@ def test_a_running_hand_that_nobody_knows_any_more_is_gone() -> None:
     def cell() -> None:
         hand = biotac.open("sim:press.toml?seconds=1000")
         hand.on_batch(lambda batch: None)
-        hand.run()
+        hand.stream()
         for _, _batch in zip(range(3), hand.batches(), strict=False):
             pass
 
@@ -49,11 +49,12 @@ def test_a_running_hand_that_nobody_knows_any_more_is_gone() -> None:
 
 
 def test_a_finger_and_an_iteration_keep_their_hand() -> None:
-    finger = biotac.open("sim:press.toml?seconds=1000").run(queue=True)["index"]
+    hand = biotac.open("sim:press.toml?seconds=1000")
+    hand.stream()
+    finger, alive = hand["index"], weakref.ref(hand)
+    del hand
     gc.collect()
-    assert finger._keeps.streaming
-    alive = weakref.ref(finger._keeps)
-    batches = finger._keeps.batches()
+    batches = finger._hand.batches()
     next(batches)
     del finger
     gc.collect()
@@ -76,7 +77,7 @@ def test_a_hand_collected_on_its_own_reading_thread_ends_too(scripted_board, hel
             gone.set()
 
     hands[0].on_batch(forgets)
-    hands[0].run()
+    hands[0].stream()
     os.write(board._master, frame(1))
     assert gone.wait(WAIT_S)
     firmware.wait_for(wire.Stop, 2)
@@ -110,7 +111,7 @@ print(seen, flush=True)
 """
 
 
-@pytest.mark.parametrize("run", [pytest.param("", marks=pytest.mark.nightly), "hand.run(queue=True)"])
+@pytest.mark.parametrize("run", [pytest.param("", marks=pytest.mark.nightly), "hand.stream()"])
 @pytest.mark.parametrize("end", ENDS)
 def test_a_program_that_ends_without_close_loses_nothing_that_came(end: str, run: str, tmp_path: Path) -> None:
     text, code = ENDS[end]
@@ -129,20 +130,18 @@ import os, sys
 import biotac
 hand = biotac.open("sim:press.toml?seconds=1000", pace=1.0)
 hand.record(sys.argv[1])
-hand.run(queue=True)
+hand.stream()
 hand.read(0.3)
 view = hand["index"]
 if os.fork() == 0:
     told = []
-    for use in (hand.ping, lambda: hand.read(1.0), lambda: view.force_n, hand.run, hand.start, hand.status,
+    for use in (hand.ping, lambda: hand.read(1.0), lambda: view.force_n, hand.stream, hand.stop, hand.status,
                 lambda: hand.on_batch(print), lambda: list(hand.batches()), hand.check):
         try:
             use()
         except biotac.DeviceLostError as error:
             told.append("belongs to the process that opened it" in str(error))
     print("child", told.count(True), hand.connected, flush=True)
-    with open("/proc/self/fd/%d" % hand.link._serial.fileno(), "wb", buffering=0) as port:
-        port.write(b"to nobody")
     try:
         hand.close()
     except biotac.DeviceLostError:
@@ -162,7 +161,7 @@ def test_a_fork_is_told_and_the_parent_reads_on(leave: str, tmp_path: Path) -> N
     program = [sys.executable, "-W", "ignore", "-c", FORKS.format(leave=leave), str(tmp_path / "a.mcap")]
     done = subprocess.run(program, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == ["child 9 False", "parent 50 0 0 True"]
+    assert done.stdout.splitlines() == ["child 9 False", "close tells, too", "parent 50 0 0 True"]
     recording = biotac.Recording(tmp_path / "a.mcap")
     assert recording.problems == [] and len(recording.frames) >= 80
 
@@ -180,7 +179,7 @@ import biotac
 
 def work(queue):
     with biotac.open("sim:press.toml?seconds=2") as hand:
-        hand.run(queue=True)
+        hand.stream()
         queue.put(hand.read(1.0)["force_n"])
 
 if __name__ == "__main__":
@@ -257,7 +256,7 @@ def test_a_cancelled_iteration_and_command_leave_the_hand_usable() -> None:
             for one in (task, command):
                 with pytest.raises(asyncio.CancelledError):
                     await one
-            assert hand.hand._streams._queues == []
+            assert hand.hand._others == []
             async for batch in hand.batches():
                 if len(batch.wire):
                     return (await hand.ask(lambda h: h.status())).fingers_present

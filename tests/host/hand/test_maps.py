@@ -27,8 +27,8 @@ from biotac.link import spidev as spidev_link
 from biotac.link.serial_port import SerialLink
 from biotac.map import file as map_file
 from biotac.map.board_map import PART_BYTES, BoardBlock, BoardMap, for_any_sensor, from_blob, made_s_of, serial_of
-from biotac.recording import Recording
 from biotac.recording.facts import Facts
+from biotac.recording.reader import Recording
 from biotac.recording.recompute import recompute
 from biotac.sim.loading import load_source
 from biotac.sim.ports import start_board
@@ -52,23 +52,23 @@ def test_the_header_is_read_as_the_boards_own_code_reads_it() -> None:
 def test_what_cannot_be_a_map_by_its_size_is_not_sent(size: int) -> None:
     with biotac.open("sim:press.toml") as hand:
         with pytest.raises(biotac.InputError, match=f"has {size} bytes, expected 24 to 20480"):
-            hand.set_map(0, bytes(size))
+            hand.board.set_map(0, bytes(size))
         assert hand.status().rx_frames < 10
 
 
 def test_a_map_of_the_librarys_own_goes_as_it_is() -> None:
     its = from_blob(make_map(3))
     with biotac.open("sim:press.toml") as hand:
-        hand.set_map(0, its)
-        assert hand.get_map(0) == its.blob
+        hand.board.set_map(0, its)
+        assert hand.board.get_map(0) == its.blob
 
 
 def test_another_sensors_is_refused_in_words() -> None:
     with biotac.open("sim:press.toml") as hand:
         with pytest.raises(biotac.CommandRefusedError, match=r"EndMap: OTHER_SENSOR .*no serial number to force it"):
-            hand.set_map(0, make_map(1, serial="BTOTHER"))
-        hand.set_map(0, make_map(1, serial="BTOTHER"), force=True)
-        assert serial_of(hand.get_map(0) or b"") == ""
+            hand.board.set_map(0, make_map(1, serial="BTOTHER"))
+        hand.board.set_map(0, make_map(1, serial="BTOTHER"), force=True)
+        assert serial_of(hand.board.get_map(0) or b"") == ""
 
 
 # ---- over bad links --------------------------------------------------------------------------------
@@ -139,7 +139,7 @@ def test_a_lost_reply_is_asked_for_again_at_every_step(board: tuple[Upload, biot
         upload.told.clear()
         upload.silent = {step}
         upload.kept = b""
-        hand.set_map(0, blob)
+        hand.board.set_map(0, blob)
         assert upload.kept == blob
         assert upload.told[step] == upload.told[step + 1]
 
@@ -152,12 +152,12 @@ def test_a_board_that_restarts_in_the_middle_is_told_all_of_it_again(board: tupl
         upload.told.clear()
         upload.forgets = {step}
         upload.kept = b""
-        hand.set_map(0, blob)
+        hand.board.set_map(0, blob)
         assert (upload.kept, upload.told.count(wire.BeginMap)) == (blob, 2)
     upload.told.clear()
     upload.forgets = set(range(100))
     with pytest.raises(biotac.CommandRefusedError, match="NOT_BEGUN"):
-        hand.set_map(0, blob)
+        hand.board.set_map(0, blob)
     assert upload.told.count(wire.BeginMap) == 3
 
 
@@ -165,7 +165,7 @@ def test_a_map_that_comes_back_otherwise_is_an_error(board: tuple[Upload, biotac
     upload, hand = board
     upload.reads_wrong = True
     with pytest.raises(biotac.PortError, match="did not arrive intact in 3 tries"):
-        hand.set_map(0, make_map(1, blocks=2))
+        hand.board.set_map(0, make_map(1, blocks=2))
 
 
 def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
@@ -185,16 +185,16 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
     boot(0)
     with Hand(SerialLink(str(path)), reconnect=True, host_clock=clock) as hand:
         blob = make_map(1, blocks=BIG)
-        hand.set_map(1, make_map(2))
-        hand.set_map(1, blob)
-        hand.set_map(0, blob)
-        hand.clear_map(0)
+        hand.board.set_map(1, make_map(2))
+        hand.board.set_map(1, blob)
+        hand.board.set_map(0, blob)
+        hand.board.clear_map(0)
         batches = hand.batches()
         next(batches)
         boards[0].close()
         point(path, "")
         assert any(isinstance(m, biotac.Gap) for batch in batches for m in batch.messages)
-        assert hand.maps() == {1: blob}
+        assert hand.board.maps() == {1: blob}
     boards[1].close()
 
 
@@ -205,34 +205,34 @@ def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
         mine, anyones = make_map(1, serial=port_serial(hand, 0), blocks=BIG), make_map(2)
-        hand.set_map(0, mine)
-        hand.set_map(1, anyones)
-        hand.save_settings()
-        hand.clear_map(1)  # not saved
+        hand.board.set_map(0, mine)
+        hand.board.set_map(1, anyones)
+        hand.board.save_settings()
+        hand.board.clear_map(1)  # not saved
     with boot(flash) as hand:
-        assert hand.maps() == {0: mine, 1: anyones}
-        hand.clear_map(1)
-        hand.save_settings()
+        assert hand.board.maps() == {0: mine, 1: anyones}
+        hand.board.clear_map(1)
+        hand.board.save_settings()
     with boot(flash, ["BTOTHER", "BTANOTHER"]) as hand:
-        assert hand.map_state(0) == CalibrationState.OTHER_SENSOR
-        assert hand.get_map(0) == mine
-        assert (hand.get_map(1), hand.map_state(1)) == (None, CalibrationState.NONE)
-        assert hand.maps() == {}
+        assert hand.board.map_state(0) == CalibrationState.OTHER_SENSOR
+        assert hand.board.get_map(0) == mine
+        assert (hand.board.get_map(1), hand.board.map_state(1)) == (None, CalibrationState.NONE)
+        assert hand.board.maps() == {}
 
 
 def test_the_flash_of_a_release_before_there_were_maps_is_taken_over(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
-        hand.set_setting(biotac.Setting.IDLE_PERIOD_MS, 250)
-        hand.save_settings()
+        hand.board.set_setting(biotac.Setting.IDLE_PERIOD_MS, 250)
+        hand.board.save_settings()
     flash.write_bytes(flash.read_bytes()[:8192])
     with boot(flash) as hand:
-        assert hand.setting(biotac.Setting.IDLE_PERIOD_MS) == 250
-        assert hand.maps() == {}
-        hand.set_map(1, make_map(1))
-        hand.save_settings()
+        assert hand.board.setting(biotac.Setting.IDLE_PERIOD_MS) == 250
+        assert hand.board.maps() == {}
+        hand.board.set_map(1, make_map(1))
+        hand.board.save_settings()
     with boot(flash) as hand:
-        assert hand.maps() == {1: make_map(1)}
+        assert hand.board.maps() == {1: make_map(1)}
 
 
 def test_a_computer_with_sensors_of_its_own_keeps_maps_until_it_is_closed(tmp_path: Path, monkeypatch) -> None:
@@ -242,11 +242,11 @@ def test_a_computer_with_sensors_of_its_own_keeps_maps_until_it_is_closed(tmp_pa
     with biotac.open("spidev:0.0,0.1") as hand:
         maps = {f: make_map(f, serial=port_serial(hand, f), blocks=BIG) for f in range(2)}
         for finger, blob in maps.items():
-            hand.set_map(finger, blob)
-        hand.set_map(1, maps[1])
-        assert hand.maps() == maps
+            hand.board.set_map(finger, blob)
+        hand.board.set_map(1, maps[1])
+        assert hand.board.maps() == maps
     with biotac.open("spidev:0.0,0.1") as hand:
-        assert hand.maps() == {}
+        assert hand.board.maps() == {}
 
 
 @pytest.fixture
@@ -254,7 +254,7 @@ def recorded(tmp_path: Path) -> Path:
     """A recording of two fingers, the second with a map."""
     path = tmp_path / "two.mcap"
     with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
-        hand.set_map(1, make_map(5, serial=port_serial(hand, 1), blocks=BIG))
+        hand.board.set_map(1, make_map(5, serial=port_serial(hand, 1), blocks=BIG))
         hand.record(path)
         hand.read(0.5)
     return path
@@ -265,11 +265,11 @@ def test_a_recording_has_the_maps_and_answers_with_them(recorded: Path) -> None:
     assert list(maps) == [1]
     assert from_blob(maps[1]).made_s == 5
     with biotac.open(f"replay:{recorded}") as hand:
-        assert hand.maps() == maps
-        assert (hand.get_map(0), hand.map_state(0)) == (None, CalibrationState.NONE)
-        assert hand.map_state(1) == CalibrationState.IN_FORCE
+        assert hand.board.maps() == maps
+        assert (hand.board.get_map(0), hand.board.map_state(0)) == (None, CalibrationState.NONE)
+        assert hand.board.map_state(1) == CalibrationState.IN_FORCE
         with pytest.raises(biotac.CommandRefusedError, match="is a recording: BeginMap"):
-            hand.set_map(0, maps[1])
+            hand.board.set_map(0, maps[1])
 
 
 def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) -> None:
@@ -345,40 +345,40 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     mine, back = tmp_path / "mine.json", tmp_path / "back.json"
     blob = make_map(1_763_731_310)
     map_file.save(mine, blob)
-    assert main(["map", "put", port, str(mine), "--finger", "1", "--save"]) == 0
+    assert main(["calibration", "put", port, str(mine), "--finger", "1", "--save"]) == 0
     said = capsys.readouterr().out
-    assert "finger 1: in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in said
-    assert main(["map", "show", port]) == 0
+    assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in said
+    assert main(["calibration", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "finger 0: none, the board's settings apply"
-    assert shown[1].startswith("finger 1: in force; force and torque") and "made 2025-11-21" in shown[1]
-    assert main(["map", "get", port, str(back), "--finger", "1", "--json"]) == 0
+    assert shown[1].startswith("finger 1: wrench map in force; force and torque") and "made 2025-11-21" in shown[1]
+    assert main(["calibration", "get", port, str(back), "--finger", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["map_crc32"] == f"{zlib.crc32(blob):08x}"
     assert map_file.load(back) == blob
-    assert main(["map", "clear", port, "--finger", "1"]) == 0
+    assert main(["calibration", "clear", port, "--finger", "1"]) == 0
     assert "the board's settings apply, until the next reboot" in capsys.readouterr().out
-    assert main(["map", "show", port, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["1"] == {"state": "NONE"}
+    assert main(["calibration", "show", port, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["1"]["map"] == {"state": "NONE"}
 
 
 def test_the_verb_forces_another_sensors_map(port: str, tmp_path: Path, capsys) -> None:
     other = tmp_path / "other.json"
     map_file.save(other, make_map(1, serial="BTOTHER"))
-    assert main(["map", "put", port, str(other), "--finger", "0"]) == 7
+    assert main(["calibration", "put", port, str(other), "--finger", "0"]) == 7
     assert "OTHER_SENSOR" in capsys.readouterr().err
-    assert main(["map", "put", port, str(other), "--finger", "0", "--force"]) == 0
+    assert main(["calibration", "put", port, str(other), "--finger", "0", "--force"]) == 0
     assert "for any sensor" in capsys.readouterr().out
 
 
 def test_the_verb_shows_a_recordings_maps(recorded: Path, capsys) -> None:
-    assert main(["map", "show", str(recorded)]) == 0
-    assert "finger 1: in force; force and torque, 12 block(s)" in capsys.readouterr().out
+    assert main(["calibration", "show", str(recorded)]) == 0
+    assert "finger 1: wrench map in force; force and torque, 12 block(s)" in capsys.readouterr().out
 
 
 def test_info_tells_of_a_map_in_force(port: str, tmp_path: Path, capsys) -> None:
     mine = tmp_path / "mine.json"
     map_file.save(mine, make_map(1_763_731_310))
-    assert main(["map", "put", port, str(mine), "--finger", "1"]) == 0
+    assert main(["calibration", "put", port, str(mine), "--finger", "1"]) == 0
     assert main(["info", port]) == 0
     assert "wrench map made 2025-11-21" in capsys.readouterr().out
     assert main(["info", port, "--json"]) == 0
@@ -391,7 +391,7 @@ def test_torsion_goes_wherever_results_go(tmp_path: Path) -> None:
     blob = BoardMap(7, (turning,)).blob
     path = tmp_path / "turned.mcap"
     with biotac.open("sim:press.toml?seconds=6") as hand:
-        hand.set_map(0, blob)
+        hand.board.set_map(0, blob)
         hand.record(path)
         hand.read_batch(100)
     assert map_file.title(blob).startswith("force, torque and torsion, 1 block(s), 316 bytes")

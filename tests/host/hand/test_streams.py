@@ -1,371 +1,429 @@
-"""Reading in the background: the board loses nothing, slow consumers lose the oldest, callbacks may fail."""
+"""What arrives and who gets it: queues, latest values, callbacks, and what the board is told to send."""
 
 from __future__ import annotations
 
+import logging
 import math
-import os
 import threading
-import time
-from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from live_board import Clock, Firmware, frame
+from live_board import WAIT_S, Live, batch_of, frame, heartbeat, packed, until
 
 import biotac
-from biotac.hand import queue as queue_module
-from biotac.hand.hand import Hand
-from biotac.hand.views import Latest
-from biotac.link.serial_port import SerialLink
+from biotac.board import consumers, stream
+from biotac.board.consumers import Queue, Troubles
 from biotac.wire import messages_gen as wire
-from biotac.wire.batches import StreamDecoder
-
-WAIT_S = 600.0  # only a failing test waits so long
+from biotac.wire.batches import Batch
 
 
-class Live:
-    """A hand on a scripted board."""
+def gaps_in(batches: list[Batch]) -> list[biotac.Gap]:
+    return [m for batch in batches for m in batch.messages if isinstance(m, biotac.Gap)]
 
-    def __init__(self, board, firmware: Firmware, clock: Clock) -> None:
-        self.board = board
-        self.firmware = firmware
-        self.clock = clock
-        self.hand = Hand(SerialLink(board.path), host_clock=clock)
 
-    def send(self, *frames: bytes) -> None:
-        os.write(self.board._master, b"".join(frames))
+def drained(queue: Queue) -> list[Batch]:
+    return list(iter(queue.take, None))
 
-    def until(self, so: Callable[[], bool]) -> None:
-        """Woken by whatever arrives."""
-        assert self.hand._board.wait_for(so, WAIT_S)
+
+# ---- one queue -----------------------------------------------------------------------------------
 
 
 @pytest.fixture
-def live(scripted_board, hello) -> Iterator[Live]:
-    firmware = Firmware(hello)
-    live = Live(scripted_board(firmware), firmware, Clock())
-    yield live
-    live.hand.close()
+def queue(live: Live, monkeypatch: pytest.MonkeyPatch) -> Queue:
+    monkeypatch.setattr(consumers, "LIMIT_ROWS", 10)
+    return Queue(live.hand._reader)
 
 
-def batch_of(*frames: bytes) -> biotac.wire.batches.Batch:
-    return StreamDecoder().feed(b"".join(frames))
-
-
-def test_a_full_queue_lets_the_oldest_go_and_counts_them() -> None:
-    queue = queue_module.BatchQueue()
-    queue.bound(10)
+def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(queue: Queue) -> None:
+    queue.put(batch_of(frame(0)))
+    assert gaps_in(drained(queue)) == []
     for k in range(5):
-        queue.put(batch_of(*(frame(4 * k + n) for n in range(4))))
-    assert (queue.batches_skipped, queue.frames_skipped, queue.rows) == (3, 12, 8)
-    assert queue.take().seq.tolist() == [12, 13, 14, 15]
+        queue.put(batch_of(*(frame(4 * k + n, finger=k % 2) for n in range(4))))
+    first, second = drained(queue)
+    assert (queue.batches_skipped, queue.frames_skipped) == (3, 12)
+    assert first.seq.tolist() == [12, 13, 14, 15]
+    (gap,) = gaps_in([first])
+    assert (gap.reason, gap.frames_missed, gap.fingers) == ("slow", 12, 0b11)
+    assert (gap.last_t_us, gap.next_t_us, gap.boot_id) == (0, 120_000, 1)
+    assert gap.lost_at_ns <= gap.back_at_ns
+    assert gaps_in([second]) == []
 
 
-def test_a_batch_larger_than_the_limit_is_kept_as_long_as_it_is_the_newest() -> None:
-    queue = queue_module.BatchQueue()
-    queue.bound(2)
-    queue.put(batch_of(*(frame(n) for n in range(4))))
-    assert len(queue.take().wire) == 4
+def test_gaps_of_dropped_batches_are_kept_and_come_in_their_order(queue: Queue) -> None:
+    lost = [biotac.Gap("lost", k, k + 1, 0, 0, 1) for k in range(2)]
+    for k in range(2):
+        batch = batch_of(*(frame(10 * k + n) for n in range(10)))
+        batch.messages = [lost[k]]
+        queue.put(batch)
+    queue.put(batch_of(frame(30)))
+    (batch,) = drained(queue)
+    assert [gap.reason for gap in gaps_in([batch])] == ["lost", "lost", "slow"]
+    assert gaps_in([batch])[:2] == lost
+    queue.put(batch_of(frame(31)))
+    assert gaps_in(drained(queue)) == []  # told once
+
+
+def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(queue: Queue) -> None:
+    queue.put(batch_of(*(frame(n) for n in range(12))))
+    assert len(queue.take().wire) == 12
     assert (queue.take(), queue.batches_skipped) == (None, 0)
 
 
-def test_the_latest_of_a_finger_is_there_by_name_number_and_not_otherwise(live: Live) -> None:
-    hand = live.hand
-    assert hand["index"].age_s == math.inf
-    assert np.isnan(hand["index"].force_n).all() and np.isnan(hand["index"].torsion_nmm)
-    assert biotac.FrameFlags.UNTARED in hand["index"].flags and hand["index"].t_us == -1
-    hand.run()
-    live.send(frame(7, finger=1, force_z_n=1.25), frame(8, finger=0), frame(8, finger=1, force_z_n=2.5))
-    live.until(lambda: hand["middle"].t_us == 80_000)
-    assert hand["middle"].force_n.tolist() == hand[1].force_n.tolist() == [0, 0, 2.5]
-    assert hand["middle"].counts.tolist() == [2000] * 19
-    assert hand["middle"].torsion_nmm == hand["middle"].frame.torsion_nmm == 0.25
-    assert hand["middle"].frame.seq == 8
-    assert hand["thumb"].age_s == math.inf
-    live.clock.now_s += 0.75
-    assert hand["middle"].age_s == pytest.approx(0.75)
-    with pytest.raises(KeyError, match=r"no finger 'pinky'; expected one of 'index', 'middle'.*or 0 to 4"):
-        hand["pinky"]
-    with pytest.raises(KeyError, match="no finger 5"):
-        hand[5]
+def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
+    for _ in range(50):
+        queue.put(batch_of(packed(wire.Touch(1, 1, 0, 1, 1))))
+    assert len(drained(queue)) == 10
 
 
-def test_fingers_may_have_other_names(scripted_board, hello) -> None:
-    board = scripted_board(Firmware(hello))
-    with biotac.open(board.path, fingers={"thumb": 0, "palm": 3}) as hand:
-        assert (hand["thumb"].finger, hand["palm"].finger, hand[1].name) == (0, 3, "1")
-        with pytest.raises(KeyError, match="'palm'"):
-            hand["index"]
-    for bad in ({"a": 5}, {"a": "b"}, {"a": 1, "b": 1}):
-        with pytest.raises(biotac.InputError, match="fingers: 'a'"):
-            biotac.open(board.path, fingers=bad)
+def test_what_a_closed_queue_has_skipped_stays_counted(live: Live, queue: Queue) -> None:
+    one = live.hand._open_queue(lambda: None)
+    for seq in range(0, 30, 10):
+        one.put(batch_of(*(frame(seq + n) for n in range(10))))
+    for _ in range(2):
+        assert (live.hand.stats.batches_skipped, live.hand.stats.frames_skipped) == (2, 20)
+        live.hand._close_queue(one)
 
 
-def test_a_heartbeat_makes_the_former_force_invalid_instead_of_stale() -> None:
-    with biotac.open("sim:press.toml?seconds=4.5") as hand:
-        hand.want("force", rest=False)
-        was_touched = False
-        for batch in hand.batches():  # of any size: the touch may begin and end within one
-            was_touched |= bool((batch.wire["flags"] & biotac.FrameFlags.CONTACT).any())
-        view = hand["index"]
-    assert was_touched and not view.touched
-    assert np.isnan(view.force_n).all() and biotac.FrameFlags.NOT_ASKED in view.flags
-    assert view.t_us > 4_000_000 and 0 < view.pdc < 4096
+# ---- who pulls -----------------------------------------------------------------------------------
 
 
-def test_callbacks_get_everything_until_they_unsubscribe(live: Live) -> None:
-    seen: list[int] = []
-    kinds: list[str] = []
+def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatch) -> None:
+    monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
+    live.hand.stream()
+    batches = live.hand.batches()
+    live.send(frame(0))
+    got = [next(b for b in batches if len(b.wire))]
+    for seq in range(1, 1000):
+        live.send(frame(seq))
+    until(lambda: live.hand.stats.frames == 1000)
+    while got[-1].seq[-1] != 999:
+        got.append(next(b for b in batches if len(b.wire)))
+    frames, stats = sum(len(b.wire) for b in got), live.hand.stats
+    assert 1 < frames <= 1 + max(100, len(got[-1].wire))  # the newest stays, however much came at once
+    assert stats.frames_skipped == 1000 - frames and stats.batches_skipped > 0 and stats.frames_lost == 0
+    (gap,) = gaps_in(got)
+    assert (gap.reason, gap.frames_missed) == ("slow", 1000 - frames)
+
+
+def test_a_hand_that_nobody_pulls_from_counts_no_loss(live: Live, monkeypatch) -> None:
+    monkeypatch.setattr(consumers, "LIMIT_ROWS", 10)
+    live.hand.stream()
+    live.send(*(frame(seq) for seq in range(15)))
+    live.send(*(frame(seq) for seq in range(15, 30)))
+    until(lambda: live.hand.stats.frames == 30)
+    assert live.hand.stats.batches_skipped == 0
+    assert gaps_in([live.hand.read_batch(0.001)]) == []  # what was dropped before was nobody's
+
+
+def test_an_unpaced_board_waits_for_a_slow_puller_instead() -> None:
+    with biotac.open("sim:press.toml?fingers=5&seconds=60") as hand:
+        pieces = [hand.read(0.5), hand.read(1.0), hand.read_batch(1000).frames]
+        assert hand.ended and hand.stats.batches_skipped == 0
+    assert [len(p) for p in pieces] == [250, 500, 5 * 6000 - 750]  # more than a queue holds
+    for finger in range(5):
+        seq = np.concatenate([p["seq"][p["finger"] == finger] for p in pieces])
+        assert seq.tolist() == list(range(6000))
+
+
+def test_a_fresh_read_has_nothing_of_before(live: Live, monkeypatch) -> None:
+    live.hand.stream()
+    clear = live.hand._pulled.clear
+    for first in range(0, 20_000, 1000):
+
+        def clear_and_go_on(first: int = first) -> None:
+            clear()
+            live.send(frame(first + 400), frame(first + 500))
+
+        monkeypatch.setattr(live.hand._pulled, "clear", clear_and_go_on)
+        live.send(frame(first + 1), frame(first + 2))
+        live.firmware.before[wire.Ping] = frame(first + 3)  # on its way when the question came
+        assert live.hand.read_batch(0.5, fresh=True).seq.tolist() == [first + 400]
+    live.send(frame(first + 501))
+    assert live.hand.read(0.005)["seq"].tolist() == [first + 500]  # not fresh: the one before ended there
+
+
+def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
+    """When STOP is answered, its rows are there for who pulls; when PING is, for views."""
+    live.hand._begin_to_pull()
+    for round_ in range(1, 100):
+        live.hand.stream()
+        live.firmware.before[wire.Ping] = frame(10 * round_)
+        live.hand.ping()
+        assert live.hand[0].frame.seq == 10 * round_
+        live.firmware.before[wire.Stop] = frame(10 * round_ + 1)
+        live.hand.stop()
+        assert live.hand._pulled.take() is not None
+        assert [b.seq[-1] for b in drained(live.hand._pulled) if len(b.wire)][-1:] == [10 * round_ + 1]
+
+
+def test_a_second_thread_that_reads_is_told_so(live: Live) -> None:
+    live.hand.stream()
+    reading, errors = threading.Event(), []
+    batches = live.hand.batches()
+
+    def first() -> None:
+        live.send(frame(1))
+        next(batches)
+        reading.set()
+        with pytest.raises(biotac.DeviceLostError, match="was closed"):
+            for _ in batches:
+                pass
+        errors.append("first")
+
+    thread = threading.Thread(target=first, name="first")
+    thread.start()
+    assert reading.wait(WAIT_S)
+    with pytest.raises(biotac.InputError, match="thread 'first' is reading this hand"):
+        live.hand.read(1.0)
+    live.hand.close()  # beside a thread that reads
+    thread.join()
+    assert errors == ["first"]
+
+
+def test_readers_may_take_turns(live: Live) -> None:
+    live.hand.stream()
+    live.send(frame(1), frame(2), frame(3), frame(4), frame(5))
+    here = live.hand.read(0.02)["seq"].tolist()
+    there: list[int] = []
+    thread = threading.Thread(target=lambda: there.extend(live.hand.read(0.02)["seq"].tolist()))
+    thread.start()
+    thread.join()
+    assert (here, there) == ([1, 2], [3, 4])
+
+
+# ---- callbacks -----------------------------------------------------------------------------------
+
+
+def test_callbacks_get_everything_in_order_until_they_unsubscribe(live: Live) -> None:
+    seen: list[object] = []
     stop = live.hand.on_batch(lambda batch: seen.extend(batch.seq.tolist()))
-    live.hand.on_touch(lambda touch: kinds.append(f"touch {touch.finger}"))
-    live.hand.on_status(lambda status: kinds.append("status"))
-    live.hand.run()
+    live.hand.on_touch(lambda touch: seen.append(f"touch {touch.finger}"))
+    live.hand.on_status(lambda status: seen.append(f"status {status.req_id}"))
+    live.hand.stream()
     assert [s.quantities & wire.QuantityFlags.TOUCH for s in live.firmware.of(wire.Subscribe)] == [32]
-    touch = wire.Touch(3, 30_000, 2, 1, 500)
-    live.send(frame(0), frame(1), biotac.wire.framing.encode(touch.ID, touch.pack()), frame(2))
-    live.until(lambda: live.hand[0].t_us == 20_000)
-    live.hand.ping()  # behind it
-    live.hand.ping()  # and everything before is dispatched when the next is read
+    touch = wire.Touch(3, live.firmware.now_us(), 2, 1, 500)
+    live.send(frame(0), frame(1), packed(touch), frame(2), packed(live.firmware.status()))
+    until(lambda: len(seen) == 5)
     stop()
     stop()
-    live.send(frame(3))
-    live.until(lambda: live.hand[0].t_us == 30_000)
-    live.hand.close()
-    assert seen == [0, 1, 2]
-    assert kinds == ["touch 2"]
+    live.send(frame(3), packed(touch))
+    until(lambda: len(seen) == 6)
+    assert seen == [0, 1, 2, "touch 2", "status 0", "touch 2"]  # the keeper's questions are its own
 
 
-def test_events_are_called_with_slips_apart(live: Live) -> None:
+def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:
     seen: list[str] = []
+    live.start_clock()
+    live.hand._latest.max_age_s = 20.0
     live.hand.on_event(lambda event: seen.append(biotac.EventKind(event.kind).name))
     stop = live.hand.on_slip(lambda event: seen.append(f"slip of {event.finger}, {event.peak_count}"))
-    live.hand.run()
-    asked = live.firmware.of(wire.Subscribe)
-    assert len(asked) == 1 and asked[0].quantities & wire.QuantityFlags.EVENTS
-    touch = wire.Event(3, 30_000, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT)
-    slip = wire.Event(5, 52_000, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
-    live.send(*(biotac.wire.framing.encode(event.ID, event.pack()) for event in (touch, slip)), frame(0))
-    live.until(lambda: len(seen) == 3)
+    live.hand.stream()
+    assert live.firmware.of(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
+    assert len(live.firmware.of(wire.Subscribe)) == 1
+    now_us = live.firmware.now_us()
+    touch = wire.Event(3, now_us, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT)
+    slip = wire.Event(5, now_us, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
+    old = wire.Event(5, now_us - 30_000_000, 3, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
+    live.send(*(packed(event) for event in (old, touch, slip)))
+    until(lambda: len(seen) == 3)
     stop()
     assert seen == ["TOUCH", "SLIP", "slip of 2, 120"]
 
 
-def test_bands_are_streamed_to_who_wants_them(live: Live) -> None:
+def test_what_callbacks_wait_for_is_added_to_what_was_chosen(live: Live) -> None:
+    touch, force, told = wire.QuantityFlags.TOUCH, wire.QuantityFlags.FORCE, live.firmware
+    live.hand.on_touch(print)
+    live.hand.stream("force", rest=False)
+    assert told.of(wire.Subscribe)[-1].quantities == force | touch
+    live.hand.stream("pac")  # TOUCH comes with frames only
+    assert told.of(wire.Start)[-1].streams & wire.StreamFlags.FRAMES
+    live.hand.stream("force", rest=False)
     seen: list[wire.Bands] = []
-    live.hand.run()
-    assert not live.firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
-    live.hand.on_bands(seen.append)
-    assert live.firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
+    live.hand.on_bands(seen.append)  # a running stream is changed at once
+    assert told.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
+    assert told.of(wire.Subscribe)[-1].quantities == force | touch
     bands = wire.Bands(3, 30_227, 2, 22, (1, 2, 3, 4, 5, 2**32 - 2))
-    live.send(biotac.wire.framing.encode(bands.ID, bands.pack()), frame(0))
-    live.until(lambda: len(seen) == 1)
+    live.send(packed(bands), frame(0))
+    until(lambda: seen)
     assert seen == [bands]
 
 
-def test_what_a_callback_raises_comes_up_at_the_next_call_and_kills_nobody(live: Live) -> None:
-    seen: list[int] = []
+def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Live, monkeypatch) -> None:
+    monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
+    go_on, calls = threading.Event(), []
 
-    def broken(batch) -> None:
-        if len(batch.wire):
-            raise ValueError("not my day")
+    def slow(batch: Batch) -> None:
+        calls.append(batch)
+        assert go_on.wait(WAIT_S)
 
-    live.hand.on_batch(broken)
-    live.hand.on_batch(lambda batch: seen.extend(batch.seq.tolist()))
-    live.hand.run()
+    live.hand.on_batch(slow)
+    live.hand.stream()
     live.send(frame(0))
-    live.until(lambda: live.hand[0].t_us == 0)
+    until(lambda: calls)
+    for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
+        live.send(*(frame(seq) for seq in range(first, first + 20)))
+    until(lambda: live.hand.stats.frames == 2001)
+    assert live.hand[0].t_us == 20_000_000
     live.hand.ping()
-    live.hand.ping()
-    with pytest.raises(biotac.CallbackError, match=r"broken raised ValueError: not my day; fix it") as caught:
-        live.hand.check()
-    assert isinstance(caught.value.__cause__, ValueError)
-    live.hand.check()  # once is enough
+    go_on.set()
+    live.send(frame(2001))  # alone it fits, however large the batches before were
+    until(lambda: any(2001 in batch.seq for batch in calls))
+    frames = sum(len(b.wire) for b in calls)
+    assert live.hand.stats.frames_skipped == 2002 - frames > 0
+    assert [gap.reason for gap in gaps_in(calls)] == ["slow"]
+
+
+def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) -> None:
+    monkeypatch.setattr(consumers, "BACKLOG_S", 0.0)
+    go_on, calls = threading.Event(), []
+
+    def slow(batch: Batch) -> None:
+        calls.append(batch)
+        assert go_on.wait(WAIT_S)
+
+    live.hand.on_batch(slow)
+    live.hand.stream()
+    for seq in range(100):
+        live.send(frame(seq))
+        until(lambda seq=seq: live.hand.stats.frames > seq)
+    closing = threading.Thread(target=live.hand.close)
+    closing.start()
+    until(lambda: live.hand._callbacks._give_up_s < math.inf)
+    go_on.set()
+    closing.join()
+    stats = live.hand.stats
+    assert len(calls) == 1 and stats.frames == 100
+    assert stats.frames_skipped == 100 - len(calls[0].wire) and stats.batches_skipped > 90
+
+
+def test_commands_of_callbacks_and_the_keepers_looks_do_not_wait_for_each_other(live: Live, quick) -> None:
+    answered: list[None] = []
+    live.hand.on_batch(lambda batch: answered.append(live.hand.ping()))
+    live.hand.stream()
+    for k in range(50):
+        live.send(frame(k))
+        until(lambda: len(answered) > k)  # noqa: B023
+    assert live.hand.connected
+
+
+def test_a_callback_may_give_commands_stop_and_close(live: Live) -> None:
+    live.hand.on_batch(lambda batch: live.hand.tare(0) if 0 in batch.seq else None)
+    live.hand.on_batch(lambda batch: live.hand.stop() if 1 in batch.seq else None)
+    live.hand.on_batch(lambda batch: live.hand.close() if 2 in batch.seq else None)
+    live.hand.stream()
+    live.send(frame(0))
+    live.firmware.wait_for(wire.TareNow)
     live.send(frame(1))
-    live.until(lambda: live.hand[0].t_us == 10_000)
-    live.hand.ping()
-    live.hand.ping()
-    with pytest.raises(biotac.CallbackError, match="not my day"):
-        live.hand.close()
-    assert seen == [0, 1]
+    live.firmware.wait_for(wire.Stop, 2)  # after the handshake's
+    live.send(frame(2))
+    until(lambda: live.hand._board.closed)
+    live.hand.close()  # nothing was wrong
+
+
+# ---- errors of callbacks -------------------------------------------------------------------------
+
+CALLS = {
+    "force_n": lambda live, path: live.hand[0].force_n,
+    "frame": lambda live, path: live.hand[0].frame,
+    "stale": lambda live, path: live.hand[0].stale,
+    "ping": lambda live, path: live.hand.ping(),
+    "status": lambda live, path: live.hand.status(),
+    "tare": lambda live, path: live.hand.tare(0),
+    "hold": lambda live, path: live.hand.hold(0),
+    "release": lambda live, path: live.hand.release(0),
+    "setting": lambda live, path: live.hand.board.setting(1),
+    "stream": lambda live, path: live.hand.stream(),
+    "stop": lambda live, path: live.hand.stop(),
+    "record": lambda live, path: live.hand.record(path / "a.mcap"),
+    "streaming": lambda live, path: live.hand.streaming,
+    "stats": lambda live, path: live.hand.stats,
+    "check": lambda live, path: live.hand.check(),
+    "read": lambda live, path: live.hand.read(0.01),
+    "on_batch": lambda live, path: live.hand.on_batch(print),
+    "close": lambda live, path: live.hand.close(),
+}
+
+
+def not_my_day(batch: Batch) -> None:
+    if len(batch.wire):
+        raise ValueError("not my day")
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_what_a_callback_raises_is_raised_by_the_next_call_of_any_kind(live: Live, call, tmp_path, caplog) -> None:
+    seen: list[int] = []
+    live.hand.on_batch(not_my_day)
+    live.hand.on_batch(lambda batch: seen.extend(batch.seq.tolist()))
+    live.hand.stream()
+    view = live.hand[0]
+    live.send(frame(0))
+    until(lambda: seen == [0])
+    with pytest.raises(biotac.CallbackError, match=r"not_my_day raised ValueError: not my day; fix it") as caught:
+        CALLS[call](live, tmp_path)
+    assert isinstance(caught.value.__cause__, ValueError)
+    (record,) = [r for r in caplog.records if r.levelno == logging.ERROR]
+    assert record.name == "biotac" and record.exc_info[1] is caught.value.__cause__
+    if call != "close":
+        view.stale, live.hand.check()  # once is enough
+        live.send(frame(1))  # it stays subscribed, and so do the others
+        until(lambda: seen == [0, 1])
+        with pytest.raises(biotac.CallbackError, match="not my day"):
+            live.hand.close()
     live.hand.close()
 
 
-def test_a_callback_that_hangs_does_not_keep_the_link_waiting(live: Live) -> None:
-    hangs, go_on = threading.Event(), threading.Event()
-
-    def slow(batch) -> None:
+def test_sys_exit_in_a_callback_is_raised_and_ends_no_thread(live: Live) -> None:
+    def leaves(batch: Batch) -> None:
         if len(batch.wire):
-            hangs.set()
-            assert go_on.wait(WAIT_S)
+            raise SystemExit(3)
 
-    live.hand.on_batch(slow)
-    live.hand.run()
-    live.send(frame(0))
-    assert hangs.wait(WAIT_S)
-    for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
-        live.send(*(frame(seq) for seq in range(first, first + 20)))
-    live.until(lambda: live.hand.stats.frames == 2001)
-    assert live.hand[0].t_us == 20_000_000
-    assert live.hand.ping() is None  # commands go through as well
-    go_on.set()
+    live.hand.on_batch(leaves)
+    live.hand.stream()
+    for seq in range(1, 3):
+        live.send(frame(seq))
+        until(lambda: live.hand._troubles._first is not None)
+        with pytest.raises(biotac.CallbackError, match=r"leaves raised SystemExit: 3"):
+            live.hand.check()
+    assert live.hand[0].t_us == 20_000 and live.hand.streaming
 
 
-def test_a_callback_may_give_commands(live: Live) -> None:
+def test_several_errors_are_one_that_counts_the_others() -> None:
+    troubles = Troubles()
+    for text in "abc":
+        troubles.keep(biotac.CallbackError(text))
+    with pytest.raises(biotac.CallbackError, match=r"^a, and 2 more error\(s\) since; fix it$"):
+        troubles.report()
+    troubles.report()
+
+
+def test_a_callbacks_commands_do_not_raise_what_callbacks_raised(live: Live) -> None:
+    """The program is told, not they: their errors would grow by one another's."""
     done = threading.Event()
 
-    def tares(batch) -> None:
-        if len(batch.wire) and not done.is_set():
-            live.hand.tare(0)
-            done.set()
-
-    live.hand.on_batch(tares)
-    live.hand.run()
-    live.send(frame(0))
-    assert done.wait(WAIT_S)
-    assert [m.finger for m in live.firmware.of(wire.TareNow)] == [0]
-
-
-def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live) -> None:
-    live.hand._streams._pulled.bound(100)
-    live.hand.run(queue=True)
-    for seq in range(1000):
-        live.send(frame(seq))
-    live.until(lambda: live.hand.stats.frames == 1000)
-    batches = live.hand.batches()
-    first = next(batch for batch in batches if len(batch.wire))
-    got = [first]
-    while got[-1].seq[-1] != 999:
-        got.append(next(b for b in batches if len(b.wire)))
-    frames = sum(len(b.wire) for b in got)
-    stats = live.hand.stats
-    assert 0 < frames <= max(100, len(got[-1].wire))  # the newest stays, however much came at once
-    assert stats.frames_skipped == 1000 - frames and stats.batches_skipped > 0
-    assert stats.frames_lost == 0
-
-
-def test_a_simulated_board_waits_for_a_slow_puller_instead() -> None:
-    with biotac.open("sim:press.toml?fingers=5&seconds=60") as hand:
-        hand.run(queue=True)
-        frames = hand.read_batch(1000).frames
-    with biotac.open("sim:press.toml?fingers=5&seconds=60") as hand:
-        pulled = hand.read_batch(1000).frames
-    assert len(frames) == 5 * 6000  # more than a queue holds
-    assert frames.tobytes() == pulled.tobytes()
-    assert hand.stats.batches_skipped == 0
-
-
-def test_read_in_pieces_gives_every_row_with_threads_too() -> None:
-    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
-        hand.run(queue=True)
-        pieces = [hand.read(0.5), hand.read(1.0), hand.read(10.0)]
-        assert hand.ended
-    assert [len(p) for p in pieces] == [100, 200, 300]
-    for finger in range(2):
-        seq = np.concatenate([p["seq"][p["finger"] == finger] for p in pieces])
-        assert seq.tolist() == list(range(300))
-
-
-def test_commands_of_many_threads_do_not_mix() -> None:
-    with biotac.open("sim:drift.toml?seconds=60") as hand:
-        hand.run()
-        asked = list(wire.Setting)
-        alone = {s: hand.setting(s) for s in asked}
-        answers: list[tuple[wire.Setting, int]] = []
-        threads = [
-            threading.Thread(target=lambda: answers.extend((s, hand.setting(s)) for s in asked)) for _ in range(4)
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert len(answers) == 4 * len(asked)
-    assert all(alone[setting] == value for setting, value in answers)
-
-
-def test_a_reading_thread_that_gives_a_command_reads_the_reply_that_another_waits_for() -> None:
-    """As at the end of a simulated source, which the thread that reads asks about while others command."""
-    with biotac.open("sim:drift.toml?seconds=60") as hand:
-        board, here = hand._board, threading.current_thread()
-        board.is_read_here, board.is_pulled = (lambda: threading.current_thread() is here), False  # as ``run`` does
-        answers: list[int] = []
-        other = threading.Thread(target=lambda: answers.append(hand.setting(wire.Setting.STATUS_PERIOD_MS)))
-        other.start()
-        while not board.awaiting:
-            time.sleep(0.001)
-        hand.ping()
-        other.join()
-    assert answers == [1000]
-
-
-def test_start_carries_the_keep_alive_and_pings_come_in_time(live: Live) -> None:
-    live.hand.start()
-    assert live.firmware.of(wire.Start)[-1].keepalive_ms == 0  # pulled: nobody would ping
-    live.hand.run()  # streaming already: told again
-    assert live.firmware.of(wire.Start)[-1].keepalive_ms == 1000
-    signs = (wire.Ping, wire.GetStatus)  # some of them ask for the time
-    live.hand.ping()  # all that was sent until now is heard
-    before = len(live.firmware.of(signs))
-    for more in range(1, 6):
-        live.send(frame(more))  # so that nothing is silent, and the reader has a turn
-        live.clock.now_s += 0.34
-        live.firmware.wait_for(signs, before + more)
-    live.hand.stop()
-    assert len(live.firmware.of(signs)) == before + 5
-    assert len(live.firmware.of(wire.GetStatus)) >= 4
-
-
-def test_a_board_whose_time_waits_has_no_keep_alive_and_a_fast_one_a_longer() -> None:
-    with biotac.open("sim:drift.toml?seconds=1") as hand:
-        hand.run()
-        assert hand._streams._keepalive.timeout_ms(live=True) == 0
-    with biotac.open("sim:drift.toml?seconds=1&pace=4") as hand:
-        hand.run()
-        assert hand._streams._keepalive.timeout_ms(live=True) == 4000
-
-
-def test_silence_ends_the_reader_in_words(live: Live) -> None:
-    live.hand.run(queue=True)
-    live.hand.ping()  # all that it was asked is answered: no late answer breaks the silence
-    live.hand.link.patience = 1.0
-    live.clock.now_s += 3.1
-    with pytest.raises(biotac.DeviceLostError, match=r"silent for 3 s.*check the cable"):
-        for _ in live.hand.batches():
-            pass
-    with pytest.raises(biotac.DeviceLostError):
+    def commands(batch: Batch) -> None:
         live.hand.ping()
-
-
-def test_a_recording_gets_every_chunk_while_threads_read(tmp_path) -> None:
-    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
-        hand.record(tmp_path / "a.mcap")
-        ended = threading.Event()
-        hand.on_batch(lambda batch: None)
-        hand.run()
-        assert hand._board.wait_for(lambda: hand.ended, WAIT_S)
-        ended.set()
-    recording = biotac.Recording(tmp_path / "a.mcap")
-    assert recording.problems == []
-    assert len(recording.frames) == 600
-
-
-def test_a_full_disk_ends_the_recording_and_is_told_not_the_reading(live: Live, tmp_path, monkeypatch) -> None:
-    recorder = type("Full", (), {"closed": True, "path": tmp_path, "close": lambda self: None})()
-
-    def full(chunk: bytes) -> None:
-        raise OSError(28, "No space left on device")
-
-    recorder.write, recorder.write_gap = full, full
-    live.hand.run()
-    live.hand._recorded.to(recorder)
-    live.send(frame(0), frame(1))
-    live.until(lambda: live.hand[0].t_us == 10_000)
-    with pytest.raises(OSError, match="No space left"):
         live.hand.check()
+        if 9 in batch.seq:
+            done.set()
+        raise ValueError("again")
+
+    live.hand.on_batch(commands)
+    live.hand.stream()
+    for seq in range(10):
+        live.send(frame(seq))
+    assert done.wait(WAIT_S)
+    with pytest.raises(biotac.CallbackError) as caught:
+        live.hand.close()
+    assert str(caught.value).count("raised ValueError") == 1
+
+
+# ---- what is wanted ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("names", "rest", "quantities", "streams"),
     [
+        ((), True, int(stream.AT_FIRST), 0b111),
         (("force", "poc", "pac"), True, 0b010011, 0b111),
         (("force",), False, 0b000010, 0b101),
         (("raw",), True, 0b010000, 0b101),
@@ -374,65 +432,136 @@ def test_a_full_disk_ends_the_recording_and_is_told_not_the_reading(live: Live, 
         (("pac",), False, 0, 0b110),
     ],
 )
-def test_wants_reach_the_board_as_subscribe_and_start(live: Live, names, rest, quantities, streams) -> None:
-    live.hand.want(*names, rest=rest)
-    live.hand.start()
+def test_names_reach_the_board_as_subscribe_and_start(live: Live, names, rest, quantities, streams) -> None:
+    live.hand.stream(*names, rest=rest)
     assert live.firmware.of(wire.Subscribe)[-1].quantities == quantities
     assert live.firmware.of(wire.Start)[-1].streams == streams
-    live.hand.want("force", "pac")
-    assert live.firmware.of(wire.Start)[-1].streams == 0b111  # a running stream is changed at once
+    live.hand.stream("force", "pac", fingers=["index", 4])  # a running stream is changed at once
+    (start,) = live.firmware.of(wire.Start)[-1:]
+    assert (start.streams, start.fingers) == (0b111, 0b10001)
+
+
+def test_reading_starts_what_was_chosen_last(live: Live) -> None:
+    live.hand.stream("raw")
+    live.hand.stop()
+    live.firmware.after[wire.Start] = frame(1) + frame(2)
+    live.hand.read(0.01)
+    assert len(live.firmware.of(wire.Start)) == 2
+    assert live.firmware.of(wire.Start)[0].streams == live.firmware.of(wire.Start)[1].streams
 
 
 def test_a_rate_takes_every_nth_frame_here_and_leaves_the_recording_whole(tmp_path) -> None:
     with biotac.open("sim:press.toml?seconds=2") as hand:
         hand.record(tmp_path / "a.mcap")
-        hand.want("force", "raw", rate_hz=20)
-        frames = hand.read(10)
+        hand.stream("force", "raw", rate_hz=20)
+        with pytest.warns(biotac.ReadWarning):
+            frames = hand.read(10)
     assert frames["seq"].tolist() == list(range(0, 200, 5))
     assert len(biotac.load(tmp_path / "a.mcap")) == 200
 
 
-def test_unknown_wants_are_refused(live: Live) -> None:
-    with pytest.raises(biotac.InputError, match=r"unknown name 'forces'; expected some of force, poc"):
-        live.hand.want("forces")
+def test_unknown_wants_are_refused_and_change_nothing(live: Live) -> None:
+    with pytest.raises(biotac.InputError, match=r"unknown name 'forces'; expected some of force, poc|results"):
+        live.hand.stream("forces")
     for rate_hz in (0, -1, 101, math.nan):
         with pytest.raises(biotac.InputError, match="rate_hz is"):
-            live.hand.want("force", rate_hz=rate_hz)
-    with pytest.raises(biotac.InputError, match="no name was given"):
-        live.hand.want()
-    assert live.firmware.of(wire.Subscribe) == []
+            live.hand.stream("force", rate_hz=rate_hz)
+    with pytest.raises(KeyError, match="no finger 'pinky'"):
+        live.hand.stream(fingers=["pinky"])
+    assert live.firmware.of((wire.Subscribe, wire.Start)) == [] and not live.hand.streaming
 
 
-def test_nothing_live_begins_after_close(live: Live) -> None:
-    live.hand.close()
-    with pytest.raises(biotac.DeviceLostError, match="was closed"):
-        live.hand.run()
+@pytest.mark.parametrize(("pace", "keepalive_ms"), [(0, 0), (0.5, 1000), (1, 1000), (4, 4000), (1000, 0xFFFF)])
+def test_the_keep_alive_is_a_second_of_this_computers(live: Live, pace, keepalive_ms) -> None:
+    live.hand.link.pace = pace
+    live.hand.stream()
+    assert live.firmware.of(wire.Start)[-1].keepalive_ms == keepalive_ms
 
 
-def test_the_latest_of_each_finger_is_found_in_whichever_batch_has_it() -> None:
-    latest = Latest(Clock())
-    batches = [batch_of(*(frame(seq, finger=finger) for finger in fingers)) for seq, fingers in enumerate(SHOWN)]
-    assert batches[1].fingers == 0b11 and batches[3].fingers == -1
-    for k, batch in enumerate(batches):
-        latest.update(batch, float(k))
-    for finger in (0, 1, 2, 3, 200):
-        seq = max(seq for seq, fingers in enumerate(SHOWN) if finger in fingers)
-        assert latest.row(finger)["seq"][0] == seq
+# ---- the latest of each finger -------------------------------------------------------------------
 
 
-#: Fingers of one batch after another; 200 has no bit in a mask.
-SHOWN = [(2,), (0, 1), (3, 3), (200, 0), (), (1,), (0, 1), (0,), *[(1, 0)] * 40]
+def test_the_latest_is_by_name_and_number_and_only_of_fingers_that_are_there(live: Live) -> None:
+    hand = live.hand
+    live.firmware.facts["fingers_present"] = 0b11111
+    hand._reader.present = 0b1011
+    assert hand["index"].age_s == math.inf and hand["index"].stale.startswith("nothing has arrived")
+    assert np.isnan(hand["index"].force_n).all() and np.isnan(hand["index"].torsion_nmm)
+    assert biotac.FrameFlags.UNTARED in hand["index"].flags and hand["index"].t_us == -1
+    for key in ("thumb", 4, "ring"):
+        with pytest.raises(KeyError, match=rf"no sensor answers as '?{key}'?; those that do: 'index', 'middle', 'li"):
+            hand[key]
+    for key in ("pinky", 5, -1, 1.0, None):
+        with pytest.raises(KeyError, match="no finger"):
+            hand[key]
+    live.hand.stream()  # whose STATUS says that the thumb answers now
+    until(lambda: hand._reader.present == 0b11111)
+    live.send(frame(7, finger=1, force_z_n=1.25), frame(8), frame(8, finger=1, force_z_n=2.5), frame(8, finger=4))
+    until(lambda: hand["thumb"].t_us == 80_000)
+    assert hand["middle"].force_n.tolist() == hand[1].force_n.tolist() == [0, 0, 2.5]
+    assert hand["middle"].torsion_nmm == hand["middle"].frame.torsion_nmm == 0.25
+    assert (hand["middle"].frame.seq, hand["middle"].stale, hand["ring"].age_s) == (8, "", math.inf)
 
 
-def test_a_program_that_was_stopped_reads_before_it_says_silent(live: Live) -> None:
-    """SIGSTOP, or a laptop's lid: the clock has gone on, and what the board said meanwhile waits to be read."""
-    live.hand.start()
-    assert live.hand._board.read(WAIT_S)  # what time it is, which start() asks
-    live.hand.link.patience = 1.0
-    live.clock.now_s += 10.0
-    live.send(frame(1))
-    live.hand._streams.read(0.0)
-    assert live.hand.stats.frames == 1
-    live.clock.now_s += 10.0
-    with pytest.raises(biotac.DeviceLostError, match="silent for 3 s"):
-        live.hand._streams.read(0.0)
+def test_fingers_may_have_other_names(scripted_board, hello) -> None:
+    from live_board import Firmware
+
+    board = scripted_board(Firmware(hello))
+    with biotac.open(board.path, fingers={"thumb": 0, "palm": 3}) as hand:
+        assert (hand["thumb"].finger, hand["palm"].finger, hand[1].name) == (0, 3, "1")
+        assert list(hand) == ["thumb", "1", "2", "palm", "4"]
+        with pytest.raises(KeyError, match="'palm'"):
+            hand["index"]
+    for bad in ({"a": 5}, {"a": "b"}, {"a": 1, "b": 1}):
+        with pytest.raises(biotac.InputError, match="fingers: 'a'"):
+            biotac.open(board.path, fingers=bad)
+
+
+SHOWN = [(2,), (0, 1), (3, 3), (), (1,), (0, 1), (0,), *[(1, 0)] * 40]  # fingers of one batch after another
+
+
+def test_the_latest_of_each_finger_is_found_in_whichever_batch_has_it(live: Live) -> None:
+    live.hand.stream()
+    for seq, fingers in enumerate(SHOWN):
+        live.send(*(frame(seq, finger) for finger in fingers), heartbeat(seq, 4))
+    until(lambda: live.hand[4].frame.seq == len(SHOWN) - 1)
+    for finger in range(4):
+        assert live.hand[finger].frame.seq == max(seq for seq, fingers in enumerate(SHOWN) if finger in fingers)
+
+
+def test_a_heartbeat_replaces_the_former_force_by_nothing(live: Live) -> None:
+    live.hand.stream("force", rest=False)
+    live.send(frame(1, force_z_n=2.0), heartbeat(5, frames=4), frame(3))
+    until(lambda: live.hand.stats.frames == 2)
+    view = live.hand["index"]
+    assert np.isnan(view.force_n).all() and biotac.FrameFlags.NOT_ASKED in view.flags and not view.touched
+    assert (view.t_us, view.pdc) == (50_000, 2000)  # the later in device time
+
+
+def test_values_older_than_the_program_wants_are_not_shown(live: Live) -> None:
+    live.start_clock()
+    live.hand.stream()
+    now_us = live.firmware.now_us()
+    live.send(frame(1, t_us=now_us, force_z_n=2.0), frame(1, finger=1, t_us=now_us - 30_000_000))
+    until(lambda: live.hand["middle"].t_us > 0)
+    assert live.hand["index"].age_s + 29 < live.hand["middle"].age_s  # by its samples, not by when it was read
+    live.hand._latest.max_age_s = 29.0
+    assert "at most 29 s is allowed" in live.hand["middle"].stale
+    assert np.isnan(live.hand["middle"].force_n).all() and live.hand["middle"].t_us == -1
+    live.hand._latest.max_age_s = -1.0
+    with pytest.raises(TimeoutError, match=r"no new frame of finger 'index' in 0 s: .* old, at most -1 s"):
+        live.hand["index"].next_frame(0)
+
+
+def test_next_frame_waits_for_one_that_comes_after_the_call(live: Live) -> None:
+    live.hand.stream()
+    live.send(frame(1), frame(1, finger=1))
+    until(lambda: live.hand[0].t_us == 10_000)
+    got: list[biotac.Frame] = []
+    thread = threading.Thread(target=lambda: got.append(live.hand[0].next_frame(WAIT_S)))
+    thread.start()
+    until(lambda: live.hand._latest._waiters)
+    live.send(frame(2, finger=1))
+    live.send(frame(3))
+    thread.join()
+    assert got[0].seq == 3

@@ -12,15 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kept_board import boot, serial_of
+from maps import make_map
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.keep import flash_record
-from biotac.recording import Recording
+from biotac.map import file as map_file
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.facts import Facts
+from biotac.recording.reader import Recording
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
@@ -203,20 +205,20 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
     flash = tmp_path / "flash"
     with boot(flash) as hand:
         mine = replace(ODD, serial=serial_of(hand, 0))
-        hand.set_calibration(0, mine)
-        hand.set_calibration(1, replace(ODD, serial=""))
-        hand.save_settings()
-        hand.clear_calibration(1)  # not saved
+        hand.board.set_calibration(0, mine)
+        hand.board.set_calibration(1, replace(ODD, serial=""))
+        hand.board.save_settings()
+        hand.board.clear_calibration(1)  # not saved
     assert flash_record.pack(mine) in flash.read_bytes()
     with boot(flash) as hand:
-        assert hand.calibrations() == {0: mine, 1: replace(ODD, serial="")}
-        hand.clear_calibration(1)
-        hand.save_settings()
+        assert hand.board.calibrations() == {0: mine, 1: replace(ODD, serial="")}
+        hand.board.clear_calibration(1)
+        hand.board.save_settings()
     with boot(flash, ["BTOTHER", "BTANOTHER"]) as hand:
-        assert hand.calibration_state(0) == CalibrationState.OTHER_SENSOR
-        assert hand.calibration(0) == mine
-        assert (hand.calibration(1), hand.calibration_state(1)) == (None, CalibrationState.NONE)
-        assert hand.calibrations() == {}
+        assert hand.board.calibration_state(0) == CalibrationState.OTHER_SENSOR
+        assert hand.board.calibration(0) == mine
+        assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (None, CalibrationState.NONE)
+        assert hand.board.calibrations() == {}
 
 
 # ---- boards, recordings ------------------------------------------------------------------------
@@ -225,9 +227,9 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
 def test_another_sensors_calibration_is_refused_in_words() -> None:
     with biotac.open("sim:press.toml") as hand:
         with pytest.raises(biotac.CommandRefusedError, match=r"SetCalibration: OTHER_SENSOR .*plug that sensor in"):
-            hand.set_calibration(0, ODD)
+            hand.board.set_calibration(0, ODD)
         with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
-            hand.calibration(5)
+            hand.board.calibration(5)
 
 
 @pytest.fixture
@@ -236,7 +238,7 @@ def two_gains(tmp_path: Path) -> Path:
     path = tmp_path / "two.mcap"
     with biotac.open("sim:shear.toml?fingers=2&seconds=3") as hand:
         gains = Calibration(PocWeights.COMPRESS_N2, (900_000, 800_000, 700_000), (600_000, 500_000), 300)
-        hand.set_calibration(1, replace(gains, serial=serial_of(hand, 1), made_s=7))
+        hand.board.set_calibration(1, replace(gains, serial=serial_of(hand, 1), made_s=7))
         hand.record(path)
         hand.read(2.5)
     return path
@@ -290,7 +292,7 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     assert main([*verb, "put", port, str(path), "--finger", "0"]) == 7
     assert "OTHER_SENSOR" in capsys.readouterr().err
     assert main([*verb, "put", port, str(path), "--finger", "0", "--force", "--save"]) == 0
-    assert "finger 0: in force, saved; for any sensor, made 2025-11-21" in capsys.readouterr().out
+    assert "finger 0: calibration in force, saved; for any sensor, made 2025-11-21" in capsys.readouterr().out
     assert main([*verb, "put", port, str(path), "--finger", "1"]) == 0
     assert "until the next reboot" in capsys.readouterr().out
     assert main([*verb, "get", port, "--finger", "1", str(back)]) == 0
@@ -302,15 +304,42 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     capsys.readouterr()
     assert main([*verb, "show", port]) == 0
     shown = capsys.readouterr().out
-    assert "finger 1: in force; for sensor BT" in shown
+    assert "finger 1: calibration in force; for sensor BT" in shown
     assert shown.count("thermal_gain_milli = -600 count/1000 per TDC count") == 2
     assert main([*verb, "clear", port, "--finger", "0"]) == 0
     capsys.readouterr()
     assert main([*verb, "show", port, "--json"]) == 0
-    states = {finger: its["state"] for finger, its in json.loads(capsys.readouterr().out).items()}
+    states = {finger: both["calibration"]["state"] for finger, both in json.loads(capsys.readouterr().out).items()}
     assert states == {"0": "NONE", "1": "IN_FORCE", "2": "NONE", "3": "NONE", "4": "NONE"}
     assert main(["info", port, "--json"]) == 0
     assert list(json.loads(capsys.readouterr().out)["calibrations"]) == ["1"]
+
+
+def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path) -> None:
+    """Files say what they are; what a board holds of both kinds is named."""
+    own, wrench_map, back = tmp_path / "own.json", tmp_path / "map.json", tmp_path / "back.json"
+    file.save(own, replace(ODD, serial=""))
+    map_file.save(wrench_map, make_map(1))
+    verb = "calibration"
+    for path in (own, wrench_map):
+        assert main([verb, "put", port, str(path), "--finger", "0"]) == 0
+    capsys.readouterr()
+    assert main([verb, "show", port]) == 0
+    shown = capsys.readouterr().out
+    assert "finger 0: calibration in force; for any" in shown and "finger 0: wrench map in force; force" in shown
+    for words in (["get", port, str(back)], ["clear", port]):
+        assert main([verb, *words, "--finger", "0"]) == 2
+        assert "name one: --kind calibration or map" in capsys.readouterr().err
+    assert main([verb, "get", port, str(back), "--finger", "0", "--kind", "map"]) == 0
+    assert map_file.load(back) == make_map(1)
+    assert main([verb, "clear", port, "--finger", "0", "--kind", "map"]) == 0
+    assert main([verb, "get", port, str(back), "--finger", "0", "--force"]) == 0
+    assert file.load(back) == replace(ODD, serial="")
+    assert main([verb, "clear", port, "--finger", "0"]) == 0
+    assert main([verb, "clear", port, "--finger", "0"]) == 0  # is clear already
+    capsys.readouterr()
+    assert main([verb, "show", port]) == 0
+    assert "finger 0: none, the board's settings apply" in capsys.readouterr().out
 
 
 def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
@@ -324,7 +353,7 @@ def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
 
 def test_settings_leave_a_calibrated_finger_alone() -> None:
     with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
-        hand.set_calibration(1, replace(ODD, serial=""))
-        hand.set_setting(Setting.FORCE_GAIN_X_NN, 42)
-        assert hand.finger_settings()[1] == hand.settings() | ODD.settings()
-        assert hand.setting(Setting.FORCE_GAIN_X_NN) == 42
+        hand.board.set_calibration(1, replace(ODD, serial=""))
+        hand.board.set_setting(Setting.FORCE_GAIN_X_NN, 42)
+        assert hand.board.finger_settings()[1] == hand.board.settings() | ODD.settings()
+        assert hand.board.setting(Setting.FORCE_GAIN_X_NN) == 42

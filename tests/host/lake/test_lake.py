@@ -44,10 +44,10 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("sources")
     faults = record_all("sim:faults.toml?fingers=2&seconds=1", folder / "faults.mcap")
     with biotac.open("sim:press.toml?fingers=2&seconds=2") as hand:
-        hand.set_calibration(0, biotac.Calibration(force_gain_nn=(1_000_000, 900_000, 800_000)))
-        hand.set_map(1, make_map(1))
-        hand.want("force", "pac", rest=False)
+        hand.board.set_calibration(0, biotac.Calibration(force_gain_nn=(1_000_000, 900_000, 800_000)))
+        hand.board.set_map(1, make_map(1))
         hand.record(folder / "own.mcap")
+        hand.stream("force", "pac", rest=False)
         hand.read_batch(100)
     return [faults, folder / "own.mcap", *copies(biotac.Recording(faults), folder, 2, 86_400.0)[1:]]
 

@@ -10,6 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from overheard import Overheard
 
 import biotac
 from biotac.keep import eeprom
@@ -44,8 +45,9 @@ def board(monkeypatch, tmp_path: Path) -> Iterator[Board]:
         monkeypatch.setitem(sys.modules, "spidev", bus.module())
         monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
         hands.append(biotac.open("spidev:" + ",".join(f"0.{f}" for f in range(fingers))))
+        hands[-1].link.pace = 0  # the bus's time runs ahead of the computer's, so nothing may be kept alive by that
         for name, value in source.settings.items():
-            hands[-1].set_setting(biotac.Setting[name.upper()], value)
+            hands[-1].board.set_setting(biotac.Setting[name.upper()], value)
         return hands[-1], bus
 
     yield make
@@ -54,7 +56,7 @@ def board(monkeypatch, tmp_path: Path) -> Iterator[Board]:
 
 
 def run(hand: biotac.Hand, bus: fake_spidev.Bus) -> Batch:
-    hand.start()
+    hand.stream()
     bus.clock.run(SECONDS + 0.1)
     return hand.read_batch(SECONDS)
 
@@ -147,10 +149,12 @@ def test_a_bus_too_slow_for_every_slot_loses_counted_slots_and_no_time(board: Bo
 def test_a_host_that_does_not_read_loses_whole_frames(board: Board, monkeypatch) -> None:
     monkeypatch.setattr(spidev_link, "OUTBOX_BYTES", 8192)
     hand, bus = board("press.toml", 1)
-    hand.start()
-    hand.ping()
+    hand.stream()
+    standstill = Overheard(still=True)
+    hand._reader.add_tap(standstill)
     bus.clock.run(SECONDS)
     bus.clock.wait()
+    standstill.go_on.set()
     dropped = hand.status().messages_dropped
     assert dropped > 0
     assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)
@@ -158,7 +162,7 @@ def test_a_host_that_does_not_read_loses_whole_frames(board: Board, monkeypatch)
 
 def test_a_bus_that_fails_is_a_lost_board(board: Board) -> None:
     hand, bus = board("press.toml", 1)
-    hand.start()
+    hand.stream()
     bus.fault = OSError(110, "Connection timed out")
     bus.clock.run(1.0)
     with pytest.raises(biotac.DeviceLostError, match=r"spidev:0\.0 failed.*Connection timed out.*open it again"):
@@ -197,7 +201,7 @@ def test_a_bad_port_says_what_is_expected(port: str, words: str) -> None:
 
 def test_without_spidev_it_names_the_extra(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "spidev", None)
-    with pytest.raises(biotac.PortError, match=r"needs spidev.*pip install 'biotac-gateway\[spi\]'"):
+    with pytest.raises(biotac.PortError, match=r"needs spidev.*pip install 'biotac-gateway\[bus\]'"):
         biotac.open("spidev:0.0")
 
 
@@ -266,7 +270,7 @@ def test_what_the_harnesses_eeproms_hold_is_in_force_when_it_is_opened(board: Bo
     with Chip("1:0x51", "24c32") as chip:
         eeprom.store(chip, mine)
     with biotac.open("spidev:0.0,0.1?calibration=,1:0x51:24c32") as hand:
-        assert hand.calibrations() == {1: mine}
+        assert hand.board.calibrations() == {1: mine}
     # On finger 0's harness it is another sensor's; and finger 0's own chip is blank.
     with pytest.raises(biotac.CommandRefusedError, match="OTHER_SENSOR"):
         biotac.open("spidev:0.0,0.1?calibration=1:0x51:24c32")

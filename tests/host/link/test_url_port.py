@@ -94,7 +94,7 @@ def test_a_board_behind_a_network_is_a_board(shared: Shared) -> None:
         assert hand.port == shared.port and hand.fingers == [0]
         assert hand.status().fingers_present == 1
         pulled = hand.read(0.3)
-        hand.run(queue=True)
+        hand.stream()
         lived = hand.read(0.3)
         assert len(pulled) == len(lived) == 30
         assert hand.stats.frames_lost == hand.stats.crc_errors == 0
@@ -102,7 +102,7 @@ def test_a_board_behind_a_network_is_a_board(shared: Shared) -> None:
 
 def test_a_network_that_goes_away_is_a_lost_board(shared: Shared) -> None:
     with biotac.open(shared.port) as hand:
-        hand.run(queue=True)
+        hand.stream()
         hand.read(0.1)
         shared._connection.shutdown(socket.SHUT_RDWR)
         with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):

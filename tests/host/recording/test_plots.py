@@ -13,7 +13,7 @@ from ros_topics import STORE, of_topic
 from rosbags.typesys import get_types_from_msg
 
 import biotac
-from biotac.hand.gap import Gap
+from biotac.board.gap import Gap
 from biotac.recording import plot_ros, plots, writer
 from biotac.recording.facts import Facts
 from biotac.wire import messages_gen as wire
@@ -95,9 +95,9 @@ def test_every_direction_has_a_turn(force_n: tuple[float, float, float]) -> None
 def test_tares_events_and_gaps_are_logged(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     with biotac.open("sim:press.toml?seconds=3") as hand:
-        facts = Facts(hand.info, [], hand.settings())
+        facts = Facts(hand.info, [], hand.board.settings())
         with_blocks = record_all("sim:press.toml?seconds=3", tmp_path / "a.mcap")
-    recorder = writer.Recorder(path, facts, "test")
+    recorder = writer.Writer(path, facts, "test")
     first, *others = biotac.Recording(with_blocks).blocks
     recorder.write(first)
     gap = Gap("silence", 1, 2, 10**9, 3 * 10**9, 7)
@@ -116,7 +116,7 @@ def test_tares_events_and_gaps_are_logged(tmp_path: Path) -> None:
 @pytest.mark.nightly
 def test_rerun_draws_it_without_being_told(recorded: Path, tmp_path: Path) -> None:
     """Its importer gives scalars with which its time series, and poses with which its 3D view draw by themselves."""
-    pytest.importorskip("rerun", reason="Rerun (half a gigabyte) is not here; pip install 'biotac-gateway[rerun]'")
+    pytest.importorskip("rerun", reason="Rerun (half a gigabyte) is not here; pip install 'biotac-gateway[nightly]'")
     out = tmp_path / "a.rrd"
     rerun = [sys.executable, "-m", "rerun"]
     subprocess.run([*rerun, "mcap", "convert", str(recorded), "-o", str(out)], check=True, capture_output=True)

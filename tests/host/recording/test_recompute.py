@@ -11,19 +11,15 @@ import pytest
 import biotac
 from biotac.cli.main import main
 from biotac.core.compiled import FORCE_GAINS, reference_q4
-from biotac.hand.subscription import RESULTS
 from biotac.wire import messages_gen as wire
 
 
-def record(
-    path: Path, source: str, *, quantities: wire.QuantityFlags | None = None, **settings: int
-) -> biotac.Recording:
+def record(path: Path, source: str, *, rest: bool = True, **settings: int) -> biotac.Recording:
     with biotac.open(source) as hand:
         for name, value in settings.items():
-            hand.set_setting(wire.Setting[name.upper()], value)
-        if quantities is not None:
-            hand.subscribe(quantities)
+            hand.board.set_setting(wire.Setting[name.upper()], value)
         hand.record(path)
+        hand.stream(rest=rest)
         hand.read_batch(100)
     return biotac.Recording(path)
 
@@ -69,7 +65,7 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) ->
         (folder / name).unlink(missing_ok=True)
     # While a command is answered some seconds pass, as much as the pipe to this side holds; it must not end in them.
     with biotac.open("sim:press.toml?seconds=300") as hand:
-        hand.set_setting(wire.Setting.HOLD_TIMEOUT_MS, timeout_ms)
+        hand.board.set_setting(wire.Setting.HOLD_TIMEOUT_MS, timeout_ms)
         hand.record(folder / "grasp.mcap")
         hand.read(0.5)
         with hand.grasp("index"):
@@ -168,7 +164,7 @@ def test_a_recording_that_began_in_mid_life_says_so(folder, capsys) -> None:
 
 def test_heartbeats_need_kept_tares(folder, capsys) -> None:
     path = folder / "quiet.mcap"
-    record(path, "sim:press.toml", quantities=RESULTS)
+    record(path, "sim:press.toml", rest=False)
     assert main(["export", "--recompute", str(path), str(folder / "q2.mcap")]) == 2
     assert "heartbeats" in capsys.readouterr().err
     assert not (folder / "q2.mcap").exists()

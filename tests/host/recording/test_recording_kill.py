@@ -58,7 +58,7 @@ class Dying:
 create = writer.create
 writer.create = lambda path, **options: Dying(create(path, **options).detach())
 recorder = hand.record(path)
-recorder._clock_s = lambda: 0.0
+recorder._writer._clock_s = lambda: 0.0
 
 read, seen, ahead = hand.link.read, 0, b""
 def reading(timeout_s):

@@ -15,11 +15,12 @@ from record_all import record_all
 
 import biotac
 from biotac.cli.main import main
-from biotac.hand.hand import Hand
 from biotac.link.ports import open_link
 from biotac.recording.file import RecordingFile
 from biotac.recording.replay.link import open_replay
 from biotac.wire import messages_gen as wire
+from biotac.wire.batches import StreamDecoder
+from biotac.wire.framing import encode
 
 SECONDS = 4
 
@@ -68,7 +69,7 @@ def test_it_answers_as_its_board_did(recorded, capsys) -> None:
     path, _ = recorded
     with biotac.open("sim:press.toml?fingers=2&seconds=1") as board, biotac.open(f"replay:{path}") as replay:
         assert replay.fingers == board.fingers == [0, 1]
-        assert replay.settings() == board.settings()
+        assert replay.board.settings() == board.board.settings()
         assert replay.sensor_info(1).serial == board.sensor_info(1).serial
         replay.ping()
         assert replay.status().fingers_present == 0b11
@@ -82,11 +83,11 @@ def test_it_answers_as_its_board_did(recorded, capsys) -> None:
     [
         (lambda hand: hand.tare(0), "TareNow"),
         (lambda hand: hand.set_tare(0, np.full(19, 3000)), "TareSet"),
-        (lambda hand: hand.set_setting(wire.Setting.POC_WEIGHTS, 2), "SetSetting"),
-        (lambda hand: hand.subscribe(wire.QuantityFlags.POC), "Subscribe"),
+        (lambda hand: hand.board.set_setting(wire.Setting.POC_WEIGHTS, 2), "SetSetting"),
+        (lambda hand: hand.hold(0), "Hold"),
         (lambda hand: hand.point(0), "GetPoint"),
-        (lambda hand: hand.save_settings(), "SaveSettings"),
-        (lambda hand: hand.reboot_bootloader(), "RebootBootloader"),
+        (lambda hand: hand.board.save_settings(), "SaveSettings"),
+        (lambda hand: hand.board.reboot_bootloader(), "RebootBootloader"),
     ],
 )
 def test_what_would_change_a_board_is_refused_in_words(recorded, command, name: str) -> None:
@@ -126,11 +127,13 @@ def test_pace_is_kept_on_the_clock(recorded, pace: float) -> None:
     path, _ = recorded
     clock = FakeClock()
     link = open_replay(f"replay:{path}", pace, clock=clock)
+    decoder = StreamDecoder()
+    link.write(encode(wire.Start.ID, wire.Start(1, int(wire.StreamFlags.FRAMES), 0x1F, 0).pack()))
     arrivals: list[tuple[float, int]] = []
-    with Hand(link) as hand:
-        for batch in hand.batches():
-            if len(batch.frames):
-                arrivals.append((clock.now, int(batch.frames["t_us"][-1])))
+    while not link.ended:
+        batch = decoder.feed(link.read(0.2))
+        if len(batch.frames):
+            arrivals.append((clock.now, int(batch.frames["t_us"][-1])))
     assert len(arrivals) >= 100 * SECONDS - 1  # round by round, not in blocks
     start_s, first_us = arrivals[0]
     for now_s, t_us in arrivals:
@@ -141,7 +144,7 @@ def test_pace_is_kept_on_the_clock(recorded, pace: float) -> None:
 def test_only_what_start_asks_for_is_played(recorded) -> None:
     path, recording = recorded
     with biotac.open(f"replay:{path}") as hand:
-        hand.start(pac=False, fingers=0b10)
+        hand.stream("force", fingers=[1])
         batch = hand.read_batch(100)
     assert len(batch.pac) == 0
     assert set(batch.frames["finger"]) == {1} and len(batch.frames) == len(recording.frames) // 2

@@ -45,5 +45,5 @@ def test_a_dataset_has_units_and_axes(recording) -> None:
 
 def test_without_the_extra_it_is_named(recording, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(biotac.InputError, match=r"pip install 'biotac-gateway\[pandas\]'"):
+    with pytest.raises(biotac.InputError, match=r"pip install 'biotac-gateway\[export\]'"):
         recording.to_pandas()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import zlib
 from typing import Any
 
 import numpy as np
 import pytest
 
-from biotac.cli.live import sensor
-from biotac.errors import CommandRefusedError, InputError, NotAGatewayError, PortError
+from biotac.cli.main import main
+from biotac.errors import CommandRefusedError, NotAGatewayError, PortError
 from biotac.hand.opening import open as open_hand
 from biotac.link.serial_port import SerialLink
 from biotac.sim.loading import load_source
@@ -117,7 +116,7 @@ def test_faults_are_set_and_refused(scripted_board, hello) -> None:
 def test_a_gateway_is_no_sensor_board_nor_the_other_way_round(scripted_board, hello) -> None:
     fake = FakeSensorBoard(hello)
     path = scripted_board(fake.answer).path
-    with pytest.raises(NotAGatewayError, match="biotac sensor"):
+    with pytest.raises(NotAGatewayError, match="biotac sim SOURCE --sensor-port"):
         open_hand(path)
     fake.board = int(wire.Board.PICO)
     with pytest.raises(PortError, match="is PICO, not a sensor board"):
@@ -126,43 +125,30 @@ def test_a_gateway_is_no_sensor_board_nor_the_other_way_round(scripted_board, he
 
 def test_the_verb_plays_a_source_and_says_how_it_went(scripted_board, hello, capsys) -> None:
     fake = FakeSensorBoard(hello, room=500, serve=500)
-    words = [
-        scripted_board(fake.answer).path,
-        "press.toml",
-        "--fingers",
-        "2",
-        "--seconds",
-        "0.2",
-        "--fault",
-        "1=unplugged",
-    ]
-    parser = argparse.ArgumentParser()
-    sensor.add_arguments(parser)
-    assert sensor.run(argparse.Namespace(**vars(parser.parse_args(words)), json=False)) == 0
+    words = ["sim", "press.toml", "--sensor-port", scripted_board(fake.answer).path, "--fingers", "2"]
+    assert main([*words, "--seconds", "0.2", "--fault", "1=unplugged"]) == 0
     assert capsys.readouterr().out.startswith("880 of 880 slots served")
     assert fake.faults == {1: int(wire.EmuFault.UNPLUGGED)}
-    with pytest.raises(InputError, match="expected FINGER=KIND"):
-        sensor.fault_of("2=loose")
+    assert main([*words, "--fault", "2=loose"]) == 2
+    assert "expected FINGER=KIND" in capsys.readouterr().err
 
 
 def test_a_tape_is_kept_and_forgotten(scripted_board, hello, capsys) -> None:
     fake = FakeSensorBoard(hello, room=900)
     port = scripted_board(fake.answer).path
-    parser = argparse.ArgumentParser()
-    sensor.add_arguments(parser)
 
-    def run(*words: str) -> str:
-        assert sensor.run(argparse.Namespace(**vars(parser.parse_args([port, *words])), json=False)) == 0
-        return capsys.readouterr().out
+    def run(*words: str, code: int = 0) -> str:
+        assert main(["sim", "--sensor-port", port, *words]) == code
+        said = capsys.readouterr()
+        return said.err if code else said.out
 
     assert "0.20 s stored in its flash" in run("press.toml", "--fingers", "2", "--seconds", "0.2", "--keep")
     assert fake.kept == 880
     run("--forget")
     assert fake.keeping == 0
-    with pytest.raises(InputError, match=r"0.3 s of 2 fingers do not fit the board: expected up to 0.2.* s"):
-        run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep")
-    with pytest.raises(InputError, match="--keep needs a SOURCE"):
-        run("--keep")
+    told = run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep", code=2)
+    assert "0.3 s of 2 fingers do not fit the board: expected up to 0.2" in told
+    assert "--keep needs a SOURCE" in run("--keep", code=2)
 
 
 def test_a_tape_that_the_board_has_not_whole_is_not_kept(scripted_board, hello) -> None:

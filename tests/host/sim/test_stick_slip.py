@@ -40,7 +40,7 @@ def test_its_strength_is_that_of_real_slides_and_a_longer_run_begins_alike() -> 
 
 def test_a_grasp_is_told_from_touch_to_release() -> None:
     with biotac.open("sim:grasp.toml") as hand:
-        hand.subscribe(biotac.QuantityFlags.EVENTS | biotac.QuantityFlags.REST_FRAMES)
+        hand.stream("events", "raw")
         told = [m for m in hand.read_batch(20.0).messages if isinstance(m, biotac.Event)]
     at_s = {kind: [m.t_us / 1e6 for m in told if m.kind == kind] for kind in EventKind}
     assert 1.5 <= at_s[EventKind.TOUCH][0] <= 1.7

@@ -32,6 +32,7 @@ def test_a_users_program_is_typed_and_a_wrong_one_is_found(checker: str, tmp_pat
     assert "tear" in done.stdout and "fersh" in done.stdout
 
 
-def test_all_that_a_program_may_name_is_there() -> None:
-    assert {"Batch", "Touch", "Tare", "Status", "per_frame"} <= set(biotac.__all__)
+def test_all_that_a_program_may_name_is_there_and_in_that_program() -> None:
+    named = set(re.findall(r"biotac\.(\w+)", PROGRAM.read_text()))
+    assert set(biotac.__all__) - named == set()
     assert all(hasattr(biotac, name) for name in biotac.__all__)

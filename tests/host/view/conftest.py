@@ -76,9 +76,8 @@ def touch() -> Batch:
 
 
 @pytest.fixture
-def view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Viewing]]:
+def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
     """Serves a source; its recordings go to tmp_path. Closed after the test."""
-    monkeypatch.setattr("biotac.view.reader.ANSWER_S", PATIENCE_MS / 1000)
     served: list[Viewing] = []
 
     def serve(source: str, **options: Any) -> Viewing:

@@ -245,6 +245,17 @@ def test_a_missing_board_is_told_and_found_again(make_player, view_of, open_page
     assert players[1].commands == [("tare", None)]
 
 
+def test_a_finger_without_news_does_not_look_touched(make_player, view_of, open_page, touch) -> None:
+    """Whatever stands still, the board or the program: the link is not known to be lost yet."""
+    player = make_player()
+    page = open_page(view_of(lambda: player))
+    player.script.put(touch)
+    page.wait_for_selector("body[data-stale] #touched:text('not known')")
+    assert "what is shown is old" in page.text_content("#link-words")
+    player.script.put(touch)
+    page.wait_for_selector("body:not([data-stale]) #touched:text-is('contact')")
+
+
 def test_the_page_finds_a_restarted_server(view, open_page) -> None:
     first = view("sim:drift.toml")
     page = open_page(first, expect="ERR_")

@@ -5,24 +5,25 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
-import os
 import random
 import re
 import socket
-import subprocess
-import sys
 import threading
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from served_page import fingers_shown
 
 import biotac
 from biotac.cli.main import main
-from biotac.view import check as checking
-from biotac.view.recorded import RecordedPlayer
+from biotac.hand.opening import shake_hands
+from biotac.recording.replay.link import ReplayLink
+from biotac.recording.replay.playback import Playback
+from biotac.view.player import Player
 from biotac.view.rows import FRAME_ROW, facts, frame_rows
 from biotac.view.server import MAX_CONNECTIONS, MAX_PAGES, TOKEN_HEADER
 from biotac.view.serving import lasting
@@ -193,25 +194,6 @@ def test_pages_are_few(make_player, view_of) -> None:
         page.close()
 
 
-def test_a_command_that_was_told_to_have_failed_is_not_carried_out(make_player, view_of, touch, monkeypatch) -> None:
-    player, held = make_player(), threading.Event()
-    taken = State.take
-
-    def stuck(state: State, batch, its) -> None:
-        held.wait()
-        taken(state, batch, its)
-
-    monkeypatch.setattr(State, "take", stuck)
-    viewing = view_of(lambda: player)
-    monkeypatch.setattr("biotac.view.reader.ANSWER_S", 0.05)
-    with pytest.raises(biotac.InputError, match=r"tare did not start within 0 s and was cancelled"):
-        viewing.reader.ask("tare", 3)
-    monkeypatch.setattr("biotac.view.reader.ANSWER_S", 300)
-    held.set()
-    assert viewing.reader.ask("tare", 4) == "done as told"
-    assert player.commands == [("tare", 4)]
-
-
 def test_only_this_computer_is_served_and_only_the_pages_files(make_player, view_of) -> None:
     viewing = view_of(lambda: make_player())
     assert viewing.server.server_address[0] == "127.0.0.1"
@@ -278,7 +260,7 @@ def test_rows_hold_the_wires_own_numbers(touch) -> None:
 
 def test_heartbeats_are_frames_without_signals() -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand:
-        hand.subscribe(wire.QuantityFlags.FORCE)
+        hand.stream("force", rest=False)
         batch = hand.read_batch(10)
     assert len(batch.idle)
     rows = [dict(zip(FRAME_ROW, json.loads(text), strict=True)) for text in frame_rows(batch)]
@@ -300,39 +282,40 @@ def test_a_tares_age_grows_between_two_status_messages() -> None:
     assert tared(2, facts_ | {"t_us": 2**32 - 1_010_000})["tare_age_ms"] == 500
 
 
-def test_a_recording_is_played_whole_and_once(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    with biotac.open("sim:press.toml?fingers=2&seconds=4") as hand:
+def player_of(folder: Path, source: str, pace: float) -> tuple[biotac.Recording, Player]:
+    path = folder / "a.mcap"
+    with biotac.open(source) as hand:
         recorder = hand.record(path)
         hand.read(10)
         recorder.close()
     recording = biotac.Recording(path)
-    for pace in (0.0, 40.0):
-        player = RecordedPlayer(recording, pace)
-        batches = list(player.batches())
-        frames = np.concatenate([b.frames for b in batches])
-        in_time = recording.frames[np.argsort(recording.frames["t_us"], kind="stable")]
-        assert frames.tobytes() == in_time.tobytes()  # NaN and all
-        assert sum(len(b.pac) for b in batches) == len(recording.pac)
-        timed = [m for m in recording.messages if hasattr(m, "t_us")]
-        assert sum(len(b.messages) for b in batches) == len(timed) > 0
-        assert player.stats().frames == len(frames)
+    return recording, Player(shake_hands(ReplayLink(str(path), Playback(recording), pace=pace)), folder)
 
 
-def test_a_paused_recording_stands_still(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    with biotac.open("sim:drift.toml?fingers=1&seconds=2") as hand:
-        recorder = hand.record(path)
-        hand.read(10)
-        recorder.close()
-    player = RecordedPlayer(biotac.Recording(path), 100.0)
+def test_a_recording_is_played_whole_and_once(tmp_path: Path) -> None:
+    recording, player = player_of(tmp_path, "sim:press.toml?fingers=2&seconds=4", 40.0)
+    batches = list(player.batches())
+    player.close()
+    frames = np.concatenate([b.frames for b in batches])
+    assert frames.tobytes() == recording.frames.tobytes()  # NaN and all
+    assert sum(len(b.pac) for b in batches) == len(recording.pac)
+    assert not player.live and player.board.endswith(f", recorded from {recording.metadata['port']}")
+    assert player.stats().frames == len(frames) and player.stats().frames_lost == 0
+
+
+def test_a_paused_recording_stands_still_until_it_goes_on_or_is_closed(tmp_path: Path, view) -> None:
+    recording, player = player_of(tmp_path, "sim:drift.toml?fingers=1&seconds=2", 100.0)
     player.do("pause", None)
-    batches = player.batches()
-    assert not any(len(next(batches).frames) for _ in range(5))
-    player.do("resume", None)
-    assert sum(len(b.frames) for b in batches) == 200
+    threading.Timer(0.5, player.do, ("resume", None)).start()
+    begin_s = time.monotonic()
+    assert sum(len(b.frames) for b in player.batches()) == len(recording.frames)
+    assert time.monotonic() - begin_s >= 0.4
     with pytest.raises(biotac.InputError, match="a recording cannot be tared; open a board"):
         player.do("tare", 0)
+    player.close()
+    viewing = view(str(recording.path))
+    assert viewing.reader.ask("pause", None) == "paused"
+    viewing.close()
 
 
 def test_a_lost_board_refuses_commands_with_the_reason(view_of) -> None:
@@ -352,18 +335,8 @@ def test_a_scenario_lasts_unless_it_says_how_long() -> None:
     assert lasting("/dev/ttyACM0") == "/dev/ttyACM0"
 
 
-def test_check_runs_without_any_tool_on_the_path() -> None:
-    words = [sys.executable, "-m", "biotac", "view", "--check"]
-    done = subprocess.run(words, env=os.environ | {"PATH": "/nowhere"}, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.endswith(": good\n") and done.stdout.count("\n") == 1
-
-
-def test_check_finds_what_is_wrong(monkeypatch, capsys) -> None:
-    real = checking.judge
-    monkeypatch.setattr(checking, "judge", lambda about, frames: real(about, [f for f in frames if f["finger"] != 2]))
-    assert main(["view", "--check", "--json"]) == 1
-    assert json.loads(capsys.readouterr().out)["problems"] == ["finger 2 sent nothing"]
+def test_a_browser_gets_every_file_and_all_fingers() -> None:
+    assert fingers_shown("sim:press.toml?fingers=5&seconds=60") == set(range(5))
 
 
 @pytest.mark.parametrize(

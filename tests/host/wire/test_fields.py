@@ -17,7 +17,7 @@ from biotac.wire.fields import FRAME_FIELDS, IDLE_FIELDS, as_json
 @pytest.fixture(scope="module")
 def rows() -> np.ndarray:
     with biotac.open("sim:faults.toml?fingers=2&pace=fast") as hand:
-        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
+        hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         return hand.read(seconds=3.0)
 
 

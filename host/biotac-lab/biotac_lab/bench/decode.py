@@ -53,7 +53,7 @@ Start = Callable[[], Feed]  # makes a fresh decoder; the function takes its chun
 def recording(frames: int) -> dict[int, Rows]:
     """FRAME and PAC messages of five simulated fingers, as rows of DTYPES by id."""
     with biotac.open(f"sim:press.toml?fingers={FINGERS}&seconds={frames / FRAMES_PER_S}") as hand:
-        hand.start()
+        hand.stream()
         batch = hand.read_batch(1e6)
     pac = np.empty(len(batch.pac), DTYPES[PAC])
     pac["seq"], pac["t_us"] = batch.pac["seq"] % 2**16, batch.pac["t_us"] % 2**32

@@ -11,18 +11,16 @@ from typing import Any
 import numpy as np
 
 import biotac
-from biotac import Batch, QuantityFlags, Tare, TareState
+from biotac import Batch, Tare, TareState
 from biotac.wire import DTYPES, OVERHEAD_BYTES, messages, slots
 
 from ..report import Show, Table
 
-RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
-
 
 def measure(source: str, show: Show = lambda text: None) -> list[Table]:
     """Play ``source`` (as for biotac.open, without ``sim:``) with frames at rest, then with heartbeats at rest."""
-    eager, _ = _play(source, RESULTS | QuantityFlags.REST_FRAMES)
-    lazy, status = _play(source, RESULTS)
+    eager, _ = _play(source, rest=True)
+    lazy, status = _play(source, rest=False)
     rows = [
         ["in contact", *share(lazy, touched=True)],
         ["at rest, REST_FRAMES", *share(eager, touched=False)],
@@ -34,10 +32,9 @@ def measure(source: str, show: Show = lambda text: None) -> list[Table]:
     return [Table(f"Link, {source}", head, rows, digits=1), Table("Skipped at rest", ["counter", "rounds"], skipped)]
 
 
-def _play(source: str, quantities: QuantityFlags) -> tuple[Batch, Any]:
+def _play(source: str, *, rest: bool) -> tuple[Batch, Any]:
     with biotac.open(f"sim:{source}") as hand:
-        hand.subscribe(quantities)
-        hand.start(pac=False)
+        hand.stream("force", "poc", "torque", "pressure", rest=rest)
         batch = hand.read_batch(1e6)
         return batch, hand.status()
 

@@ -102,7 +102,7 @@ def ours(path: str, arrivals: list[Arrival], until: Callable[[], None]) -> None:
 
     with biotac.open(path) as hand:
         hand.on_batch(arrived)
-        hand.run()
+        hand.stream()
         until()
         hand.ping()
 

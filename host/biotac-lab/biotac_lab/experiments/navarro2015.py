@@ -112,7 +112,7 @@ def calibrate(
     with _played(text, board) as (hand, truth):
         for fitted in fits.values():
             put(hand, fitted.finger, with_gain(hand, fitted, int(time.time())))
-        settings, own = hand.settings(), hand.finger_settings()
+        settings, own = hand.board.settings(), hand.board.finger_settings()
         for batch in hand.batches():
             outcome.add(batch.wire, settings, own)
             rows = rows_of(batch.wire, batch.t_us, truth)

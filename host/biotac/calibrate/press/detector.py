@@ -55,7 +55,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Press:
-    """One held contact: ``rows`` (n,) of ROW_DTYPE. ``number`` counts a finger's presses from 1."""
+    """One held contact: ``rows`` (n,) of ROW_DTYPE. ``number`` counts a finger's presses of a series from 1."""
 
     finger: int
     number: int
@@ -265,30 +265,34 @@ class Step:
 
 
 class Procedure:
-    """Takes ``fingers`` in turn through a press for each of ``forces_n``.
+    """Takes ``fingers`` in turn through a press for each of the forces of a series, then through the next series.
 
     Only the finger whose turn it is matters; the others may be touched or not. With ``needs_force``, rows without a
     reference do not count as held. Raises InputError for no fingers, one that occurs twice, no forces, or forces that
     are not above 0 and below 100 N.
     """
 
-    def __init__(self, fingers: Sequence[int], forces_n: Sequence[float], *, needs_force: bool = True) -> None:
+    def __init__(self, fingers: Sequence[int], *series_n: Sequence[float], needs_force: bool = True) -> None:
         if not fingers or len(set(fingers)) != len(fingers):
             raise InputError(f"fingers are {list(fingers)}; expected one or more, each once")
-        if not forces_n or not all(0 < force < MAX_N for force in forces_n):
-            raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
-        self.forces_n = tuple(float(force) for force in forces_n)
+        for forces_n in series_n:
+            if not forces_n or not all(0 < force < MAX_N for force in forces_n):
+                raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
         self.needs_force = needs_force
-        self._machines = [Presses(finger, len(self.forces_n), needs_force=needs_force) for finger in fingers]
+        self._turns = [
+            (Presses(finger, len(forces_n), needs_force=needs_force), tuple(float(force) for force in forces_n))
+            for forces_n in series_n
+            for finger in fingers
+        ]
 
     @property
     def step(self) -> Step | None:
         """What to do now; None when all is done."""
-        machine = next((m for m in self._machines if m.phase is not Phase.DONE), None)
+        machine, forces_n = next((turn for turn in self._turns if not turn[0].done), (None, ()))
         if machine is None:
             return None
         number = len(machine.presses) + (machine.phase is not Phase.RELEASE)
-        return Step(machine.finger, machine.phase, number, len(self.forces_n), self.forces_n[number - 1])
+        return Step(machine.finger, machine.phase, number, len(forces_n), forces_n[number - 1])
 
     @property
     def done(self) -> bool:
@@ -297,21 +301,32 @@ class Procedure:
 
     @property
     def rests(self) -> dict[int, Rest]:
-        """Rest by finger, for those that have been at rest."""
-        return {m.finger: m.rest for m in self._machines if m.rest is not None}
+        """Rest before the first press by finger, for those that have been at rest."""
+        return {m.finger: m.rest for m, _ in reversed(self._turns) if m.rest is not None}
 
     @property
     def presses(self) -> dict[int, list[Press]]:
-        """Presses held so far, by finger."""
-        return {m.finger: list(m.presses) for m in self._machines}
+        """Presses held so far, by finger, of all series."""
+        found: dict[int, list[Press]] = {}
+        for machine, _ in self._turns:
+            found.setdefault(machine.finger, []).extend(machine.presses)
+        return found
+
+    def asked(self) -> list[tuple[Press, Step]]:
+        """Every press held so far, and what was asked for."""
+        return [
+            (press, Step(press.finger, Phase.RELEASE, press.number, len(forces_n), forces_n[press.number - 1]))
+            for machine, forces_n in self._turns
+            for press in machine.presses
+        ]
 
     def feed(self, rows: StructArray) -> None:
         """Take rows (n,) of ROW_DTYPE of any fingers, in order of time.
 
         Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
         """
-        for machine in self._machines:
-            if machine.phase is Phase.DONE:
+        for machine, _ in self._turns:
+            if machine.done:
                 continue
             own = rows[rows["finger"] == machine.finger]
             taken = machine.feed(own)
@@ -322,7 +337,7 @@ class Procedure:
 
     def finish(self) -> None:
         """End: no more rows come. Raises InputError unless every press was seen."""
-        for machine in self._machines:
+        for machine, _ in self._turns:
             machine.finish()
 
     def find(self, rows: StructArray) -> dict[int, list[Press]]:

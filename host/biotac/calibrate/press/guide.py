@@ -8,7 +8,7 @@ from typing import Protocol
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...wire.batches import Batch
-from .detector import Phase, Press, Procedure, Step
+from .detector import Press, Procedure, Step
 from .force_source import Reference
 from .rows import rows_of
 
@@ -39,48 +39,39 @@ def guide(
     reference: Reference | None,
     face: Face,
     *,
-    after_us: int = 0,
     heard: Callable[[Batch], None] = lambda batch: None,
 ) -> dict[int, list[Press]]:
     """Feed ``procedure`` with what ``hand`` streams until it is done; the presses by finger, each with its force.
 
     The force is the ``reference``'s, or what ``face`` gives. Starts the stream if necessary and leaves it on. ``heard``
-    gets every batch; ``procedure`` does not get the first ``after_us`` of device time. Raises InputError when a finger
-    waits too long, or a simulated source ends first.
+    gets every batch. Raises InputError when a finger waits too long, or a simulated source ends first.
     """
-    asked: dict[tuple[int, int], float] = {}
+    forces_n: list[float] = []
 
     def show(step: Step | None) -> None:
         if reference is None:
-            _ask_forces(procedure, asked, face)
+            ask_forces(procedure, forces_n, face)
         face.show(step)
 
     shown = procedure.step
     show(shown)
-    first_us: int | None = None
     for batch in hand.batches():
         heard(batch)
-        rows = rows_of(batch.wire, batch.t_us, reference)
-        if first_us is None and len(rows):
-            first_us = int(rows["t_us"].min())
-        procedure.feed(rows[rows["t_us"] - (first_us or 0) >= after_us])
+        procedure.feed(rows_of(batch.wire, batch.t_us, reference))
         if procedure.step != shown:
             shown = procedure.step
             show(shown)
         if procedure.done:
             break
     procedure.finish()
-    return {
-        finger: [press.with_force(asked[finger, press.number]) if asked else press for press in presses]
-        for finger, presses in procedure.presses.items()
-    }
+    if reference is not None:
+        return procedure.presses
+    found: dict[int, list[Press]] = {}
+    for (press, _), force_n in zip(procedure.asked(), forces_n, strict=True):
+        found.setdefault(press.finger, []).append(press.with_force(force_n))
+    return found
 
 
-def _ask_forces(procedure: Procedure, asked: dict[tuple[int, int], float], face: Face) -> None:
+def ask_forces(procedure: Procedure, forces_n: list[float], face: Face) -> None:
     """Ask for the force of every press without one: several, when somebody presses faster than they type."""
-    for finger, presses in procedure.presses.items():
-        for press in presses:
-            if (finger, press.number) not in asked:
-                force_n = procedure.forces_n[press.number - 1]
-                step = Step(finger, Phase.RELEASE, press.number, len(procedure.forces_n), force_n)
-                asked[finger, press.number] = face.force_n(step)
+    forces_n += [face.force_n(step) for _, step in procedure.asked()[len(forces_n) :]]

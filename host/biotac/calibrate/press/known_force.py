@@ -12,7 +12,7 @@ import numpy as np
 from ...core.geometry import Floats
 from ...errors import InputError
 from ...hand.hand import Hand
-from ...recording import Recording
+from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch, join
 from ...wire.frames import Q4_PER_COUNT, StructArray

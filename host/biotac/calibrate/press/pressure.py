@@ -185,7 +185,7 @@ def _check(where: str, press: Press) -> None:
 # ---- results -----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass
 class Outcome:
     """Results by finger: K, the calibration with it, its provenance, and the verification press.
 
@@ -199,6 +199,14 @@ class Outcome:
     verified: dict[int, Verification]
     lag_rows: dict[int, int] = field(default_factory=dict)
     not_saved: CommandRefusedError | None = None
+
+    def add(self, rest: Rest, presses: Sequence[Press], **source: str) -> Fit:
+        """Fit a finger's presses but the last, which verifies the fit; ``source`` is where they are from."""
+        fitted = fit(rest, presses[:-1])
+        self.fits[fitted.finger] = fitted
+        self.verified[fitted.finger] = verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
+        self.provenance[fitted.finger] = provenance(fitted, **source)
+        return fitted
 
 
 def provenance(fitted: Fit, **source: str) -> Provenance:

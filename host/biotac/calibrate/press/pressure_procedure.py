@@ -1,14 +1,13 @@
-"""Pressure calibration on a board, K written to it and read back, and from a recording; one more press verifies K.
+"""Pressure calibration on a board and from a recording: K from a finger's presses, verified on its last one.
 
-A board takes no calibration while it streams, so the stream is stopped between the presses and the verification. The
-time of an unpaced emulated board would run on meanwhile, so such a board is opened again, and in its second run
-everything up to the end of the first presses is ignored.
+The board's force at that press is computed by the board's own code, from the filtered pressure and the tare that the
+board sent. A board takes no calibration while it streams, so it gets K after the last press.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,12 +15,12 @@ import numpy as np
 from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
 from ...keep import Calibration
-from ...recording import Recording
+from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ...wire.frames import StructArray
 from ...wire.identity import ascii_text, serial_text
 from .detector import Procedure
-from .force_source import Reference, Series, Truth, check_alignment
+from .force_source import Series, Truth, check_alignment
 from .guide import Face, guide
 from .pressure import (
     CALIBRATION_FORCES_N,
@@ -29,10 +28,6 @@ from .pressure import (
     VERIFICATION_FORCES_N,
     Fit,
     Outcome,
-    fit,
-    provenance,
-    verify,
-    with_board_force,
 )
 from .rows import rows_of
 
@@ -51,66 +46,40 @@ class Plan:
 # ---- on a board --------------------------------------------------------------------------------
 
 
-def calibrate(open_hand: Callable[[], Hand], plan: Plan, face: Face, *, made_s: int, save: bool = False) -> Outcome:
-    """Run ``plan`` on the board that ``open_hand`` opens; the force is its scenario's, or what ``face`` gives.
+def calibrate(hand: Hand, plan: Plan, face: Face, *, made_s: int, save: bool = False) -> Outcome:
+    """Run ``plan`` on a board; the force is its scenario's, or what ``face`` gives.
 
-    ``save`` keeps the result over reboots once every finger is verified; see Outcome.not_saved if the board refuses.
-    Raises InputError for presses that cannot be used, for a finger without a sensor, and for a sensor that was changed
-    meanwhile; the board then keeps nothing beyond the next reboot.
+    ``save`` keeps the result over reboots; see Outcome.not_saved if the board refuses. Raises InputError for presses
+    that cannot be used, for a finger without a sensor, and for a sensor that was changed meanwhile; the board then
+    keeps nothing beyond the next reboot.
     """
     if len(plan.forces_n) < MIN_PRESSES:
         raise InputError(f"{len(plan.forces_n)} presses are planned, expected {MIN_PRESSES} or more; name more forces")
-    with open_hand() as hand:
-        fingers = _fingers(hand, plan)
-        serials = {finger: _serial(hand, finger) for finger in fingers}
-        reference = None if hand.link.source is None else Truth(hand.link.source)
-        procedure = Procedure(fingers, plan.forces_n, needs_force=reference is not None)
-        presses = guide(hand, procedure, reference, face)
-        fits = {finger: fit(procedure.rests[finger], held) for finger, held in presses.items()}
-        if reference is None or hand.link.pace != 0:
-            hand.stop()
-            return _verified(hand, fits, serials, reference, face, plan, made_s, save=save, after_us=0)
-        lasted_us = max(int(press.rows["t_us"][-1]) for held in presses.values() for press in held) - reference.first_us
-    with open_hand() as hand:
-        assert hand.link.source is not None
-        second = Truth(hand.link.source)
-        return _verified(hand, fits, serials, second, face, plan, made_s, save=save, after_us=lasted_us)
-
-
-def _verified(
-    hand: Hand,
-    fits: dict[int, Fit],
-    serials: dict[int, str],
-    reference: Reference | None,
-    face: Face,
-    plan: Plan,
-    made_s: int,
-    *,
-    save: bool,
-    after_us: int,
-) -> Outcome:
-    calibrations, origins = {}, {}
-    for finger, fitted in fits.items():
+    fingers = _fingers(hand, plan)
+    serials = {finger: _serial(hand, finger) for finger in fingers}
+    reference = None if hand.link.source is None else Truth(hand.link.source)
+    procedure = Procedure(fingers, plan.forces_n, plan.verification_n, needs_force=reference is not None)
+    held = guide(hand, procedure, reference, face)
+    hand.stop()
+    outcome = Outcome({}, {}, {}, {})
+    for finger, presses in held.items():
         now = _serial(hand, finger)
         if now != serials[finger]:
             raise InputError(
-                f"finger {finger} is now sensor {now!r}, but was {serials[finger]!r} during the presses; expected "
-                "the same; start again"
+                f"finger {finger} is now sensor {now!r}, but was {serials[finger]!r} when it began; expected the same; "
+                "start again"
             )
-        calibrations[finger] = with_gain(hand, fitted, made_s)
-        origins[finger] = provenance(fitted, **{"from": hand.port, "board_serial": serial_text(hand.info)})
-        put(hand, finger, calibrations[finger])
-    procedure = Procedure(list(fits), plan.verification_n, needs_force=reference is not None)
-    held = guide(hand, procedure, reference, face, after_us=after_us)
-    verified = {finger: verify(fits[finger], presses[-1]) for finger, presses in held.items()}
-    hand.stop()
-    not_saved = None
+        fitted = outcome.add(
+            procedure.rests[finger], presses, **{"from": hand.port, "board_serial": serial_text(hand.info)}
+        )
+        outcome.calibrations[finger] = with_gain(hand, fitted, made_s)
+        put(hand, finger, outcome.calibrations[finger])
     if save:
         try:
-            hand.save_settings()
+            hand.board.save_settings()
         except CommandRefusedError as error:
-            not_saved = error  # the presses are not lost for this
-    return Outcome(fits, calibrations, origins, verified, not_saved=not_saved)
+            outcome.not_saved = error  # the presses are not lost for this
+    return outcome
 
 
 def _fingers(hand: Hand, plan: Plan) -> Sequence[int]:
@@ -130,9 +99,9 @@ def _serial(hand: Hand, finger: int) -> str:
 
 def with_gain(hand: Hand, fitted: Fit, made_s: int) -> Calibration:
     """The finger's calibration on the board with K put in, for the sensor that is connected."""
-    own = hand.calibration(fitted.finger)
-    if own is None or hand.calibration_state(fitted.finger) != wire.CalibrationState.IN_FORCE:
-        own = Calibration().changed(hand.settings())
+    own = hand.board.calibration(fitted.finger)
+    if own is None or hand.board.calibration_state(fitted.finger) != wire.CalibrationState.IN_FORCE:
+        own = Calibration().changed(hand.board.settings())
     return replace(own, pressure_gain_nn=fitted.gain_nn, serial=_serial(hand, fitted.finger), made_s=made_s)
 
 
@@ -141,9 +110,9 @@ def put(hand: Hand, finger: int, calibration: Calibration) -> None:
 
     Raises CommandRefusedError, or InputError when the board returns another calibration or does not use it.
     """
-    hand.set_calibration(finger, calibration)
-    back = hand.calibration(finger)
-    if back != calibration or hand.calibration_state(finger) != wire.CalibrationState.IN_FORCE:
+    hand.board.set_calibration(finger, calibration)
+    back = hand.board.calibration(finger)
+    if back != calibration or hand.board.calibration_state(finger) != wire.CalibrationState.IN_FORCE:
         raise InputError(
             f"finger {finger}: the board returns {back}, expected the calibration it was given, in force; check with "
             "`biotac calibration show`"
@@ -190,7 +159,7 @@ def calibrate_recording(
         "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
         "reference": reference.name if reference is not None else "typed",
     }
-    outcome = Outcome({}, {}, {}, {}, {})
+    outcome = Outcome({}, {}, {}, {})
     for finger in fingers or there:
         own_rows = rows[rows["finger"] == finger]
         if reference is not None:
@@ -200,14 +169,11 @@ def calibrate_recording(
         presses = procedure.find(own_rows)[finger]
         if reference is None:
             presses = [press.with_force(force) for press, force in zip(presses, forces_n, strict=True)]
-        fitted = fit(procedure.rests[finger], presses[:-1])
+        fitted = outcome.add(procedure.rests[finger], presses, **source)
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
-        outcome.fits[finger] = fitted
-        outcome.verified[finger] = verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
         outcome.calibrations[finger] = replace(
             own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s
         )
-        outcome.provenance[finger] = provenance(fitted, **source)
     return outcome
 
 

@@ -72,7 +72,7 @@ def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError(
-            f"{path} is a ROS 2 bag, which needs the package rosbags; install it: pip install 'biotac-gateway[ros2]'"
+            f"{path} is a ROS 2 bag, which needs the package rosbags; install it: pip install 'biotac-gateway[export]'"
         ) from None
     store = get_typestore(Stores.ROS2_HUMBLE)
     return lambda data: store.deserialize_cdr(data, SCHEMAS[0])

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...documents import Provenance
 from ...errors import InputError
-from ...recording import Recording
+from ...recording.reader import Recording
 from ...version import __version__
 from ...wire.identity import ascii_text
 from ..reference.samples import Reference

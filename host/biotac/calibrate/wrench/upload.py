@@ -47,8 +47,8 @@ def upload(
     compute what was fitted.
     """
     sent = fitted.on_board(serial=serial, made_s=made_s).blob
-    hand.set_map(finger, sent, force=force)
-    blob = hand.get_map(finger)
+    hand.board.set_map(finger, sent, force=force)
+    blob = hand.board.get_map(finger)
     # only the header may differ: a forced map has no serial number in it
     if blob is None or blob[HEADER_BYTES:] != sent[HEADER_BYTES:]:
         seen = "none" if blob is None else f"another of {len(blob)} bytes"

@@ -3,29 +3,57 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
+import biotac
 from biotac import Calibration, Hand
 
-from ...documents import made_text
+from ...documents import JSON_BYTES, made_text, parse_json, read_text, write_new
 from ...errors import InputError
-from ...keep import calibration_file as file
-from ...keep import eeprom
-from ...keep.chip import KINDS, Chip
+from ...hand.configuration import Configuration
+from ...keep import calibration_file, eeprom
+from ...keep.chip import Chip, parse_place
+from ...map import file as map_file
 from ...version import __version__
-from ...wire.identity import setting_text
-from . import subverbs
+from ...wire.identity import serial_text, setting_text
+from ...wire.sensor_gen import MAX_SENSORS
+from .. import values
+from ..outputs import say
 
 EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
+EEPROM = "i2c:"
+IN_EEPROM = f"{EEPROM}BUS:ADDRESS:CHIP"
 
-run = subverbs.run
+
+@dataclass(frozen=True)
+class Kind:
+    """What a board keeps for a finger: its name, its file module, the functions of ``Hand.board`` for it, its texts.
+
+    ``write`` gets true last if any sensor will do; ``lines`` tell the content.
+    """
+
+    name: str
+    file: ModuleType
+    read: Callable[[Configuration, int], Any]  # None if the finger has none
+    state: Callable[[Configuration, int], biotac.CalibrationState]
+    write: Callable[[Configuration, int, Any, bool], object]
+    remove: Callable[[Configuration, int], object]
+    title: Callable[[Any], str]
+    lines: Callable[[Any], list[str]] = lambda content: []
 
 
-def _write(hand: Hand, finger: int, calibration: Calibration, force: bool) -> None:
-    hand.set_calibration(finger, replace(calibration, serial="") if force else calibration)
+def _write_calibration(board: Configuration, finger: int, calibration: Calibration, force: bool) -> None:
+    board.set_calibration(finger, replace(calibration, serial="") if force else calibration)
+
+
+def _write_map(board: Configuration, finger: int, blob: bytes, force: bool) -> None:
+    board.set_map(finger, blob, force=force)
 
 
 def _title(calibration: Calibration) -> str:
@@ -37,65 +65,167 @@ def _lines(calibration: Calibration) -> list[str]:
     return [f"  {setting_text(setting, value)}" for setting, value in calibration.settings().items()]
 
 
-CALIBRATION = subverbs.Kept(
-    "calibration", file, Hand.calibration, Hand.calibration_state, _write, Hand.clear_calibration, _title, _lines
-)
+KINDS = {
+    "calibration": Kind(
+        "calibration", calibration_file, Configuration.calibration, Configuration.calibration_state,
+        _write_calibration, Configuration.clear_calibration, _title, _lines,
+    ),
+    "map": Kind(
+        "wrench map", map_file, Configuration.get_map, Configuration.map_state,
+        _write_map, Configuration.clear_map, map_file.title,
+    ),
+}  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the subverbs, each with calibration own arguments."""
+    """Add the subverbs, each with its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    add = partial(subverbs.add, what, "calibration")
 
-    show = add("show", _show, "What a board, a file or an EEPROM holds.", "show index.json")
-    show.add_argument("where", metavar="PORT|FILE", nargs="?", help="left out with --i2c")
-    _add_eeprom(show, required=False)
+    def add(name: str, action: Callable[..., int], text: str, example: str) -> argparse.ArgumentParser:
+        return values.add_subverb(what, name, action, text, f"biotac calibration {name} {example}")
 
-    CALIBRATION.add(add, "Back to the board's settings.")
+    which = f"an EEPROM, for one calibration, is {EEPROM}1:0x50:24c32, for example"
+    show = add("show", _show, "What a board, a recording, a file or an EEPROM holds.", "index.json")
+    show.add_argument("where", metavar=f"PORT|REC|FILE|{IN_EEPROM}", help=which)
 
-    store = add("store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 index.json")
-    store.add_argument("file", metavar="FILE", nargs="?", type=Path, help="default: standard input")
-    _add_eeprom(store, required=True)
+    get = add("get", _get, "From a board, recording or EEPROM to a file.", "/dev/ttyACM0 --finger index index.json")
+    get.add_argument("where", metavar=f"PORT|REC|{IN_EEPROM}", help=which)
+    get.add_argument("file", metavar="FILE", type=Path, help="- is standard output")
+    get.add_argument("--force", action="store_true", help="overwrite FILE")
 
-    load = add("load", _load, "From an EEPROM.", "load --i2c 1:0x50 --chip 24c32 index.json")
-    load.add_argument("file", metavar="FILE", nargs="?", type=Path, help="default: standard output")
-    load.add_argument("--force", action="store_true", help="overwrite FILE")
-    _add_eeprom(load, required=True)
+    put = add("put", _put, "From a file to a board or an EEPROM.", "/dev/ttyACM0 index.json --finger index --save")
+    put.add_argument("where", metavar=f"PORT|{IN_EEPROM}", help=which)
+    put.add_argument("file", metavar="FILE", type=Path, help="- is standard input")
+    put.add_argument("--force", action="store_true", help="accept a sensor other than the file's")
 
-
-def _add_eeprom(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    parser.add_argument("--i2c", metavar="BUS:ADDRESS", required=required, help="where the EEPROM is, such as 1:0x50")
-    parser.add_argument("--chip", choices=KINDS, required=required, metavar="KIND", help=f"{', '.join(KINDS)}")
-
-
-def _store(args: argparse.Namespace) -> None:
-    calibration = file.load(args.file) if args.file else file.loads(sys.stdin.read(), "standard input")
-    with Chip(args.i2c, args.chip) as chip:
-        written = eeprom.store(chip, calibration)
-    more = ", stored" if written else ", which it held already"
-    CALIBRATION.say(args, f"EEPROM {args.i2c}", calibration, more=more)
+    clear = add("clear", _clear, "Back to the board's settings.", "/dev/ttyACM0 --finger index --save")
+    clear.add_argument("where", metavar="PORT")
+    for one in (get, put, clear):
+        values.add_finger(one, required=one is clear, text="name or chip select, of a board")
+    for one in (get, clear):
+        one.add_argument("--kind", choices=KINDS, help="which of the two, for a finger that has both")
+    for one in (put, clear):
+        values.add_save(one)
 
 
-def _load(args: argparse.Namespace) -> None:
-    with Chip(args.i2c, args.chip) as chip:
-        calibration = eeprom.load(chip)
-    source = {"from": f"EEPROM {args.i2c}"}
-    if args.file is None:
-        print(file.dumps(calibration, {"software": f"biotac-gateway {__version__}", **source}), end="")
+def _show(args: argparse.Namespace) -> int:
+    is_file = args.where.endswith(".json") or (Path(args.where).is_file() and _port(args.where) == args.where)
+    if is_file or args.where.startswith(EEPROM):
+        kind, content = _load(Path(args.where)) if is_file else (KINDS["calibration"], _in_eeprom(args.where))
+        lines = [f"{args.where}: {kind.title(content)}", *kind.lines(content)]
+        say(args, kind.file.to_dict(content), "\n".join(lines))
+        return 0
+    facts: dict[int, dict[str, Any]] = {}
+    lines = []
+    with biotac.open(_port(args.where)) as hand:
+        for finger in range(MAX_SENSORS):
+            facts[finger], before = {}, len(lines)
+            for name, kind in KINDS.items():
+                state, content = kind.state(hand.board, finger), kind.read(hand.board, finger)
+                facts[finger][name] = {"state": state.name, **(kind.file.to_dict(content) if content else {})}
+                if content is not None:
+                    in_force = state == biotac.CalibrationState.IN_FORCE
+                    force = "in force" if in_force else "not in force, a different sensor is connected"
+                    lines += [f"finger {finger}: {kind.name} {force}; {kind.title(content)}", *kind.lines(content)]
+            if finger in hand.fingers and len(lines) == before:
+                lines.append(f"finger {finger}: none, the board's settings apply")
+    say(args, facts, "\n".join(lines))
+    return 0
+
+
+def _get(args: argparse.Namespace) -> int:
+    if args.where.startswith(EEPROM):
+        had, board = [(KINDS["calibration"], _in_eeprom(args.where))], {"from": args.where}
     else:
-        CALIBRATION.save(args, calibration, source)
+        _check_named(args)
+        with biotac.open(_port(args.where)) as hand:
+            had = _had(args, hand)
+            board = {"from": args.where, "board_serial": serial_text(hand.info), "finger": args.finger}
+    if not had:
+        missing = KINDS[args.kind].name if args.kind else "calibration and no wrench map"
+        cure = "the recording has none" if _port(args.where).startswith("replay:") else "upload one with `put`"
+        raise InputError(f"finger {args.finger} on {args.where} has no {missing}; {cure}")
+    ((kind, content),) = had
+    text = kind.file.dumps(content, {"software": f"biotac-gateway {__version__}", **board})
+    if str(args.file) == "-":
+        print(text, end="")
+        return 0
+    write_new(args.file, text, overwrite=args.force)
+    say(args, kind.file.to_dict(content), f"{args.file}: {kind.title(content)}")
+    return 0
 
 
-def _show(args: argparse.Namespace) -> None:
-    if (args.where is None) == (args.i2c is None):
-        raise InputError("expected exactly one of PORT, FILE and --i2c; see `biotac calibration show --help`")
-    if args.i2c is not None:
-        if args.chip is None:
-            raise InputError(f"--i2c {args.i2c} needs --chip; expected one of {', '.join(KINDS)}")
-        with Chip(args.i2c, args.chip) as chip:
-            calibration = eeprom.load(chip)
-        CALIBRATION.say(args, f"EEPROM {args.i2c}", calibration, whole=True)
-    elif Path(args.where).is_file() or args.where.endswith(".json"):
-        CALIBRATION.say(args, args.where, file.load(Path(args.where)), whole=True)
-    else:
-        CALIBRATION.show_board(args, args.where)
+def _put(args: argparse.Namespace) -> int:
+    kind, content = _load(args.file)
+    if args.where.startswith(EEPROM):
+        if kind is not KINDS["calibration"]:
+            raise InputError(f"{args.file} is a {kind.name}, which no EEPROM holds; expected a calibration")
+        with Chip(*parse_place(args.where.removeprefix(EEPROM))) as chip:
+            more = "stored" if eeprom.store(chip, content) else "which it held already"
+        say(args, kind.file.to_dict(content), f"{args.where}: {kind.title(content)}, {more}")
+        return 0
+    _check_named(args)
+    with biotac.open(args.where) as hand:
+        kind.write(hand.board, args.finger, content, args.force)
+        content = kind.read(hand.board, args.finger) or content
+        if args.save:
+            hand.board.save_settings()
+    text = f"finger {args.finger}: {kind.name} in force, {values.how_long(args)}; {kind.title(content)}"
+    say(args, kind.file.to_dict(content), text)
+    return 0
+
+
+def _clear(args: argparse.Namespace) -> int:
+    with biotac.open(args.where) as hand:
+        for kind, _ in _had(args, hand):
+            kind.remove(hand.board, args.finger)
+        if args.save:
+            hand.board.save_settings()
+    say(args, {"finger": args.finger}, f"finger {args.finger}: the board's settings apply, {values.how_long(args)}")
+    return 0
+
+
+def _had(args: argparse.Namespace, hand: Hand) -> list[tuple[Kind, Any]]:
+    """What the finger has, at most one thing. Raises InputError if it has both kinds and none is named."""
+    kinds = [KINDS[args.kind]] if args.kind else KINDS.values()
+    had = [(kind, content) for kind in kinds if (content := kind.read(hand.board, args.finger)) is not None]
+    if len(had) > 1:
+        both = " or ".join(KINDS)
+        raise InputError(f"finger {args.finger} has a calibration and a wrench map; name one: --kind {both}")
+    return had
+
+
+def _check_named(args: argparse.Namespace) -> None:
+    if args.finger is None:
+        raise InputError(f"{args.where} has several fingers; name one with --finger")
+
+
+def _in_eeprom(where: str) -> Calibration:
+    with Chip(*parse_place(where.removeprefix(EEPROM))) as chip:
+        return eeprom.load(chip)
+
+
+def _port(where: str) -> str:
+    recording = where.lower().endswith(".mcap") and not where.startswith("replay:")
+    return f"replay:{where}" if recording else where
+
+
+def _load(path: Path) -> tuple[Kind, Any]:
+    """What a file holds, and of which kind it is: its format tells."""
+    piped = str(path) == "-"
+    try:
+        text = sys.stdin.read() if piped else read_text(path, JSON_BYTES)
+        tree = parse_json(text)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
+    except ValueError as error:
+        raise InputError(f"{path} is not usable: {error}; expected JSON of `biotac calibration get`") from error
+    seen = tree.get("format") if isinstance(tree, dict) else None
+    for kind in KINDS.values():
+        if seen == kind.file.FORMAT:
+            return kind, kind.file.loads(text, "standard input" if piped else str(path))
+    formats = " or ".join(f'"{kind.file.FORMAT}"' for kind in KINDS.values())
+    raise InputError(
+        f'{path} is not usable: it has "format": {json.dumps(seen)}, expected {formats}, as `biotac calibration get` '
+        "and `biotac calibrate` write it"
+    )

@@ -22,6 +22,7 @@ from ...sim.sensor_board import SensorBoard
 from ...version import __version__
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
+from ..outputs import say
 
 EXAMPLE = "biotac doctor --fingers 5"
 PLAYED, PLAYED_S = "press.toml", 60.0
@@ -39,11 +40,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", metavar="FILE", help="also write everything to one JSON file, to attach to a bug report"
     )
+    parser.add_argument(
+        "--udev-rule",
+        choices=("install", "print"),
+        help="only install (as root) or print the Linux rule that lets you open boards",
+    )
     parser.add_argument("--fingers", type=int, help="how many sensors to expect (default: those that answer)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Examine the board and print the findings; return 1 if there are any."""
+    if args.udev_rule is not None:
+        return udev_rule(args)
     if args.sensor_port is None:
         facts = examine(args.port, seconds=args.seconds, expected_fingers=args.fingers)
     else:
@@ -52,11 +60,18 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         with whole(Path(args.report), overwrite=True) as place:
             place.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
-    if args.json:
-        print(json.dumps(summary(facts, findings)))
-    else:
-        print_words(facts, findings)
+    say(args, summary(facts, findings), words(facts, findings))
     return 1 if findings else 0
+
+
+def udev_rule(args: argparse.Namespace) -> int:
+    """Install the rule or print it."""
+    installed, text = args.udev_rule == "install", udev.rule().rstrip()
+    if installed:
+        udev.install()
+        text = f"wrote {udev.RULES}; now run sudo udevadm control --reload, and plug the board in again"
+    say(args, {"path": str(udev.RULES), "installed": installed, "rule": udev.rule()}, text)
+    return 0
 
 
 def examine_pair(port: str | None, sensor_port: str, seconds: float) -> Facts:
@@ -122,20 +137,21 @@ def measured(facts: Facts) -> dict[str, Any]:
     return out
 
 
-def print_words(facts: Facts, findings: list[Finding]) -> None:
-    """Print the result for people."""
+def words(facts: Facts, findings: list[Finding]) -> str:
+    """The result for people."""
+    lines = []
     for finding in findings:
-        print(f"{finding.entry.severity.value} {finding.code}: {finding.seen}")
+        lines.append(f"{finding.entry.severity.value} {finding.code}: {finding.seen}")
         for title, text in (("meaning", finding.entry.meaning), ("cure", finding.entry.cure)):
-            print(textwrap.fill(f"{title}: {text}", 100, initial_indent="    ", subsequent_indent="    "))
+            lines.append(textwrap.fill(f"{title}: {text}", 100, initial_indent="    ", subsequent_indent="    "))
         if finding.code == "no_permission":
-            print(textwrap.indent(udev.rule(), "    "), end="")
+            lines.append(textwrap.indent(udev.rule().rstrip(), "    "))
     seen = measured(facts)
     if seen:
         rates = ", ".join(f"finger {f}: {r:.0f} slots per second" for f, r in seen["slots_per_s"].items() if r)
         drift = ""
         if "drift_ppm" in seen:
             drift = f", clock {seen['drift_ppm']:+.0f} ppm, +/- {seen['drift_uncertainty_ppm']:.0f}"
-        print(f"measured: {seen['frames']} frames, {rates or 'no rates'}{drift}")
-    name = facts.port or "no port"
-    print(f"{name}: {len(findings)} finding(s)" if findings else f"{name}: healthy")
+        lines.append(f"measured: {seen['frames']} frames, {rates or 'no rates'}{drift}")
+    verdict = f"{len(findings)} finding(s)" if findings else "healthy"
+    return "\n".join([*lines, f"{facts.port or 'no port'}: {verdict}"])

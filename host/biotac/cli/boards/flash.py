@@ -13,8 +13,9 @@ from ...errors import FlashError, InputError, PortError
 from ...flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
 from ...flash.carried import find_image
 from ...flash.image import note_text
-from ...flash.procedure import Result, flash_every
+from ...flash.procedure import flash_every
 from ...wire.identity import serial_text, version_text
+from .. import outputs, values
 from ..progress import Progress
 
 EXAMPLE = "biotac flash /dev/ttyACM0"
@@ -48,9 +49,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--backup and --no-backup contradict each other; use only one")
     port, path = sort_out(args.port, args.image, alone=args.emulated or args.all)
     if args.all:
-        for flag in ("emulated", "backup", "restore"):
-            if getattr(args, flag):
-                raise InputError(f"--all flashes every board, --{flag} is for one; use only one of them")
+        values.refuse(args, ("emulated", "backup", "restore"), "is for one board; use only one, it or --all")
     image = read_image(path or find_image())
     kept = None if args.restore is None else read_backup(args.restore)
     say(f"{image.path}: {note_text(image.note)}")
@@ -58,19 +57,19 @@ def run(args: argparse.Namespace) -> int:
         return run_all(image, args)
     target, loaders = find_board(EMULATED if args.emulated else port)
     with closing(target), Progress() as progress:
-        outcome = flash(
-            image,
-            target,
-            loaders,
-            backup_path=args.backup,
-            keep=not args.no_backup,
-            restore_from=kept,
-            downgrade=args.downgrade,
-            say=say,
-            show=lambda done, of: progress.show(f"{done} of {of} blocks"),
-        )
-    print(json.dumps(facts(image, outcome)) if args.json else summary(outcome))
+        given = how(args, progress)
+        outcome = flash(image, target, loaders, backup_path=args.backup, restore_from=kept, **given)
+    outputs.say(args, facts(image, outcome), summary(outcome))
     return 0
+
+
+def how(args: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    """What one board and every board are flashed with."""
+
+    def show(done: int, of: int) -> None:
+        progress.show(f"{done} of {of} blocks")
+
+    return {"keep": not args.no_backup, "downgrade": args.downgrade, "say": say, "show": show}
 
 
 def say(text: str) -> None:
@@ -87,15 +86,7 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
         raise PortError("no board is plugged in; `biotac list` shows what is there")
     progress = Progress()
     results = []
-    for result in flash_every(
-        image,
-        targets,
-        usb_loaders(),
-        keep=not args.no_backup,
-        downgrade=args.downgrade,
-        say=say,
-        show=lambda done, of: progress.show(f"{done} of {of} blocks"),
-    ):
+    for result in flash_every(image, targets, usb_loaders(), **how(args, progress)):
         progress.done()
         results.append(result)
         if result.error is not None:
@@ -103,17 +94,13 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
         elif not args.json:
             print(summary(result.outcome) if result.outcome else f"{result.port} already runs this image")
     if args.json:
-        print(json.dumps([its_facts(image, result) for result in results]))
+        ends = [(result, facts(image, result.outcome) if result.outcome else {}) for result in results]
+        told = [{"port": end.port, "error": end.error and str(end.error), **outcome} for end, outcome in ends]
+        print(json.dumps(told))
     failed = [result.port for result in results if result.error is not None]
     if failed:
         raise FlashError(f"{len(failed)} of {len(results)} boards were not flashed: {', '.join(failed)}; see above")
     return 0
-
-
-def its_facts(image: Image, result: Result) -> dict[str, Any]:
-    """The result of one of several boards, as JSON types."""
-    error = None if result.error is None else str(result.error)
-    return {"port": result.port, "error": error} | (facts(image, result.outcome) if result.outcome else {})
 
 
 def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str | None, Path | None]:
@@ -173,7 +160,7 @@ def known(backup: Backup, settings: Restored) -> str:
     """How many of a backup's settings, calibrations and maps the firmware knows."""
     more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
     count = len(backup.values) + sum(more.values()) - len(settings.unknown)
-    return f"{count} {', '.join(['settings', *(name for name, its in more.items() if its)])}"
+    return f"{count} {', '.join(['settings', *(name for name, held in more.items() if held)])}"
 
 
 def summary(outcome: Outcome) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 from typing import Any
 
 import biotac
@@ -16,6 +15,7 @@ from ...map.board_map import made_s_of
 from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_text, serial_text, setting_text, version_text
 from .. import values
+from ..outputs import say
 
 EXAMPLE = "biotac info /dev/ttyACM0"
 
@@ -30,40 +30,38 @@ def run(args: argparse.Namespace) -> int:
     with biotac.open(args.port) as hand:
         hello = hand.info
         sensors = [hand.sensor_info(f) for f in hand.fingers]
-        settings = hand.settings()
-        calibrations = hand.calibrations()
-        maps = hand.maps()
+        settings = hand.board.settings()
+        calibrations = hand.board.calibrations()
+        maps = hand.board.maps()
         status = hand.status()
         warnings = hand.warnings
-    if args.json:
-        facts: dict[str, Any] = {
-            "port": hand.port,
-            "board": board_text(hello.board),
-            "firmware": version_text(hello),
-            "wire": f"{hello.wire_major}.{hello.wire_minor}",
-            "schema_hash": f"{hello.schema_hash:08x}",
-            "schema_matches": hello.schema_hash == wire.SCHEMA_HASH,
-            "serial_number": serial_text(hello),
-            "boot_id": hello.boot_id,
-            "sensors": [
-                {"finger": s.finger, "serial": ascii_text(s.serial), "software": ascii_text(s.software_version)}
-                for s in sensors
-            ],
-            "calibrations": {finger: to_dict(calibration) for finger, calibration in calibrations.items()},
-            "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
-            "settings": {s.name.lower(): value for s, value in settings.items()},
-            "status": dataclasses.asdict(status),
-        }
-        print(json.dumps(facts))
-        return 0
-    print(f"{board_text(hello.board)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
-    print(f"serial {serial_text(hello)}, boot {hello.boot_id:08x}, up {status.uptime_s} s")
-    for warning in warnings:
-        print(f"warning: {warning.text}")
-    for s in sensors:
-        own = f", calibration {made_text(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
-        own += f", wrench map {made_text(made_s_of(maps[s.finger]))}" if s.finger in maps else ""
-        print(f"finger {s.finger}: BioTac {ascii_text(s.serial)}, software {ascii_text(s.software_version)}{own}")
-    for setting, value in settings.items():
-        print(setting_text(setting, value))
+    facts: dict[str, Any] = {
+        "port": hand.port,
+        "board": board_text(hello.board),
+        "firmware": version_text(hello),
+        "wire": f"{hello.wire_major}.{hello.wire_minor}",
+        "schema_hash": f"{hello.schema_hash:08x}",
+        "schema_matches": hello.schema_hash == wire.SCHEMA_HASH,
+        "serial_number": serial_text(hello),
+        "boot_id": hello.boot_id,
+        "sensors": [
+            {"finger": s.finger, "serial": ascii_text(s.serial), "software": ascii_text(s.software_version)}
+            for s in sensors
+        ],
+        "calibrations": {finger: to_dict(calibration) for finger, calibration in calibrations.items()},
+        "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
+        "settings": {s.name.lower(): value for s, value in settings.items()},
+        "status": dataclasses.asdict(status),
+    }
+    lines = [
+        f"{facts['board']}, firmware {facts['firmware']}, wire {facts['wire']}",
+        f"serial {facts['serial_number']}, boot {hello.boot_id:08x}, up {status.uptime_s} s",
+        *(f"warning: {warning.text}" for warning in warnings),
+    ]
+    for s in facts["sensors"]:
+        finger = s["finger"]
+        own = f", calibration {made_text(calibrations[finger].made_s)}" if finger in calibrations else ""
+        own += f", wrench map {made_text(made_s_of(maps[finger]))}" if finger in maps else ""
+        lines.append(f"finger {finger}: BioTac {s['serial']}, software {s['software']}{own}")
+    say(args, facts, "\n".join([*lines, *(setting_text(setting, value) for setting, value in settings.items())]))
     return 0

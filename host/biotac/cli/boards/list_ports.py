@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from contextlib import closing
 from typing import Any
 
@@ -14,6 +13,7 @@ from ...link.discovery import SerialPort, serial_ports
 from ...sim.loading import bundled_scenarios
 from ...wire import messages_gen as wire
 from ...wire.identity import board_text, serial_text, version_text
+from ..outputs import say
 
 EXAMPLE = "biotac list"
 NO_DESCRIPTION = "n/a"  # of pyserial
@@ -36,20 +36,15 @@ def run(args: argparse.Namespace) -> int:
     ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []
-    if args.json:
-        print(json.dumps({"ports": ports, "scenarios": scenarios, "zenoh": remote}))
-        return 0
-    for port in ports:
-        print(as_line(port))
+    lines = [as_line(port) for port in ports]
     for facts in remote:
         commander = f"commanded by {facts['writer']}" if facts.get("writer") else "not commanded by anyone"
-        print(f"{as_line(facts)}  {commander}")
+        lines.append(f"{as_line(facts)}  {commander}")
     if args.zenoh is not None and not remote:
-        print("no board is shared on the network; `biotac serve PORT --name NAME` shares one")
+        lines.append("no board is shared on the network; `biotac share PORT --zenoh NAME` shares one")
     if not any(port["is_board"] for port in ports):
-        print("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
-    for name in scenarios:
-        print(name)
+        lines.append("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
+    say(args, {"ports": ports, "scenarios": scenarios, "zenoh": remote}, "\n".join([*lines, *scenarios]))
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 from collections.abc import Iterator
 
 import biotac
@@ -34,11 +33,12 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Fi
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
     name = serial or f"finger{finger}"
     files = Files(args.out / f"{name}.mcap", args.out / f"{name}.csv")
+    recorded = f"the recorded data is in {files.recording} and {files.reference}"
     progress = Progress()
 
     def show(event: str) -> None:
         progress.done()
-        print(f"biotac: {event}", file=sys.stderr)
+        outputs.note(event)
 
     with _reader(args, hand, finger) as (reader, mounting):
         outputs.make_folder(args.out)
@@ -47,18 +47,15 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Fi
             walk(hand, reader, procedure, files, overwrite=args.force, show=show, progress=progress.show)
         except BiotacError:
             if files.recording.exists():
-                print(f"biotac: the recorded data is in {files.recording} and {files.reference}", file=sys.stderr)
+                outputs.note(recorded)
             raise
         finally:
             progress.done()
         lost = reader.stats
     if lost.lost or lost.late or lost.bad:
-        print(f"biotac: reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad", file=sys.stderr)
+        outputs.note(f"reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad")
     if procedure.zero is None:
-        raise KeyboardInterrupt(
-            f"ended while {procedure.last_step.value.partition(':')[0]}; the recorded data is in {files.recording} "
-            f"and {files.reference}"
-        )
+        raise KeyboardInterrupt(f"ended while {procedure.last_step.value.partition(':')[0]}; {recorded}")
     return files, procedure.coverage.missing()
 
 

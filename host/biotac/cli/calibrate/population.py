@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from ...map.columns import ELECTRODES
 from ...map.population import in_force
 from ...wire import messages_gen as wire
 from .. import values
+from ..outputs import say
 
 NAME = "population"
 HELP = "Force of an uncalibrated finger from a map of other fingers: the firmware's, or one made by biotac-lab."
@@ -26,40 +26,38 @@ EXAMPLE = "biotac calibrate population /dev/ttyACM0 --finger index --population 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the board, the finger and the map."""
     parser.add_argument("port", metavar="PORT", help="a board")
-    parser.add_argument("--finger", metavar="NAME", type=values.finger, required=True, help="name or chip select")
+    values.add_finger(parser)
     parser.add_argument(
         "--population", metavar="FILE", type=Path, help="a map of other fingers (default: the firmware's own)"
     )
-    parser.add_argument("--save", action="store_true", help="save it on the board, so that it survives a restart")
+    values.add_save(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Put the map into force, and print which fingers it is from and how far off it may be."""
     trained = population_map.load(args.population)
     with biotac.open(args.port) as hand:
-        if args.finger not in hand.fingers:
-            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; check its cable")
+        values.check_answers(hand, args.finger)
         if args.population is None:
             _use_firmwares(hand, args.finger)
         else:
             # the board takes counts above its own tare: any will do here
             fitted = trained.population.wrench_map(np.zeros(ELECTRODES))
-            hand.set_map(args.finger, fitted.on_board(made_s=int(time.time())))
+            hand.board.set_map(args.finger, fitted.on_board(made_s=int(time.time())))
         if args.save:
-            hand.save_settings()
+            hand.board.save_settings()
     facts = {"finger": args.finger, "made_of": trained.fingers, "sigma_n": trained.sigma_n.tolist(), "saved": args.save}
     sigma = "  ".join(f"{value:.2f}" for value in trained.sigma_n)
-    kept = "saved" if args.save else "until the next reboot (--save keeps it)"
-    text = f"finger {args.finger}: map of {trained.fingers}, in force, {kept}\n  one sigma along x, y, z: {sigma} N"
-    print(json.dumps(facts) if args.json else text)
+    text = f"finger {args.finger}: map of {trained.fingers}, in force, {values.how_long(args)}"
+    say(args, facts, f"{text}\n  one sigma along x, y, z: {sigma} N")
     return 0
 
 
 def _use_firmwares(hand: biotac.Hand, finger: int) -> None:
-    if hand.get_map(finger) is not None:
-        hand.clear_map(finger)
-    hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
-    if not in_force(hand.finger_settings().get(finger, hand.settings())):
+    if hand.board.get_map(finger) is not None:
+        hand.board.clear_map(finger)
+    hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
+    if not in_force(hand.board.finger_settings().get(finger, hand.board.settings())):
         raise InputError(
             f"finger {finger} has force gains of its own, which go before the map: expected the default ones; "
             "`biotac calibration clear` removes a finger's, and the board's are the settings force_gain_x_nn to _z_nn"

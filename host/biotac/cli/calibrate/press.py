@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -26,7 +25,7 @@ from ...keep import calibration_file
 from ...map import file as map_file
 from ...map.bound import summary
 from ...partial_file import whole
-from ...recording import Recording
+from ...recording.reader import Recording
 from ...wire.identity import ascii_text
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import outputs, values
@@ -94,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the finger's map goes here (.wrench.json); with --pressure a folder, for a calibration of each finger",
     )  # fmt: skip
     parser.add_argument("--no-upload", action="store_true", help="leave the board as it is; not with --pressure")
-    parser.add_argument("--save", action="store_true", help="save it on the board, so that it survives a restart")
+    values.add_save(parser)
     parser.add_argument("--force", action="store_true", help="overwrite files; upload a map even if it does not help")
 
 
@@ -115,8 +114,7 @@ def run(args: argparse.Namespace) -> int:
         serial = next((ascii_text(s.serial) for s in recording.sensors if s.finger == finger), "")
         return _fit_map(args, loads, loads.recorded(recording), serial, None)
     with biotac.open(args.where) as hand:
-        if finger not in hand.fingers:
-            raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; check its cable")
+        values.check_answers(hand, finger)
         held = loads.guided(hand)
         return _fit_map(args, loads, held, ascii_text(hand.sensor_info(finger).serial), hand)
 
@@ -258,8 +256,8 @@ def _fit_map(args: argparse.Namespace, loads: _Loads, held: known_force.Held, se
     if hand is not None and wanted and not facts["refused"]:
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
         if args.save:
-            hand.save_settings()
-    print(json.dumps(facts) if args.json else "\n".join(_map_lines(facts, loads.how)))
+            hand.board.save_settings()
+    outputs.say(args, facts, "\n".join(_map_lines(facts, loads.how)))
     return int(facts["refused"])
 
 
@@ -302,12 +300,10 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
         path = args.out / f"{stem}finger{finger}.json"
         calibration_file.save(path, calibration, outcome.provenance[finger], overwrite=args.force)
         written.append(str(path))
-    if args.json:
-        print(json.dumps({"fingers": pressure.facts(outcome), "written": written}))
-    else:
-        print("\n".join([*pressure.lines(outcome), *(f"  written: {path}" for path in written)]))
-        if not recorded and (not args.save or outcome.not_saved is not None):
-            print("in force until the next reboot (--save keeps it)")
+    lines = [*pressure.lines(outcome), *(f"  written: {path}" for path in written)]
+    if not recorded and (not args.save or outcome.not_saved is not None):
+        lines.append("in force until the next reboot (--save keeps it)")
+    outputs.say(args, {"fingers": pressure.facts(outcome), "written": written}, "\n".join(lines))
     if outcome.not_saved is not None:
         raise outcome.not_saved
     return 0
@@ -322,22 +318,15 @@ def _from_recording(args: argparse.Namespace) -> pressure.Outcome:
 
 
 def _on_board(args: argparse.Namespace) -> pressure.Outcome:
-    def opened() -> Hand:
-        hand = biotac.open(args.where)
-        try:
-            _check_terminal(hand, args.where)
-        except InputError:
-            hand.close()
-            raise
-        return hand
-
     def press(step: Step) -> str:
         return f"press finger {step.finger} with about {step.force_n:g} N, and hold still"
 
     face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go of finger {finger}")
     forces_n = args.forces or pressure.CALIBRATION_FORCES_N
     plan = pressure_procedure.Plan(args.finger, forces_n, (args.verify,))
-    return pressure_procedure.calibrate(opened, plan, face, made_s=int(time.time()), save=args.save)
+    with biotac.open(args.where) as hand:
+        _check_terminal(hand, args.where)
+        return pressure_procedure.calibrate(hand, plan, face, made_s=int(time.time()), save=args.save)
 
 
 def _force(text: str) -> float:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -51,9 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "netft:HOST (ATI Net F/T), or nano17 (emulated, beside sim:)",
     )  # fmt: skip
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
-    parser.add_argument(
-        "--finger", metavar="NAME", type=values.finger, help="of a recording with several: name or chip select"
-    )
+    values.add_finger(parser, required=False, text="of a recording with several: name or chip select")
     parser.add_argument(
         "--population",
         metavar="FILE",
@@ -68,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     guided.add_argument("--upload", metavar="PORT", help="upload the map fitted from FILE to this board's finger")
     guided.add_argument("--no-upload", action="store_true", help="with --live: leave the board as it is")
-    guided.add_argument("--save", action="store_true", help="save the map on the board, so that it survives a restart")
+    values.add_save(guided)
     parser.add_argument(
         "--as-recorded", action="store_true", help="do not correct the lag of counts after force, do not smooth counts"
     )
@@ -92,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         calibrated = _fit(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
         if args.upload is not None:
             _upload_to_port(args, calibrated)
-        _print(args, calibrated.facts)
+        outputs.say(args, calibrated.facts, _text(calibrated.facts))
     return 0
 
 
@@ -102,18 +98,17 @@ def _live(args: argparse.Namespace) -> int:
     if args.out is None:
         raise InputError("--live saves its recording: expected --out FOLDER")
     with live.open_board(args) as hand:
-        if args.finger not in hand.fingers:
-            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; check its cable")
+        values.check_answers(hand, args.finger)
         files, missing = live.record(args, hand, args.finger)
         for line in missing:
-            print(f"biotac: not covered: {line}", file=sys.stderr)
+            outputs.note(f"not covered: {line}")
         if not args.force:
             _check_out(args.out, [files.recording], overwrite=False)
         reference = files.reference, read_reference(str(files.reference))
         calibrated = _fit(args, load(files.recording, reference, finger=args.finger))
         if not args.no_upload:
             _upload(args, hand, args.finger, calibrated)
-        _print(args, calibrated.facts | {"not_covered": missing})
+        outputs.say(args, calibrated.facts | {"not_covered": missing}, _text(calibrated.facts))
     return 0
 
 
@@ -168,7 +163,7 @@ def _upload(args: argparse.Namespace, hand: biotac.Hand, finger: int, calibrated
         hand, finger, fitted, run.counts, run.pdc, serial=origin["serial"], made_s=origin["made_s"], force=args.force
     )
     if args.save:
-        hand.save_settings()
+        hand.board.save_settings()
     calibrated.facts["board"] = found | {"saved": args.save}
 
 
@@ -218,27 +213,20 @@ def _origin(origin: Provenance) -> str:
     return "\n".join(["", "## Provenance", "", *[f"* {name}: {what}" for name, what in rows], ""])
 
 
-def _print(args: argparse.Namespace, facts: dict[str, Any]) -> None:
-    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
-
-
-def _lines(facts: dict[str, Any]) -> list[str]:
+def _text(facts: dict[str, Any]) -> str:
     def numbers(values: list[float | None]) -> str:
         return "  ".join("    -" if value is None else f"{value:5.3f}" for value in values)
 
     up, down = (f"{counts:+.0f}" for counts in facts["drift_counts"])
-    return [
+    torsion = f"  torsion:                RMSE {facts.get('torsion_rmse_nmm', 0):5.3f} N mm"
+    lines = [
         f"{facts['file']}: {facts['rows']} rows, {facts['model']}",
         f"  held out, x y z:        RMSE {numbers(facts['rmse_n'])} N   R2 {numbers(facts['r2'][:3])}   "
         f"median angle {facts['median_angle_deg']:.2f} deg",
         f"  drifted {up} counts:    RMSE {numbers(facts['drift_rmse_n'][0])} N",
         f"  drifted {down} counts:    RMSE {numbers(facts['drift_rmse_n'][1])} N",
         *([f"  torque, x y z:          RMSE {numbers(facts['rmse_nmm'])} N mm"] if "rmse_nmm" in facts else []),
-        *(
-            [f"  torsion:                RMSE {facts['torsion_rmse_nmm']:5.3f} N mm"]
-            if "torsion_rmse_nmm" in facts
-            else []
-        ),
+        *([torsion] if "torsion_rmse_nmm" in facts else []),
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
         f"  counts lag the force by {facts['lag_rows']} rows, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
@@ -248,6 +236,7 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         *[f"  written: {path}" for path in facts.get("written", [])],
         *(_board_lines(facts["board"]) if "board" in facts else []),
     ]
+    return "\n".join(lines)
 
 
 def _board_lines(found: dict[str, Any]) -> list[str]:

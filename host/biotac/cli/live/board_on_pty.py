@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import argparse
 import os
 import sys
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ...errors import PortError
+from ..outputs import say
 
 
 class Board(Protocol):
@@ -30,17 +31,16 @@ def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
     except KeyboardInterrupt:
         pass
     finally:
-        if link is not None and link.is_symlink():
-            link.unlink()
+        if link is not None and link.is_symlink() and os.readlink(link) == board.path:
+            link.unlink()  # not one that another board has taken since
         board.close()
 
 
-def tell(board: Board, link: Path | None, plays: str, facts: dict[str, Any], *, as_json: bool) -> None:
+def tell(board: Board, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
     """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port."""
-    if link is not None:
-        make_link(link, board.path)
-    print(json.dumps({"port": board.path, **facts}) if as_json else f"{board.path} plays {plays}; Ctrl-C stops")
-    sys.stdout.flush()
+    if args.link is not None:
+        make_link(args.link, board.path)
+    say(args, {"port": board.path, **facts}, f"{board.path} plays {plays}; Ctrl-C stops")
 
 
 def tell_over(plays: str) -> None:
@@ -49,8 +49,13 @@ def tell_over(plays: str) -> None:
 
 
 def make_link(link: Path, target: str) -> None:
-    """Make the link; replaces a link left over from before, never anything else."""
+    """Make the link; replaces a link left over from before, never anything else.
+
+    Raises PortError when it leads to a port that is there: that of another simulator.
+    """
     if link.is_symlink():
+        if link.exists():
+            raise PortError(f"{link} leads to {os.readlink(link)}, which another program has; choose another --link")
         link.unlink()
     try:
         os.symlink(target, link)

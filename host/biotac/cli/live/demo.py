@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 from ...demo.run import run_demo
 from .. import values
+from ..outputs import say
 from ..progress import Progress
 
 EXAMPLE = "biotac demo press.toml --out my-demo"
@@ -31,19 +31,15 @@ def run(args: argparse.Namespace) -> int:
     )
     progress.done()
     facts, check = demo.facts, demo.facts["crosscheck"]
-    if args.json:
-        print(json.dumps(facts))
-        return 0 if demo.good else 1
-    print(
+    skipped = f"{facts['rows_skipped']} incomplete row(s) of the recording skipped"
+    lines = [
         f"{facts['source']}: {facts['frames']} frames from {facts['fingers']} finger(s), {facts['frames_lost']} lost, "
-        f"{facts['crc_errors']} CRC errors; host CPU {facts['host_cpu_percent']} % of one core"
-    )
-    print(
+        f"{facts['crc_errors']} CRC errors; host CPU {facts['host_cpu_percent']} % of one core",
         f"on-board against float64: PoC {check['poc_um_max']:.3f} um, force {check['force_mn_max']:.4f} mN, "
-        f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)"
-    )
-    print(f"recording {facts['recording']}, report {facts['report']}")
-    if facts["rows_skipped"]:
-        print(f"{facts['rows_skipped']} incomplete row(s) of the recording skipped")
-    print(f"picture {facts['picture']}")
+        f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)",
+        f"recording {facts['recording']}, report {facts['report']}",
+        *([skipped] if facts["rows_skipped"] else []),
+        f"picture {facts['picture']}",
+    ]
+    say(args, facts, "\n".join(lines))
     return 0 if demo.good else 1

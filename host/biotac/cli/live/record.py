@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Any
 
 import biotac
 
 from .. import values
+from ..outputs import note, say
 from ..progress import Progress
+from .reading import batches
 from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
@@ -29,8 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the source ends or Ctrl-C, and keep what has arrived."""
     progress = Progress(enabled=not is_possible())
-    first_us: int | None = None
-    last_us = 0
+    recorded_s = 0.0
     with biotac.open(args.port) as hand:
         earlier = faults_told(hand)
         recorder = hand.record(args.out, overwrite=args.force)
@@ -38,39 +39,33 @@ def run(args: argparse.Namespace) -> int:
         with ExitStack() as shown, suppress(KeyboardInterrupt):  # the usual way to stop a recording
             if not args.json and is_possible():
                 table = shown.enter_context(LiveTable(hand, f"{hand.port} to {args.out}"))
-            for batch in hand.batches():
-                if not len(batch.frames):
-                    continue
-                last_us = int(batch.frames["t_us"][-1])
-                first_us = int(batch.frames["t_us"][0]) if first_us is None else first_us
-                words = f"{(last_us - first_us) / 1e6:.1f} s, {hand.stats.frames} frames"
+            for _, recorded_s in batches(hand, args.seconds):
+                words = f"{recorded_s:.1f} s, {hand.stats.frames} frames"
                 progress.show(f"{words}, Ctrl-C stops")
                 if table is not None:
                     table.show(f"{words}, {recorder.path.stat().st_size / 1e6:.1f} MB, Ctrl-C stops")
-                if args.seconds is not None and last_us - first_us >= args.seconds * 1e6:
-                    break
         progress.done()
+        recorder.close()
         stats = hand.stats
         faults = [line for line in faults_told(hand) if line not in earlier]
-    facts = {
+    facts: dict[str, Any] = {
         "recording": str(args.out),
-        "frames": stats.frames,
-        "frames_lost": stats.frames_lost,
+        "frames": recorder.frames,
+        "frames_lost": recorder.frames_lost,
+        "gaps": stats.gaps,
         "crc_errors": stats.crc_errors,
         "faults": faults,
-        "device_seconds": (last_us - (first_us or 0)) / 1e6,
+        "device_seconds": recorded_s,
     }
-    if args.json:
-        print(json.dumps(facts))
-    else:
-        print(f"{args.out}: {stats.frames} frames, {stats.frames_lost} lost; `biotac check {args.out}` verifies them")
-        for fault in faults:
-            print(f"fault during the recording: {fault}")
+    held = f"{args.out}: {recorder.frames} frames, {recorder.frames_lost} lost, {stats.gaps} gap(s)"
+    lines = [f"{held}; `biotac check {args.out}` verifies them", *(f"fault during the recording: {f}" for f in faults)]
+    say(args, facts, "\n".join(lines))
+    if args.seconds is not None and recorded_s < args.seconds:
+        note(f"{recorded_s:.1f} s were recorded, {args.seconds:g} s asked for: it ended before")
+        return 1
     return 0
 
 
 def faults_told(hand: biotac.Hand) -> list[str]:
-    """The board's latched faults, a line each; none for firmware that latches none."""
-    with suppress(biotac.WireVersionError):
-        return str(hand.faults()).splitlines()
-    return []
+    """The board's latched faults, a line each."""
+    return str(hand.board.faults()).splitlines()

@@ -13,6 +13,7 @@ from ...sim.loading import load_source
 from ...sim.ports import start_board
 from ...sim.process import SimBoard
 from .. import values
+from . import sensor_board
 from .board_on_pty import tell, tell_over, until_ctrl_c
 
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
@@ -21,7 +22,7 @@ SCENARIO_S = 600.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add source and pace."""
-    parser.add_argument("source", metavar="SOURCE", help="scenario (.toml) or recorded counts (.npz, .btd)")
+    parser.add_argument("source", metavar="SOURCE", nargs="?", help="scenario (.toml) or recorded counts (.npz, .btd)")
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
     parser.add_argument(
         "--seconds",
@@ -31,30 +32,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--board",
         choices=("posix", "pico"),
-        default="posix",
         help="posix (default): the firmware as a process; pico: the Pico's flash image in an emulator",
     )
     parser.add_argument("--image", help="flash image for --board pico (default: build/pico/biotac-pico.bin)")
-    parser.add_argument("--pace", type=values.pace, default=1.0, help="real (default) or device seconds per second")
+    parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
+    sensor_board.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the pty's path, then run until Ctrl-C."""
+    """Print the pty's path, then run until Ctrl-C; or play on a sensor board."""
+    seconds = args.seconds or (SCENARIO_S if (args.source or "").endswith(".toml") else None)
+    if args.sensor_port is not None:
+        values.refuse(args, ("board", "image", "pace", "link"), "is for a board on a pty; drop it, or --sensor-port")
+        return sensor_board.run(args, seconds)
+    values.refuse(args, ("by_time", "keep", "forget", "fault"), "is for a sensor board; add --sensor-port PORT")
+    if args.source is None:
+        raise InputError("no SOURCE is given, expected a scenario such as press.toml, or recorded counts")
     if args.pace == 0:
         raise InputError(
             "--pace is 0, expected above 0 for a board on a pty; only biotac.open and biotac demo run unpaced"
         )
-    if args.image is not None and args.board == "posix":
+    if args.image is not None and args.board != "pico":
         raise InputError("--image needs a board that has a flash image; add --board pico")
     name = args.source.removeprefix("sim:")
-    seconds = args.seconds or (SCENARIO_S if name.endswith(".toml") else None)
     source = load_source(name, fingers=args.fingers, seconds=seconds)
-    board = start_board(args.board, source, pace=args.pace, image=args.image)
+    board = start_board(args.board or "posix", source, pace=args.pace or 1.0, image=args.image)
     with until_ctrl_c(board, args.link):
         prepare(board)
         facts = {"source": source.name, "fingers": source.samples.shape[1]}
-        tell(board, args.link, source.name, facts, as_json=args.json)
+        tell(board, args, source.name, facts)
         while not board.wait():
             pass
         tell_over(source.name)

@@ -8,13 +8,14 @@ import sys
 
 import biotac
 
-from ...hand.subscription import AT_FIRST, RESULTS
 from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
-from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags, QuantityFlags
+from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
 from .. import values
+from ..outputs import note
+from .reading import batches, tell_lost
 from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
@@ -38,35 +39,23 @@ def run(args: argparse.Namespace) -> int:
     # For people watching, simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
         for warning in hand.warnings:
-            print(f"biotac: {warning.text}", file=sys.stderr)
-        wanted = RESULTS if args.touched else AT_FIRST
-        if args.touched or args.events:
-            hand.subscribe(wanted | QuantityFlags.EVENTS if args.events else wanted)
+            note(warning.text)
+        hand.stream("results", *(["events"] if args.events else []), rest=not args.touched)
         if not args.json and not args.events and is_possible():
             watch(hand, seconds=args.seconds)
         else:
             show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
-        lost = hand.stats.frames_lost
-        if lost:
-            print(f"biotac: {lost} frame(s) lost; close other programs, or use a faster computer", file=sys.stderr)
+        tell_lost(hand)
     return 0
 
 
 def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
     """Show a table, updated in place."""
-    first_us: int | None = None
-    words = ""
+    words = "nothing yet"
     with LiveTable(hand, hand.port) as table:
-        for batch in hand.batches():
-            last_us = batch.last_t_us()
-            if last_us is None:
-                continue
-            first_us = batch.first_t_us() if first_us is None else first_us
-            passed_s = (last_us - (first_us or 0)) / 1e6
+        for _, passed_s in batches(hand, seconds):
             words = f"{passed_s:.1f} s, {hand.stats.frames} frames, Ctrl-C stops"
             table.show(words)
-            if seconds is not None and passed_s >= seconds:
-                break
         table.show(words, now=True)
 
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
-import sys
 import webbrowser
-from dataclasses import asdict
 from pathlib import Path
 
 from ...errors import InputError
 from ...link.discovery import choose
 from ...view import DEFAULT_PORT
+from ..outputs import say
 
 EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
@@ -31,42 +29,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--once", action="store_true", help="play once instead of again and again; the page stays until Ctrl-C"
     )
-    parser.add_argument("--check", action="store_true", help="test the page with a simulated hand, and exit")
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    if args.check:
-        if args.source:
-            raise InputError(f"--check uses a simulated hand of its own, but {args.source} is given; drop one of them")
-        return _check(as_json=args.json)
     if args.port is not None and not 0 <= args.port <= 65535:
         raise InputError(f"--port is {args.port}, expected 0 to 65535")
     source = args.source or choose()
     from ...view.serving import Viewing  # here, because other verbs need no HTTP server
 
     with Viewing(source, port=args.port, folder=args.folder, again=not args.once) as viewing:
-        print(json.dumps({"url": viewing.url, "source": source}) if args.json else f"{viewing.url} shows {source}")
-        if not args.json:
-            print("Ctrl-C stops", file=sys.stderr)
-        sys.stdout.flush()
+        say(args, {"url": viewing.url, "source": source}, f"{viewing.url} shows {source}; Ctrl-C stops")
         if not args.no_browser:
             webbrowser.open(viewing.url)
         with contextlib.suppress(KeyboardInterrupt):  # the usual way to stop it
             viewing.wait()
     return 0
-
-
-def _check(*, as_json: bool) -> int:
-    from ...view.check import check
-
-    checked = check()
-    if as_json:
-        print(json.dumps(asdict(checked)))
-    else:
-        verdict = "; ".join(checked.problems) or "good"
-        print(
-            f"page of {checked.files} files, {checked.bytes} bytes; {checked.fingers} fingers, "
-            f"{checked.frames} frames; checks: {verdict}"
-        )
-    return 1 if checked.problems else 0

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,11 +14,12 @@ from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
 from ...partial_file import whole
-from ...recording import Recording
 from ...recording.btd_import import import_btd
+from ...recording.reader import Recording
 from ...recording.recompute import recompute
 from ...wire import messages_gen as wire
 from ...wire.identity import setting_text
+from .. import outputs
 from ..progress import Progress
 from . import lake
 from .loading import load
@@ -86,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
             with _recording_at(out, args.force, written) as place:
                 notes = recompute(recording, place, changes, keep_tare=args.keep_tare, show=show)
             for note in notes:
-                print(f"biotac: {printable(note)}", file=sys.stderr)
+                outputs.note(printable(note))
             made = {"frames": len(recording.frames), "pac": len(recording.pac), "notes": notes}
             changed = ", ".join(setting_text(s, value) for s, value in changes.items()) or "no setting changed"
             text = f"{made['frames']} frames, {changed},"
@@ -96,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
     names = [str(path) for path in written]
-    print(json.dumps({"written": names} | made) if args.json else printable(f"{text} to {', '.join(names)}"))
+    outputs.say(args, {"written": names} | made, printable(f"{text} to {', '.join(names)}"))
     return 0
 
 

@@ -11,12 +11,14 @@ from collections.abc import Callable, Iterator
 from datetime import datetime, timezone
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from ...errors import BiotacError, InputError, printable
 from .. import values
+from ..outputs import note, say
 from ..progress import Progress
+from .check import largest_text
 
 EXAMPLE = 'biotac lake sql "SELECT board, count(*) FROM frames GROUP BY board" trials.lake'
 
@@ -35,31 +37,29 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the subverbs of a lake."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    subverbs = {
-        "check": (
-            run_check,
-            "Check all files against their checksums, and every on-board result against the float64 reference.",
-        ),
-        "sql": (run_sql, "Query with DuckDB; each topic is a table. Prints CSV, or with --json one object per line."),
-        "inventory": (
-            run_inventory,
-            "List boards and sensors, their ages, and their health against their own history.",
-        ),
-    }
-    for name, (action, text) in subverbs.items():
-        one = what.add_parser(name, help=text, description=text)
-        one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
-        if name == "sql":
-            one.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
-        one.add_argument("folder", metavar="DIR", nargs="?" if name == "sql" else None, type=Path, help="the lake")
-        if name == "check":
-            _add_workers(one)
-        one.set_defaults(action=action)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the subverb."""
-    return int(args.action(args))
+    check = values.add_subverb(
+        what,
+        "check",
+        run_check,
+        "Check all files against their checksums, and every on-board result against the float64 reference.",
+    )
+    check.add_argument("folder", metavar="DIR", type=Path, help="the lake")
+    _add_workers(check)
+    sql = values.add_subverb(
+        what,
+        "sql",
+        run_sql,
+        "Query with DuckDB; each topic is a table. Prints CSV, with --json one object per line.",
+    )
+    sql.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
+    sql.add_argument("folder", metavar="DIR", nargs="?", type=Path, help="the lake")
+    inventory = values.add_subverb(
+        what,
+        "inventory",
+        run_inventory,
+        "List boards and sensors, their ages, and their health against their own history.",
+    )
+    inventory.add_argument("folder", metavar="DIR", type=Path, help="the lake")
 
 
 def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
@@ -88,13 +88,8 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
         "failed": failed,
         "rows": sum(new.values()),
     }
-    folder = printable(str(args.lake))
-    print(
-        json.dumps(facts)
-        if args.json
-        else f"{folder}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already "
-        f"there, {len(failed)} failed"
-    )
+    text = f"{facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already there"
+    say(args, facts, f"{printable(str(args.lake))}: {text}, {len(failed)} failed")
     return InputError.exit_code if failed else 0
 
 
@@ -109,6 +104,8 @@ def run_check(args: argparse.Namespace) -> int:
         f"{args.folder / path} is not in the list of checksums; export again or remove it" for path in lake.unlisted
     ]
     good = not wrong and not failed and bool(done)
+    names = ("poc_um_max", "force_mn_max", "torque_nmm_max")
+    largest = {name: max((getattr(checked.outcome, name) for checked in done), default=0.0) for name in names}
     facts: dict[str, Any] = {
         "lake": str(args.folder),
         "good": good,
@@ -117,23 +114,12 @@ def run_check(args: argparse.Namespace) -> int:
         "violations": sum(checked.outcome.violations for checked in done),
         "wrong": wrong,
         "failed": failed,
+        **largest,
     }
-    largest = {
-        name: max((getattr(checked.outcome, name) for checked in done), default=0.0)
-        for name in ("poc_um_max", "force_mn_max", "torque_nmm_max")
-    }
-    if args.json:
-        print(json.dumps(facts | largest))
-        return 0 if good else 1
-    for text in wrong:
-        print(printable(text))
     verdict = "good" if good else f"{len(wrong) + len(failed)} problem(s)" if done else "empty"
-    poc_um, force_mn, torque_nmm = largest.values()
-    folder = printable(str(args.folder))
-    print(
-        f"{folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
-        f"PoC {poc_um:.3f} um, force {force_mn:.4f} mN, torque {torque_nmm:.5f} N*mm"
-    )
+    text = f"{printable(str(args.folder))}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; "
+    lines = [*map(printable, wrong), text + largest_text(SimpleNamespace(**largest))]
+    say(args, facts, "\n".join(lines))
     return 0 if good else 1
 
 
@@ -158,17 +144,13 @@ def run_inventory(args: argparse.Namespace) -> int:
     """Print the inventory; return 1 if a sensor is not as it used to be."""
     lake = _opened(args.folder)
     found = room("inventory").take(lake)
-    if args.json:
-        print(json.dumps(found))
-    else:
-        for board in found["boards"]:
-            print(
-                f"board {board['board']}: firmware {board['firmware']}, {board['recordings']} recordings, "
-                f"{board['hours']:.2f} h, {_day(board['first_ns'])} to {_day(board['last_ns'])}, "
-                f"{board['frames_lost']} frames lost"
-            )
-        for sensor in found["sensors"]:
-            print(_sensor_line(sensor))
+    lines = [
+        f"board {board['board']}: firmware {board['firmware']}, {board['recordings']} recordings, "
+        f"{board['hours']:.2f} h, {_day(board['first_ns'])} to {_day(board['last_ns'])}, "
+        f"{board['frames_lost']} frames lost"
+        for board in found["boards"]
+    ]
+    say(args, found, "\n".join([*lines, *map(_sensor_line, found["sensors"])]))
     return 1 if any(sensor["findings"] for sensor in found["sensors"]) else 0
 
 
@@ -195,7 +177,7 @@ def _day(at_ns: int) -> str:
 def _opened(folder: Path) -> Any:
     lake = room("folder").opened(folder)
     if lake.unlisted:
-        print(f"biotac: {len(lake.unlisted)} file(s) of no finished export are ignored; export again", file=sys.stderr)
+        note(f"{len(lake.unlisted)} file(s) of no finished export are ignored; export again")
     return lake
 
 
@@ -216,7 +198,7 @@ def _all(
             raise KeyboardInterrupt("run the same command again to finish") from None
     for _, text in sorted(problems.items()):
         failed.append(text)
-        print(f"biotac: {text}", file=sys.stderr)
+        note(text)
 
 
 def room(name: str) -> ModuleType:

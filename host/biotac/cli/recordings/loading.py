@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from ...errors import printable
-from ...recording import Recording
+from ...recording.reader import Recording
+from ..outputs import note
 from ..progress import Progress
 
 
@@ -16,5 +16,5 @@ def load(path: Path, *, quiet: bool = False) -> Recording:
         recording = Recording(path, lambda share: progress.show(f"reading {path}: {share:.0%}"))
     if not quiet:
         for problem in recording.problems:
-            print(f"biotac: {printable(problem)}", file=sys.stderr)
+            note(printable(problem))
     return recording

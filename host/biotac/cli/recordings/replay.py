@@ -61,7 +61,7 @@ def on_pty(args: argparse.Namespace, playback: Playback) -> int:
     board = ReplayPty(playback, args.pace)
     name = str(args.recording)
     with until_ctrl_c(board, args.link):
-        tell(board, args.link, name, {"recording": name}, as_json=args.json)
+        tell(board, args, name, {"recording": name})
         announced = False
         while True:
             board.turn(1.0)

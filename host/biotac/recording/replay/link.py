@@ -38,13 +38,14 @@ class Pacer:
 
     def __init__(self, playback: Playback, pace: float, clock: HostClock) -> None:
         self.playback = playback
+        self.paused = False  # set from any thread
         self._pace = pace
         self._clock = clock
         self._start_s: float | None = None
 
     def wait_s(self) -> float | None:
         """Seconds until the next bytes are due; None when none are due for now."""
-        due_us = self.playback.next_us() if self.playback.playing else None
+        due_us = self.playback.next_us() if self.playback.playing and not self.paused else None
         if due_us is None:
             self._start_s = None
             return None
@@ -66,40 +67,42 @@ class ReplayLink(Link):
     """A Link to a ``playback``. Commands that would change a board raise CommandRefusedError."""
 
     keeps_time = False
+    owns_stream = False
 
     def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: HostClock | None = None) -> None:
         self.port = port
         self.pace = pace
         self._clock = clock or SystemClock()
-        self._pacer = Pacer(playback, pace, self._clock)
+        self.pacer = Pacer(playback, pace, self._clock)
         self._answers = b""
         self._answering = threading.Lock()  # commands may come from a thread other than the reader
+        self._commanded = threading.Event()
         self._closed = False
 
     @property
     def recording(self) -> Recording:
         """The recording being played."""
-        return self._pacer.playback.recording
+        return self.pacer.playback.recording
 
     def read(self, timeout_s: float) -> bytes:
         with self._answering:
             answers, self._answers = self._answers, b""
         if answers:
             return answers
-        wait_s = self._pacer.wait_s()
+        wait_s = self.pacer.wait_s()
         if wait_s is None:
-            self.ended = self._pacer.playback.over
-            if not self.ended:
-                self._clock.sleep(timeout_s)
+            had_ended, self.ended = self.ended, self.pacer.playback.over
+            if self.ended == had_ended and self._commanded.wait(timeout_s):
+                self._commanded.clear()
             return b""
         if wait_s > 0:
             self._clock.sleep(min(wait_s, timeout_s))
-        return self._pacer.due()
+        return self.pacer.due()
 
     def write(self, data: bytes) -> None:
         if self._closed:
             raise DeviceLostError(f"{self.port} was closed; open it again")
-        playback = self._pacer.playback
+        playback = self.pacer.playback
         for message_id, payload in playback.requests(data):
             answer = playback.answer(message_id, payload)
             if answer is None:
@@ -109,6 +112,7 @@ class ReplayLink(Link):
                 )
             with self._answering:
                 self._answers += answer
+            self._commanded.set()
 
     def close(self) -> None:
         self._closed = True

@@ -166,10 +166,14 @@ class Playback:
             infos = {info.finger: info for info in self.recording.sensors}
             return _again(infos.get(payload[1]), req_id) or _reply(req_id, message_id, wire.Error.NO_SUCH_FINGER)
         if known is wire.GetStatus:
-            return _again(self._status, req_id)
+            return _again(self._status and dataclasses.replace(self._status, streams=self._streams()), req_id)
         if known is wire.GetSensorStatus:
             return _again(self._sensor_status.get(payload[1]), req_id)
         return None
+
+    def _streams(self) -> int:
+        """The streams that are on here; those of the recording are of another program."""
+        return self._asked.streams if self._asked is not None and self.playing else 0
 
     def refusal(self, message_id: int, payload: bytes) -> bytes:
         """The reply to a command for which ``answer`` returned None."""

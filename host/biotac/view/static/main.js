@@ -11,6 +11,7 @@ import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
 
 const READ_MS = 100; // numbers that change faster cannot be read
+const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
 
 const byId = (id) => document.getElementById(id);
 
@@ -118,10 +119,17 @@ class Page {
 
   // ---- what it shows -----------------------------------------------------------------------
 
+  // Whether the shown finger, or this page's program, stands still: its last force is not to look like the present one.
+  isSilent() {
+    const finger = this.model.fingers.get(this.shown);
+    return Boolean(finger?.latest) && performance.now() - finger.addedMs > STALE_MS;
+  }
+
   showState() {
     const { health } = this.model;
     if (!health) return;
     if (this.frozen && health.link === "live") showLink("paused", "Paused: the picture is frozen; the board and any recording keep running.");
+    else if (health.link === "live" && this.isSilent()) showLink("live", "No new frames come from this finger: what is shown is old.", true);
     else showLink(health.link, health.words);
     this.showButtons();
   }
@@ -134,7 +142,7 @@ class Page {
     const paused = this.frozen || health?.link === "paused";
     for (const id of ["tare", "tare-all", "record"]) byId(id).disabled = !board;
     byId("pause").disabled = !playing;
-    byId("again").hidden = health?.link !== "over";
+    byId("again").hidden = !["over", "taken"].includes(health?.link);
     byId("record").setAttribute("aria-pressed", String(Boolean(recording)));
     byId("record").title = recording ? recording.path : "";
     byId("record-words").textContent = recording ? `Stop, ${Math.floor(recording.seconds)} s` : "Record";
@@ -189,6 +197,7 @@ class Page {
 
   read(nowMs) {
     this.readMs = nowMs;
+    this.showState();
     const { fingers, about, health, dropped } = this.model;
     if (health) this.link.show(health, dropped, this.drawsPerS);
     if (this.frozen) return;
@@ -202,8 +211,9 @@ class Page {
     this.flags.show(frame.flags);
     this.hand.read(fingers);
     const touched = byId("touched");
-    touched.textContent = frame.flags & this.masks.CONTACT ? "contact" : "no contact";
-    touched.dataset.kind = frame.flags & this.masks.CONTACT ? "on" : "calm";
+    const isKnown = !document.body.hasAttribute("data-stale");
+    touched.textContent = !isKnown ? "not known" : frame.flags & this.masks.CONTACT ? "contact" : "no contact";
+    touched.dataset.kind = isKnown && frame.flags & this.masks.CONTACT ? "on" : "calm";
     byId("numbers").toggleAttribute("data-untouched", !(frame.flags & this.masks.CONTACT));
   }
 }

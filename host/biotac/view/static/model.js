@@ -66,6 +66,7 @@ export class Model {
 export class Finger {
   constructor() {
     this.latest = null;
+    this.addedMs = 0; // when the latest came, by the browser's clock
     this.history = { t: ring(HISTORY_ROWS), x: ring(HISTORY_ROWS), y: ring(HISTORY_ROWS), z: ring(HISTORY_ROWS), pdc: ring(HISTORY_ROWS) };
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
@@ -76,6 +77,7 @@ export class Finger {
 
   add(frame) {
     this.latest = frame;
+    this.addedMs = performance.now();
     const at = this.rows++ % HISTORY_ROWS;
     this.history.t[at] = frame.tUs / 1e6;
     [this.history.x[at], this.history.y[at], this.history.z[at]] = frame.forceN;

@@ -162,10 +162,10 @@ export class Link {
   }
 }
 
-export function showLink(link, words) {
+export function showLink(link, words, isSilent = false) {
   byId("link").dataset.link = link;
   write(byId("link-words"), words);
-  const stale = !["live", "playing", "paused", "over"].includes(link);
+  const stale = isSilent || !["live", "playing", "paused", "over"].includes(link);
   document.body.toggleAttribute("data-stale", stale);
 }
 

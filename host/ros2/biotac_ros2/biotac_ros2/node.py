@@ -17,7 +17,6 @@ from std_srvs.srv import Trigger
 
 import biotac
 from biotac.clock.stamps import Stamps
-from biotac.hand.subscription import AT_FIRST
 from biotac.recording.layout import frame_id
 
 #: Reliable, so that every subscriber's quality of service fits; half a second of rounds.
@@ -41,7 +40,7 @@ class Fingers(Node):
         self.declare_parameter("port", "")
         # A simulated board in real time; others have no pace.
         self.hand = hand = biotac.open(self.get_parameter("port").value or None, pace=1.0)
-        hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)
+        hand.stream("results", "events")
         self._stamps = Stamps(hand, lambda: self.get_clock().now().nanoseconds / 1e9)
         kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32, "event": String}
         self._topics = {

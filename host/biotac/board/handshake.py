@@ -5,15 +5,44 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from ..errors import NotAGatewayError, WireVersionError
 from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire.batches import StreamDecoder
-from .compatibility import describe_mismatch
 
 TRIES = 3
+
+
+@dataclass(frozen=True)
+class HandWarning:
+    """Something about a board that keeps it from working as well as it could."""
+
+    code: str
+    text: str  # one line with the cure
+
+
+def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
+    """Where this board's firmware and this library do not fit together; empty when they fit."""
+    if hello.schema_hash == wire.SCHEMA_HASH:
+        return []
+    text = f"the firmware on {port} has schema {hello.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
+    return [HandWarning("schema_differs", f"{text}; what only one side knows is ignored; {cure(hello)}")]
+
+
+def describe_mismatch(hello: wire.Hello) -> str:
+    """Both wire versions, and the command that makes them the same."""
+    mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
+    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+
+
+def cure(hello: wire.Hello) -> str:
+    """The command that updates the older side; the firmware if both have the same wire version."""
+    if (hello.wire_major, hello.wire_minor) > (wire.WIRE_MAJOR, wire.WIRE_MINOR):
+        return "update this library: pip install -U biotac-gateway"
+    return "update the firmware: biotac flash"
 
 
 def handshake(link: Link, send: Callable[[Any], None], *, timeout_s: float) -> wire.Hello:

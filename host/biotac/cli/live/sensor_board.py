@@ -1,11 +1,11 @@
-"""biotac sensor PORT SOURCE"""
+"""biotac sim SOURCE --sensor-port PORT"""
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
+from contextlib import closing
 from dataclasses import asdict
 
 from ...errors import InputError
@@ -14,72 +14,53 @@ from ...sim.loading import load_source
 from ...sim.sensor_board import SensorBoard
 from ...wire import messages_gen as wire
 from ...wire.sensor_gen import SLOT_HZ, SLOTS
-from .. import values
+from ..outputs import say
 
-EXAMPLE = "biotac sensor /dev/ttyACM1 press.toml --fingers 5"
-SCENARIO_S = 600.0
 LOOK_S = 0.5
+KINDS = ", ".join(fault.name.lower() for fault in wire.EmuFault)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, source and faults."""
-    parser.add_argument(
-        "port", metavar="PORT", help="device path or serial:NUMBER of the sensor board, not the gateway"
-    )
-    parser.add_argument(
-        "source",
-        metavar="SOURCE",
-        nargs="?",
-        help="scenario (.toml) or recorded counts (.npz, .btd); without one the board goes on with its present tape",
-    )
-    parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
-    parser.add_argument(
-        "--seconds",
-        type=values.seconds,
-        help="device time (default: scenarios repeat for ten minutes, recordings play once)",
-    )
-    parser.add_argument(
+    """Add its port, how the tape is kept, and faults."""
+    group = parser.add_argument_group("as the sensors of a gateway, by a second Pico (firmware/sensor_board)")
+    group.add_argument("--sensor-port", metavar="PORT", help="of the sensor board, which plays SOURCE or its last tape")
+    group.add_argument(
         "--by-time",
         action="store_true",
         help="keep the tape to the board's clock: where the gateway's differs, rounds are skipped or repeated",
     )
-    kept = parser.add_mutually_exclusive_group()
+    kept = group.add_mutually_exclusive_group()
     kept.add_argument(
         "--keep",
         action="store_true",
         help="keep SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, over and over",
     )
     kept.add_argument("--forget", action="store_true", help="erase what --keep has stored")
-    kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
-    parser.add_argument(
+    group.add_argument(
         "--fault",
         action="append",
         default=[],
         metavar="FINGER=KIND",
-        help=f"from now on, whatever the tape says: {kinds}; may be repeated",
+        help=f"from now on, whatever the tape says: {KINDS}; may be repeated",
     )
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace, length_s: float | None) -> int:
     """Plug the sensors in, feed them until their tape ends or Ctrl-C, and print how the board did."""
     faults = [fault_of(text) for text in args.fault]
     if args.source is None and (args.keep or args.by_time):
         raise InputError(f"{'--keep' if args.keep else '--by-time'} needs a SOURCE, such as press.toml")
-    board = SensorBoard(open_link(args.port))
-    try:
+    with closing(SensorBoard(open_link(args.sensor_port))) as board:
         if args.source is not None:
-            repeats = args.source.endswith(".toml") and not args.keep  # a loop repeats on its own
-            seconds = args.seconds or (SCENARIO_S if repeats else None)
-            board.plug(load_source(args.source, fingers=args.fingers, seconds=seconds))
+            seconds = args.seconds if args.keep else length_s  # a loop repeats on its own
+            board.plug(load_source(args.source.removeprefix("sim:"), fingers=args.fingers, seconds=seconds))
             board.play(by_time=args.by_time)
         if args.forget:
             board.forget()
         for finger, fault in faults:
             board.fault(finger, fault)
         status = board.keep() if args.keep else board.status() if args.source is None else play(board)
-    finally:
-        board.close()
-    print(json.dumps(asdict(status)) if args.json else summary(status))
+    say(args, asdict(status), summary(status))
     return 0
 
 
@@ -100,8 +81,7 @@ def fault_of(text: str) -> tuple[int, wire.EmuFault]:
     """Finger and fault of a text such as ``2=stuck_low``."""
     finger, _, kind = text.partition("=")
     if not finger.isdigit() or kind.upper() not in wire.EmuFault.__members__:
-        kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
-        raise InputError(f"--fault {text}: expected FINGER=KIND, as in 2=stuck_low; kinds are {kinds}")
+        raise InputError(f"--fault {text}: expected FINGER=KIND, as in 2=stuck_low; kinds are {KINDS}")
     return int(finger), wire.EmuFault[kind.upper()]
 
 

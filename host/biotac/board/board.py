@@ -1,0 +1,212 @@
+"""One board on a link: the thread that reads it, and commands that are repeated until they are answered."""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import cycle
+from typing import Any, TypeVar
+
+from ..clock.host_clock import HostClock, SystemClock
+from ..errors import CommandRefusedError, DeviceLostError, InputError
+from ..link import Link
+from ..wire import messages_gen as wire
+from ..wire.framing import encode
+from .handshake import describe_mismatch, handshake
+from .reader import Reader
+
+REPLY_TIMEOUT_S = 1.0
+REPLY_TRIES = 3
+#: The errors with which a board refuses what only the other side knows.
+NOT_KNOWN = (wire.Error.UNKNOWN_COMMAND, wire.Error.UNKNOWN_SETTING, wire.Error.BAD_LENGTH)
+
+Reply = TypeVar("Reply")
+
+
+class Board:
+    """The board that answers on ``link``, which is closed when the handshake fails. Any thread may ask it."""
+
+    def __init__(self, link: Link, *, host_clock: HostClock | None = None) -> None:
+        self.link = link
+        self.host_clock = host_clock or SystemClock()
+        self.closed = False
+        self.sent_s = time.monotonic()  #: when the board last heard from this side
+        self._req_ids = cycle(range(1, 256))
+        self._writing = threading.Lock()
+        self._asking = threading.RLock()  # one command at a time
+        self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
+        try:
+            hello = self.handshake()
+        except BaseException:
+            link.close()
+            raise
+        self.reader = Reader(link, hello)
+        self.reader.start()
+
+    @property
+    def info(self) -> wire.Hello:
+        """What the board said about itself when it was opened, or when it last came back."""
+        return self.reader.hello
+
+    @property
+    def connected(self) -> bool:
+        """Whether the board can be reached: it is neither looked for, nor lost, nor closed."""
+        reader = self.reader
+        return not (self.closed or reader.lost or reader.failure or reader.is_inherited())
+
+    def handshake(self) -> wire.Hello:
+        """The board's HELLO, read here: nothing else may read the link meanwhile."""
+        return handshake(self.link, self._write_numbered, timeout_s=self.patience_s())
+
+    def reopen(self, place: str) -> None:
+        """Open a place in place of the lost port, while nobody writes."""
+        with self._writing:
+            self.link.reopen(place)
+
+    def patience_s(self) -> float:
+        """How long one reply may take, s."""
+        return REPLY_TIMEOUT_S * self.link.patience
+
+    def close(self) -> None:
+        """End reading and give the port back."""
+        self.reader.close()
+        with self._writing:
+            self.closed = True
+            self.link.close()
+
+    # ---- commands ------------------------------------------------------------------------------
+
+    def send(self, request: Any) -> None:
+        """Send a command without waiting for a reply. Its ``req_id`` is replaced by the next one."""
+        self.reader.check()
+        self._write_numbered(request)
+
+    def _write_numbered(self, request: Any) -> None:
+        self._write(replace(request, req_id=next(self._req_ids)))
+
+    def _write(self, message: Any) -> None:
+        try:
+            payload = message.pack()
+        except struct.error as error:
+            name = type(message).__name__
+            raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
+        with self._writing:
+            if self.closed:
+                self.reader.raise_closed()
+            self.link.write(encode(message.ID, payload))
+            self.sent_s = time.monotonic()
+
+    @contextmanager
+    def turn(self) -> Iterator[None]:
+        """No other thread's command gets in between."""
+        self.reader.check()
+        # Another thread's command may wait for a reply, and this one for its turn.
+        self.reader.read_elsewhere()
+        with self._asking:
+            yield
+
+    def ask(self, request: Any, reply: type[Reply], *, timeout_s: float | None = None, quiet: bool = False) -> Reply:
+        """Send a command, up to REPLY_TRIES times until it is answered, and return its reply.
+
+        Its ``req_id`` is replaced by the next one. ``timeout_s`` is for each try. The answer to a
+        ``quiet`` question is not in any batch. Raises CommandRefusedError when the
+        board refuses; DeviceLostError when it does not answer, or is away.
+        """
+        timeout_s = self.patience_s() if timeout_s is None else timeout_s
+        with self.turn(), self._awaiting():
+            request = replace(request, req_id=next(self._req_ids))
+            self.reader.quiet_id = request.req_id if quiet else 0
+            # The time of the first try counts: whichever try was answered was sent then or later.
+            sent_s = time.monotonic()
+            for _ in range(REPLY_TRIES):
+                self._check_here()  # another board may be on the port, while this one is looked for
+                self._write(request)
+                answer, arrived_s = self._answer(request, reply, timeout_s)
+                if isinstance(answer, reply) and not (isinstance(answer, wire.Reply) and answer.error):
+                    if isinstance(answer, wire.Status):
+                        self._timed(answer, sent_s, arrived_s)
+                    return answer
+                if answer is not None:
+                    raise CommandRefusedError(describe_refusal(request, answer, self.info), answer.error)
+        raise DeviceLostError(
+            f"{self.link.port} did not answer {type(request).__name__} within {timeout_s * REPLY_TRIES:.0f} s; check "
+            "the cable and open it again"
+        )
+
+    @contextmanager
+    def _awaiting(self) -> Iterator[None]:
+        self.reader.replies.clear()
+        self.reader.awaited += 1
+        self.reader.room()
+        try:
+            yield
+        finally:
+            self.reader.quiet_id = 0
+            self.reader.awaited -= 1
+
+    def _answer(self, request: Any, reply: type[Any], timeout_s: float) -> tuple[Any, float]:
+        """The reply and when it arrived; (None, 0) when there is none in time."""
+        found: list[tuple[Any, float]] = []
+        reader = self.reader
+
+        def came() -> bool:
+            while reader.replies and not found:
+                message, arrived_s = reader.replies.popleft()
+                # A command whose length the board does not know is refused without its req_id, which it did not read.
+                unread = isinstance(message, wire.Reply) and (message.req_id, message.command) == (0, request.ID)
+                if unread or (isinstance(message, (reply, wire.Reply)) and message.req_id == request.req_id):
+                    found.append((message, arrived_s))
+            return bool(found) or reader.lost is not None or reader.failure is not None or reader.closing.is_set()
+
+        reader.wait_for(came, timeout_s)
+        if found:
+            return found[0]
+        self._check_here()
+        return None, 0.0
+
+    def _check_here(self) -> None:
+        reader = self.reader
+        reader.check()
+        if reader.closing.is_set():
+            reader.raise_closed()
+        if reader.lost is not None:
+            raise DeviceLostError(f"{self.link.port} is away and being looked for; wait until it returns")
+
+    def _timed(self, answer: wire.Status, sent_s: float, arrived_s: float) -> None:
+        self.reader.present |= answer.fingers_present
+        if self.link.keeps_time:
+            self.reader.clock.round_trip(sent_s, self.reader.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
+
+    def tell(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
+        """Send a command whose reply only confirms it; with ``lasting`` it is remembered, see ``remember``."""
+        answers = wire.ANSWERS[type(request)]
+        self.ask(request, answers)
+        if lasting is not None:
+            self.remember(lasting, lambda: self.ask(request, answers))
+
+    def remember(self, what: tuple[str, int], again: Callable[[], object]) -> None:
+        """Remember to tell a board that restarted ``what`` (kind, number) again, by ``again``; the latest goes last."""
+        with self._asking:
+            self._lasting.pop(what, None)
+            self._lasting[what] = again
+
+    def tell_again(self) -> None:
+        """Repeat everything that lasts until the board restarts: settings, calibrations, maps and subscriptions.
+
+        Not tares: after a restart the board takes its own, and an earlier one may be wrong by then.
+        """
+        for again in list(self._lasting.values()):
+            again()
+
+
+def describe_refusal(request: Any, reply: wire.Reply, board: wire.Hello) -> str:
+    """One line with the command and the board's reason; if the versions may be the cause, also those and the cure."""
+    name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
+    text = f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
+    if reply.error in NOT_KNOWN and (board.wire_major, board.wire_minor) != (wire.WIRE_MAJOR, wire.WIRE_MINOR):
+        text += f"; its firmware speaks {describe_mismatch(board)}"
+    return text

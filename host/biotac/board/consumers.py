@@ -1,0 +1,277 @@
+"""What takes batches from the reading thread: queues, and functions that are called with what arrives."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from ..errors import CallbackError
+from ..wire.batches import Batch
+from .gap import Gap
+from .reader import Reader
+
+# Ten to twenty seconds of five fingers with PAC; a few tens of megabytes.
+LIMIT_ROWS = 16_384
+# At the end, what waits is passed to callbacks for this long; the rest is skipped.
+BACKLOG_S = 1.0
+# Of five fingers, the Pico's ring holds 40 ms of frames; what comes until then has to fit in the computer's buffers.
+SLOW_S = 0.04
+
+Unsubscribe = Callable[[], None]
+
+
+class Queue:
+    """Batches on their way to one consumer, who may be slow: first in, first out.
+
+    A full queue drops its oldest batches and counts them; their Gaps are kept, and a Gap says what is missing. A board
+    whose time waits for its reader waits instead. With ``lets_pass`` nothing is kept: nobody takes from this queue yet.
+    ``on_news`` is called on the reading thread, to tell the consumer to look.
+    """
+
+    def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None) -> None:
+        self.batches_skipped = 0
+        self.frames_skipped = 0
+        self.lets_pass = False
+        self._reader = reader
+        self._on_news = on_news
+        # Thousands of times a second: this wakes its consumer at a fifth of the cost of a Condition. None only wakes.
+        self._waiting: SimpleQueue[Batch | None] = SimpleQueue()
+        self._back: list[Batch] = []  # the consumer did not use it
+        # Rows put and dropped here, and taken: each counted by one thread. A batch of messages alone counts as one.
+        self._put_rows = self._taken_rows = 0
+        self._has_rows = False  # messages alone make no board wait
+        self._before: Batch | None = None  # the latest with frames that was taken
+        self._slow: Gap | None = None
+        self._kept: list[Gap] = []  # of batches that were dropped
+
+    def begin(self) -> None:
+        """Somebody begins to take: what was dropped before was nobody's."""
+        self.batches_skipped = self.frames_skipped = 0
+        self.lets_pass, self._slow = False, None
+
+    def put(self, batch: Batch) -> None:
+        """Add the newest batch."""
+        if self.lets_pass:
+            return
+        self._waiting.put(batch)
+        self._put_rows += weight(batch)
+        self._has_rows |= bool(len(batch.wire) or len(batch.pac) or len(batch.idle))
+        # The newest batch stays, however large it is.
+        while self._put_rows - self._taken_rows > LIMIT_ROWS and self._waiting.qsize() > 1:
+            self._skip()
+        if self._on_news is not None:
+            self._on_news()
+
+    def wake(self) -> None:
+        """See reader.Consumer."""
+        self._waiting.put(None)
+        if self._on_news is not None:
+            self._on_news()
+
+    def is_full(self) -> bool:
+        """See reader.Consumer."""
+        return self._has_rows and self._put_rows > self._taken_rows
+
+    def take(self, *, wait: bool = False) -> Batch | None:
+        """Take the oldest batch. None when there is none; with ``wait``, when there is none but a wake."""
+        if self._back:
+            return self._back.pop()
+        batch = None
+        while batch is None:
+            try:
+                batch = self._waiting.get(wait)
+            except Empty:
+                return None
+            if batch is None and wait and self._waiting.empty():
+                return None
+        self._taken_rows += weight(batch)
+        self._has_rows &= self._put_rows > self._taken_rows
+        self._reader.room()
+        if self._slow is not None or self._kept:
+            batch = self._with_gaps(batch)
+        if len(batch.wire):
+            self._before = batch
+        return batch
+
+    def put_back(self, batch: Batch) -> None:
+        """Return a batch that was taken and not used."""
+        self._back.append(batch)
+
+    def clear(self) -> None:
+        """Discard what waits without counting it: the consumer does not want it."""
+        while self.take() is not None:
+            pass
+
+    def leave(self) -> None:
+        """Discard what waits and count it as skipped: the consumer has no more time for it."""
+        self.batches_skipped += len(self._back)
+        while not self._waiting.empty():
+            self._skip()
+
+    def _skip(self) -> None:
+        with suppress(Empty):  # the consumer took it meanwhile
+            batch = self._waiting.get(False)
+            if batch is None:
+                return
+            self._put_rows -= weight(batch)
+            self.batches_skipped += 1
+            self.frames_skipped += len(batch.wire)
+            self._kept += [m for m in batch.messages if isinstance(m, Gap)]
+            first_us = batch.first_t_us()
+            if first_us is not None and self._slow is None:
+                self._slow = Gap("slow", None, None, time.time_ns(), 0, self._reader.hello.boot_id, frames_missed=0)
+            if self._slow is not None:
+                frames, fingers = (self._slow.frames_missed or 0) + len(batch.wire), self._slow.fingers
+                self._slow = replace(self._slow, frames_missed=frames, fingers=fingers | max(0, batch.fingers))
+
+    def _with_gaps(self, batch: Batch) -> Batch:
+        gaps, self._kept = self._kept, []
+        slow, first_us = self._slow, batch.first_t_us()
+        if slow is not None and first_us is not None:
+            last_us = None if self._before is None else self._before.last_t_us()
+            gaps.append(replace(slow, last_t_us=last_us, next_t_us=first_us, back_at_ns=time.time_ns()))
+            self._slow = None
+        # The other consumers have the same batch.
+        return replace(batch, messages=[*gaps, *batch.messages])
+
+
+def weight(batch: Batch) -> int:
+    """How many rows a batch has, at least one."""
+    return len(batch.wire) + len(batch.pac) + len(batch.idle) or 1
+
+
+class Troubles:
+    """Errors of callbacks and recordings, until they are raised to the program: the first, and how many more."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._first: BaseException | None = None
+        self._more = 0
+
+    def keep(self, error: BaseException) -> None:
+        """Keep an error for the next ``report``."""
+        with self._lock:
+            if self._first is None:
+                self._first = error
+            else:
+                self._more += 1
+
+    def report(self) -> None:
+        """Raise what happened since the last report, if anything did."""
+        if self._first is None:
+            return
+        with self._lock:
+            first, more, self._first, self._more = self._first, self._more, None, 0
+        if isinstance(first, CallbackError):
+            again = f", and {more} more error(s) since" if more else ""
+            raise CallbackError(f"{first}{again}; fix it") from first.__cause__
+        if first is not None:
+            raise first
+
+
+class Callbacks:
+    """Functions that are called with batches, or with messages of one kind.
+
+    They are called on the reading thread, which costs no switch between threads, until one of them has taken longer
+    than SLOW_S, or gives a command: from then on that thread calls them, another one reads, and what they are too slow
+    for is dropped.
+    What they raise is logged when it happens and kept in ``troubles``. A callback that raised stays subscribed.
+    """
+
+    def __init__(self, reader: Reader, troubles: Troubles) -> None:
+        self.queue = Queue(reader)
+        self.wanted: tuple[tuple[type[Any], Callable[[Any], Any]], ...] = ()
+        self._reader = reader
+        self._troubles = troubles
+        self._lock = threading.Lock()
+        self._since_s = math.inf  # since when the reading thread has been calling
+        self._thread: threading.Thread | None = None  # that calls and does not read
+        self._is_slow = False
+        self._give_up_s = math.inf
+
+    def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
+        """Call ``fn`` with every message of a kind, or with every Batch; returns a function that ends this."""
+        entry = (kind, fn)
+
+        def unsubscribe() -> None:
+            with self._lock:
+                self.wanted = tuple(one for one in self.wanted if one is not entry)
+
+        with self._lock:
+            self._reader.last = self
+            self.wanted = (*self.wanted, entry)
+        return unsubscribe
+
+    def close(self) -> None:
+        """Call with what has arrived for up to one more second, and end; a running callback is waited for."""
+        self._give_up_s = time.monotonic() + BACKLOG_S
+        self.queue.wake()
+        if self._thread is not None:
+            self._thread.join()
+        self.queue.leave()
+
+    def put(self, batch: Batch) -> None:
+        """See reader.Consumer."""
+        if self._is_slow:
+            self.queue.put(batch)
+            return
+        self._since_s = time.monotonic()
+        self._call(batch)
+        with self._lock:
+            self._since_s = math.inf
+            if not self._is_slow:
+                return
+        self._go_on()
+
+    def wake(self) -> None:
+        """See reader.Consumer."""
+        self.queue.wake()
+
+    def is_full(self) -> bool:
+        """See reader.Consumer."""
+        return self.queue.is_full()
+
+    def relieve(self, *, at_once: bool = False) -> None:
+        """Let another thread read, if a callback has been keeping the reading thread for too long; or ``at_once``."""
+        with self._lock:
+            if time.monotonic() - self._since_s > (-1.0 if at_once else SLOW_S):
+                self._since_s, self._is_slow = math.inf, True
+                self._thread = self._reader.read_in_another_thread()
+
+    def _go_on(self) -> None:
+        """Call with what waits. Another thread reads."""
+        closing = self._reader.closing
+        while True:
+            batch = self.queue.take(wait=not closing.is_set())
+            if batch is None:
+                if closing.is_set():
+                    return
+            elif time.monotonic() >= self._give_up_s:
+                self.queue.put_back(batch)
+                return
+            else:
+                self._call(batch)
+
+    def _call(self, batch: Batch) -> None:
+        wanted = self.wanted
+        for one in (batch, *batch.messages):
+            for kind, fn in wanted:
+                if type(one) is kind:
+                    try:
+                        fn(one)
+                    except BaseException as error:  # SystemExit too: a thread that ended would look like silence
+                        self._failed(fn, error)
+
+    def _failed(self, fn: Callable[[Any], Any], error: BaseException) -> None:
+        name = getattr(fn, "__qualname__", repr(fn))
+        logging.getLogger("biotac").error("callback %s failed", name, exc_info=error)
+        told = CallbackError(f"callback {name} raised {type(error).__name__}: {error}")
+        told.__cause__ = error
+        self._troubles.keep(told)

@@ -1,0 +1,187 @@
+"""Rows that are missing from what a board sent, and why."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from ..wire.batches import Batch, join, split
+from ..wire.messages_gen import FrameFlags
+from ..wire.sensor_gen import MAX_SENSORS
+from ..wire.slots import FRAME_HZ
+
+GAP = "gap"  # its name in a recording's metadata
+# More than this between two rows of a finger is told.
+JUMP_US = 250_000
+# After a loss, this many batches may wait until every held finger has said whether it is still held.
+BATCHES_HELD_BACK = 8
+
+Reason = Literal["unplugged", "rebooted", "silence", "paused", "lost", "finger", "slow"]
+
+WORDS: Mapping[Reason, str] = {
+    "unplugged": "the port went away",
+    "rebooted": "the board restarted",
+    "silence": "the board fell silent",
+    "paused": "this program stood still, so the board stopped streaming",
+    "lost": "frames were lost on the link",
+    "finger": "a sensor fell silent",
+    "slow": "this reader was too slow",
+}
+#: The fingers in each bit mask; -1, an unknown one, has all.
+FINGERS_IN = [tuple(f for f in range(MAX_SENSORS) if mask >> f & 1) for mask in range(1 << MAX_SENSORS)]
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Rows are missing here. It is in ``Batch.messages`` of the first batch with rows after the gap.
+
+    ``reason`` is ``unplugged`` when the port went away, ``silence`` when it stayed but no rows came, and ``paused``
+    when the board stopped because this program was not heard: it was stopped, or its computer slept. It is
+    ``rebooted``, whatever was seen first, when the board restarted: then its clock, sequence numbers and tares began
+    anew. Of ``fingers``, a bit mask, rows were ``lost`` on the link for longer than 0.25 s, or the sensor gave none
+    (``finger``). ``slow`` is only for the reader who gets it, whose oldest batches were dropped.
+
+    ``last_t_us`` and ``next_t_us`` are the device times in us of the rows around the gap; after a reboot they are of
+    different clocks, and ``last_t_us`` is None when no row had come before. ``lost_at_ns`` and ``back_at_ns`` are this
+    computer's Unix time in ns. ``boot_id`` is the board's after the gap. ``frames_missed`` is how many rounds of all
+    its ``fingers`` are missing, None where that is unknown. ``holds_lapsed`` is the bit mask of the fingers that were
+    held (``Hand.hold``) and are not any more: nothing renews a hold but the program itself.
+    """
+
+    reason: Reason
+    last_t_us: int | None
+    next_t_us: int | None
+    lost_at_ns: int
+    back_at_ns: int
+    boot_id: int
+    fingers: int = 0
+    frames_missed: int | None = None
+    holds_lapsed: int = 0
+
+    def as_text(self) -> dict[str, str]:
+        """Its values as text, for a recording's metadata, which holds nothing else."""
+        return {name: "" if value is None else str(value) for name, value in asdict(self).items()}
+
+    @classmethod
+    def from_text(cls, text: Mapping[str, str]) -> Gap:
+        """Inverse of as_text. Raises KeyError or ValueError for text that as_text cannot have made."""
+        if text["reason"] not in WORDS:
+            raise ValueError(f"reason {text['reason']!r}")
+        values: dict[str, Any] = {n: int(text[n]) if text[n] else None for n in cls.__slots__ if n != "reason"}
+        if None in {values[n] for n in values if n not in ("last_t_us", "next_t_us", "frames_missed")}:
+            raise ValueError("a time, a boot or fingers are missing")
+        return cls(cast(Reason, text["reason"]), **values)
+
+    def words(self) -> str:
+        """One sentence for people."""
+        missed = "" if self.frames_missed is None else f", {self.frames_missed} frames missed"
+        lapsed = "; a hold lapsed" if self.holds_lapsed else ""
+        return f"gap of {self.seconds:.1f} s{missed}: {WORDS[self.reason]}{lapsed}"
+
+    @property
+    def seconds(self) -> float:
+        """How long it lasted, by the device's clock; by this computer's where that restarted."""
+        if self.reason == "rebooted" or self.last_t_us is None or self.next_t_us is None:
+            return (self.back_at_ns - self.lost_at_ns) / 1e9
+        return (self.next_t_us - self.last_t_us) / 1e6
+
+
+class Gaps:
+    """Puts a Gap into the first batch after rows are missing. To be used by one thread."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.held = 0  #: bit mask of the fingers that the program holds
+        self._seen_us: dict[int, int] = {}  # by finger: device time of its latest row, to within a batch
+        self._last_s = time.monotonic()  # when the latest row was taken
+        self._begun: tuple[Reason, int | None, int] | None = None
+        self._held_back: list[Batch] = []
+
+    def begin(self, reason: Reason) -> None:
+        """The stream has stopped. Two losses without a row in between are one gap."""
+        if self._begun is None:
+            self._begun = reason, max(self._seen_us.values(), default=None), self._lost_at_ns()
+        elif reason == "rebooted":
+            self._begun = (reason, *self._begun[1:])
+
+    def forget(self) -> None:
+        """The stream was stopped on purpose, and all of it has come: what follows is no gap."""
+        self._seen_us = {}
+
+    def _lost_at_ns(self) -> int:
+        return time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
+
+    def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> Batch:
+        """``batch``, whose latest row is of ``last_us``, with a Gap if one ends here.
+
+        Without its rows while held fingers have yet to be heard after a loss: they come with a later one.
+        ``lost_after`` has (finger, seq, frames missing).
+        """
+        seen_us, fingers = self._seen_us, FINGERS_IN[batch.fingers]
+        gap: Gap | None = None
+        if self._begun is not None:
+            now, later = split(batch, batch.first_t_us() or 0)
+            self._held_back.append(later)
+            batch = join(self._held_back)
+            flags = {finger: int(rows[-1][3]) for finger, rows in _rows(batch).items()}
+            if self.held & ~sum(1 << f for f in flags) and len(self._held_back) < BATCHES_HELD_BACK:
+                now.fingers = 0
+                return now  # the messages, which do not wait
+            batch.messages = now.messages
+            gap = self._loss(*self._begun, batch.first_t_us() or last_us, flags)
+            self._begun, self._held_back, fingers = None, [], tuple(flags)
+            batch.fingers = sum(1 << finger for finger in fingers)
+        elif any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers):
+            gap = self._jump(_rows(batch), {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
+        for finger in fingers:
+            seen_us[finger] = last_us
+        self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
+        if gap is not None:
+            self.count += 1
+            batch.messages.insert(0, replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id))
+        return batch
+
+    def _loss(self, reason: Reason, last_us: int | None, lost_at_ns: int, next_us: int, flags: dict[int, int]) -> Gap:
+        lapsed = self.held & ~sum(1 << finger for finger, bits in flags.items() if bits & FrameFlags.HELD)
+        self.held &= ~lapsed
+        missed = sum(_rounds_between(seen, next_us) for seen in self._seen_us.values())
+        fingers = sum(1 << finger for finger in self._seen_us)
+        self._seen_us.clear()
+        known = None if reason == "rebooted" else missed
+        return Gap(reason, last_us, next_us, lost_at_ns, 0, 0, fingers, known, lapsed)
+
+    def _jump(self, rows: dict[int, list[tuple[int, int, int, int]]], losses: set[tuple[int, int]]) -> Gap | None:
+        """A gap of single fingers, while the stream went on; None where heartbeats cover the time."""
+        gap: Gap | None = None
+        for finger in rows:
+            last_us = self._seen_us.get(finger, rows[finger][0][0])
+            for t_us, seq, covered_us, _ in rows[finger]:
+                if t_us - last_us - covered_us > JUMP_US:
+                    reason: Reason = "lost" if (finger, seq) in losses else "finger"
+                    lost_at_ns = time.time_ns() - 1000 * (t_us - last_us)
+                    gap = gap or Gap(reason, last_us, t_us, lost_at_ns, 0, 0, frames_missed=0)
+                    missed = (gap.frames_missed or 0) + _rounds_between(last_us, t_us)
+                    gap = replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)
+                last_us = t_us
+        return gap
+
+
+def _rows(batch: Batch) -> dict[int, list[tuple[int, int, int, int]]]:
+    """Each finger's rows in order: device time, seq, the time in us that it covers (a heartbeat), flags."""
+    beats = batch.idle
+    covered = np.round(beats["frames"] * (1e6 / FRAME_HZ)).astype(int)
+    found = list(zip(batch.t_us, batch.seq, 0 * batch.seq, batch.wire["flags"], batch.wire["finger"], strict=True))
+    found += zip(beats["t_us"], beats["seq"], covered, beats["flags"], beats["finger"], strict=True)
+    out: dict[int, list[tuple[int, int, int, int]]] = {}
+    for *row, finger in sorted(tuple(map(int, row)) for row in found):
+        out.setdefault(finger, []).append(cast(tuple[int, int, int, int], tuple(row)))
+    return out
+
+
+def _rounds_between(last_us: int, next_us: int) -> int:
+    """How many rounds lie between two rows of one finger."""
+    return max(0, round((next_us - last_us) * 1e-6 * FRAME_HZ) - 1)

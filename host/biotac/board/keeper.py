@@ -1,0 +1,194 @@
+"""Keeps a board's stream alive, finds out when it has stopped, and starts it again.
+
+A thread asks the board every third of a second which streams are on. The answer keeps the board from stopping, feeds
+the clock, and is compared with what was started: replies alone are no sign that the stream lives. A board whose time
+waits for its reader is not asked.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+
+from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError, StreamTakenError
+from ..wire import messages_gen as wire
+from .board import Board
+from .consumers import SLOW_S, Callbacks
+from .gap import Reason
+from .stream import KEEPALIVE_S, Stream
+
+LOOK_S = KEEPALIVE_S / 3
+RETRY_S = 0.25
+# This many looks without rows from a finger that is there, and the stream has stopped.
+LOOKS_WITHOUT_ROWS = 3
+ROWS = wire.StreamFlags.FRAMES | wire.StreamFlags.PAC | wire.StreamFlags.BANDS
+# Of a board that is not asked, times its link's patience.
+SILENCE_S = 3.0
+
+
+class Keeper:
+    """Keeps ``stream`` of ``board`` alive; with ``reconnect``, also brings back a board that was lost."""
+
+    def __init__(self, board: Board, stream: Stream, callbacks: Callbacks, *, reconnect: bool) -> None:
+        self._board = board
+        self._reader = board.reader
+        self._stream = stream
+        self._callbacks = callbacks
+        self.reconnect = reconnect
+        self._started: wire.Start | None = None  # the stream that was looked at last
+        self._looked_s = time.monotonic()
+        # At the last look; looks without rows since, and how often the stream was started again for that.
+        self._rows = self._idle = self._faults = self._looks = self._restarts = 0
+        self._thread = self._reader.thread(self._run, "keeper")
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Wait for the thread to end; the reader is closing."""
+        self._board.host_clock.wake()
+        self._reader.wake()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        reader = self._reader
+        try:
+            while not reader.closing.is_set() and reader.failure is None:
+                try:
+                    self._step()
+                except DeviceLostError as error:
+                    if not reader.closing.is_set():  # with a cause: the link's own error
+                        reader.lose(error, "unplugged" if error.__cause__ else "silence")
+                due_s = time.monotonic() + LOOK_S
+                while not reader.wait_for(self._is_due, SLOW_S if self._callbacks.wanted else LOOK_S):
+                    self._callbacks.relieve()
+                    if time.monotonic() >= due_s:
+                        break
+        except BaseException as error:  # unforeseen errors too: a stream that nobody keeps alive would stop unseen
+            reader.fail(error)
+
+    def _step(self) -> None:
+        reader, stream, link = self._reader, self._stream, self._board.link
+        if reader.lost is not None:
+            self._bring_back(*reader.lost)
+        elif stream.on and link.ended:
+            self._board.tell(wire.Ping(0))  # a barrier: its reply comes after the last frame
+            stream.end()
+        elif stream.on and link.pace:
+            self._look()
+        elif stream.on and reader.silent_s > SILENCE_S * link.patience:
+            raise DeviceLostError(f"{link.port} has been silent for {reader.silent_s:.0f} s while streaming")
+
+    def _is_due(self) -> bool:
+        reader, stream, link = self._reader, self._stream, self._board.link
+        if reader.lost is not None or reader.closing.is_set() or reader.failure is not None:
+            return True
+        return stream.on and (link.ended or (link.pace != 0 and stream.started is not self._started))
+
+    # ---- does it stream? -----------------------------------------------------------------------
+
+    def _look(self) -> None:
+        board = self._board
+        with board.turn():  # so that no START or STOP gets in between
+            started = self._stream.started
+            if started is None or self._reader.lost is not None:
+                return
+            is_new, self._started = started is not self._started, started
+            late_s = time.monotonic() - self._looked_s
+            try:
+                status = board.ask(wire.GetStatus(0), wire.Status, timeout_s=LOOK_S * board.link.patience, quiet=True)
+            except CommandRefusedError:
+                return  # a recording that has no STATUS yet
+            self._looked_s = time.monotonic()
+            if is_new:
+                self._looks = self._restarts = 0
+                if self._has_restarted():  # while nothing streamed, so that nobody looked
+                    return
+            if board.link.owns_stream or board.link.keeps_time:  # a recording has pauses of its own
+                self._judge(started, status, late_s)
+            self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
+
+    def _judge(self, started: wire.Start, status: wire.Status, late_s: float) -> None:
+        if self._stream.started is not started:
+            return  # it is being closed
+        if self._board.link.owns_stream and status.streams != started.streams:
+            self._stopped(status, late_s)
+        elif not (started.fingers & status.fingers_present and started.streams & status.streams & ROWS):
+            self._looks = 0  # no rows are due
+        elif self._reader.rows != self._rows or status.frames_idle != self._idle:
+            self._looks = self._restarts = 0
+        else:
+            self._looks += 1
+            if self._looks >= LOOKS_WITHOUT_ROWS:
+                self._start_again("silence")
+
+    def _stopped(self, status: wire.Status, late_s: float) -> None:
+        """The board answers, but does not send what it was told to."""
+        if self._has_restarted():
+            return
+        port = self._board.link.port
+        if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or late_s >= KEEPALIVE_S:
+            self._start_again("paused")
+        else:
+            self._reader.fail(
+                StreamTakenError(
+                    f"another program, or the board's other port, took the stream of {port}; end that program and open "
+                    "the port again"
+                )
+            )
+
+    def _has_restarted(self) -> bool:
+        hello = self._board.ask(wire.HelloRequest(0, secrets.randbits(32)), wire.Hello, quiet=True)
+        if hello.boot_id == self._reader.hello.boot_id:
+            return False
+        self._reader.lose(DeviceLostError(f"{self._board.link.port} restarted; open it again"), "rebooted")
+        return True
+
+    def _start_again(self, reason: Reason) -> None:
+        self._restarts += 1
+        if self._restarts > 1:
+            text = (
+                f"{self._board.link.port} answers, but its stream stays silent; look for the cause with `biotac doctor`"
+            )
+            self._reader.lose(DeviceLostError(text), "silence")
+            return
+        self._looks = 0
+        self._reader.gaps.begin(reason)
+        self._stream.resume()
+
+    # ---- a board that was lost -----------------------------------------------------------------
+
+    def _bring_back(self, error: DeviceLostError, reason: Reason) -> None:
+        reader, board = self._reader, self._board
+        before = reader.hello
+        reader.wait_for(lambda: reader.parked or reader.closing.is_set() or reader.failure)
+        if not self.reconnect or not board.link.places():
+            reader.fail(error)
+            return
+        while not self._found(before):
+            if reader.closing.is_set():
+                return
+            board.host_clock.sleep(RETRY_S)
+        if reader.hello.boot_id != before.boot_id:
+            reason = "rebooted"
+        with board.turn():  # what others ask or tell is about the board as it was
+            # Before START, because rows may come with its reply.
+            reader.gaps.begin(reason)
+            board.tell_again()
+            self._stream.resume()
+        self._looked_s = time.monotonic()
+
+    def _found(self, before: wire.Hello) -> bool:
+        board = self._board
+        for place in board.link.places():
+            try:
+                board.reopen(place)
+                hello = board.handshake()
+            except (PortError, DeviceLostError, NotAGatewayError):
+                continue
+            if hello.board_serial == before.board_serial:
+                self._reader.resume(hello)
+                return True
+        return False

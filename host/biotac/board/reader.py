@@ -1,0 +1,353 @@
+"""The one thread that reads a board, from open to close.
+
+Bytes go one way: the link, the decoder, a batch, the consumers. Reading waits for nobody: a consumer that is too slow
+loses its oldest batches (consumers.py). Only a simulated board that is not paced is the other way round: its time
+waits for its reader, so reading waits until every consumer has taken what came, or somebody awaits a reply.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import weakref
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NoReturn, Protocol
+
+from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
+from ..errors import DeviceLostError
+from ..link import Link
+from ..link.serial_port import went_away
+from ..wire import messages_gen as wire
+from ..wire.batches import Batch, LinkStats, StreamDecoder
+from .gap import Gaps, Reason
+
+# The longest wait for a link before other conditions are checked, such as closing.
+POLL_S = 0.2
+
+#: Of all hands. A hand that is garbage-collected on one of them ends on another, which may wait for it.
+THREADS: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+
+
+class Consumer(Protocol):
+    """Takes batches on the reading thread, which must not wait for it."""
+
+    def put(self, batch: Batch) -> None:
+        """Take a batch that has arrived."""
+
+    def wake(self) -> None:
+        """Look again: the stream has ended, or the board is lost."""
+
+    def is_full(self) -> bool:
+        """Whether a board whose time waits for its reader has to wait for this consumer."""
+
+
+class Last(Consumer, Protocol):
+    """Comes after the other consumers, and may hold up the reading thread."""
+
+    def relieve(self, *, at_once: bool) -> None:
+        """Let another thread read, if this one is held up or, ``at_once``, will be."""
+
+
+class Tap(Consumer, Protocol):
+    """Takes the bytes themselves too, before the batch that they completed."""
+
+    def put_raw(self, chunk: bytes) -> None:
+        """Take bytes as they arrived."""
+
+
+class Reader:
+    """Reads ``link``, whose board said ``hello``, into ``clock`` and the consumers.
+
+    When the link breaks, reading stops until ``resume``; keeper.py decides what happens then.
+    """
+
+    def __init__(self, link: Link, hello: wire.Hello) -> None:
+        self.link = link
+        #: What the board said about itself when it was opened, or when it last came back.
+        self.hello = hello
+        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
+        self.closing = threading.Event()
+        #: The error that ended everything: every call from now on raises it; and whether one did.
+        self.failure: BaseException | None = None
+        self.told = False
+        #: Why reading stopped, while it is stopped.
+        self.lost: tuple[DeviceLostError, Reason] | None = None
+        self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
+        self.every = 1  #: consumers get frames whose seq is a multiple of this
+        self.rows = 0  #: how many batches with rows have come
+        self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
+        self.silent_s = 0.0  #: for how long it has listened in vain
+        self.awaited = 0  #: how many replies are awaited
+        self.replies: deque[tuple[Any, float]] = deque()  #: what came meanwhile, and when
+        self.quiet_id = 0  #: the req_id of a question whose answer no consumer is to see
+        self.parked = False  #: nothing is read, because the board is lost
+        self.gaps = Gaps()
+        self.consumers: tuple[Consumer, ...] = ()
+        self.last: Last | None = None
+        self.taps: tuple[Tap, ...] = ()
+        #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
+        self.changed = threading.Condition()
+        self._pid = os.getpid()
+        self._decoder = _decoder(hello)
+        self._past: list[LinkStats] = []  # of decoders before a reboot
+        self._bytes = self._frames = 0
+        self._arrivals = Arrivals(self.clock)
+        self._waits_for_room = link.pace == 0
+        self._own: list[threading.Thread] = []
+        self._thread = self.thread(self._run, "reader")
+        self.start = self._thread.start
+
+    def thread(self, run: Callable[[], None], name: str) -> threading.Thread:
+        """A thread of the hand's own, which is not the program that failures are raised to."""
+        thread = threading.Thread(target=run, name=f"biotac {name} {self.link.port}", daemon=True)
+        self._own.append(thread)
+        THREADS.add(thread)
+        return thread
+
+    def is_own(self) -> bool:
+        """Whether the caller runs on a thread of this hand's own."""
+        return threading.current_thread() in self._own
+
+    def add(self, consumer: Consumer) -> None:
+        """Pass everything that arrives from now on to ``consumer`` too."""
+        with self.changed:
+            self.consumers = (*self.consumers, consumer)
+
+    def read_in_another_thread(self) -> threading.Thread:
+        """Let a new thread read. Returns the one that did, in which a consumer holds it up, and reads no more."""
+        before = self._thread
+        self._thread = self.thread(self._run, "reader")
+        self._thread.start()
+        return before
+
+    def read_elsewhere(self) -> None:
+        """Let another thread read if this one does: it is about to wait for what it would read itself."""
+        if threading.current_thread() is self._thread and self.last is not None:
+            self.last.relieve(at_once=True)
+
+    def add_tap(self, tap: Tap) -> None:
+        """Pass the bytes to ``tap`` too, and the batches."""
+        self.add(tap)
+        with self.changed:
+            self.taps = (*self.taps, tap)
+
+    def remove(self, consumer: Consumer) -> None:
+        """Pass nothing more to ``consumer``."""
+        with self.changed:
+            self.consumers = tuple(one for one in self.consumers if one is not consumer)
+            self.taps = tuple(one for one in self.taps if one is not consumer)
+            self.changed.notify_all()
+
+    # ---- what has become of it -----------------------------------------------------------------
+
+    def is_inherited(self) -> bool:
+        """Whether this process is a fork of the one that opened the board, which alone may use it."""
+        return os.getpid() != self._pid
+
+    def check(self) -> None:
+        """Raise the error that ended everything, if there was one."""
+        if self.is_inherited():
+            raise DeviceLostError(
+                f"this Hand on {self.link.port} belongs to the process that opened it, not to a fork of it; open "
+                "boards in the process that reads them"
+            )
+        if self.failure is not None:
+            self.told = self.told or not self.is_own()
+            raise self.failure
+
+    def raise_closed(self) -> NoReturn:
+        """Raise the failure, or else DeviceLostError saying that the hand was closed."""
+        self.check()
+        raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
+
+    def fail(self, error: BaseException) -> None:
+        """End everything with ``error``. The first of several errors counts."""
+        if not self.closing.is_set():
+            self.failure = self.failure or error
+        self.wake()
+
+    def lose(self, error: DeviceLostError, reason: Reason) -> None:
+        """Stop reading, because the link broke or the board fell silent."""
+        spoilt = self.link.spoilt()
+        self.lost = self.lost or (DeviceLostError(spoilt) if spoilt else error, reason)
+        self.wake()
+
+    def resume(self, hello: wire.Hello) -> None:
+        """Read on: the link was opened again, and the same board answered with ``hello``."""
+        if hello.boot_id != self.hello.boot_id:
+            self._past.append(self._decoder.stats(0, 0))
+            self._decoder = _decoder(hello)
+            self.clock.restart()
+            self._arrivals.forget()
+        else:
+            self._decoder.feed(b"\0")  # ends a packet that was cut off halfway: the rest of it will not come
+        self.hello, self.lost = hello, None
+        self.present |= hello.fingers_present
+        self.wake()
+
+    def wake(self) -> None:
+        """Let everybody who waits look again."""
+        with self.changed:
+            self.changed.notify_all()
+        for consumer in (*self.consumers, *([self.last] if self.last else [])):
+            consumer.wake()
+
+    def wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
+        """Wait until ``so`` is true, looking whenever ``changed`` is notified."""
+        with self.changed:
+            return bool(self.changed.wait_for(so, timeout_s))
+
+    def room(self) -> None:
+        """Read on, where reading waits for room: somebody took a batch, or awaits a reply."""
+        if self._waits_for_room:
+            with self.changed:
+                self.changed.notify_all()
+
+    def close(self) -> None:
+        """Stop reading and wait until it has stopped."""
+        self.closing.set()
+        self.wake()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since the handshake, over reboots too; ``..._skipped`` are the consumers'."""
+        now = self._decoder.stats(self._bytes, self._frames)
+        counted = ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors")
+        lost = {name: sum(getattr(stats, name) for stats in (*self._past, now)) for name in counted}
+        return replace(now, gaps=self.gaps.count, **lost)
+
+    # ---- reading -------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            while threading.current_thread() is self._thread and not self.closing.is_set():
+                if self.lost is not None:
+                    self._park()
+                elif self._waits_for_room and self._is_full():
+                    self.wait_for(lambda: self.lost or self.closing.is_set() or not self._is_full())
+                else:
+                    self._read()
+        except BaseException as error:  # unforeseen errors too: a thread that just ended would look like a silent board
+            self.fail(error)
+
+    def _park(self) -> None:
+        with self.changed:
+            self.parked = True
+            self.changed.notify_all()
+            self.changed.wait_for(lambda: self.lost is None or self.closing.is_set())
+            self.parked = False
+
+    def _is_full(self) -> bool:
+        if self.awaited:
+            return False
+        return any(consumer.is_full() for consumer in self.consumers) or bool(self.last and self.last.is_full())
+
+    def _read(self) -> None:
+        had_ended = self.link.ended
+        try:
+            batch = self._next()
+        except DeviceLostError as error:
+            self.lose(error, "unplugged")
+            return
+        except OSError as error:
+            self.lose(went_away(self.link.port, error), "unplugged")
+            return
+        self.silent_s = 0.0 if batch is not None else self.silent_s + POLL_S
+        if batch is not None:
+            self._arrived(batch)
+        if self.link.ended and not had_ended:
+            self.wake()
+
+    def _next(self) -> Batch | None:
+        fd, decoder = self.link.fd, self._decoder
+        if fd is not None:
+            batch = decoder.read(fd, POLL_S)
+            if batch is not None and self.taps:
+                self._tap(decoder.chunk())
+            return batch
+        chunk = self.link.read(POLL_S)
+        if chunk and self.taps:
+            self._tap(chunk)
+        return decoder.feed(chunk, time.monotonic()) if chunk else None
+
+    def _tap(self, chunk: bytes) -> None:
+        for tap in self.taps:
+            tap.put_raw(chunk)
+
+    def _arrived(self, batch: Batch) -> None:
+        messages = batch.messages
+        if self.quiet_id:
+            batch.messages = [m for m in messages if getattr(m, "req_id", 0) != self.quiet_id]
+        counted = self._counted(batch)
+        if counted is not None:
+            for consumer in self.consumers:
+                consumer.put(counted)
+        # Now, so that whoever has the reply knows that what came before it has reached every consumer.
+        if messages and self.awaited:
+            self.replies.extend((message, batch.arrived_s) for message in messages)
+            with self.changed:
+                self.changed.notify_all()
+        if counted is not None and self.last is not None:
+            self.last.put(counted)
+
+    def _counted(self, batch: Batch) -> Batch | None:
+        """``batch`` for the consumers, counted and with its Gap; None when nothing is in it."""
+        decoder = self._decoder
+        self._bytes += decoder.taken
+        last_us = decoder.last_t_us
+        if last_us is not None:
+            self.rows += 1
+            self._frames += len(batch.wire)
+            self._arrivals.note(last_us + LAST_SAMPLE_US, batch.arrived_s)
+            batch.taken_s = self.taken_s(last_us, batch.arrived_s)
+            self.last_t_us = last_us
+            batch = self.gaps.through(batch, last_us, self.hello.boot_id, decoder.lost_after)
+        elif len(batch.pac):
+            self.rows += 1
+        elif not batch.messages:
+            return None
+        return batch if self.every == 1 else thin(batch, self.every)
+
+    # ---- its time ------------------------------------------------------------------------------
+
+    def taken_s(self, t_us: int, arrived_s: float) -> float:
+        """When the last sample of a round was taken, by time.monotonic(); NaN while the board's clock is unknown.
+
+        A board whose time is not a real clock counts as just read.
+        """
+        if not self.link.keeps_time:
+            return arrived_s
+        # A row was taken before it came, whatever the clock's estimate says. NaN is never smaller.
+        return min(self.clock.estimate_s(t_us + LAST_SAMPLE_US), arrived_s)
+
+    def age_s(self, t_us: int) -> float:
+        """How long ago a message with this 32-bit device time was made; NaN while the board's clock is unknown."""
+        if not self.link.keeps_time:
+            return 0.0
+        return time.monotonic() - self.clock.estimate_s(self.unwrap_t_us(t_us))
+
+    def unwrap_t_us(self, t_us: int) -> int:
+        """A message's 32-bit device time on the same axis as the batches' ``t_us``."""
+        return self._decoder.unwrap_t_us(t_us)
+
+
+def thin(batch: Batch, every: int) -> Batch:
+    """The batch with only those frames whose seq is a multiple of ``every``; everything else stays."""
+    if not len(batch.wire):
+        return batch
+    kept = batch.seq % every == 0
+    frames = batch.wire[kept]
+    fingers = sum({1 << finger for finger in (*frames["finger"].tolist(), *batch.idle["finger"].tolist())})
+    return replace(batch, wire=frames, seq=batch.seq[kept], t_us=batch.t_us[kept], fingers=fingers)
+
+
+def _decoder(hello: wire.Hello) -> StreamDecoder:
+    decoder = StreamDecoder()
+    if hello.wire_minor > wire.WIRE_MINOR:
+        decoder.accept_newer_minor()
+    return decoder

@@ -1,0 +1,161 @@
+"""What a program wants from the board: by name, as the flags of SUBSCRIBE and START, and what the board was told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import CommandRefusedError, InputError
+from ..wire.messages_gen import Bands, Error, Event, QuantityFlags, Start, Stop, StreamFlags, Subscribe, Touch
+from ..wire.sensor_gen import MAX_SENSORS
+from ..wire.slots import FRAME_HZ
+from . import bandwidth
+from .board import Board
+
+#: What a FRAME can say about a contact.
+RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
+AT_FIRST = RESULTS | QuantityFlags.REST_FRAMES
+ALL_FINGERS = (1 << MAX_SENSORS) - 1
+# A board stops streaming this long after it last heard from its host.
+KEEPALIVE_S = 1.0
+
+QUANTITIES = {
+    "results": RESULTS,
+    "force": QuantityFlags.FORCE,
+    "poc": QuantityFlags.POC,
+    "torque": QuantityFlags.TORQUE,
+    "pressure": QuantityFlags.PRESSURE,
+    "sigma": QuantityFlags.SIGMA,
+    "touch": QuantityFlags.TOUCH,
+    "events": QuantityFlags.EVENTS,
+}
+IN_EVERY_FRAME = ("raw", "pdc", "temperature")
+STREAMS = {"pac": StreamFlags.PAC, "bands": StreamFlags.BANDS}
+NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS, "status")
+# Messages that a board sends only to those who want them, by the name of what carries them.
+CARRIED_BY = {Touch: "touch", Event: "events", Bands: "bands"}
+
+
+@dataclass(frozen=True, slots=True)
+class Wants:
+    """Flags for the board; this side keeps one of ``every`` frames."""
+
+    quantities: QuantityFlags = AT_FIRST
+    streams: StreamFlags = StreamFlags.FRAMES | StreamFlags.STATUS
+    fingers: int = ALL_FINGERS
+    every: int = 1
+
+    @classmethod
+    def of(cls, names: tuple[str, ...], *, fingers: int, rest: bool, rate_hz: float | None, has_room: bool) -> Wants:
+        """The flags for ``names``; for none, "results", with PAC where the line ``has_room``.
+
+        Raises InputError for an unknown name, or a rate out of range.
+        """
+        for name in names:
+            if name not in NAMES:
+                raise InputError(f"unknown name {name!r}; expected some of {', '.join(NAMES)}")
+        if rate_hz is not None and not 0 < rate_hz <= FRAME_HZ:
+            raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ:g}, the board's rate")
+        quantities = QuantityFlags.REST_FRAMES if rest else QuantityFlags(0)
+        # Status is the link's sign of life: without it, a hand without sensors would look dead.
+        streams = StreamFlags.STATUS
+        for name in names or ("results",):
+            quantities |= QUANTITIES.get(name, QuantityFlags(0))
+            streams |= STREAMS.get(name, StreamFlags(0))
+            if name in QUANTITIES or name in IN_EVERY_FRAME:
+                streams |= StreamFlags.FRAMES
+            if name == "results" and has_room:
+                streams |= StreamFlags.PAC
+        return cls(quantities, streams, fingers, 1 if rate_hz is None else round(FRAME_HZ / rate_hz))
+
+    def plus(self, name: str) -> Wants:
+        """These, and what carries the quantity or stream ``name``."""
+        streams = self.streams | STREAMS.get(name, StreamFlags.FRAMES)
+        return Wants(self.quantities | QUANTITIES.get(name, QuantityFlags(0)), streams, self.fingers, self.every)
+
+
+class Stream:
+    """The board's stream: what it was told to send, and whether it does."""
+
+    def __init__(self, board: Board) -> None:
+        #: Whether the board was told to stream, and has neither ended nor been stopped.
+        self.on = False
+        #: Whether a simulated source has played to its end and all of it has arrived.
+        self.ended = False
+        self.started: Start | None = None  #: the last START; None before the first and after a STOP
+        self._board = board
+        self._wants = Wants()
+        self._has_chosen = False
+        self._implied: dict[str, None] = {}  # by callbacks, in order
+
+    def start(self, names: tuple[str, ...] = (), *, fingers: int = ALL_FINGERS, rest: bool = True,
+              rate_hz: float | None = None) -> None:  # fmt: skip
+        """See Hand.stream."""
+        has_room = self._board.link.bits_per_s is None
+        self._tell(Wants.of(names, fingers=fingers, rest=rest, rate_hz=rate_hz, has_room=has_room), chosen=True)
+
+    def go(self) -> None:
+        """Start the stream, unless it runs or the source has ended."""
+        if not (self.on or self.ended):
+            self.start() if not self._has_chosen else self._tell(self._wants, chosen=True)
+
+    def imply(self, kind: type) -> None:
+        """Add what carries messages of this kind, which a callback waits for."""
+        name = CARRIED_BY.get(kind)
+        if name is not None and name not in self._implied:
+            self._implied[name] = None
+            if self.on:
+                self._tell(self._wants, chosen=self._has_chosen)
+
+    def _tell(self, wants: Wants, *, chosen: bool) -> None:
+        board, link = self._board, self._board.link
+        asked = wants
+        for name in self._implied:
+            asked = asked.plus(name)
+        present = asked.fingers & board.info.fingers_present
+        if link.bits_per_s is not None:
+            bandwidth.check(link.port, link.bits_per_s, asked.streams, present.bit_count())
+        with board.turn():
+            subscribe = Subscribe(0, ALL_FINGERS, int(asked.quantities))
+            try:
+                board.tell(subscribe, lasting=("subscription", 0))
+            except CommandRefusedError as error:
+                # A recording, and a board that somebody else streams, have the quantities that were chosen there.
+                if link.owns_stream and error.error != Error.NOT_HERE:
+                    raise
+            start = Start(0, int(asked.streams), asked.fingers, self.keepalive_ms())
+            board.tell(start)
+            self._wants, self._has_chosen, self.started, self.on = wants, chosen, start, True
+            board.reader.every = asked.every
+        board.reader.wake()
+        link.release()
+
+    def keepalive_ms(self) -> int:
+        """After how long a silence of this side the board stops; 0: never."""
+        # In device time, which may run fast on a simulated board. One that waits for its reader needs no keep-alive.
+        pace = self._board.link.pace
+        return 0 if pace == 0 else min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, pace)))
+
+    def resume(self) -> None:
+        """Make a board that stopped stream again, if it did before."""
+        with self._board.turn():
+            if self.started is not None:
+                self._board.tell(self.started)
+
+    def stop(self) -> None:
+        """Stop the stream. What was on its way has arrived when this returns."""
+        with self._board.turn():
+            self.started, self.on = None, False
+            self._board.tell(Stop(0))
+            self._board.reader.gaps.forget()
+        self._board.reader.wake()
+
+    def end(self) -> None:
+        """The simulated source has ended, and all of it has arrived."""
+        self.ended, self.on = True, False
+        self._board.reader.wake()
+
+    def leave(self) -> None:
+        """Tell the board to stop, without waiting for its answer."""
+        if self.on and self._board.connected:
+            self.started, self.on = None, False
+            self._board.send(Stop(0))

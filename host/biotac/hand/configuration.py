@@ -1,0 +1,156 @@
+"""What a board keeps for its fingers, ``hand.board``: settings, calibrations, wrench maps; and its faults."""
+
+from __future__ import annotations
+
+from ..board.board import Board
+from ..errors import CommandRefusedError, WireVersionError
+from ..keep.calibration import Calibration, own_settings
+from ..map import board_map as maps
+from ..map.board_map import BoardMap
+from ..wire import messages_gen as wire
+from ..wire.sensor_gen import MAX_SENSORS
+from . import map_transfer as transfer
+from .commands import Commands, Finger
+from .faults import Faults, faults_of
+
+
+class Configuration:
+    """Settings, calibrations and maps of a board, and its faults; each method is a command, and raises as Hand's do."""
+
+    def __init__(self, board: Board, commands: Commands) -> None:
+        self._board = board
+        self._commands = commands
+
+    def faults(self) -> Faults:
+        """What went wrong on the board since ``clear_faults`` or its start, even if only for one round.
+
+        The board keeps faults until they are cleared; reading does not clear them.
+        """
+        return faults_of(self._commands.status(), self._commands.names)
+
+    def clear_faults(self) -> Faults:
+        """Like ``faults``, and clears those on the board. A fault that is new meanwhile stays for the next call."""
+        told = self.faults()
+        self._commands.tell(wire.ClearFaults(0, int(told.board), told.by_index))
+        return told
+
+    def setting(self, setting: wire.Setting | int) -> int:
+        """The value of a setting, in the unit that wire.SETTINGS names."""
+        return self._commands.ask(wire.GetSetting(0, setting), wire.SettingValue).value
+
+    def set_setting(self, setting: wire.Setting | int, value: int) -> None:
+        """Change a setting until the next reboot; refused while streaming."""
+        self._commands.tell(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
+
+    def save_settings(self) -> None:
+        """Save the settings, calibrations and maps in force, so that they survive reboots.
+
+        Not while streaming: the board loses slots meanwhile.
+        """
+        self._commands.tell(wire.SaveSettings(0))
+
+    def reboot_bootloader(self) -> None:
+        """Send the board to its bootloader; it disconnects and comes back as a drive."""
+        self._commands.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
+
+    def settings(self) -> dict[wire.Setting, int]:
+        """All settings. For one that the board's firmware does not have, the default."""
+        return {setting: self._known_setting(setting) for setting in wire.Setting}
+
+    def _known_setting(self, setting: wire.Setting) -> int:
+        try:
+            return self.setting(setting)
+        except CommandRefusedError as error:
+            if error.error != wire.Error.UNKNOWN_SETTING:
+                raise
+            return wire.SETTINGS[setting].default
+
+    # ---- calibrations --------------------------------------------------------------------------
+
+    def calibration(self, finger: Finger) -> Calibration | None:
+        """The finger's calibration, its own values in place of the settings; None without. See calibration_state."""
+        told = self._calibration(finger)
+        return None if told.state == wire.CalibrationState.NONE else _known(told)
+
+    def calibration_state(self, finger: Finger) -> wire.CalibrationState:
+        """Whether the finger has a calibration, and whether it is in force or belongs to another sensor."""
+        return wire.CalibrationState(self._calibration(finger).state)
+
+    def set_calibration(self, finger: Finger, calibration: Calibration) -> None:
+        """Give a finger a calibration until the next reboot, or for good with save_settings.
+
+        Refused while streaming, and when its serial number is not that of the sensor that answered there when the
+        board started; ``serial=""`` fits any.
+        """
+        number = self._commands.index(finger)
+        request = wire.SetCalibration(
+            0, number, calibration.wire_serial(), calibration.made_s, calibration.wire_values()
+        )
+        self._commands.tell(request, lasting=("calibration", number))
+
+    def clear_calibration(self, finger: Finger) -> None:
+        """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
+        number = self._commands.index(finger)
+        self._commands.tell(wire.ClearCalibration(0, number), lasting=("calibration", number))
+
+    def calibrations(self) -> dict[int, Calibration]:
+        """The calibrations in force, by finger."""
+        answers = [self._calibration(finger) for finger in range(MAX_SENSORS)]
+        return {m.finger: _known(m) for m in answers if m.state == wire.CalibrationState.IN_FORCE}
+
+    def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
+        """All settings that a finger's results are computed with, for the fingers with a calibration in force."""
+        return own_settings(self.settings(), self.calibrations())
+
+    # ---- wrench maps ---------------------------------------------------------------------------
+
+    def get_map(self, finger: Finger) -> bytes | None:
+        """The finger's wrench map as the board stores it, None without; see map_state.
+
+        Raises PortError when it does not arrive intact.
+        """
+        return transfer.read(self._board, self._commands.index(finger))
+
+    def map_state(self, finger: Finger) -> wire.CalibrationState:
+        """Whether the finger has a map, and whether it is in force or belongs to another sensor."""
+        return wire.CalibrationState(transfer.info(self._board, self._commands.index(finger)).state)
+
+    def set_map(self, finger: Finger, new: bytes | BoardMap, *, force: bool = False) -> None:
+        """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
+
+        Refused while streaming, and when its serial number is not that of the sensor that answered there when the
+        board started. With ``force`` it is sent without its serial number, so that it fits any sensor, and reads back
+        like that. The former map stays in force until the new one is complete. Raises InputError for more bytes than a
+        board takes (20 KiB), and PortError when other bytes read back.
+        """
+        blob = maps.for_any_sensor(maps.as_blob(new)) if force else maps.as_blob(new)
+        number = self._commands.index(finger)
+        transfer.write(self._board, number, blob)
+        self._board.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
+
+    def clear_map(self, finger: Finger) -> None:
+        """Remove a finger's wrench map, until the next reboot or, with save_settings, for good.
+
+        Its force then comes from the setting force_model and the gains again.
+        """
+        number = self._commands.index(finger)
+        self._commands.tell(wire.ClearMap(0, number), lasting=("map", number))
+
+    def maps(self) -> dict[int, bytes]:
+        """The maps in force, by finger."""
+        infos = [transfer.info(self._board, finger) for finger in range(MAX_SENSORS)]
+        held = {m.finger: self.get_map(m.finger) for m in infos if m.state == wire.CalibrationState.IN_FORCE}
+        return {finger: blob for finger, blob in held.items() if blob is not None}
+
+    def _calibration(self, finger: Finger) -> wire.Calibration:
+        return self._commands.ask(wire.GetCalibration(0, self._commands.index(finger)), wire.Calibration)
+
+
+def _known(told: wire.Calibration) -> Calibration:
+    try:
+        return Calibration.from_wire(told.serial, told.made_s, told.value)
+    except ValueError as error:
+        raise WireVersionError(
+            f"this library does not know the board's calibration of finger {told.finger} ({error}); install the "
+            "biotac-gateway of the firmware's release"
+        ) from error

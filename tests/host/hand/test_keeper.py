@@ -1,0 +1,389 @@
+"""A stream that stops, and a board that goes away and comes back: found out, told, started again. No time passes."""
+
+from __future__ import annotations
+
+import termios
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from types import SimpleNamespace
+
+import pytest
+from live_board import Clock, Firmware, Live, frame, heartbeat, point, until
+
+import biotac
+from biotac.board import gap as gap_module
+from biotac.board import keeper
+from biotac.link.serial_port import SerialLink
+from biotac.wire import messages_gen as wire
+
+OURS, OTHER = (7,) * 12, (8,) * 12
+HELD = int(wire.FrameFlags.HELD)
+
+
+def gaps_of(hand: biotac.Hand) -> Callable[[], list[biotac.Gap]]:
+    """All gaps from now on."""
+    gaps: list[biotac.Gap] = []
+    hand.on_gap(gaps.append)
+    return lambda: gaps
+
+
+# ---- it answers, but does not stream -------------------------------------------------------------
+
+
+def test_a_started_stream_is_looked_at_at_once(live: Live, monkeypatch) -> None:
+    monkeypatch.setattr(keeper, "LOOK_S", 600.0)
+    live.hand.stream()
+    live.firmware.wait_for(wire.GetStatus)
+    live.hand.stream("raw")
+    live.firmware.wait_for(wire.GetStatus, 2)
+
+
+def test_looks_keep_a_stream_alive_and_are_nobody_elses(live: Live, quick) -> None:
+    seen: list[wire.Status] = []
+    live.hand.on_status(seen.append)
+    live.hand.stream()
+    live.firmware.wait_for_looks(50)
+    assert live.hand.status().req_id > 0  # asked for by the program, it is the program's
+    until(lambda: len(seen) == 1)
+    live.hand.stop()
+    looks = len(live.firmware.of(wire.GetStatus))
+    live.hand.ping()
+    live.hand.ping()
+    assert len(live.firmware.of(wire.GetStatus)) == looks
+    assert len(live.firmware.of(wire.Start)) == 1
+
+
+def test_a_stream_that_another_host_took_is_a_lost_board(live: Live, quick) -> None:
+    live.hand.stream()
+    live.firmware.wait_for_looks()
+    live.firmware.streams = 0b100
+    with pytest.raises(biotac.DeviceLostError, match=r"another program, or the board's other port, took the stream"):
+        live.hand.read(1.0)
+    assert len(live.firmware.of(wire.Start)) == 1 and not live.hand.connected
+
+
+def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, quick) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream("force")
+    live.send(frame(1), frame(1, finger=2))
+    live.firmware.wait_for_looks()
+    live.firmware.after[wire.Start] = frame(11) + frame(11, finger=2)
+    live.firmware.faults, live.firmware.streams = int(wire.FaultFlags.HOST_SILENT), 0
+    until(gaps)
+    (gap,) = gaps()
+    assert (gap.reason, gap.last_t_us, gap.next_t_us, gap.fingers) == ("paused", 10_000, 110_000, 0b101)
+    assert (gap.frames_missed, gap.holds_lapsed, gap.boot_id) == (2 * 9, 0, 1)
+    first, again = live.firmware.of(wire.Start)
+    assert (first.streams, first.fingers, first.keepalive_ms) == (again.streams, again.fingers, again.keepalive_ms)
+    live.firmware.wait_for_looks()  # the fault is latched, and not new any more
+    assert live.hand.connected and len(live.firmware.of(wire.Start)) == 2
+
+
+def test_a_stream_without_rows_is_started_again_once_and_then_lost(live: Live, quick) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.send(frame(1))
+    live.firmware.after[wire.Start] = frame(2)
+    live.firmware.idle = False
+    until(gaps)
+    assert gaps()[0].reason == "silence"
+    with pytest.raises(biotac.DeviceLostError, match="answers, but its stream stays silent; look for the cause"):
+        live.hand.read(100.0)
+    assert len(live.firmware.of(wire.Start)) == 2  # by the program, and once more
+
+
+@pytest.mark.parametrize("how", [{"fingers_present": 0}, {}])
+def test_where_no_rows_are_due_none_are_missed(scripted_board, hello, quick, how) -> None:
+    firmware = Firmware(hello, **how)
+    live = Live(scripted_board(firmware), firmware)
+    firmware.idle = False
+    live.hand.stream("status")
+    firmware.wait_for_looks(20)
+    live.hand.check()
+    live.hand.close()
+    assert len(firmware.of(wire.Start)) == 1
+
+
+def test_a_board_that_does_not_answer_is_lost(live: Live, quick) -> None:
+    live.hand.stream()
+    live.firmware.wait_for_looks()
+    live.firmware.mute = {wire.GetStatus}
+    live.hand.link.patience = 0.01
+    with pytest.raises(biotac.DeviceLostError, match="did not answer GetStatus"):
+        live.hand.read(1.0)
+
+
+def test_a_board_that_restarted_while_nothing_streamed_is_found_out(live: Live, quick) -> None:
+    live.firmware.facts["boot_id"] = 2
+    live.hand.stream()
+    with pytest.raises(biotac.DeviceLostError, match="restarted; open it again"):
+        live.hand.read(1.0)
+
+
+def test_another_program_that_changes_the_ports_settings_is_named(live: Live, quick) -> None:
+    live.hand.stream()
+    settings = termios.tcgetattr(live.hand.link.fd)
+    settings[3] |= termios.ICANON
+    termios.tcsetattr(live.hand.link.fd, termios.TCSANOW, settings)
+    live.send(frame(1), b"\4", b"\4")  # its end of file
+    with pytest.raises(biotac.DeviceLostError, match=r"changed the settings of .*, as `stty` does"):
+        live.hand.read(1.0)
+
+
+@pytest.mark.parametrize("moment", ["close", "stop"])
+def test_ending_a_stream_is_nobody_taking_it(scripted_board, hello, quick, moment) -> None:
+    for _ in range(20):
+        firmware = Firmware(hello)
+        live = Live(board := scripted_board(firmware), firmware)
+        live.hand.stream()
+        if moment == "stop":
+            live.hand.stop()
+        live.hand.close()
+        board.close()
+
+
+# ---- holes in the stream -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("pieces", [1, 2])
+@pytest.mark.parametrize(("next_seq", "next_us", "reason"), [(101, 1_010_000, "lost"), (2, 1_010_000, "finger")])
+def test_rows_that_are_missing_are_told(live: Live, pieces, next_seq, next_us, reason) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.send(frame(0), frame(0, finger=1))
+    until(lambda: live.hand._reader.gaps._seen_us)
+    rows = [frame(1), frame(1, finger=1), frame(25, finger=1), frame(next_seq, t_us=next_us)]
+    for piece in [rows] if pieces == 1 else [rows[:3], rows[3:]]:
+        live.send(*piece)
+    until(gaps)
+    (gap,) = gaps()
+    assert (gap.reason, gap.fingers, gap.next_t_us, gap.boot_id) == (reason, 0b1, next_us, 1)
+    assert gap.last_t_us in (10_000, 250_000)  # to within a batch
+    assert gap.back_at_ns - gap.lost_at_ns >= 1000 * (next_us - gap.last_t_us)
+
+
+def test_heartbeats_cover_their_time_and_short_losses_are_only_counted(live: Live) -> None:
+    live.hand.stream(rest=False)
+    live.send(frame(1))
+    live.send(heartbeat(101, frames=100))
+    live.send(frame(110))
+    live.hand.ping()
+    assert live.hand.stats.gaps == 0 and live.hand.stats.frames_lost == 8
+
+
+# ---- a board that was lost -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
+    """A port that is a symbolic link, boards that can be behind it, and a hand that was opened on it."""
+    world = SimpleNamespace(path=tmp_path / "ttyBOARD", clock=Clock(), hand=None)
+
+    def plug(**facts: object) -> SimpleNamespace:
+        firmware = Firmware(hello, **({"board_serial": OURS} | facts))
+        board = scripted_board(firmware)
+        point(world.path, board.path)
+        return SimpleNamespace(board=board, firmware=firmware)
+
+    def unplug(there: SimpleNamespace) -> None:
+        point(world.path, "")
+        there.board.hang_up()  # as the kernel does: whoever reads the port gets an error from now on
+
+    def opened(there: SimpleNamespace, reconnect: bool = True) -> Live:
+        link = SerialLink(str(world.path))
+        live = Live(there.board, there.firmware, link, reconnect=reconnect, host_clock=world.clock)
+        world.hand = live.hand
+        return live
+
+    world.plug, world.unplug, world.opened = plug, unplug, opened
+    yield world
+    if world.hand is not None:
+        with suppress(biotac.BiotacError):
+            world.hand.close()
+
+
+def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:
+    live = world.opened(there := world.plug(), reconnect=False)
+    live.hand.stream()
+    world.unplug(there)
+    for _ in range(2):
+        with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):
+            live.hand.read(1.0)
+    assert not live.hand.connected
+    live.hand.close()  # told before
+
+
+@pytest.mark.parametrize(("boot_id", "reason"), [(1, "unplugged"), (2, "rebooted")])
+def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, boot_id, reason) -> None:
+    live = world.opened(there := world.plug(boot_id=1))
+    hand, back = live.hand, []
+    for setting, value in ((1, 2), (2, 50), (1, 0)):
+        hand.board.set_setting(setting, value)
+    hand.stream("force", "pac", rest=False)
+    gaps = gaps_of(hand)
+    hand.hold(0)
+    live.send(frame(10), frame(11))
+    until(lambda: hand[0].t_us == 110_000)
+
+    def return_at_third(pauses: int) -> None:
+        if pauses == 3:
+            back.append(world.plug(boot_id=boot_id))
+            back[0].firmware.after[wire.Start] = frame(50)
+
+    world.clock.while_away = return_at_third
+    live.send(b"\x01half a fra")
+    world.unplug(there)
+    until(gaps)
+    (gap,), told = gaps(), back[0].firmware
+    assert (gap.reason, gap.last_t_us, gap.next_t_us, gap.boot_id) == (reason, 110_000, 500_000, boot_id)
+    assert (gap.holds_lapsed, told.of(wire.Hold)) == (1, [])  # nothing renews a hold
+    assert gap.frames_missed == (None if boot_id == 2 else 38)
+    assert world.clock.pauses == 3 and gap.back_at_ns >= gap.lost_at_ns
+    assert [(m.setting, m.value) for m in told.of(wire.SetSetting)] == [(2, 50), (1, 0)]
+    assert [m.quantities for m in told.of(wire.Subscribe)] == [wire.QuantityFlags.FORCE]
+    assert [(m.streams, m.keepalive_ms) for m in told.of(wire.Start)] == [(0b111, 1000)]
+    assert hand.stats.gaps == 1 and hand.connected and hand[0].t_us == 500_000
+
+
+def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) -> None:
+    for reconnect in (False, True):
+        live = world.opened(there := world.plug(boot_id=1), reconnect=reconnect)
+        live.hand.board.set_setting(1, 2)
+        gaps = gaps_of(live.hand)
+        live.hand.stream()
+        live.send(frame(1000))
+        there.firmware.wait_for_looks()
+        there.firmware.facts["boot_id"], there.firmware.streams = 2, 0
+        there.firmware.t_us = 0
+        there.firmware.after[wire.Start] = frame(1)
+        if not reconnect:
+            with pytest.raises(biotac.DeviceLostError, match="restarted; open it again"):
+                live.hand.read(1000.0)
+            with suppress(biotac.DeviceLostError):
+                live.hand.close()
+    until(gaps)
+    assert (gaps()[0].reason, gaps()[0].next_t_us, live.hand.info.boot_id) == ("rebooted", 10_000, 2)
+    assert [m.value for m in there.firmware.of(wire.SetSetting)] == [2, 2]
+    assert live.hand.stats.disordered == 0  # numbers that begin anew are no step back
+
+
+def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
+    live = world.opened(there := world.plug(boot_id=1))
+    live.hand.stream()
+    strangers, refusals = [], []
+
+    def command() -> None:
+        with pytest.raises(biotac.DeviceLostError, match="is away and being looked for"):
+            live.hand.ping()
+        refusals.append(live.hand[0].stale)
+
+    def others(pauses: int) -> None:
+        if pauses == 1:
+            strangers.append(world.plug(board_serial=OTHER))
+        if pauses == 2:
+            thread = threading.Thread(target=command)
+            thread.start()
+            thread.join()
+        if pauses == 3:
+            world.plug(boot_id=1)
+
+    world.clock.while_away = others
+    world.unplug(there)
+    until(lambda: live.hand.connected and world.clock.pauses == 3)
+    assert {type(m) for m in strangers[0].firmware.told} == {wire.Stop, wire.HelloRequest}
+    assert refusals == ["the board is away and being looked for"]
+    live.hand.ping()
+
+
+def test_a_board_that_is_lost_while_it_is_restored_is_restored_again(world) -> None:
+    live = world.opened(there := world.plug(boot_id=1))
+    live.hand.board.set_setting(1, 2)
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.send(frame(10))
+    until(lambda: live.hand[0].t_us == 100_000)
+    back = []
+
+    def while_away(pauses: int) -> None:
+        back.append(world.plug(boot_id=2))
+        firmware = back[-1].firmware
+        if pauses == 1:
+            firmware.mute = {wire.SetSetting}
+            threading.Thread(target=lambda: (firmware.wait_for(wire.SetSetting), world.unplug(back[0]))).start()
+        firmware.after[wire.Start] = frame(1)
+
+    world.clock.while_away = while_away
+    world.unplug(there)
+    until(gaps)
+    assert [gap.reason for gap in gaps()] == ["rebooted"]
+    assert [m.value for m in back[-1].firmware.of(wire.SetSetting)] == [2]
+
+
+def test_a_stream_that_is_stopped_while_the_board_is_away_stays_stopped(world) -> None:
+    live = world.opened(there := world.plug())
+    live.hand.stream()
+    back = []
+
+    def while_away(pauses: int) -> None:
+        if pauses == 1:
+            thread = threading.Thread(target=lambda: suppress(biotac.DeviceLostError).__enter__() or stop())
+            thread.start()
+            thread.join()
+            back.append(world.plug())
+
+    def stop() -> None:
+        with suppress(biotac.DeviceLostError):
+            live.hand.stop()
+
+    world.clock.while_away = while_away
+    world.unplug(there)
+    until(lambda: live.hand.connected and back)
+    live.hand.ping()
+    assert back[0].firmware.of(wire.Start) == [] and not live.hand.streaming
+
+
+def test_close_ends_the_search(world) -> None:
+    live = world.opened(there := world.plug())
+    live.hand.stream()
+    world.unplug(there)
+    until(lambda: world.clock.pauses > 3)
+    live.hand.close()
+    assert live.hand._board.closed
+
+
+# ---- holds ---------------------------------------------------------------------------------------
+
+
+def lapse(live: Live, *rows: bytes) -> None:
+    live.firmware.wait_for_looks()
+    live.firmware.after[wire.Start] = b"".join(rows)
+    live.firmware.faults, live.firmware.streams = int(wire.FaultFlags.HOST_SILENT), 0
+
+
+def test_a_hold_that_lapsed_is_in_the_gap_and_is_not_renewed(live: Live, quick) -> None:
+    gaps = gaps_of(live.hand)
+    live.hand.stream()
+    live.hand.hold(0, 1)
+    live.send(frame(1, flags=HELD), frame(1, finger=1, flags=HELD))
+    lapse(live, frame(10, finger=1, flags=HELD), frame(11, finger=1, flags=HELD), frame(11))
+    until(gaps)
+    assert gaps()[0].holds_lapsed == 0b1
+    assert len(live.firmware.of(wire.Hold)) == 1
+
+
+def test_rows_wait_for_what_held_fingers_say_but_not_for_ever_and_come_once(live: Live, quick) -> None:
+    live.hand.stream()
+    live.hand.hold(0, 1)
+    live.send(frame(1, flags=HELD), frame(1, finger=1, flags=HELD))
+    seqs: list[int] = []
+    lapse(live, frame(9, flags=HELD))
+    live.firmware.wait_for(wire.Start, 2)
+    live.hand.on_batch(lambda batch: seqs.extend(batch.seq.tolist()))
+    gaps = gaps_of(live.hand)
+    for seq in range(10, 10 + gap_module.BATCHES_HELD_BACK + 1):
+        live.hand.ping()  # replies do not wait
+        live.send(frame(seq, flags=HELD))
+    until(lambda: 10 + gap_module.BATCHES_HELD_BACK in seqs)
+    assert [gap.holds_lapsed for gap in gaps()] == [0b10]
+    assert seqs[-gap_module.BATCHES_HELD_BACK - 1 :] == sorted(set(seqs))[-gap_module.BATCHES_HELD_BACK - 1 :]

@@ -1,0 +1,370 @@
+"""Never an old force as a new one: every way of reading, through every way in which a stream can stop.
+
+A simulated board in real time, behind a proxy; the reader is a program of its own, which can be stopped. Its clock and
+this one's are the same, and the board's own time is told from what passed before the stop: how old something was when
+it was shown is known to within the jitter of this computer, whatever the library says.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from board_behind_proxy import BoardBehindProxy
+
+import biotac
+from biotac.board.gap import JUMP_US
+
+PROGRAM = Path(__file__).resolve().parents[1] / "support" / "liveness_program.py"
+ROS = Path(__file__).resolve().parents[2] / "host" / "ros2" / "biotac_ros2"
+MAX_AGE_S = 0.25
+# The library's clock and this test's differ by the quickest message's delay, and a look takes some time itself.
+TOLERANCE_S = 0.1
+STEADY_FRAMES = 120
+# All is over within a second on a quiet computer; a busy one may take its time, but shows nothing old meanwhile.
+PATIENCE = float(os.environ.get("BIOTAC_PATIENCE", "10"))
+HELD = """
+name = "held"
+fingers = FINGERS
+[[step]]
+do = "rest"
+seconds = 1.0
+[[step]]
+do = "press"
+seconds = 0.5
+at = "E17"
+force_n = 4.0
+[[step]]
+do = "hold"
+seconds = 600.0
+"""
+LOOSE = """
+[[fault]]
+at_s = 5.0
+seconds = 1.2
+finger = 1
+kind = "stuck_low"
+"""
+
+
+class Program:
+    """The reader, and all that it said."""
+
+    def __init__(self, way: str, board: BoardBehindProxy | Served, *, reconnect: bool, folder: Path) -> None:
+        words = [way, str(board.path), "yes" if reconnect else "no", str(folder)]
+        pipe, paths = subprocess.PIPE, [str(ROS), os.environ.get("PYTHONPATH", "")]
+        env = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "ROS_LOG_DIR": str(folder)}
+        env["ROS_DOMAIN_ID"] = str(os.getpid() % 100 + 1)  # nodes beside this one do not hear it
+        self._process = subprocess.Popen(
+            [sys.executable, str(PROGRAM), *words], stdin=pipe, stdout=pipe, text=True, env=env
+        )
+        self.said: list[dict[str, Any]] = []
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.said.append(json.loads(line))
+
+    def of(self, what: str) -> list[dict[str, Any]]:
+        return [one for one in list(self.said) if what in one]
+
+    def wait_for_rows(self) -> None:
+        """Until it has said as many new values as make its clock settle."""
+        end_s, before = time.monotonic() + 300, len(self.said)
+        while sum(bool(one.get("shown") or one.get("t_us")) for one in self.said[before:]) < STEADY_FRAMES:
+            assert time.monotonic() < end_s
+            time.sleep(0.01)
+
+    def pause(self, seconds: float) -> None:
+        self._process.send_signal(signal.SIGSTOP)
+        time.sleep(seconds)
+        self._process.send_signal(signal.SIGCONT)
+
+    def end(self) -> None:
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.close()
+        assert self._process.wait(300) == 0
+        self._thread.join()
+        self._process.stdout.close()
+
+
+@pytest.fixture
+def board(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[BoardBehindProxy]:
+    """The simulated board; where a test names it "pico", the Pico's image in the emulator."""
+    (tmp_path / "held.toml").write_text(HELD.replace("FINGERS", "1"))
+    board = BoardBehindProxy(str(tmp_path / "held.toml"), tmp_path, getattr(request, "param", "posix"))
+    yield board
+    board.close()
+
+
+WAYS = ["pull", "views", "callbacks", "aio", "record", "lsl"]
+# Each opens its hand itself, without reconnect; the page looks for a lost board by opening it anew.
+OPENERS = ["page", "ros"]
+ON_PICO = ["pull", "views"]
+PAUSES_S = [0.5, 1.6, 5.0, 30.0]
+BY_DAY = {("pull", 1.6), ("views", 1.6), ("callbacks", 1.6), ("record", 1.6), ("views", 0.5)}
+
+
+def running(program: Program, board: BoardBehindProxy) -> None:
+    """Until the program streams, and its clock has settled."""
+    board.wait_for(lambda: len(board.passed) >= STEADY_FRAMES)
+
+
+def offset_s(program: Program) -> float:
+    """This computer's time at the board's time 0, by the quickest row that was ever seen."""
+    rows = [(one["at_s"], one.get("t_us", one.get("shown"))) for one in program.said]
+    return min(at_s - t_us * 1e-6 for at_s, t_us in rows if t_us)
+
+
+def no_old_value_was_shown_as_new(program: Program, first_s: float) -> None:
+    """A view shows nothing older than it may; batches tell their true age."""
+    for one in program.said:
+        if one.get("shown") is not None:
+            assert one["at_s"] - first_s - one["shown"] * 1e-6 <= MAX_AGE_S + TOLERANCE_S, one
+        if one.get("age_s") is not None:
+            assert one["age_s"] >= one["at_s"] - first_s - one["t_us"] * 1e-6 - TOLERANCE_S, one
+
+
+@pytest.mark.parametrize(
+    ("board", "way", "pause_s", "reconnect"),
+    [
+        pytest.param("posix", way, pause_s, reconnect, marks=() if by_day else pytest.mark.nightly)
+        for way in [*WAYS, *OPENERS]
+        for pause_s in PAUSES_S
+        for reconnect in ([False] if way in OPENERS else [False, True])
+        for by_day in [(way, pause_s) in BY_DAY and not reconnect]
+    ]
+    + [pytest.param("pico", way, pause_s, False, marks=pytest.mark.nightly) for way in ON_PICO for pause_s in PAUSES_S],
+    indirect=["board"],
+)
+def test_a_program_that_was_stopped_goes_on_and_is_told(
+    board: BoardBehindProxy, tmp_path: Path, way: str, pause_s: float, reconnect: bool
+) -> None:
+    program = Program(way, board, reconnect=reconnect, folder=tmp_path)
+    running(program, board)
+    first_s = None if way == "record" else offset_s(program)
+    program.pause(pause_s)
+    resumed_s = time.monotonic()
+    before = len(board.passed)
+    board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
+    program.end()
+    assert not program.of("lost")
+    stamps_us = [t_us for t_us, _ in board.passed]
+    at = max(range(1, len(stamps_us)), key=lambda k: stamps_us[k] - stamps_us[k - 1])
+    last_us, next_us = stamps_us[at - 1], stamps_us[at]
+    if first_s is not None:
+        assert first_s + next_us * 1e-6 <= resumed_s + 1.0 * PATIENCE  # of the board's time
+        no_old_value_was_shown_as_new(program, first_s)
+    if way == "record":
+        (path,) = program.of("paths")[0]["paths"]
+        recording = biotac.Recording(path)
+        gaps = recording.gaps
+        assert program.of("frames")[0]["frames"] == len(recording.frames)
+    elif way == "views":
+        assert bool(program.of("counted")) == (next_us - last_us > JUMP_US)
+        return
+    elif way == "page":
+        assert bool(program.of("marked")) == (next_us - last_us > JUMP_US)
+        return
+    else:
+        gaps = [biotac.Gap.from_text(one["gap"]) for one in program.of("gap")]
+    if way == "callbacks":
+        assert len(program.of("on_gap")) == len(gaps)
+    if next_us - last_us <= JUMP_US:
+        assert pause_s < 1.0 and not gaps
+        return
+    (gap,) = gaps
+    assert gap.reason == ("paused" if pause_s > 1 else "lost")
+    assert (gap.last_t_us, gap.next_t_us) == (last_us, next_us)
+    assert gap.frames_missed == round((next_us - last_us) / 10_000) - 1
+
+
+def stops(board: BoardBehindProxy, cause: str) -> None:
+    """Let the stream stop for this cause."""
+    if cause == "reset":
+        board.boot()
+    elif cause == "silent":
+        board.silent = True
+    elif cause == "taken":
+        board.take_over()
+    else:
+        board.unplug()
+
+
+CAUSES = {
+    "reset": "restarted|did not answer",
+    "silent": "stream stays silent",
+    "taken": "took the stream",
+    "unplugged": "went away",
+}
+
+
+@pytest.mark.parametrize(
+    ("board", "way", "cause"),
+    [
+        pytest.param("posix", way, cause, marks=() if way in ("pull", "views") else pytest.mark.nightly)
+        for way in [*WAYS, *OPENERS]
+        for cause in CAUSES
+    ]
+    + [pytest.param("pico", way, cause, marks=pytest.mark.nightly) for way in ON_PICO for cause in CAUSES],
+    indirect=["board"],
+)
+def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_path: Path, way: str, cause: str) -> None:
+    program = Program(way, board, reconnect=False, folder=tmp_path)
+    running(program, board)
+    first_s = None if way == "record" else offset_s(program)
+    starts = board.starts
+    stops(board, cause)
+    stopped_s = time.monotonic()
+    board.wait_for(lambda: bool(program.of("lost")))
+    program.end()
+    (lost,) = program.of("lost")
+    assert re.search(CAUSES[cause], lost["lost"])
+    if way != "page" or cause == "taken":  # it opens the board again, unless another program took it
+        assert board.starts - starts == (cause == "silent")  # a link that another took is not taken back
+    # A board that answers but is silent is started once more before it is given up.
+    assert lost["at_s"] <= stopped_s + (4.0 if cause == "silent" else 1.0) * PATIENCE
+    if first_s is not None:
+        no_old_value_was_shown_as_new(program, first_s)
+
+
+@pytest.mark.parametrize(
+    ("board", "way", "cause"),
+    [
+        pytest.param("posix", way, cause, marks=() if way == "views" else pytest.mark.nightly)
+        for way in WAYS
+        for cause in ("reset", "unplugged", "silent")
+    ]
+    + [
+        pytest.param("pico", way, cause, marks=pytest.mark.nightly)
+        for way in ON_PICO
+        for cause in ("reset", "unplugged", "silent")
+    ],
+    indirect=["board"],
+)
+def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_path: Path, way: str, cause: str) -> None:
+    program = Program(way, board, reconnect=True, folder=tmp_path)
+    running(program, board)
+    stops(board, cause)
+    if cause == "unplugged":
+        time.sleep(0.5)
+        board.plug()
+    elif cause == "silent":
+        board.wait_for(lambda: board.starts >= 2)
+        board.silent = False
+    before = len(board.passed)
+    board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
+    program.end()
+    assert not program.of("lost")
+    if way == "views":
+        assert program.of("counted") and program.said[-1]["shown"] is not None
+        return
+    if way == "record":
+        gaps = [gap for path in program.of("paths")[0]["paths"] for gap in biotac.Recording(path).gaps]
+    else:
+        gaps = [biotac.Gap.from_text(one["gap"]) for one in program.of("gap")]
+    assert [gap.reason for gap in gaps] == [{"reset": "rebooted"}.get(cause, "silence" if cause == "silent" else cause)]
+
+
+@pytest.mark.parametrize("way", [pytest.param(w, marks=() if w in ON_PICO else pytest.mark.nightly) for w in WAYS])
+def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path, way: str) -> None:
+    (tmp_path / "loose.toml").write_text(HELD.replace("FINGERS", "2").replace("600.0", "300.0") + LOOSE)
+    board = BoardBehindProxy(str(tmp_path / "loose.toml"), tmp_path)
+    program = Program(way, board, reconnect=False, folder=tmp_path)
+
+    def hole() -> tuple[int, int]:
+        stamps_us = [t_us for t_us, finger in board.passed if finger == 1]
+        return max(pairwise(stamps_us), key=lambda two: two[1] - two[0], default=(0, 0))
+
+    board.wait_for(lambda: hole()[1] - hole()[0] > 1_000_000)
+    before = len(board.passed)
+    board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
+    program.end()
+    board.close()
+    assert not program.of("lost")
+    if way != "record":
+        no_old_value_was_shown_as_new(program, offset_s(program))
+    if way == "views":
+        assert program.of("counted") and program.said[-1]["shown"] is not None
+        return
+    if way == "record":
+        (gap,) = biotac.Recording(program.of("paths")[0]["paths"][0]).gaps
+    else:
+        (gap,) = (biotac.Gap.from_text(one["gap"]) for one in program.of("gap"))
+    assert (gap.reason, gap.fingers, (gap.last_t_us, gap.next_t_us)) == ("finger", 0b10, hole())
+
+
+def test_a_hold_that_lapsed_in_a_pause_is_told_and_not_renewed(board: BoardBehindProxy) -> None:
+    with biotac.open(str(board.path)) as hand:
+        hand.stream()
+        hand.hold("index")
+        gaps: list[biotac.Gap] = []
+        hand.on_gap(gaps.append)
+        board.wait_for(lambda: bool(hand["index"].flags & biotac.FrameFlags.HELD))
+        link, write = hand.link, hand.link.write
+        link.write = lambda data: None  # type: ignore[method-assign]  # the board hears nothing, as if this stood still
+        time.sleep(2.5)
+        link.write = write  # type: ignore[method-assign]
+        board.wait_for(lambda: bool(gaps))
+        assert gaps[0].holds_lapsed == 1
+        board.wait_for(lambda: not hand["index"].stale)
+        assert not hand["index"].flags & biotac.FrameFlags.HELD
+
+
+class Served:
+    """The board, shared on this computer by a program of its own."""
+
+    def __init__(self, board: BoardBehindProxy) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        words = ["share", str(board.path), "--zenoh", "left", "--listen", endpoint]
+        self._process = subprocess.Popen([sys.executable, "-m", "biotac", *words], stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        self._process.stdout.readline()  # it is shared
+        self.path = f"zenoh:left?connect={endpoint}"
+        self.passed, self.wait_for = board.passed, board.wait_for
+
+    def close(self) -> None:
+        assert self._process.stdout is not None
+        self._process.send_signal(signal.SIGINT)
+        self._process.wait(60)
+        self._process.stdout.close()
+
+
+@pytest.fixture
+def served(board: BoardBehindProxy) -> Iterator[Served]:
+    served = Served(board)
+    yield served
+    served.close()
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("way", ["pull", "views"])
+@pytest.mark.parametrize("pause_s", PAUSES_S)
+def test_a_reader_of_a_shared_board_that_was_stopped(served: Served, tmp_path: Path, way: str, pause_s: float) -> None:
+    """The network keeps what came meanwhile, or drops it, or ends the session: what arrives late is known as old."""
+    program = Program(way, served, reconnect=True, folder=tmp_path)
+    program.wait_for_rows()
+    first_s = offset_s(program)
+    program.pause(pause_s)
+    resumed_s = time.monotonic()
+    program.wait_for_rows()
+    rows = [one for one in program.said if (one.get("shown") or one.get("t_us")) and one["at_s"] > resumed_s]
+    program.end()
+    no_old_value_was_shown_as_new(program, first_s)
+    assert not program.of("lost") and rows

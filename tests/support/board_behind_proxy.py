@@ -1,0 +1,130 @@
+"""A simulated board in real time behind a proxy's pty: the proxy sees what passes, and breaks the link in every way."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import threading
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+from deframer import Deframer, encode
+
+from biotac.sim.loading import load_source
+from biotac.sim.ports import start_board
+from biotac.sim.process import SimBoard
+from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
+
+ROWS = {wire.Frame.ID, wire.Pac.ID, wire.Idle.ID, wire.Bands.ID}
+
+
+class BoardBehindProxy:
+    """``path`` is a symbolic link to the proxy's pty. What came through is in ``passed``: (device time, finger)."""
+
+    def __init__(self, source: str, folder: Path, kind: str = "posix") -> None:
+        self.path = folder / "ttyBOARD"
+        self._source, self._kind = source, kind
+        self.passed: list[tuple[int, int]] = []
+        self.starts = 0  #: how many START commands came
+        self.silent = False  #: rows do not pass; answers do
+        self.gone = False
+        self._wires: tuple[int, int] | None = None  # the proxy's side of its pty, and the board's port
+        self._over = threading.Event()
+        self._changing = threading.Lock()
+        self._board: SimBoard | None = None
+        self.boot()
+        self.plug()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def boot(self) -> None:
+        """Start the board, or another one in its place: what was in its memory is gone."""
+        before = self._board
+        board = start_board(self._kind, load_source(self._source, seconds=900), pace=1.0)
+        port = os.open(board.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        tty.setraw(port)
+        board.release()
+        with self._changing:
+            if before is not None:
+                os.close(self._port)
+                before.close()
+            self._board, self._port = board, port
+            self._from_board, self._from_host = Deframer(), Deframer()
+
+    def plug(self) -> None:
+        """Make the proxy's pty, and the link to it."""
+        with self._changing:
+            self._near, far = pty.openpty()
+            tty.setraw(far)
+            os.set_blocking(self._near, False)
+            self.path.unlink(missing_ok=True)
+            self.path.symlink_to(os.ttyname(far))
+            self._far = far
+            self.gone = False
+
+    def unplug(self) -> None:
+        """As the kernel does: whoever reads the port gets an error from now on, and its name is gone."""
+        with self._changing:
+            self.gone = True
+            self.path.unlink()
+            os.close(self._far)
+            os.close(self._near)
+
+    def take_over(self) -> None:
+        """Another program stops the stream."""
+        with self._changing:
+            os.write(self._port, encode(wire.Stop.ID, wire.Stop(77).pack()))
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            with self._changing:
+                watched = [self._port] if self.gone else [self._port, self._near]
+                ready, _, _ = select.select(watched, [], [], 0)
+                try:
+                    if self._port in ready:
+                        self._pass_on(os.read(self._port, 4096))
+                    if not self.gone and self._near in ready:
+                        self._hear(os.read(self._near, 4096))
+                except OSError:
+                    ready = []  # it hangs up just now
+            if not ready:
+                time.sleep(0.001)
+
+    def _hear(self, chunk: bytes) -> None:
+        self.starts += sum(message_id == wire.Start.ID for message_id, _ in self._from_host.feed(chunk))
+        os.write(self._port, chunk)
+
+    def _pass_on(self, chunk: bytes) -> None:
+        for message_id, payload in self._from_board.feed(chunk):
+            is_row = message_id in ROWS or (message_id == wire.Status.ID and payload[6] == 0)
+            if self.gone or (self.silent and is_row):
+                continue
+            try:
+                data = encode(message_id, payload)
+                whole = os.write(self._near, data) == len(data)
+            except BlockingIOError:
+                continue  # the pty is full, as a board's ring would be
+            if message_id == wire.Frame.ID and whole:
+                t_us = int.from_bytes(payload[2:6], "little")
+                self.passed.append((t_us, payload[DTYPES[wire.Frame.ID].fields["finger"][1]]))  # type: ignore[index]
+
+    def wait_for(self, so: Callable[[], bool]) -> None:
+        """Until ``so`` is true; only a failing test waits for minutes."""
+        end_s = time.monotonic() + 300
+        while not so():
+            assert time.monotonic() < end_s
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        """End it."""
+        self._over.set()
+        self._thread.join()
+        if not self.gone:
+            self.unplug()
+        os.close(self._port)
+        assert self._board is not None
+        self._board.close()

@@ -1,0 +1,175 @@
+"""A program that reads a hand in one of the ways there are, and says what it sees as JSON lines.
+
+python liveness_program.py WAY PORT RECONNECT [FOLDER]; it ends with the end of stdin.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from urllib.request import urlopen
+
+import biotac
+
+LOOK_S = 0.01
+over = threading.Event()
+
+
+def say(**what: Any) -> None:
+    """One observation, at the time of this computer that all processes share."""
+    print(json.dumps({"at_s": time.monotonic()} | what), flush=True)
+
+
+def say_gaps(batch: biotac.Batch) -> None:
+    """The gaps that a batch tells."""
+    for message in batch.messages:
+        if isinstance(message, biotac.Gap):
+            say(gap=message.as_text())
+
+
+def say_batch(batch: biotac.Batch) -> None:
+    """What a reader of batches has in hand: how old it is by its own account, and of when it is."""
+    say_gaps(batch)
+    if len(batch.t_us):
+        at_s, age_s = time.monotonic(), batch.age_s
+        say(at_s=at_s, t_us=int(batch.t_us[-1]), age_s=None if math.isnan(age_s) else age_s)
+
+
+def pull(hand: biotac.Hand) -> None:
+    while not over.is_set():
+        say_batch(hand.read_batch(0.02))
+
+
+def views(hand: biotac.Hand) -> None:
+    hand.stream()
+    finger = hand[hand.fingers[-1]]
+    gaps = 0
+    while not over.wait(LOOK_S):
+        at_s = time.monotonic()
+        frame, stats = finger.frame, hand.stats
+        if stats.gaps != gaps:
+            gaps = stats.gaps
+            say(counted=gaps)
+        say(at_s=at_s, shown=None if math.isnan(frame.force_n[2]) else frame.t_us, stale=finger.stale)
+
+
+def callbacks(hand: biotac.Hand) -> None:
+    hand.on_batch(say_batch)
+    hand.on_gap(lambda gap: say(on_gap=gap.reason))
+    hand.stream()
+    while not over.wait(LOOK_S):
+        hand.check()
+
+
+def record(hand: biotac.Hand) -> None:
+    recorder = hand.record(f"{sys.argv[4]}/live.mcap")
+    hand.stream()
+    while not over.wait(LOOK_S):
+        hand.check()
+    recorder.close()
+    say(paths=[str(path) for path in recorder.paths], frames=recorder.frames)
+
+
+def lsl(hand: biotac.Hand) -> None:
+    from biotac.bridges.lsl import Outlet
+
+    with Outlet(hand) as outlet:
+        push, lsl_now = outlet._outlets[hand.fingers[0], ""].push_chunk, outlet._lsl.local_clock
+
+        def pushed(values: Any, stamps_s: list[float]) -> None:
+            say(stamp_age_s=lsl_now() - stamps_s[-1])
+            push(values, stamps_s)
+
+        outlet._outlets[hand.fingers[0], ""].push_chunk = pushed  # type: ignore[method-assign]
+        for batch in hand.batches():
+            outlet.push(batch)
+            say_batch(batch)
+            if over.is_set():
+                return
+
+
+async def aio(port: str, reconnect: bool) -> None:
+    async with biotac.aio.open(port, reconnect=reconnect) as hand:
+        async for batch in hand.batches():
+            say_batch(batch)
+            if over.is_set():
+                return
+
+
+def page(port: str) -> None:
+    """The live page's own source of news; a browser is not needed to see them."""
+    from biotac.view.rows import FRAME_ROW
+    from biotac.view.serving import Viewing
+
+    def follow(url: str) -> None:
+        lost = False
+        for line in urlopen(f"{url}events"):
+            if not line.startswith(b'data: {"frames"'):
+                continue
+            news = json.loads(line.removeprefix(b"data: "))
+            health = news["health"] or {"link": "live", "events": []}
+            if news["frames"] and not lost:
+                say(t_us=news["frames"][-1][FRAME_ROW.index("t_us")], age_s=None)
+            for _ in (event for event in health["events"] if event["name"] == "gap"):
+                say(marked=True)
+            if health["link"] in ("lost", "taken") and not lost:
+                lost = True
+                say(lost=health["words"])
+
+    with Viewing(port, folder=Path(sys.argv[4])) as viewing:
+        threading.Thread(target=follow, args=(viewing.server.url,), daemon=True).start()
+        over.wait()
+
+
+def ros(port: str) -> None:
+    import rclpy
+    from biotac_ros2.node import Fingers, spin
+
+    rclpy.init(args=["--ros-args", "-p", f"port:={port}"])
+    node = Fingers()
+    publish_row, publish, clock = node._publish, node.publish, node.get_clock()
+
+    def published(row: Any, stamp_ns: int) -> None:
+        say(t_us=int(row["t_us"]), age_s=(clock.now().nanoseconds - stamp_ns) * 1e-9)
+        publish_row(row, stamp_ns)
+
+    def published_all(batch: biotac.Batch) -> None:
+        say_gaps(batch)
+        publish(batch)
+        if over.is_set():
+            raise KeyboardInterrupt
+
+    node._publish, node.publish = published, published_all
+    with suppress(KeyboardInterrupt), node.hand:
+        spin(node)
+
+
+WAYS = {"pull": pull, "views": views, "callbacks": callbacks, "record": record, "lsl": lsl}
+WITH_HANDS_OF_THEIR_OWN = {"page": page, "ros": ros}
+
+
+def main() -> None:
+    """Read until stdin ends or the hand says that it is over."""
+    way, port, reconnect = sys.argv[1], sys.argv[2], sys.argv[3] == "yes"
+    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
+    try:
+        if way == "aio":
+            asyncio.run(aio(port, reconnect))
+        elif way in WITH_HANDS_OF_THEIR_OWN:
+            WITH_HANDS_OF_THEIR_OWN[way](port)
+        else:
+            with biotac.open(port, reconnect=reconnect) as hand:
+                say(opened=True)
+                WAYS[way](hand)
+    except biotac.DeviceLostError as error:
+        say(lost=str(error))
+
+
+main()

@@ -1,0 +1,32 @@
+"""What a hand's reader reads, for tests of the wire beside the hand."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from biotac.wire.batches import Batch
+
+
+class Overheard:
+    """A tap (Hand.tap) that keeps the bytes and the messages, and stands still on demand, and the reader with it."""
+
+    def __init__(self, *, still: bool = False) -> None:
+        self.sent = bytearray()
+        self.messages: list[Any] = []
+        self.go_on = threading.Event()
+        if not still:
+            self.go_on.set()
+
+    def put_raw(self, chunk: bytes) -> None:
+        self.go_on.wait()
+        self.sent += chunk
+
+    def put(self, batch: Batch) -> None:
+        self.messages += batch.messages
+
+    def wake(self) -> None:
+        pass
+
+    def is_full(self) -> bool:
+        return False
