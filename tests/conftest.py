@@ -32,6 +32,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--sensor-port", help="port of the sensor board that is wired to it, for the rig 'bench'")
 
 
+def pytest_report_header(config: pytest.Config) -> list[str]:
+    """What no rig of tests/hil says, because its tests are not even collected."""
+    return [] if config.getoption("--port") else ["tests/hil: no --port, so no real board is tested"]
+
+
 @pytest.fixture(scope="session", autouse=True)
 def patience() -> Iterator[None]:
     """Whoever answers is waited for, for minutes, however busy this computer is."""

@@ -87,7 +87,7 @@ m4f_tests() { # arguments go to ctest
 python_tests() { # arguments go to pytest; two processes, each with whole files, for what tests of a file share
     # Skipped tests say why, once a reason. What hangs is told with where it stands, after longer than any test takes on
     # a busy computer.
-    pytest -rs -n 2 --dist loadfile --timeout 900 "$@"
+    pytest -rsfE -n 2 --dist loadfile --timeout 900 "$@"
 }
 
 fuzzing() {

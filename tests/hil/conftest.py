@@ -1,5 +1,5 @@
-"""Every test here runs against every rig of rigs/*.toml. --rig NAME picks one, --port and --sensor-port
-name real boards."""
+"""Every test here runs against every rig of rigs/*.toml whose board is there: --port and --sensor-port name real
+boards. --rig NAME picks one."""
 
 from __future__ import annotations
 
@@ -19,9 +19,17 @@ RIGS = all_rigs()
 READY: dict[str, str | None] = {}
 
 
+def missing_port(rig_name: str, config: pytest.Config) -> str | None:
+    """The option that would name a board of this rig, when it was not given."""
+    options = {"{port}": "--port", "{sensor_port}": "--sensor-port"}
+    port = RIGS[rig_name]["port"]
+    return next((option for field, option in options.items() if field in port and not config.getoption(option)), None)
+
+
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "rig_name" in metafunc.fixturenames:
-        chosen = metafunc.config.getoption("--rig") or list(RIGS)
+        config = metafunc.config
+        chosen = config.getoption("--rig") or [name for name in RIGS if not missing_port(name, config)]
         unknown = set(chosen) - set(RIGS)
         if unknown:
             raise pytest.UsageError(f"no rig {sorted(unknown)[0]}: expected one of {', '.join(RIGS)}")
@@ -42,11 +50,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """The board under test; whatever was opened on it is closed after the test."""
-    ports = {name: request.config.getoption(f"--{name.replace('_', '-')}") for name in ("port", "sensor_port")}
     facts = RIGS[rig_name]
-    for name, port in ports.items():
-        if f"{{{name}}}" in facts["port"] and port is None:
-            pytest.skip(f"{rig_name}: no --{name.replace('_', '-')} was given, so there is no board to test")
+    option = missing_port(rig_name, request.config)
+    if option is not None:
+        pytest.skip(f"{rig_name}: no {option} was given, so there is no board to test")
     if rig_name not in READY:
         READY[rig_name] = prepare(facts)
     why = READY[rig_name]
@@ -54,7 +61,7 @@ def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
         if in_ci():
             pytest.fail(f"{rig_name}: {why}")
         pytest.skip(f"{rig_name}: {why}")
-    rig = Rig(rig_name, facts, **ports)
+    rig = Rig(rig_name, facts, *(request.config.getoption(option) for option in ("--port", "--sensor-port")))
     yield rig
     rig.close()
 

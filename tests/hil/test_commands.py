@@ -70,11 +70,11 @@ REFUSED = [
 ]
 
 
-def replies_to(hand: biotac.Hand, message_id: int, payload: bytes) -> list[Any]:
-    """All that comes back for one message and the PING behind it, but not the PING's reply."""
+def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
+    """All that comes back for a message, sent so many times, and the PING behind it, but not the PING's reply."""
     overheard = Overheard()
     hand._reader.add_tap(overheard)
-    hand.link.write(encode(message_id, payload))
+    hand.link.write(times * encode(message_id, payload))
     hand.ping()
     hand._reader.remove(overheard)
     seen = [m for m in overheard.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == 7]
@@ -139,8 +139,7 @@ def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> No
     start = wire.Start(7, int(wire.StreamFlags.FRAMES), 1, 0)
     set_it = wire.SetSetting(7, int(Setting.IDLE_PERIOD_MS), 250)
     for message in (set_it, wire.Hold(7, 1), wire.Release(7, 1), wire.ClearFaults(7, 0, (0,) * 5), start, wire.Stop(7)):
-        hand.link.write(encode(message.ID, message.pack()))
-        first, again = replies_to(hand, message.ID, message.pack())
+        first, again = replies_to(hand, message.ID, message.pack(), times=2)
         assert first == again and getattr(first, "error", wire.Error.OK) == wire.Error.OK
     assert (hand.board.setting(Setting.IDLE_PERIOD_MS), hand.status().streams) == (250, 0)
     hand.stream("force", "poc", "torque", "pressure")

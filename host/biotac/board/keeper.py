@@ -34,7 +34,7 @@ class Keeper:
         self._reader = board.reader
         self._stream = stream
         self._callbacks = callbacks
-        self.reconnect = reconnect
+        self._reader.reconnects = reconnect
         self._started: wire.Start | None = None  # the stream that was looked at last
         self._looked_s = time.monotonic()
         # At the last look; looks without rows since, and how often the stream was started again for that.
@@ -72,7 +72,7 @@ class Keeper:
     def _step(self) -> None:
         reader, stream, link = self._reader, self._stream, self._board.link
         if reader.lost is not None:
-            self._bring_back(*reader.lost)
+            self._bring_back(reader.lost)
         elif stream.on and link.ended:
             self._board.tell(wire.Ping(0))  # a barrier: its reply comes after the last frame
             stream.end()
@@ -160,13 +160,10 @@ class Keeper:
 
     # ---- a board that was lost -----------------------------------------------------------------
 
-    def _bring_back(self, error: DeviceLostError, reason: Reason) -> None:
+    def _bring_back(self, reason: Reason) -> None:
         reader, board = self._reader, self._board
         before = reader.hello
         reader.wait_for(lambda: reader.parked or reader.closing.is_set() or reader.failure)
-        if not self.reconnect or not board.link.places():
-            reader.fail(error)
-            return
         while not self._found(before):
             if reader.closing.is_set():
                 return

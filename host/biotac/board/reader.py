@@ -61,7 +61,7 @@ class Tap(Consumer, Protocol):
 class Reader:
     """Reads ``link``, whose board said ``hello``, into ``clock`` and the consumers.
 
-    When the link breaks, reading stops until ``resume``; keeper.py decides what happens then.
+    When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (keeper.py).
     """
 
     def __init__(self, link: Link, hello: wire.Hello) -> None:
@@ -74,7 +74,8 @@ class Reader:
         self.failure: BaseException | None = None
         self.told = False
         #: Why reading stopped, while it is stopped.
-        self.lost: tuple[DeviceLostError, Reason] | None = None
+        self.lost: Reason | None = None
+        self.reconnects = False
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
         self.every = 1  #: consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
@@ -172,7 +173,9 @@ class Reader:
     def lose(self, error: DeviceLostError, reason: Reason) -> None:
         """Stop reading, because the link broke or the board fell silent."""
         spoilt = self.link.spoilt()
-        self.lost = self.lost or (DeviceLostError(spoilt) if spoilt else error, reason)
+        if not (self.reconnects and self.link.places()) and not self.closing.is_set():
+            self.failure = self.failure or (DeviceLostError(spoilt) if spoilt else error)
+        self.lost = self.lost or reason
         self.wake()
 
     def resume(self, hello: wire.Hello) -> None:

@@ -6,14 +6,14 @@ finding's code is listed in ``catalogue`` and, for people, in host/docs/doctor.m
 
 from __future__ import annotations
 
-from . import bus, connection, leads, sensors, tare, timing, version
+from . import bus, connection, leads, sensors, signals, tare, timing, version
 from .catalogue import CATALOGUE, Finding
 from .facts import BoardFacts, Facts, PairFacts, SystemFacts
 
 
 def judge(facts: Facts) -> list[Finding]:
     """All findings, in the order in which to cure them."""
-    of = (connection, version, leads, sensors, bus, timing, tare)
+    of = (connection, version, leads, sensors, bus, timing, tare, signals)
     return [finding for module in of for finding in module.check(facts)]
 
 

@@ -269,7 +269,7 @@ CATALOGUE: dict[str, Entry] = {
     "tare_fault": Entry(
         E,
         "The tare machine has given up on the finger: more than two electrodes are railed or missing.",
-        "See electrodes_railed and channel_missing.",
+        "See channel_railed and channel_missing.",
     ),
     "base_old": Entry(
         W,
@@ -277,15 +277,37 @@ CATALOGUE: dict[str, Entry] = {
         "meanwhile, so forces may creep.",
         "Let go of it. If nothing touches it, tare it now: `Hand.tare(finger)`.",
     ),
-    "electrodes_railed": Entry(
+    # ---- signals
+    "sensor_frozen": Entry(
         E,
-        "Electrodes at the end of their range, 0 or at least 4090 counts, in most frames: they carry no signal. The "
-        "skin is dry, torn or empty, presses on the core, or a trace is broken.",
-        "Look at the skin and the fluid (the manual's inflation check); let go of the finger and run the doctor again.",
+        "Every channel says one and the same count, round after round. A live sensor has noise in each of them: its "
+        "electronics hang, and what it says is as old as the moment at which they did.",
+        "Unplug the sensor and plug it in again; measure V+ at the sensor. If it comes back so, replace it.",
     ),
     "channel_missing": Entry(
         E,
         "A channel had no good word in most frames. Results are computed without it and flagged.",
         "See words_error, words_parity and slots_late: one of them says why. Some models lack a channel.",
+    ),
+    "channel_railed": Entry(
+        E,
+        "A channel at the end of its range, 0 or at least 4090 counts, in most frames: it carries no signal. Of an "
+        "electrode: the skin is dry, torn or empty, presses on the core, or a trace is broken. Of PDC: skin and core "
+        "touch, or the pressure sensor is broken.",
+        "Let go of the finger and run the doctor again; look at the skin and the fluid (the manual's inflation check).",
+    ),
+    "channel_stuck": Entry(
+        E,
+        "A channel says one and the same count, round after round, while others move: its amplifier or a trace is "
+        "broken. The board cannot tell: it computes with the count it is given.",
+        "Press the finger and look at the channel in `biotac view`. If it does not move, do not trust forces of this "
+        "sensor, and have it repaired.",
+    ),
+    "channel_noisy": Entry(
+        E,
+        "The count of an electrode jumps from round to round, far more than the others' and more than a press moves it: "
+        "a trace or a contact is loose, or something couples into it.",
+        "Reseat the flex connector; keep motors' wires away from the sensor's. If it stays, do not trust forces of "
+        "this sensor.",
     ),
 }

@@ -49,6 +49,7 @@ class BoardFacts:
     sensors_before: list[wire.SensorStatus]
     sensors_after: list[wire.SensorStatus]
     frames: StructArray  #: FRAME_DTYPE
+    pac: StructArray  #: PAC_DTYPE
     idle: StructArray  #: IDLE_DTYPE
     stats: LinkStats
     clock: Fit | None  #: None where the board's time is no clock, as on a simulated board

@@ -55,6 +55,7 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         sensors_before=sensors_before,
         sensors_after=[hand.sensor_status(finger) for finger in range(MAX_SENSORS)],
         frames=batch.frames,
+        pac=batch.pac,
         idle=batch.idle,
         stats=hand.stats,
         clock=hand.clock.now() if has_crystal(hand) else None,

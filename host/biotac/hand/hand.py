@@ -209,8 +209,6 @@ class Hand:
     def _report_at_end(self) -> None:
         if not self._reader.told:
             self._reader.check()
-            if self._reader.lost is not None and not self._keeper.reconnect:  # so recently that nobody has failed yet
-                raise self._reader.lost[0]
         self._troubles.report()
 
     def check(self) -> None:

@@ -26,7 +26,7 @@ from biotac.link.holders import Holder
 from biotac.version import __version__
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import LinkStats
-from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE
+from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE
 
 ROOT = Path(__file__).resolve().parents[3]
 PORT = "/dev/ttyACM0"
@@ -44,17 +44,25 @@ def info(finger: int, serial: str, flex: str = "20", software: str = "0210") -> 
     return message(wire.SensorInfo, finger=finger, present=1, **{k: tuple(v.encode()) for k, v in ascii_of.items()})
 
 
-def rounds(fingers: tuple[int, ...] = (0, 1), n: int = 100, step_us: int = 10_000) -> np.ndarray:
+def rounds(fingers: tuple[int, ...] = (0, 1), n: int = 300, step_us: int = 10_000) -> np.ndarray:
     frames = np.zeros(n * len(fingers), FRAME_DTYPE)
     for k, finger in enumerate(fingers):
         mine = slice(k, None, len(fingers))
         frames["finger"][mine] = finger
         frames["seq"][mine] = np.arange(n)
         frames["t_us"][mine] = np.arange(n) * step_us
-    frames["counts"] = 3000
-    for name in ("pdc", "tac", "tdc"):
-        frames[name] = 2000
+    noise = np.random.default_rng(7).integers(-1, 2, (len(frames), 22))
+    frames["counts"] = 3000 + noise[:, :19]
+    for k, name in enumerate(("pdc", "tac", "tdc")):
+        frames[name] = 2000 + noise[:, 19 + k]
     return frames
+
+
+def dynamic_pressure(fingers: tuple[int, ...] = (0, 1), n: int = 300) -> np.ndarray:
+    pac = np.zeros(n * len(fingers), PAC_DTYPE)
+    pac["finger"] = np.tile(fingers, n)
+    pac["pac"] = 2030 + np.random.default_rng(8).integers(-4, 5, pac["pac"].shape)
+    return pac
 
 
 def hello(*firmware: int, **values: Any) -> wire.Hello:
@@ -75,6 +83,7 @@ def healthy(**changes: Any) -> BoardFacts:
         "sensors_before": states,
         "sensors_after": after,
         "frames": rounds(),
+        "pac": dynamic_pressure(),
         "idle": np.empty(0, IDLE_DTYPE),
         "stats": LinkStats(1000, 200, 0, 0, 0, 0, 0),
         "clock": Fit(0.0, 1.0, 0.001, -60.0, 30.0),
@@ -108,6 +117,25 @@ def frames(change: Callable[[np.ndarray], None]) -> Facts:
     rows = rounds()
     change(rows[1::2])
     return board(frames=rows)
+
+
+def vibration(change: Callable[[np.ndarray], None]) -> Facts:
+    rows = dynamic_pressure()
+    change(rows[1::2])
+    return board(pac=rows)
+
+
+def freeze(facts: Facts) -> Facts:
+    """Finger 1 repeats its first round."""
+    assert facts.board is not None
+    for rows in (facts.board.frames[1::2], facts.board.pac[1::2]):
+        for name in {"counts", "pdc", "tac", "tdc", "pac"} & set(rows.dtype.names):
+            rows[name] = rows[name][0]
+    return facts
+
+
+def noisy(rows: np.ndarray) -> None:
+    rows["counts"][:, 2] = 3000 + np.random.default_rng(9).normal(0, 60, len(rows))
 
 
 def mark(name: str, value: int, column: int | None = None) -> Callable[[np.ndarray], None]:
@@ -224,8 +252,8 @@ CASES: list[tuple[str, Facts, str]] = [
     ("sensor_lost", board(after=message(wire.Status, **AFTER | {"fingers_present": 1})), "finger 1 stopped"),
     (
         "sensor_unsure",
-        frames(lambda rows: mark("flags", int(wire.FrameFlags.SENSOR_UNSURE))(rows[60:])),
-        "finger 1 was away and has not identified itself since: 40 of 100",
+        frames(lambda rows: mark("flags", int(wire.FrameFlags.SENSOR_UNSURE))(rows[260:])),
+        "finger 1 was away and has not identified itself since: 40 of 300",
     ),
     (
         "sensor_other",
@@ -262,8 +290,17 @@ CASES: list[tuple[str, Facts, str]] = [
     ("no_tare", state(tare_state=wire.TareState.INIT), "finger 1"),
     ("tare_fault", state(tare_state=wire.TareState.FAULT, tare_age_ms=90_000), "90 s old"),
     ("base_old", frames(mark("flags", int(wire.FrameFlags.BASE_OLD))), "finger 1 has been touched for over a minute"),
-    ("electrodes_railed", frames(mark("counts", 4090, 4)), "finger 1: E5"),
-    ("electrodes_railed", frames(mark("counts", 0, 18)), "finger 1: E19"),
+    ("sensor_frozen", freeze(board()), "finger 1: every channel"),
+    *(
+        ("channel_railed", frames(mark(name, count, column)), f"finger 1: {told}")
+        for name, column, told in (("counts", 4, "E5"), ("counts", 18, "E19"), ("pdc", None, "PDC"), ("tdc", None, "TDC"))
+        for count in (0, 4090)
+    ),
+    ("channel_railed", vibration(mark("pac", 4095)), "finger 1: PAC"),
+    *(("channel_stuck", frames(mark(name, 2100)), f"finger 1: {name.upper()}") for name in ("pdc", "tac", "tdc")),
+    ("channel_stuck", frames(mark("counts", 2100, 6)), "finger 1: E7"),
+    ("channel_stuck", vibration(mark("pac", 2100)), "finger 1: PAC"),
+    ("channel_noisy", frames(noisy), "finger 1: E3"),
     ("channel_missing", frames(mark("counts", wire.INVALID_COUNT, 0)), "finger 1: E1"),
     ("channel_missing", frames(mark("tdc", wire.INVALID_COUNT)), "finger 1: TDC"),
 ]

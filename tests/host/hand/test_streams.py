@@ -248,8 +248,8 @@ def test_what_callbacks_wait_for_is_added_to_what_was_chosen(live: Live) -> None
     assert seen == [bands]
 
 
-def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
+def streaming_to_a_slow_callback(live: Live) -> tuple[threading.Event, list[Batch]]:
+    """An event that the callback waits for, and the batches it was called with."""
     go_on, calls = threading.Event(), []
 
     def slow(batch: Batch) -> None:
@@ -258,6 +258,12 @@ def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Liv
 
     live.hand.on_batch(slow)
     live.hand.stream()
+    return go_on, calls
+
+
+def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Live, monkeypatch) -> None:
+    monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
+    go_on, calls = streaming_to_a_slow_callback(live)
     live.send(frame(0))
     until(lambda: calls)
     for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
@@ -275,14 +281,7 @@ def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Liv
 
 def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) -> None:
     monkeypatch.setattr(consumers, "BACKLOG_S", 0.0)
-    go_on, calls = threading.Event(), []
-
-    def slow(batch: Batch) -> None:
-        calls.append(batch)
-        assert go_on.wait(WAIT_S)
-
-    live.hand.on_batch(slow)
-    live.hand.stream()
+    go_on, calls = streaming_to_a_slow_callback(live)
     for seq in range(100):
         live.send(frame(seq))
         until(lambda seq=seq: live.hand.stats.frames > seq)
