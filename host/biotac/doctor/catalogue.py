@@ -305,8 +305,8 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "channel_noisy": Entry(
         E,
-        "The count of an electrode jumps from round to round, far more than the others' and more than a press moves it: "
-        "a trace or a contact is loose, or something couples into it.",
+        "The count of an electrode jumps from round to round, far more than the others' and more than a press moves "
+        "it: a trace or a contact is loose, or something couples into it.",
         "Reseat the flex connector; keep motors' wires away from the sensor's. If it stays, do not trust forces of "
         "this sensor.",
     ),

@@ -292,8 +292,8 @@ CASES: list[tuple[str, Facts, str]] = [
     ("base_old", frames(mark("flags", int(wire.FrameFlags.BASE_OLD))), "finger 1 has been touched for over a minute"),
     ("sensor_frozen", freeze(board()), "finger 1: every channel"),
     *(
-        ("channel_railed", frames(mark(name, count, column)), f"finger 1: {told}")
-        for name, column, told in (("counts", 4, "E5"), ("counts", 18, "E19"), ("pdc", None, "PDC"), ("tdc", None, "TDC"))
+        ("channel_railed", frames(mark(name, count, column)), f"finger 1: {at}")
+        for name, column, at in (("counts", 4, "E5"), ("counts", 18, "E19"), ("pdc", None, "PDC"), ("tdc", None, "TDC"))
         for count in (0, 4090)
     ),
     ("channel_railed", vibration(mark("pac", 4095)), "finger 1: PAC"),
