@@ -67,7 +67,7 @@ enum bt_poc_weights {
 // Where the force of a finger without a wrench map comes from.
 enum bt_force_model {
     BT_FORCE_MODEL_LIN = 0, // Lin's three gains, force_gain_*_nn
-    BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/population.md), if all three force gains are defaults; otherwise LIN
+    BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 };
 
 // Pins of a board's UART. On a Pico, four pairs are not used by the sensors.

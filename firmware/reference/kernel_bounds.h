@@ -1,6 +1,6 @@
 // How far the shipped kernel's results may be from the formulas in double (firmware/reference/lin2013.h).
 // Checked by tests/core/solve/test_kernels.c frame by frame, by tests/fuzz and by `biotac check`; parts are
-// proved in tests/proofs (host/docs/testing.md, Arithmetic).
+// proved in tests/proofs (host/docs/develop/testing.md, Arithmetic).
 //
 // Where the bounds come from (nothing is tuned):
 //  PoC    Rounding to um: 0.5 per axis. Rounding direction components to 16 bits: 2^-16 of r per axis.

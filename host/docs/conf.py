@@ -19,7 +19,8 @@ html_title = f"{project} {release}"
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 # The source folder is the repository, so that links between pages are those that GitHub follows too.
 root_doc = "host/docs/index"
-include_patterns = ["host/docs/*.md", "host/docs/lab/*.md", "protocol/*.md", "protocol/vectors/*.md"]
+FOLDERS = ("host/docs", "host/docs/*", "host/biotac-lab/docs", "protocol", "protocol/*")
+include_patterns = [f"{folder}/*.md" for folder in FOLDERS]
 myst_heading_anchors = 3
 
 html_theme = "alabaster"

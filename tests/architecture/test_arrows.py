@@ -1,4 +1,4 @@
-"""Imports and includes run one way: as the table of rooms in host/docs/architecture.md allows, and in no circle.
+"""Imports and includes run one way: as the table of rooms in docs/develop/architecture.md allows, and in no circle.
 
 Python's imports are read wherever they stand, inside functions too, and so are modules that are named in strings.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "host/docs/architecture.md"
+PAGE = ROOT / "host/docs/develop/architecture.md"
 PYTHON = "host/biotac"
 C = ("firmware", "host/binding")
 BY_NAME = re.compile(r"biotac(\.\w+)+(:\w+)?")

@@ -1,4 +1,4 @@
-"""The pages of host/docs: what they tell people to type works, and what is generated is up to date.
+"""The pages: what they tell people to type works, and what is generated is up to date.
 
 tools/docs builds them with warnings as errors, broken links among them; tools/test runs it.
 """
@@ -22,8 +22,8 @@ import biotac
 from biotac.cli.main import main, parser
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted((ROOT / "host/docs").rglob("*.md"))
-NOTEBOOK = ROOT / "host/docs/examples/press.ipynb"
+PAGES = [page for folder in ("docs", "biotac-lab/docs") for page in sorted((ROOT / "host" / folder).rglob("*.md"))]
+NOTEBOOK = ROOT / "host/docs/guides/examples/press.ipynb"
 BLOCKS = [
     pytest.param(page.name, code, id=f"{page.stem}-{k}")
     for page in PAGES
@@ -63,7 +63,7 @@ def test_the_notebook_runs_and_is_the_one_on_the_page(tmp_path: Path, monkeypatc
     plt.switch_backend("agg")
     cells = ["".join(cell["source"]) for cell in json.loads(NOTEBOOK.read_text())["cells"]]
     assert len([line for cell in cells for line in cell.splitlines() if line]) <= 10
-    assert "\n\n".join(cells) in (ROOT / "host/docs/quickstart.md").read_text()
+    assert "\n\n".join(cells) in (ROOT / "host/docs/start/quickstart.md").read_text()
     names: dict[str, object] = {}
     for cell in cells[:-1]:
         exec(compile(cell, NOTEBOOK.name, "exec"), names)
@@ -101,7 +101,7 @@ def test_the_command_lines_page_has_every_option(monkeypatch, capsys) -> None:
 
 
 def test_the_reference_has_every_public_name() -> None:
-    reference = (ROOT / "host/docs/api.md").read_text(encoding="utf-8")
+    reference = (ROOT / "host/docs/reference/api.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"(?:^\| `|:: )biotac\.(\w+)", reference, flags=re.M))
     missing = set(biotac.__all__) - listed
     assert not missing
@@ -126,12 +126,12 @@ seconds = 1.0
 
 
 def test_the_controllers_page_has_every_flag() -> None:
-    table = (ROOT / "host/docs/controller.md").read_text(encoding="utf-8")
+    table = (ROOT / "host/docs/guides/controller.md").read_text(encoding="utf-8")
     assert [flag.name for flag in biotac.FrameFlags if f"`{flag.name}`" not in table] == []
 
 
 def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path) -> None:
-    drawing = html.unescape((ROOT / "host/docs/frames.svg").read_text(encoding="utf-8"))
+    drawing = html.unescape((ROOT / "host/docs/reference/frames.svg").read_text(encoding="utf-8"))
     pressed = re.findall(r">pressed at (E\d+): ([^<]*(?:[<>] 0,? ?[^<]*)*)</text>", drawing)
     checked = 0
     for name, readings in pressed:

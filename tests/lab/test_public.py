@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 LAB = sorted((ROOT / "host/biotac-lab/biotac_lab").rglob("*.py"))
 GATEWAY = sorted((ROOT / "host/biotac").rglob("*.py"))
-API = (ROOT / "host/docs/api.md").read_text(encoding="utf-8")
+API = (ROOT / "host/docs/reference/api.md").read_text(encoding="utf-8")
 
 
 def stable() -> tuple[set[str], set[str]]:

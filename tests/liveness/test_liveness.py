@@ -119,9 +119,16 @@ PAUSES_S = [0.5, 1.6, 5.0, 30.0]
 BY_DAY = {("pull", 1.6), ("views", 1.6), ("callbacks", 1.6), ("record", 1.6), ("views", 0.5)}
 
 
-def running(program: Program, board: BoardBehindProxy) -> None:
-    """Until the program streams, and its clock has settled."""
+def running(program: Program, board: BoardBehindProxy) -> int:
+    """Wait until the program streams, and its clock has settled; what it said from then on is to be judged.
+
+    A process keeps time from the beginning. An emulator's time stands still while its own code is compiled.
+    """
     board.wait_for(lambda: len(board.passed) >= STEADY_FRAMES)
+    if board.kind == "posix":
+        return 0
+    program.wait_for_rows()
+    return len(program.said)
 
 
 def offset_s(program: Program) -> float:
@@ -130,9 +137,9 @@ def offset_s(program: Program) -> float:
     return min(at_s - t_us * 1e-6 for at_s, t_us in rows if t_us)
 
 
-def no_old_value_was_shown_as_new(program: Program, first_s: float) -> None:
+def no_old_value_was_shown_as_new(program: Program, first_s: float, begin: int = 0) -> None:
     """A view shows nothing older than it may; batches tell their true age."""
-    for one in program.said:
+    for one in program.said[begin:]:
         if one.get("shown") is not None:
             assert one["at_s"] - first_s - one["shown"] * 1e-6 <= MAX_AGE_S + TOLERANCE_S, one
         if one.get("age_s") is not None:
@@ -155,7 +162,7 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
     board: BoardBehindProxy, tmp_path: Path, way: str, pause_s: float, reconnect: bool
 ) -> None:
     program = Program(way, board, reconnect=reconnect, folder=tmp_path)
-    running(program, board)
+    begin = running(program, board)
     first_s = None if way == "record" else offset_s(program)
     program.pause(pause_s)
     resumed_s = time.monotonic()
@@ -168,7 +175,7 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
     last_us, next_us = stamps_us[at - 1], stamps_us[at]
     if first_s is not None:
         assert first_s + next_us * 1e-6 <= resumed_s + 1.0 * PATIENCE  # of the board's time
-        no_old_value_was_shown_as_new(program, first_s)
+        no_old_value_was_shown_as_new(program, first_s, begin)
     if way == "record":
         (path,) = program.of("paths")[0]["paths"]
         recording = biotac.Recording(path)
@@ -225,7 +232,7 @@ CAUSES = {
 )
 def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_path: Path, way: str, cause: str) -> None:
     program = Program(way, board, reconnect=False, folder=tmp_path)
-    running(program, board)
+    begin = running(program, board)
     first_s = None if way == "record" else offset_s(program)
     starts = board.starts
     stops(board, cause)
@@ -239,7 +246,7 @@ def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_pat
     # A board that answers but is silent is started once more before it is given up.
     assert lost["at_s"] <= stopped_s + (4.0 if cause == "silent" else 1.0) * PATIENCE
     if first_s is not None:
-        no_old_value_was_shown_as_new(program, first_s)
+        no_old_value_was_shown_as_new(program, first_s, begin)
 
 
 @pytest.mark.parametrize(
@@ -268,10 +275,12 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
         board.silent = False
     before = len(board.passed)
     board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
+    if way == "views":
+        board.wait_for(lambda: program.said[-1].get("shown") is not None)
     program.end()
     assert not program.of("lost")
     if way == "views":
-        assert program.of("counted") and program.said[-1]["shown"] is not None
+        assert program.of("counted")
         return
     if way == "record":
         gaps = [gap for path in program.of("paths")[0]["paths"] for gap in biotac.Recording(path).gaps]
@@ -341,7 +350,7 @@ class Served:
 
     def close(self) -> None:
         assert self._process.stdout is not None
-        self._process.send_signal(signal.SIGINT)
+        self._process.terminate()
         self._process.wait(60)
         self._process.stdout.close()
 

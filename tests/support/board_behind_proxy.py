@@ -27,7 +27,7 @@ class BoardBehindProxy:
 
     def __init__(self, source: str, folder: Path, kind: str = "posix") -> None:
         self.path = folder / "ttyBOARD"
-        self._source, self._kind = source, kind
+        self._source, self.kind = source, kind
         self.passed: list[tuple[int, int]] = []
         self.starts = 0  #: how many START commands came
         self.silent = False  #: rows do not pass; answers do
@@ -44,7 +44,7 @@ class BoardBehindProxy:
     def boot(self) -> None:
         """Start the board, or another one in its place: what was in its memory is gone."""
         before = self._board
-        board = start_board(self._kind, load_source(self._source, seconds=900), pace=1.0)
+        board = start_board(self.kind, load_source(self._source, seconds=900), pace=1.0)
         port = os.open(board.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(port)
         board.release()

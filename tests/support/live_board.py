@@ -33,7 +33,8 @@ def packed(message: Any) -> bytes:
 def frame(seq: int, finger: int = 0, force_z_n: float = 0.0, t_us: int | None = None, flags: int = 0) -> bytes:
     """A FRAME of device time 10 ms * seq, unless told otherwise."""
     values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
-    values |= {"seq": seq % 65536, "t_us": seq * 10_000 if t_us is None else t_us, "finger": finger, "flags": flags}
+    t_us = seq * 10_000 if t_us is None else t_us
+    values |= {"seq": seq % 65536, "t_us": t_us % 2**32, "finger": finger, "flags": flags}
     values |= {"tare_q4": (32000,) * 19, "poc_um": (0, 0, 5080), "force_100un": (0, 0, round(force_z_n * 1e4))}
     values |= {"torsion_mnmm": 250 * finger, "torque_mnmm": (0, 0, 0), "force_sigma_100un": (0, 0, 0)}
     return packed(wire.Frame(**values | {"counts": (2000,) * 19}))
@@ -104,7 +105,8 @@ class Firmware:
         """Its STATUS."""
         self.frames_idle += self.idle
         facts = dict.fromkeys((f.name for f in fields(wire.Status)), 0) | {"finger_faults": (0,) * 5}
-        facts |= {"req_id": req_id, "t_us": self.now_us(), "fingers_present": self.facts["fingers_present"]}
+        facts |= {"req_id": req_id, "t_us": self.now_us() % 2**32, "uptime_s": self.now_us() // 10**6}
+        facts |= {"fingers_present": self.facts["fingers_present"]}
         return wire.Status(**facts | {"streams": self.streams, "faults": self.faults, "frames_idle": self.frames_idle})
 
     def of(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:

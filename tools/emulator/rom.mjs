@@ -1,6 +1,8 @@
 // What surrounds the program on a real chip and rp2040js has not: the boot ROM's functions and the ring oscillator's
 // random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17). The ROM's calls are real calls, to two
 // instructions: BKPT, which comes here, and BX LR.
+import { randomInt } from 'node:crypto'
+
 import { correctDma } from './dma.mjs'
 import { ERASE_NS, Flash, PAGE, PROGRAM_NS, SECTOR } from './flash.mjs'
 
@@ -20,9 +22,9 @@ const ROSC_RANDOMBIT = 0x1c
 
 /** What outlives a power cycle, for the rig to keep. */
 export class Board {
-  constructor({ uniqueId = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x2c], seed = 1 } = {}) {
+  constructor({ uniqueId = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x2c] } = {}) {
     this.uniqueId = uniqueId
-    this.random = seed
+    this.random = randomInt(1, 2 ** 31) // no two programs boot alike
     this.cutAfter = null // bytes erased or programmed until power fails
     this.worn = false // its flash takes the longest that it may
     this.quad = true // its flash has all four lines switched on; null: it does not even say

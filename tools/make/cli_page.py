@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write host/docs/cli.md from the command line's own parsers.
+"""Write host/docs/reference/cli.md from the command line's own parsers.
 
 tools/make/cli_page.py           write it
 tools/make/cli_page.py --check   exit 1 when it has drifted
@@ -96,4 +96,4 @@ def subparsers(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser
 
 
 if __name__ == "__main__":
-    sys.exit(write_or_check({ROOT / "host/docs/cli.md": page()}, "host/biotac/cli/"))
+    sys.exit(write_or_check({ROOT / "host/docs/reference/cli.md": page()}, "host/biotac/cli/"))

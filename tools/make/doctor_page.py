@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write host/docs/doctor.md from the doctor's catalogue of findings.
+"""Write host/docs/reference/doctor.md from the doctor's catalogue of findings.
 
 tools/make/doctor_page.py           write it
 tools/make/doctor_page.py --check   exit 1 when it has drifted
@@ -32,4 +32,4 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(write_or_check({ROOT / "host/docs/doctor.md": page()}, "host/biotac/doctor/catalogue.py"))
+    sys.exit(write_or_check({ROOT / "host/docs/reference/doctor.md": page()}, "host/biotac/doctor/catalogue.py"))

@@ -32,7 +32,7 @@ def header(root: Path) -> str:
     flat = [str(weight) for row in weights for weight in row]
     return c_header(
         "POPULATION",
-        ["The population map (host/docs/population.md): a wrench map's blob, which bt_map_open takes."],
+        ["The population map (host/docs/guides/population.md): a wrench map's blob, which bt_map_open takes."],
         [
             "#include <stdint.h>",
             "",

@@ -1,5 +1,5 @@
 // The population map: a wrench map built into the firmware (population_gen.h), for fingers that nobody has
-// calibrated. It holds what other fingers have in common (host/docs/population.md).
+// calibrated. It holds what other fingers have in common (host/docs/guides/population.md).
 //
 // It was trained on fingers of one rig, with a flat plate. A touch that is lighter than those, or whose
 // pattern is unlike theirs, gets a force along the normals of the compressed electrodes instead: the

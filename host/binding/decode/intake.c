@@ -13,6 +13,8 @@ _Static_assert(BT_IDLE_BYTES > 16 && BT_FRAME_BYTES > 16, "each row may have a g
 _Static_assert(BT_DECODED_FRAME == 0 && BT_DECODED_PAC == 1 && BT_DECODED_IDLE == 2, "rows come first");
 
 #define ROUND_US   (1000000 * BT_SLOTS / BT_SLOT_HZ)
+#define WRAP_US    (INT64_C(1) << 32)
+#define LATEST_US  (INT64_C(1) << 62) // lies about uptime must not add up to an overflow
 #define UNHEARD_US 60000000 // a board sends at least a STATUS a second; numbers wrap after 655 s
 
 static const uint32_t row_bytes[BT_INTAKE_ROW_KINDS] = {BT_FRAME_BYTES, BT_PAC_BYTES, BT_IDLE_BYTES};
@@ -24,6 +26,8 @@ void bt_intake_reset(bt_intake *intake)
     bt_numbering_reset(&intake->rounds);
     bt_numbering_reset(&intake->pacs);
     intake->t_us = (bt_unwrapper){0, 0};
+    intake->uptime_s = UINT32_MAX;
+    intake->status_us = 0;
     intake->unheard = 0;
 }
 
@@ -76,6 +80,22 @@ static int64_t hear(bt_intake *intake, uint32_t t_us)
     return now_us;
 }
 
+// Who has not listened for longer than device time takes to wrap finds the wraps in the board's uptime.
+static void hear_status(bt_intake *intake, const bt_msg_status *status)
+{
+    if (status->uptime_s >= intake->uptime_s) { // else this is the first, or the board has restarted
+        int64_t due_us = intake->status_us + INT64_C(1000000) * (status->uptime_s - intake->uptime_s);
+        int64_t late_us = due_us - bt_unwrapped(&intake->t_us, status->t_us);
+        if (late_us > WRAP_US / 2 && intake->t_us.last < LATEST_US) {
+            int64_t skip_us = (late_us + WRAP_US / 2) / WRAP_US * WRAP_US;
+            intake->t_us.last += skip_us;
+            intake->unheard += skip_us / ROUND_US;
+        }
+    }
+    intake->status_us = hear(intake, status->t_us);
+    intake->uptime_s = status->uptime_s;
+}
+
 // Message by message in the order of arrival; seq and t_us have room for the rows of their kind.
 static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t *t_us[BT_INTAKE_ROW_KINDS])
 {
@@ -99,7 +119,7 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
             if (other[0] == BT_STATUS_ID) {
                 bt_msg_status status;
                 bt_msg_status_unpack(&status, other + 2);
-                hear(intake, status.t_us);
+                hear_status(intake, &status);
             }
             other += 2 + other[1];
             continue;

@@ -33,7 +33,9 @@ typedef struct {
     bt_numbering rounds; // FRAMEs and IDLEs share one numbering: together they account for every round
     bt_numbering pacs;
     bt_unwrapper t_us; // one clock for all, STATUS too: a finger plugged in late is not early
-    int64_t unheard;   // rounds, in all, of stretches without a message of any finger
+    uint32_t uptime_s; // of the latest STATUS, and its t_us
+    int64_t status_us;
+    int64_t unheard; // rounds, in all, of stretches without a message of any finger
     uint8_t in[BT_DECODE_BYTES];
 } bt_intake;
 

@@ -52,8 +52,8 @@ def compute(
     field of a structured array. ``tare`` is (19,) or has the shape of ``counts``; it is 0..4095 counts, rounded to
     1/16 count as on the board. ``settings`` are those of a board. What they leave out has its default, and a key that
     is not a biotac.Setting raises ValueError. By default, force comes from the population map
-    (host/docs/population.md); for Lin's three scales give {Setting.FORCE_MODEL: ForceModel.LIN}, or force gains of
-    your own. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and returned: a reused buffer
+    (host/docs/guides/population.md); for Lin's three scales give {Setting.FORCE_MODEL: ForceModel.LIN}, or force gains
+    of your own. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and returned: a reused buffer
     saves the page faults of a new one.
 
     ``wrench_map``, a map or its blob, gives the force in place of the gains, and also the torque if it has six axes or

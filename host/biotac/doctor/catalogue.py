@@ -1,4 +1,4 @@
-"""Every finding: its severity, meaning and cure. host/docs/doctor.md is generated from this."""
+"""Every finding: its severity, meaning and cure. host/docs/reference/doctor.md is generated from this."""
 
 from __future__ import annotations
 

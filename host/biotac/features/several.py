@@ -46,7 +46,7 @@ def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
 
     There are none if every electrode is below ``least_n`` by Eq 4, or one is missing. ``row`` is a frame of
     ``biotac.load`` or of a live hand, or signals (19,). Shares are an estimate from Eq 4, good to about 0.1
-    (host/docs/features.md).
+    (host/docs/guides/features.md).
     """
     force = electrode_force(row if row.dtype.names else row[None, :])[0]
     if np.isnan(force).any() or force.max() < least_n:

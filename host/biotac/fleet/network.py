@@ -66,7 +66,7 @@ def open_session(
     if outside is not None and not own:
         raise InputError(
             f"{outside} leaves this computer: expected a Zenoh configuration that says who may connect (--config FILE, "
-            "?config=FILE or ZENOH_CONFIG); host/docs/network.md shows one with passwords or TLS"
+            "?config=FILE or ZENOH_CONFIG); host/docs/guides/network.md shows one with passwords or TLS"
         )
     try:
         facts = zenoh.Config.from_file(str(own)) if own else zenoh.Config()

@@ -38,7 +38,7 @@ _RECORDINGS = pa.schema(
         pa.field("sensors", pa.map_(pa.uint8(), pa.string()), metadata={"what": "serial numbers by finger"}),
         pa.field("calibrations", pa.map_(pa.uint8(), pa.string()), metadata={"what": "ids by finger"}),
         pa.field(
-            "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as described in host/docs/recording.md"}
+            "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as in host/docs/guides/recording.md"}
         ),
     ]
 )

@@ -11,7 +11,7 @@ from ..wire.frames import StructArray
 
 
 def to_pandas(frames: StructArray, stamp_ns: Any) -> Any:
-    """A DataFrame with the flat names of host/docs/rows.md, one row per frame, indexed by ``stamp`` (UTC).
+    """A DataFrame with the flat names of host/docs/reference/rows.md, one row per frame, indexed by ``stamp`` (UTC).
 
     Integer fields that can be missing are nullable (UInt16); all others have NumPy types.
     """

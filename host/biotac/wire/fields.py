@@ -1,7 +1,7 @@
 """The columns of rows: the one table of names, units and invalid marks for live rows, recordings, views and exports.
 
-``FRAME_DTYPE``, ``Frame``, JSON, the columns of every export and the page host/docs/rows.md are made from it, or
-checked against it by tests.
+``FRAME_DTYPE``, ``Frame``, JSON, the columns of every export and the page host/docs/reference/rows.md are made from it,
+or checked against it by tests.
 """
 
 from __future__ import annotations

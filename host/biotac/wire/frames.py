@@ -26,7 +26,7 @@ from .sensor_gen import FULL_SCALE_COUNT
 
 StructArray = NDArray[np.void]
 
-#: One row per finger and round of slots; names, units and invalid marks are in host/docs/rows.md (fields.FRAME_FIELDS).
+#: One row per finger and round of slots; names, units and invalid marks are those of fields.FRAME_FIELDS.
 FRAME_DTYPE = dtype_of(FRAME_FIELDS)
 
 #: 22 samples of dynamic pressure, 1/2200 s apart, the first at ``t_us``; 0xFFFF where missing.

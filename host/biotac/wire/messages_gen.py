@@ -84,7 +84,7 @@ class ForceModel(IntEnum):
     """Where the force of a finger without a wrench map comes from."""
 
     LIN = 0  # Lin's three gains, force_gain_*_nn
-    POPULATION = 1  # the population map, trained on other fingers (host/docs/population.md), if all three force gains are defaults; otherwise LIN
+    POPULATION = 1  # the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 
 
 class UartPins(IntEnum):
@@ -257,7 +257,7 @@ POC_WEIGHTS_DOC: dict[int, str] = {
 
 FORCE_MODEL_DOC: dict[int, str] = {
     0: "Lin's three gains, force_gain_*_nn",
-    1: "the population map, trained on other fingers (host/docs/population.md), if all three force gains are defaults; otherwise LIN",
+    1: "the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN",
 }
 
 

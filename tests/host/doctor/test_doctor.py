@@ -320,7 +320,7 @@ def test_a_development_version_is_not_newer_than_its_release(version: str) -> No
 
 def test_every_code_has_a_case_and_a_page() -> None:
     assert {case[0] for case in CASES} | {code for _, all_of in LEADS for code, _ in all_of} == set(CATALOGUE)
-    page = (ROOT / "host/docs/doctor.md").read_text()
+    page = (ROOT / "host/docs/reference/doctor.md").read_text()
     for code, entry in CATALOGUE.items():
         assert f"## {code}\n" in page
         assert entry.meaning in page

@@ -121,9 +121,9 @@ def export(recording: biotac.Recording, out: Path, *options: str) -> int:
 
 def test_every_column_is_documented_and_has_a_unit() -> None:
     docs = Path(__file__).parents[3] / "host" / "docs"
-    text = (docs / "recording.md").read_text()
+    text = (docs / "guides" / "recording.md").read_text()
     assert all(f"`{suffix}`" in text for suffix in FORMATS)
-    page = (docs / "rows.md").read_text()
+    page = (docs / "reference" / "rows.md").read_text()
     assert re.findall(r"^\| `.*$", page, re.MULTILINE) == [
         f"| `{f.name}` | {f.unit} | {' to '.join(f.parts[:: len(f.parts) - 1]) if f.parts else ''} "
         f"| {np.dtype(f.dtype)} | {f.what} |"

@@ -1,11 +1,11 @@
-"""The example of a controller that tightens before what it holds slips (host/docs/examples/tighten.py)."""
+"""The example of a controller that tightens before what it holds slips (host/docs/guides/examples/tighten.py)."""
 
 from __future__ import annotations
 
 import runpy
 from pathlib import Path
 
-EXAMPLE = Path(__file__).resolve().parents[3] / "host" / "docs" / "examples" / "tighten.py"
+EXAMPLE = Path(__file__).resolve().parents[3] / "host/docs/guides/examples/tighten.py"
 
 
 def test_what_is_held_is_lost_and_what_is_tightened_is_not() -> None:

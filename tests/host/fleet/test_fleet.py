@@ -220,7 +220,7 @@ def listening_at() -> set[str]:
 
 
 def test_a_client_is_written_from_the_page(shared) -> None:
-    """host/docs/network.md and SPEC.md are all it needs: Zenoh, cobs and zlib, nothing of ours."""
+    """host/docs/guides/network.md and SPEC.md are all it needs: Zenoh, cobs and zlib, nothing of ours."""
     import struct
     import zlib
 
@@ -444,7 +444,7 @@ def test_a_password_keeps_others_out(tmp_path: Path) -> None:
 
 @pytest.mark.nightly
 def test_tls_keeps_others_out(tmp_path: Path) -> None:
-    """Certificates by openssl, as host/docs/network.md says."""
+    """Certificates by openssl, as host/docs/guides/network.md says."""
     for name in ("board", "other"):
         words = ["-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
         words += ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]

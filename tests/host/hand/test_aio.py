@@ -21,7 +21,7 @@ def run(main: Coroutine[Any, Any, Any]) -> Any:
         return pool.submit(asyncio.run, main).result()
 
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "host" / "docs" / "examples"
+EXAMPLES = Path(__file__).resolve().parents[3] / "host/docs/guides/examples"
 SAYS = {
     "pull.py": "300 frames",
     "latest.py": "FrameFlags.CONTACT",

@@ -63,17 +63,21 @@ def test_a_stream_that_another_host_took_is_a_lost_board(live: Live, quick) -> N
     assert len(live.firmware.of(wire.Start)) == 1 and not live.hand.connected
 
 
-def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, quick) -> None:
+@pytest.mark.parametrize("pause_s", [0.09, 600.0, 4500.0])
+def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, quick, pause_s: float) -> None:
+    """Even one whose clock, of 71.6 min, has begun again meanwhile."""
+    missed = round(100 * pause_s)
     gaps = gaps_of(live.hand)
     live.hand.stream("force")
     live.send(frame(1), frame(1, finger=2))
     live.firmware.wait_for_looks()
-    live.firmware.after[wire.Start] = frame(11) + frame(11, finger=2)
+    live.firmware.after[wire.Start] = frame(2 + missed) + frame(2 + missed, finger=2)
+    live.firmware.t_us += 10_000 * missed
     live.firmware.faults, live.firmware.streams = int(wire.FaultFlags.HOST_SILENT), 0
     until(gaps)
     (gap,) = gaps()
-    assert (gap.reason, gap.last_t_us, gap.next_t_us, gap.fingers) == ("paused", 10_000, 110_000, 0b101)
-    assert (gap.frames_missed, gap.holds_lapsed, gap.boot_id) == (2 * 9, 0, 1)
+    assert (gap.reason, gap.last_t_us, gap.next_t_us) == ("paused", 10_000, 10_000 * (2 + missed))
+    assert (gap.fingers, gap.frames_missed, gap.holds_lapsed, gap.boot_id) == (0b101, 2 * missed, 0, 1)
     first, again = live.firmware.of(wire.Start)
     assert (first.streams, first.fingers, first.keepalive_ms) == (again.streams, again.fingers, again.keepalive_ms)
     live.firmware.wait_for_looks()  # the fault is latched, and not new any more

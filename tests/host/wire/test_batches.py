@@ -40,6 +40,11 @@ def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
     return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
 
 
+def status(uptime_s: int) -> bytes:
+    values = [uptime_s * 10**6 % 2**32, 0, uptime_s, *[0] * 16]
+    return encode(wire.Status.ID, wire.Status(0, *values, finger_faults=(0,) * 5).pack())
+
+
 def idle(finger: int, seq: int, t_us: int, frames: int) -> bytes:
     message = wire.Idle(seq % 2**16, t_us % 2**32, finger, 1, 0, frames, 17, 2400, 1000)
     return encode(wire.Idle.ID, message.pack())
@@ -211,10 +216,22 @@ def test_a_status_keeps_device_time_when_nothing_streams() -> None:
     decoder.feed(frame(0, 0, 0))
     half_hour_us = 30 * 60 * 10**6
     for k in range(1, 10):
-        status = wire.Status(k, k * half_hour_us % 2**32, *[0] * 18, finger_faults=(0,) * 5)
-        decoder.feed(encode(wire.Status.ID, status.pack()))
+        decoder.feed(status(k * 30 * 60))
     assert decoder.unwrap_t_us(9 * half_hour_us % 2**32) == 9 * half_hour_us
     assert decoder.unwrap_t_us((9 * half_hour_us + 5) % 2**32) == 9 * half_hour_us + 5
+
+
+@pytest.mark.parametrize("hours", [0.01, 1.0, 1.25, 4.0, 24.0])
+def test_a_status_tells_who_did_not_listen_how_long_that_was(hours: float) -> None:
+    """Device time wraps every 71.6 min. What waited in a buffer meanwhile is as old as it was."""
+    decoder, seconds = StreamDecoder(), round(hours * 3600)
+    decoder.feed(status(100) + frame(0, 0, 100 * 10**6))
+    late_us = (101 + seconds) * 10**6
+    batch = decoder.feed(frame(0, 1, 100_010_000) + status(101 + seconds) + frame(0, 100 * (1 + seconds), late_us))
+    assert batch.t_us.tolist() == [100_010_000, late_us]
+    assert decoder.lost == 100 * (1 + seconds) - 2
+    restarted = decoder.feed(status(3) + frame(0, 300, 3 * 10**6) + status(4) + frame(0, 400, 4 * 10**6))
+    assert np.diff(restarted.t_us).tolist() == [10**6]
 
 
 def test_threads_cannot_share_a_decoder() -> None:

@@ -65,7 +65,7 @@ class Result:
 
 
 def run(options: Options) -> Report:
-    """Run it, for minutes, as host/docs/lab/learning.md says."""
+    """Run it, for minutes, as host/biotac-lab/docs/learning.md says."""
     size = QUICK if options.quick else Size()
     # the nets are many small systems, on which BLAS's own threads would only wait for each other
     with threadpool_limits(limits=1, user_api="blas"), warnings.catch_warnings():

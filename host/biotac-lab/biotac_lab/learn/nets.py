@@ -1,7 +1,7 @@
 """A perceptron of one tanh layer and linear outputs: Wettels and Loeb 2011, Eq 1-3, by scikit-learn.
 
 The paper trains by Levenberg-Marquardt with Bayesian regularisation and stops by held-out rows; L-BFGS with the weight
-decay that is best on such rows comes to the same errors (host/docs/lab/learning.md).
+decay that is best on such rows comes to the same errors (host/biotac-lab/docs/learning.md).
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 The paper's perceptron is train(); machine() is a newer method, and better.
 
 A frame's electrodes depend mostly on the place of contact, and a net fails at places that it has not seen: held out by
-contact, frames do badly on the emulated finger (host/docs/lab/learning.md). The shape of a contact about its own middle
-depends far less on the place, and how that shape grows with the load says more than any single frame. Hence shape() and
+contact, frames do badly on the emulated finger (docs/learning.md). The shape of a contact about its own middle depends
+far less on the place, and how that shape grows with the load says more than any single frame. Hence shape() and
 trajectories().
 """
 
