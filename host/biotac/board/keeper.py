@@ -36,7 +36,7 @@ class Keeper:
         self._callbacks = callbacks
         self._reader.reconnects = reconnect
         self._started: wire.Start | None = None  # the stream that was looked at last
-        self._looked_s = time.monotonic()
+        self._asked_s = time.monotonic()
         # At the last look; looks without rows since, and how often the stream was started again for that.
         self._rows = self._idle = self._faults = self._looks = self._restarts = 0
         self._thread = self._reader.thread(self._run, "keeper")
@@ -96,25 +96,25 @@ class Keeper:
             if started is None or self._reader.lost is not None:
                 return
             is_new, self._started = started is not self._started, started
-            late_s = time.monotonic() - self._looked_s
+            heard_s, self._asked_s = self._asked_s, time.monotonic()  # the board heard nothing in between
             try:
                 status = board.ask(wire.GetStatus(0), wire.Status, timeout_s=LOOK_S * board.link.patience, quiet=True)
             except CommandRefusedError:
                 return  # a recording that has no STATUS yet
-            self._looked_s = time.monotonic()
+            silent_s = time.monotonic() - heard_s
             if is_new:
                 self._looks = self._restarts = 0
                 if self._has_restarted():  # while nothing streamed, so that nobody looked
                     return
             if board.link.owns_stream or board.link.keeps_time:  # a recording has pauses of its own
-                self._judge(started, status, late_s)
+                self._judge(started, status, silent_s)
             self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
 
-    def _judge(self, started: wire.Start, status: wire.Status, late_s: float) -> None:
+    def _judge(self, started: wire.Start, status: wire.Status, silent_s: float) -> None:
         if self._stream.started is not started:
             return  # it is being closed
         if self._board.link.owns_stream and status.streams != started.streams:
-            self._stopped(status, late_s)
+            self._stopped(status, silent_s)
         elif not (started.fingers & status.fingers_present and started.streams & status.streams & ROWS):
             self._looks = 0  # no rows are due
         elif self._reader.rows != self._rows or status.frames_idle != self._idle:
@@ -124,12 +124,12 @@ class Keeper:
             if self._looks >= LOOKS_WITHOUT_ROWS:
                 self._start_again("silence")
 
-    def _stopped(self, status: wire.Status, late_s: float) -> None:
+    def _stopped(self, status: wire.Status, silent_s: float) -> None:
         """The board answers, but does not send what it was told to."""
         if self._has_restarted():
             return
         port = self._board.link.port
-        if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or late_s >= KEEPALIVE_S:
+        if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or silent_s >= KEEPALIVE_S:
             self._start_again("paused")
         else:
             self._reader.fail(
@@ -175,7 +175,7 @@ class Keeper:
             reader.gaps.begin(reason)
             board.tell_again()
             self._stream.resume()
-        self._looked_s = time.monotonic()
+        self._asked_s = time.monotonic()
 
     def _found(self, before: wire.Hello) -> bool:
         board = self._board

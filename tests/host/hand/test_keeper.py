@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import termios
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from types import SimpleNamespace
@@ -82,6 +83,27 @@ def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, qu
     assert (first.streams, first.fingers, first.keepalive_ms) == (again.streams, again.fingers, again.keepalive_ms)
     live.firmware.wait_for_looks()  # the fault is latched, and not new any more
     assert live.hand.connected and len(live.firmware.of(wire.Start)) == 2
+
+
+def test_a_board_that_took_too_long_to_answer_was_not_taken(live: Live, quick, monkeypatch) -> None:
+    """Its HOST_SILENT is latched since an earlier pause. It may have heard nothing until it answered."""
+    gaps = gaps_of(live.hand)
+    live.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
+    live.hand.stream()
+    live.send(frame(1))
+    live.firmware.wait_for_looks()
+    monkeypatch.setattr(keeper, "KEEPALIVE_S", 0.05)
+    answer = live.firmware.status
+
+    def late(req_id: int = 0) -> wire.Status:
+        time.sleep(0.1)
+        return answer(req_id)
+
+    monkeypatch.setattr(live.firmware, "status", late)
+    live.firmware.after[wire.Start] = frame(11)
+    live.firmware.streams = 0
+    until(lambda: live.hand.check() or gaps())
+    assert gaps()[0].reason == "paused"
 
 
 def test_a_stream_without_rows_is_started_again_once_and_then_lost(live: Live, quick) -> None:
