@@ -126,12 +126,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
         raise top.error("fault", "lasts too long", f"at most {FAULTS_MAX_S:g} s in total", "remove some")
     return Scenario(
-        name=name,
-        fit_gains="gains" in top,
-        fingers=specs,
-        tracks=tracks,
-        faults=faults,
-        seconds=tracks[0].seconds,
+        name=name, fit_gains="gains" in top, fingers=specs, tracks=tracks, faults=faults, seconds=tracks[0].seconds
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
@@ -31,14 +31,6 @@ class Pose:
     celsius: float = REST_CELSIUS
     slip_mm_s: float = 0.0
 
-    def row(self) -> list[float]:
-        """As numbers, in field order."""
-        return [
-            self.x_mm, self.y_mm, self.force_n, self.shear_x_n, self.shear_y_n,
-            self.torsion_nmm, self.tip_mm, self.celsius,
-            self.slip_mm_s,
-        ]  # fmt: skip
-
     def released(self) -> Pose:
         """The same place and temperature, without load."""
         return replace(self, force_n=0.0, shear_x_n=0.0, shear_y_n=0.0, torsion_nmm=0.0)
@@ -53,8 +45,8 @@ class Track:
     moving_s: float = 0.0  #: part of ``seconds`` with a changing load, of which each frame must be computed
     _starts_s: list[float] = field(default_factory=list)
     _lengths_s: list[float] = field(default_factory=list)
-    _from: list[list[float]] = field(default_factory=list)
-    _to: list[list[float]] = field(default_factory=list)
+    _from: list[tuple[float, ...]] = field(default_factory=list)
+    _to: list[tuple[float, ...]] = field(default_factory=list)
 
     def ramp(self, seconds: float, end: Pose, start: Pose | None = None) -> None:
         """Go linearly to ``end``; with ``start``, jump there first (a jump without load has no effect)."""
@@ -63,8 +55,8 @@ class Track:
             self.moving_s += seconds
         self._starts_s.append(self.seconds)
         self._lengths_s.append(seconds)
-        self._from.append(begin.row())
-        self._to.append(end.row())
+        self._from.append(astuple(begin))
+        self._to.append(astuple(end))
         self.pose = end
         self.seconds += seconds
 

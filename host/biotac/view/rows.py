@@ -36,12 +36,7 @@ FRAME_ROW = (
 )
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
-SCALES = {
-    "signal_q4": Q4_PER_COUNT,
-    "poc_um": UM_PER_MM,
-    "force_100un": FORCE_LSB_PER_N,
-    "torque_mnmm": MNMM_PER_NMM,
-}
+SCALES = {"signal_q4": Q4_PER_COUNT, "poc_um": UM_PER_MM, "force_100un": FORCE_LSB_PER_N, "torque_mnmm": MNMM_PER_NMM}
 
 
 def frame_rows(batch: Batch) -> list[str]:
