@@ -39,9 +39,9 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     if lower.endswith(".toml"):
         return play(parse_scenario(_scenario_bytes(place), file=place.name), fingers=fingers, seconds=seconds)
     if lower.endswith(".npz"):
-        return load_npz(_existing(place), fingers=fingers, seconds=seconds)
+        return load_npz(place, fingers=fingers, seconds=seconds)
     if lower.endswith((".btd", ".btd.gz")):
-        return load_btd(_existing(place), fingers=fingers, seconds=seconds)
+        return load_btd(place, fingers=fingers, seconds=seconds)
     raise InputError(
         f"{path}: unknown kind of source: expected .toml (scenario), .npz, .btd or .btd.gz (recording); "
         f"bundled scenarios: {', '.join(bundled_scenarios())}"
@@ -62,12 +62,3 @@ def _scenario_bytes(place: Path) -> bytes:
         raise InputError(
             f"{place}: cannot be read ({error.strerror}): expected a scenario file; check the path"
         ) from error
-
-
-def _existing(place: Path) -> Path:
-    if not place.is_file():
-        seen = "not a file" if place.exists() else "no such file"
-        raise InputError(f"{place}: {seen}: expected a recording; check the path")
-    if place.stat().st_size == 0:
-        raise InputError(f"{place}: the file is empty: expected a recording; copy it again")
-    return place

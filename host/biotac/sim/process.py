@@ -95,11 +95,6 @@ class SimBoard:
         """Let a held board's time run."""
         self.say("run")
 
-    def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait at most timeout_s for output of the board; return True when the tape is over."""
-        self.hear(timeout_s)
-        return self.over
-
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
         if self._process.poll() is None:
