@@ -12,7 +12,7 @@ from ..wire import sensor_gen as sensor
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, bands_from_wire
 from ..wire.native import ffi, lib
-from .compiled import check_words
+from .compiled import checked_words
 
 #: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
@@ -42,20 +42,12 @@ def pac_bands(pac: Any) -> NDArray[np.float64]:
     round of 10 ms, and no rounds are missing. An energy is the sum of squares over the round's 22 samples. Raises
     ValueError for another shape, type or range.
     """
-    words = pac_words(pac)
+    words = checked_words("pac", pac, None, SAMPLES)
     sent = np.zeros(len(words), _WIRE)
     sent["good"], sent["energy_q4"] = _energies(words)
     rounds = np.arange(len(words))
     energy: NDArray[np.float64] = bands_from_wire(sent, rounds, rounds)["energy_count2"]
     return energy
-
-
-def pac_words(pac: Any) -> NDArray[np.uint16]:
-    """``pac`` as C takes it. Raises ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
-    words = np.asarray(pac)
-    if words.ndim != 2 or words.shape[1] != SAMPLES or words.dtype.kind not in "iu":
-        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of shape (n, {SAMPLES})")
-    return np.ascontiguousarray(check_words("pac", words), np.uint16)
 
 
 def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:

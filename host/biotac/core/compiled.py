@@ -85,19 +85,6 @@ def pressure_force_100un(
     return out
 
 
-def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[np.uint16]:
-    """The board's filter over the PDC words (n,) of consecutive rounds, from its initial state; in 1/16 count.
-
-    Raises ValueError for other shapes or ranges.
-    """
-    pdc = integers("pdc", pdc, np.uint16, None)
-    board_settings({wire.Setting.PRESSURE_FILTER_MILLI: filter_milli})  # raises ValueError out of range
-    out = np.empty(len(pdc), np.uint16)
-    pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
-    lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
-    return out
-
-
 def board_settings(settings: Settings) -> Any:
     """The C struct bt_settings with these values; settings left out have their defaults.
 
@@ -152,10 +139,7 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
 
     Raises ValueError for another shape, for values that are not integers, and for ones that do not fit ``dtype``.
     """
-    array = np.asarray(values)
-    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
-        wanted = ", ".join("n" if size is None else str(size) for size in shape)
-        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
+    array = _shaped(name, values, shape)
     if array.dtype != dtype:
         limits = np.iinfo(dtype)
         if array.dtype.kind not in "iu":
@@ -166,12 +150,26 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
     return np.ascontiguousarray(array, dtype)
 
 
-def check_words(name: str, words: NDArray[Any]) -> NDArray[Any]:
-    """``words`` as they are. Raises ValueError, naming the first bad row, unless all are 0..4095 or 0xFFFF."""
-    bad = (words != wire.INVALID_COUNT) & ~((words >= 0) & (words <= FULL_SCALE_COUNT))
+def checked_words(name: str, values: Any, *shape: int | None) -> NDArray[np.uint16]:
+    """The sensor's words for C, an array as integers() gives.
+
+    Raises ValueError, naming the first bad row, unless they are integers 0..4095 or 0xFFFF.
+    """
+    array = _shaped(name, values, shape)
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"{name} are {array.dtype}, expected integers")
+    bad = (array != wire.INVALID_COUNT) & ~((array >= 0) & (array <= FULL_SCALE_COUNT))
     if bad.any():
         raise ValueError(
-            f"{name} row {np.argwhere(bad)[0][0]} holds {words[bad][0]}, expected 0..{FULL_SCALE_COUNT}, or 0xFFFF "
+            f"{name} row {np.argwhere(bad)[0][0]} holds {array[bad][0]}, expected 0..{FULL_SCALE_COUNT}, or 0xFFFF "
             "where missing"
         )
-    return words
+    return np.ascontiguousarray(array, np.uint16)
+
+
+def _shaped(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    array = np.asarray(values)
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("n" if size is None else str(size) for size in shape) + ("," if len(shape) == 1 else "")
+        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
+    return array

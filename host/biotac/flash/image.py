@@ -13,8 +13,7 @@ from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire.identity import board_text
 from ..wire.sensor_gen import MAX_SENSORS
-from . import note
-from .note import Note
+from .note import Note, find
 
 BLOCK_BYTES = 512
 HEAD = struct.Struct("<8I")
@@ -62,7 +61,7 @@ def read_image(path: Path) -> Image:
         blocks = split(data)
         payload = join_payloads(blocks)
         check_boot2(payload)
-        return Image(path, blocks, note.find(payload))
+        return Image(path, blocks, find(payload))
     except ValueError as error:
         raise InputError(f"{path} cannot be flashed: {error}") from error
 
@@ -121,6 +120,6 @@ def check_boot2(payload: bytes) -> None:
         )
 
 
-def note_text(its: Note) -> str:
+def note_text(note: Note) -> str:
     """A note as text for users."""
-    return f"{board_text(its.board)}, firmware {its.version}, wire {'.'.join(map(str, its.wire))}"
+    return f"{board_text(note.board)}, firmware {note.version}, wire {'.'.join(map(str, note.wire))}"

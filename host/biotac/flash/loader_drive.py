@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..errors import FlashError
 from .image import Image
-from .loader import Loader, Show
+from .interfaces import Loader, Show
 
 LABEL = "RPI-RP2"
 INFO = "INFO_UF2.TXT"

@@ -33,7 +33,8 @@ class SerialLink(Link):
         self._serial: Any = None
         self._poll: Any = None
         self.reopen(path)
-        self._usb_serial = usb_serial(path)
+        real = os.path.realpath(path)  # its USB device, if it is one
+        self._usb_serial = next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
 
     def spoilt(self) -> str:
         if self.fd is None or not _is_cooked(self.fd):
@@ -46,10 +47,11 @@ class SerialLink(Link):
         return [self._path, *(path for path in moved if path != self._path)]
 
     def reopen(self, place: str) -> None:
-        self._close_port()
+        SerialLink.close(self)  # the port alone, not what a subclass closes with it
         try:
             rate = self.bits_per_s or USB_BITS_PER_S
-            self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive())
+            exclusive = True if os.name == "posix" else None  # on Windows access always is
+            self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive)
         except (serial.SerialException, OSError, ValueError) as error:
             raise open_error(place, error) from error
         if os.name == "posix":
@@ -106,9 +108,6 @@ class SerialLink(Link):
             raise went_away(self.port, error) from error
 
     def close(self) -> None:
-        self._close_port()
-
-    def _close_port(self) -> None:
         if self._serial is not None:
             self._serial.close()
 
@@ -147,24 +146,6 @@ def open_uart(port: str) -> SerialLink:
 def went_away(port: str, error: Exception) -> DeviceLostError:
     """The DeviceLostError to raise when reading an open port failed with ``error``."""
     return DeviceLostError(f"{port} went away while it was open ({error}); plug the board in and open it again")
-
-
-def nowhere(fd: int) -> None:
-    """Point a descriptor to the null device, in this process only; its number stays in use."""
-    null = os.open(os.devnull, os.O_RDWR)
-    os.dup2(null, fd)
-    os.close(null)
-
-
-def usb_serial(path: str) -> str | None:
-    """Serial number of the USB device behind a port; None without one."""
-    real = os.path.realpath(path)
-    return next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
-
-
-def exclusive() -> bool | None:
-    """Whether to ask pyserial for exclusive access: True on POSIX; None on Windows, where access always is."""
-    return True if os.name == "posix" else None
 
 
 def open_error(path: str, error: Exception) -> PortError:

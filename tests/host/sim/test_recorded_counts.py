@@ -145,10 +145,10 @@ def test_files_that_are_no_npz_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["none.npz", "none.btd", "none.btd.gz"])
 def test_missing_and_empty_recordings_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="No such file.*check the path"):
+    with pytest.raises(InputError, match=r"No such file.*check the path"):
         load_source(tmp_path / name)
     (tmp_path / name).touch()
-    with pytest.raises(InputError, match="expected an? "):
+    with pytest.raises(InputError, match=r"expected an? "):
         load_source(tmp_path / name)
 
 
