@@ -25,7 +25,6 @@ from .poke import COLORS, SHIPPED, WEIGHTS, WORDS, called
 from .trial import Bools, Floats, Script, Trial, play
 
 RECORDING = "E, PDC and z_dir, a plate's unit normal"
-TAKES: frozenset[str] = frozenset()
 
 CONTACT_COUNTS = 40.0
 THRESHOLDS_COUNTS = (0.0, 20.0, 40.0, 80.0, 200.0)
