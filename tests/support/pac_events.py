@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biotac.core.compiled import checked_words
+from biotac.core.compiled import c_pointers, checked_words
 from biotac.core.finger import EVENT_DTYPE
-from biotac.wire.native import ffi, lib
+from biotac.wire.native import lib
 
 _MOST_A_ROUND = 8
 
@@ -22,8 +22,5 @@ def pac_events(pac: Any) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
     words = checked_words("pac", pac, None, 22)
     slips = np.zeros(len(words), np.uint8)
     events = np.zeros(_MOST_A_ROUND * len(words), EVENT_DTYPE)
-    found = lib.bt_replay_pac(
-        len(words), ffi.from_buffer("uint16_t[]", words), True, ffi.from_buffer("uint8_t[]", slips),
-        ffi.from_buffer("uint8_t[]", events), len(events),
-    )  # fmt: skip
+    found = lib.bt_replay_pac(len(words), *c_pointers(words), True, *c_pointers(slips, events), len(events))
     return events[:found], slips.astype(bool)

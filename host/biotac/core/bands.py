@@ -12,7 +12,7 @@ from ..wire import sensor_gen as sensor
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, bands_from_wire
 from ..wire.native import ffi, lib
-from .compiled import checked_words
+from .compiled import c_pointers, checked_words
 
 #: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
@@ -54,11 +54,5 @@ def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.uint8], NDArray[np.
     words = np.ascontiguousarray(words)
     good = np.zeros(len(words), np.uint8)
     energy_q4 = np.zeros((len(words), len(BANDS_HZ)), np.uint32)
-    lib.bt_replay_bands(
-        ffi.new("bt_bands *"),
-        len(words),
-        ffi.from_buffer("uint16_t[]", words),
-        ffi.from_buffer("uint8_t[]", good),
-        ffi.from_buffer("uint32_t[]", energy_q4),
-    )
+    lib.bt_replay_bands(ffi.new("bt_bands *"), len(words), *c_pointers(words, good, energy_q4))
     return good, energy_q4

@@ -47,20 +47,9 @@ def on_board_q4(
     board = board_settings(settings)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
     n = len(raw)
-    poc_um = np.empty((n, 3), np.int16)
-    force_100un = np.empty((n, 3), np.int32)
-    torque_mnmm = np.empty((n, 3), np.int32)
-    flags = np.empty(n, np.uint32)
-    lib.bt_kernel_frames(
-        n,
-        ffi.from_buffer("uint16_t[]", raw),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        kernel,
-        ffi.from_buffer("int16_t[]", poc_um),
-        ffi.from_buffer("int32_t[]", force_100un),
-        ffi.from_buffer("int32_t[]", torque_mnmm),
-        ffi.from_buffer("uint32_t[]", flags),
-    )
+    force_100un, torque_mnmm = np.empty((2, n, 3), np.int32)
+    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
+    lib.bt_kernel_frames(n, *c_pointers(raw, tare_q4), kernel, *c_pointers(poc_um, force_100un, torque_mnmm, flags))
     return poc_um, force_100un, torque_mnmm, flags
 
 
@@ -75,14 +64,14 @@ def pressure_force_100un(
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(filtered_q4))
     board_settings({wire.Setting.PRESSURE_GAIN_NN: gain_nn})  # raises ValueError out of range
     out = np.empty(len(filtered_q4), np.int32)
-    lib.bt_pressure_forces(
-        len(out),
-        ffi.from_buffer("uint16_t[]", filtered_q4),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        gain_nn,
-        ffi.from_buffer("int32_t[]", out),
-    )
+    lib.bt_pressure_forces(len(out), *c_pointers(filtered_q4, tare_q4), gain_nn, *c_pointers(out))
     return out
+
+
+def c_pointers(*arrays: NDArray[Any]) -> list[Any]:
+    """The memory of contiguous arrays for C, which must not outlive them; that of structured ones as bytes."""
+    kinds = {"V": "uint8_t", "f": "double"}
+    return [ffi.from_buffer(f"{kinds.get(a.dtype.kind, f'{a.dtype.name}_t')}[]", a) for a in arrays]
 
 
 def board_settings(settings: Settings) -> Any:
@@ -106,15 +95,8 @@ def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settin
     """
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
-    gains = formula_settings(settings)
-    out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
-    lib.lin2013_frames(
-        len(raw),
-        ffi.from_buffer("uint16_t[]", raw),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        gains,
-        *(ffi.from_buffer("double[]", array) for array in out),
-    )
+    out = np.empty((3, len(raw), 3), np.float64)
+    lib.lin2013_frames(len(raw), *c_pointers(raw, tare_q4), formula_settings(settings), *c_pointers(*out))
     return Results(*out)
 
 

@@ -21,7 +21,7 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
-from .compiled import Settings, board_settings, checked_words, default_settings
+from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
 
 ROUND_US = 10_000
 #: An EVENT message's fields (protocol/MESSAGES.md), as the board sends them.
@@ -99,15 +99,8 @@ class Finger:
         words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
         rows = np.empty(len(words), FINGER_DTYPE)
         if len(words):
-            lib.bt_replay(
-                self._finger,
-                self._settings,
-                ffi.NULL if self._map is None else self._map.handle,
-                len(words),
-                ffi.from_buffer("uint16_t[]", words),
-                ffi.from_buffer("uint32_t[]", times),
-                ffi.from_buffer("uint8_t[]", rows),
-            )
+            own_map = ffi.NULL if self._map is None else self._map.handle
+            lib.bt_replay(self._finger, self._settings, own_map, len(words), *c_pointers(words, times, rows))
         return rows
 
     def events(
@@ -121,16 +114,8 @@ class Finger:
         events = np.zeros(_EVENTS_A_ROUND * len(words), EVENT_DTYPE)
         if not len(words):
             return events
-        found = lib.bt_replay_events(
-            self._finger,
-            self._settings,
-            len(words),
-            ffi.from_buffer("uint16_t[]", words),
-            ffi.from_buffer("uint32_t[]", times),
-            ffi.from_buffer("uint8_t[]", events),
-            len(events),
-        )
-        return events[:found]
+        pointers = c_pointers(words, times, events)
+        return events[: lib.bt_replay_events(self._finger, self._settings, len(words), *pointers, len(events))]
 
     def _words_of(
         self, counts: Any, pdc: Any, tac: Any, tdc: Any, pac: Any, t_us: Any

@@ -53,7 +53,7 @@ class EmulatedBoard(SimBoard):
         self.uart_path = ""
         super().__init__(source, pace=pace, hold=hold)
 
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+    def _start(self, options: list[str]) -> Any:
         tools = self._tools
         command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors), *options]
         with ExitStack() as ptys:

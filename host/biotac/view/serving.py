@@ -36,7 +36,12 @@ class Viewing:
         opener = opener_of(source, writable(folder or Path()))
         self.state = State(source)
         self.reader = Reader(opener, self.state, again=again)
-        self.server = serve(self.state, self.reader, port)
+        try:  # the default port first, so that a page left open reconnects when the program runs again
+            self.server = ViewServer(self.state, self.reader, DEFAULT_PORT if port is None else port)
+        except PortError:
+            if port is not None:
+                raise
+            self.server = ViewServer(self.state, self.reader, 0)
         self._thread = threading.Thread(target=self.server.serve_forever, name="biotac-view-http", daemon=True)
         self._thread.start()
         self.reader.start()
@@ -66,17 +71,6 @@ class Viewing:
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-
-def serve(state: State, reader: Reader, port: int | None) -> ViewServer:
-    """The server on ``port``; None: on the default port, or any free one if that is taken."""
-    if port is not None:
-        return ViewServer(state, reader, port)
-    try:
-        # The default one, so that a page left open reconnects when the program runs again.
-        return ViewServer(state, reader, DEFAULT_PORT)
-    except PortError:
-        return ViewServer(state, reader, 0)
 
 
 def opener_of(source: str, folder: Path) -> Opener:
