@@ -16,7 +16,7 @@ export function age(ms) {
   return `${Math.floor(s / 3600)} h ago`;
 }
 
-const byId = (id) => document.getElementById(id);
+export const byId = (id) => document.getElementById(id);
 
 // Writing what stands there already costs a layout all the same.
 function write(element, text) {
@@ -28,7 +28,7 @@ function put(element, value, digits) {
   element.dataset.value = String(value);
 }
 
-function make(tag, properties = {}, data = {}) {
+export function make(tag, properties = {}, data = {}) {
   const element = Object.assign(document.createElement(tag), properties);
   Object.assign(element.dataset, data);
   return element;
