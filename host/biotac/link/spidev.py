@@ -15,7 +15,7 @@ from __future__ import annotations
 import secrets
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from ..errors import DeviceLostError, PortError
@@ -54,13 +54,11 @@ def parse_spidev(port: str) -> list[tuple[int, int]]:
         bus, dot, device = text.partition(".")
         if not (dot and bus.isdecimal() and device.isdecimal() and text.isascii()):
             raise PortError(f"{port}: {text!r} is not an SPI device; expected BUS.DEVICE per finger: spidev:0.0,0.1")
+        if (int(bus), int(device)) in devices:
+            raise PortError(f"{port}: {text} is listed twice; each finger needs its own chip select")
         devices.append((int(bus), int(device)))
     if len(devices) > sensor.MAX_SENSORS:
         raise PortError(f"{port}: {len(devices)} devices; expected at most {sensor.MAX_SENSORS}")
-    for bus_device in devices:
-        if devices.count(bus_device) > 1:
-            name = "{}.{}".format(*bus_device)
-            raise PortError(f"{port}: {name} is listed twice; each finger needs its own chip select")
     return devices
 
 
@@ -71,22 +69,18 @@ def open_devices(port: str) -> list[Any]:
         import spidev
     except ImportError as error:
         raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[bus]'") from error
-    opened: list[Any] = []
-    try:
-        for bus, device in places:
-            spi = spidev.SpiDev()
+    opened = [spidev.SpiDev() for _ in places]
+    with ExitStack() as on_failure:
+        for spi, (bus, device) in zip(opened, places, strict=True):
             try:
                 spi.open(bus, device)
-                opened.append(spi)
+                on_failure.callback(spi.close)
                 spi.mode = 0
                 spi.max_speed_hz = sensor.SPI_HZ
                 spi.bits_per_word = 8  # two bytes per 16-bit word: the Raspberry Pi's bus cannot do 16 bits
             except OSError as error:
                 raise PortError(describe_open_error(f"/dev/spidev{bus}.{device}", error)) from error
-    except BaseException:
-        for spi in opened:
-            spi.close()
-        raise
+        on_failure.pop_all()
     return opened
 
 

@@ -36,12 +36,7 @@ def write_tape(path: str | Path, source: Source) -> None:
             f"source {source.name}: samples are {samples.dtype} {samples.shape}: expected uint16 "
             f"(frames, fingers, {_SLOTS}); load it with load_source"
         )
-    frames, fingers, slots = samples.shape
-    if not 1 <= fingers <= _sensor.MAX_SENSORS or frames < 1:
-        raise InputError(
-            f"source {source.name}: {frames} frames of {fingers} fingers: expected at least one frame "
-            f"and 1 to {_sensor.MAX_SENSORS} fingers; load it with load_source"
-        )
+    frames, fingers, slots = samples.shape  # the simulator checks that there are not too few or too many
     blocks = [samples[first : first + _BLOCK] for first in range(0, frames, _BLOCK)]
     for k, block in enumerate(blocks):
         wrong = (block > _sensor.FULL_SCALE_COUNT) & (block < min(CODES))
