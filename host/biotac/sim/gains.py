@@ -11,12 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import geometry as surface
-from ..core.compiled import FORCE_GAINS, TORQUE_GAINS
 from ..core.geometry import Floats
-from ..wire.messages_gen import SETTINGS
+from ..wire.messages_gen import SETTINGS, Setting
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
-_SETTINGS = (*FORCE_GAINS, *TORQUE_GAINS)
+_SETTINGS = (
+    Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN, Setting.TORQUE_GAIN_Y_NN,
+    Setting.TORQUE_GAIN_Z_NN,
+)  # fmt: skip
 _WEIGHTS = (*surface.ELECTRODE_NORMAL.T, *_ARMS_MM.T[1:])  # of each
 
 
