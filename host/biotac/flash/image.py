@@ -32,6 +32,9 @@ SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/keep/storage.h
 MAPS_BYTES = (2 * MAX_SENSORS + 1) * _map.MAX_BYTES  # before them: firmware/core/map/store.h
 BOOT2_BYTES = 252  # followed by its CRC
 
+CARRIED = Path(__file__).with_name("biotac-pico.uf2")  # host/CMakeLists.txt puts it there
+BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
+
 
 @dataclass(frozen=True)
 class Image:
@@ -49,6 +52,22 @@ class Image:
         any order.
         """
         return (*self.blocks[1:], self.blocks[0])
+
+
+def find_image() -> Path:
+    """The image included in this package or, if there is none, the one built in the clone around the working directory.
+
+    Raises InputError when there is neither.
+    """
+    if CARRIED.is_file():
+        return CARRIED
+    for folder in (Path.cwd(), *Path.cwd().parents):
+        if (folder / BUILT).is_file():
+            return folder / BUILT
+    raise InputError(
+        f"this biotac-gateway was built without a board image, and no {BUILT} is in this folder or above; install a "
+        "released wheel, or name an IMAGE, a .uf2 file (to build one, see firmware/boards/pico)"
+    )
 
 
 def read_image(path: Path) -> Image:

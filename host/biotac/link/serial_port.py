@@ -56,11 +56,9 @@ class SerialLink(Link):
             raise open_error(place, error) from error
         if os.name == "posix":
             self.fd = self._serial.fileno()
-            with suppress(OSError):  # not a tty
-                _one_byte_at_least(self.fd)
-        if hasattr(select, "poll"):
-            self._poll = select.poll()
-            self._poll.register(self._serial.fileno(), select.POLLIN)
+            _one_byte_at_least(self.fd)
+            self._poll = select.poll()  # serves all waits; select() would build and take apart three lists for each
+            self._poll.register(self.fd, select.POLLIN)
 
     def read(self, timeout_s: float) -> bytes:
         try:
@@ -71,10 +69,7 @@ class SerialLink(Link):
             raise went_away(self.port, error) from error
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until something can be read; false when nothing can within timeout_s."""
-        # One poll() object serves all waits; select() would build and take apart three lists for each.
-        if self._poll is None:
-            return bool(select.select([self._serial.fileno()], [], [], timeout_s)[0])
+        """Wait until something can be read; false when nothing can within timeout_s. Not on Windows."""
         return bool(self._poll.poll(1000 * timeout_s))
 
     def _drain(self) -> bytes:
@@ -116,12 +111,10 @@ def _one_byte_at_least(fd: int) -> None:
     """Let a read without data wait, as cfmakeraw does: pyserial's setting, no wait, would stay for the next program."""
     import termios
 
-    settings = termios.tcgetattr(fd)
-    settings[6][termios.VMIN] = 1
-    try:
+    with suppress(termios.error):  # not a tty
+        settings = termios.tcgetattr(fd)
+        settings[6][termios.VMIN] = 1
         termios.tcsetattr(fd, termios.TCSANOW, settings)
-    except termios.error as error:
-        raise OSError(*error.args) from error
 
 
 def _is_cooked(fd: int) -> bool:

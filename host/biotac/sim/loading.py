@@ -53,12 +53,8 @@ def _scenario_bytes(place: Path) -> bytes:
         if not place.exists() and place.parent == Path() and place.name in bundled_scenarios():
             return (resources.files(__package__) / "scenarios" / place.name).read_bytes()
         return place.read_bytes()
-    except FileNotFoundError:
-        raise InputError(
-            f"{place}: no such file or bundled scenario: expected a scenario's path or one of "
-            f"{', '.join(bundled_scenarios())}"
-        ) from None
     except OSError as error:
         raise InputError(
-            f"{place}: cannot be read ({error.strerror}): expected a scenario file; check the path"
+            f"{place}: cannot be read ({error.strerror}): expected a scenario's path or one of "
+            f"{', '.join(bundled_scenarios())}"
         ) from error
