@@ -21,15 +21,6 @@ from .source import Source
 from .tape import write_tape
 
 
-def executable() -> Path:
-    """The simulator in this package; the environment variable BIOTAC_SIM names another build."""
-    override = os.environ.get("BIOTAC_SIM")
-    path = Path(override) if override else BUILT / "bin" / "biotac-sim"
-    if not path.is_file():
-        raise PortError(f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set")
-    return path
-
-
 class SimBoard:
     """A running simulator process; ``path`` is a pty that any serial program can open."""
 
@@ -63,9 +54,14 @@ class SimBoard:
         self._folder.cleanup()
 
     def _start(self, options: list[str]) -> Any:
-        """The board's process, with three pipes."""
-        command = [str(executable()), *options]
-        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        """The board's process, with three pipes; the environment variable BIOTAC_SIM names another build of it."""
+        path = Path(os.environ.get("BIOTAC_SIM") or BUILT / "bin" / "biotac-sim")
+        if not path.is_file():
+            raise PortError(
+                f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
+            )
+        pipe = subprocess.PIPE
+        return subprocess.Popen([str(path), *options], stdin=pipe, stdout=pipe, stderr=pipe)
 
     def hear(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""

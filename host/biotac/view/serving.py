@@ -23,7 +23,7 @@ RECORDING_SUFFIX = ".mcap"
 
 
 class Viewing:
-    """A page being served; use as a context manager.
+    """A page being served until it is closed.
 
     ``source`` is a PORT or a recording (.mcap). ``port``: the page's TCP port; None: the default one, or any free one
     if that is taken. ``folder``: where recordings go. ``again``: start over after the end.
@@ -65,12 +65,6 @@ class Viewing:
         self.server.shutdown()
         self.server.server_close()
         self._thread.join()
-
-    def __enter__(self) -> Viewing:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def opener_of(source: str, folder: Path) -> Opener:

@@ -100,7 +100,6 @@ export class Flags {
     if (flags === this.shown) return;
     this.shown = flags;
     const active = this.flags.filter(({ mask }) => flags & mask);
-    active.sort((a, b) => a.mask - b.mask);
     const items = (wanted) => active.filter(({ warns }) => warns === wanted).map(({ name, words, warns }) => {
       const item = make("li", {}, { flag: name, kind: warns ? "warn" : "calm" });
       item.append(make("b", { textContent: name.replaceAll("_", " ") }), words);
