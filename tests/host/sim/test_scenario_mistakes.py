@@ -15,46 +15,49 @@ def step(text: str) -> str:
     return f'name = "t"\n\n{PRESS}{text}'
 
 
+def second(do: str, keys: str) -> str:
+    """A step of a second after a press."""
+    return step(f'[[step]]\ndo = "{do}"\nseconds = 1\n{keys}\n')
+
+
+def first(do: str, keys: str) -> str:
+    return f'name = "t"\n[[step]]\ndo = "{do}"\nseconds = 1\n{keys}\n'
+
+
+def fault(at_s: float, seconds: float = 1, finger: int = 0, kind: str = "stuck_low", more: str = "") -> str:
+    return (
+        f'name = "t"\n{REST}[[fault]]\nat_s = {at_s}\nseconds = {seconds}\nfinger = {finger}\nkind = "{kind}"\n{more}'
+    )
+
+
 BAD: list[tuple[str, str, int, str, str]] = [
     # (case, text, line, who, what)
     (
         "unknown step key",
-        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
+        first("press", 'at = "E1"\nforcen = 2'),
         6,
         "step 1",
         "'forcen' is unknown for press: expected one of do, seconds, fingers, force_n",
     ),
-    (
-        "near miss",
-        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
-        6,
-        "step 1",
-        "did you mean 'force_n'?",
-    ),
-    (
-        "key of another step",
-        step('[[step]]\ndo = "hold"\nseconds = 1\ncelsius = 30\n'),
-        11,
-        "step 2",
-        "'celsius' is unknown for hold",
-    ),
+    ("near miss", first("press", 'at = "E1"\nforcen = 2'), 6, "step 1", "did you mean 'force_n'?"),
+    ("key of another step", second("hold", "celsius = 30"), 11, "step 2", "'celsius' is unknown for hold"),
     ("unknown do", step('[[step]]\nseconds = 1\ndo = "pres"\n'), 10, "step 2", "did you mean 'press'?"),
     ("missing do", step("[[step]]\nseconds = 1\n"), 8, "step 2", "'do' is missing"),
     ("missing seconds", step('[[step]]\ndo = "hold"\n'), 8, "step 2", "'seconds' is missing"),
     (
         "missing force",
-        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\n',
+        first("press", 'at = "E1"'),
         2,
         "step 1",
         "'force_n' is missing: expected a number 0 to 50 N; add it",
     ),
-    ("missing place", 'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 1\n', 2, "step 1", "'at' is missing"),
+    ("missing place", first("press", "force_n = 1"), 2, "step 1", "'at' is missing"),
     ("text for a number", step('[[step]]\ndo = "hold"\nseconds = "1"\n'), 10, "step 2", "'seconds' is '1'"),
     ("bool for a number", step('[[step]]\ndo = "hold"\nseconds = true\n'), 10, "step 2", "'seconds' is True"),
     ("nan", step('[[step]]\ndo = "hold"\nseconds = nan\n'), 10, "step 2", "'seconds' is nan"),
-    ("inf", step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = inf\n'), 11, "step 2", "'force_n' is inf"),
+    ("inf", second("press", "force_n = inf"), 11, "step 2", "'force_n' is inf"),
     ("negative time", step('[[step]]\ndo = "hold"\nseconds = -1\n'), 10, "step 2", "expected a number 0.01 to 3600 s"),
-    ("too much force", step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 51\n'), 11, "step 2", "'force_n' is 51"),
+    ("too much force", second("press", "force_n = 51"), 11, "step 2", "'force_n' is 51"),
     (
         "too long for its fingers",
         'name = "t"\nfingers = 5\n[[step]]\ndo = "rest"\nseconds = 181\n',
@@ -86,53 +89,29 @@ BAD: list[tuple[str, str, int, str, str]] = [
         "step 1",
         "'at_mm' is [0, 0, 0]: expected [x, y]",
     ),
-    (
-        "place while touching",
-        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\nat = "E1"\n'),
-        12,
-        "step 2",
-        "'at' is given during a contact",
-    ),
+    ("place while touching", second("press", 'force_n = 2\nat = "E1"'), 12, "step 2", "'at' is given during a contact"),
     (
         "tip while touching",
-        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\ntip_mm = 2\n'),
+        second("press", "force_n = 2\ntip_mm = 2"),
         12,
         "step 2",
         "'tip_mm' is given during a contact",
     ),
-    (
-        "release of nothing",
-        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 0\n',
-        5,
-        "step 1",
-        "'force_n' is 0 but nothing touches",
-    ),
+    ("release of nothing", first("press", "force_n = 0"), 5, "step 1", "'force_n' is 0 but nothing touches"),
     (
         "shear of nothing",
-        'name = "t"\n[[step]]\ndo = "shear"\nseconds = 1\nshear_n = [1, 0]\n',
+        first("shear", "shear_n = [1, 0]"),
         3,
         "step 1",
         "'do' is 'shear' but nothing touches finger 0",
     ),
-    ("shear nan", step('[[step]]\ndo = "shear"\nseconds = 1\nshear_n = [nan, 0]\n'), 11, "step 2", "'shear_n' is [nan"),
-    (
-        "twist too far",
-        step('[[step]]\ndo = "twist"\nseconds = 1\ntorsion_nmm = 101\n'),
-        11,
-        "step 2",
-        "'torsion_nmm' is 101",
-    ),
+    ("shear nan", second("shear", "shear_n = [nan, 0]"), 11, "step 2", "'shear_n' is [nan"),
+    ("twist too far", second("twist", "torsion_nmm = 101"), 11, "step 2", "'torsion_nmm' is 101"),
     ("slide nowhere", step('[[step]]\ndo = "slide"\nseconds = 1\n'), 8, "step 2", "'to' is missing"),
-    ("too hot", step('[[step]]\ndo = "temperature"\nseconds = 1\ncelsius = 61\n'), 11, "step 2", "'celsius' is 61"),
-    (
-        "finger out of range",
-        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [1]\n'),
-        11,
-        "step 2",
-        "'fingers' is [1]",
-    ),
-    ("finger twice", step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [0, 0]\n'), 11, "step 2", "distinct"),
-    ("no fingers at all", step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = []\n'), 11, "step 2", "'fingers' is []"),
+    ("too hot", second("temperature", "celsius = 61"), 11, "step 2", "'celsius' is 61"),
+    ("finger out of range", second("hold", "fingers = [1]"), 11, "step 2", "'fingers' is [1]"),
+    ("finger twice", second("hold", "fingers = [0, 0]"), 11, "step 2", "distinct"),
+    ("no fingers at all", second("hold", "fingers = []"), 11, "step 2", "'fingers' is []"),
     ("unknown top key", 'name = "t"\nspeed = 2\n' + REST, 2, "", "key 'speed' is unknown"),
     ("unknown table", 'name = "t"\n' + REST + "[[steps]]\n", 5, "", "key 'steps' is unknown"),
     ("missing name", REST, 1, "", "key 'name' is missing"),
@@ -144,13 +123,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
     ("huge", 'name = "t"\nseed = 0x' + "f" * 9000 + "\n" + REST, 2, "", "key 'seed' is a huge number"),
     ("huge time", step('[[step]]\ndo = "hold"\nseconds = 0x' + "f" * 9000 + "\n"), 10, "step 2", "a huge number"),
     ("many digits", 'name = "t"\nseed = 1' + "0" * 9000 + "\n" + REST, 1, "", "this TOML cannot be read"),
-    (
-        "fault at the end",
-        'name = "t"\n' + REST + '[[fault]]\nat_s = 1\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
-        6,
-        "fault 1",
-        "'at_s' is 1",
-    ),
+    ("fault at the end", fault(1), 6, "fault 1", "'at_s' is 1"),
     ("key below a first header", REST + "seed = 1\n", 1, "", "key 'name' is missing"),
     ("seed", 'name = "t"\nseed = -1\n' + REST, 2, "", "key 'seed' is -1"),
     ("seed is no whole number", 'name = "t"\nseed = 1.5\n' + REST, 2, "", "key 'seed' is 1.5"),
@@ -164,41 +137,11 @@ BAD: list[tuple[str, str, int, str, str]] = [
     ("six tables", 'name = "t"\n' + "[[finger]]\n" * 6 + REST, 2, "", "key 'finger' has 6 tables"),
     ("profile", 'name = "t"\n[[finger]]\n[[finger]]\nprofile = "old"\n' + REST, 4, "finger 2", "'profile' is 'old'"),
     ("serial", 'name = "t"\n[[finger]]\nserial = "BT1"\n' + REST, 3, "finger 1", "'serial' is 'BT1'"),
-    (
-        "fault kind",
-        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 0\nkind = "odd"\n',
-        9,
-        "fault 1",
-        "'kind' is 'odd': expected one of bad_parity",
-    ),
-    (
-        "fault finger",
-        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 1\nkind = "stuck_low"\n',
-        8,
-        "fault 1",
-        "'finger' is 1",
-    ),
-    (
-        "fault too late",
-        'name = "t"\n' + REST + '[[fault]]\nat_s = 2\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
-        6,
-        "fault 1",
-        "'at_s' is 2",
-    ),
-    (
-        "fault too long",
-        'name = "t"\n' + REST + '[[fault]]\nat_s = 0.5\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
-        7,
-        "fault 1",
-        "'seconds' is 1: expected a number 0.001 to 0.5 s",
-    ),
-    (
-        "fault channel",
-        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 0\nkind = "stuck_low"\nchannel = "E20"\n',
-        10,
-        "fault 1",
-        "'channel' is 'E20'",
-    ),
+    ("fault kind", fault(0, kind="odd"), 9, "fault 1", "'kind' is 'odd': expected one of bad_parity"),
+    ("fault finger", fault(0, finger=1), 8, "fault 1", "'finger' is 1"),
+    ("fault too late", fault(2), 6, "fault 1", "'at_s' is 2"),
+    ("fault too long", fault(0.5), 7, "fault 1", "'seconds' is 1: expected a number 0.001 to 0.5 s"),
+    ("fault channel", fault(0, more='channel = "E20"\n'), 10, "fault 1", "'channel' is 'E20'"),
     ("no toml", 'name = "t"\n[[step]]\ndo = \n', 3, "", "not valid TOML"),
     ("unfinished toml", 'name = "t"\nx = [1,\n', 2, "", "not valid TOML"),
     ("key twice", 'name = "t"\nseed = 1\nseed = 2\n' + REST, 3, "", "not valid TOML"),
