@@ -52,7 +52,7 @@ def frame_rows(batch: Batch) -> list[str]:
 def pac_rows(batch: Batch) -> list[str]:
     """One JSON text per PAC block."""
     rows = batch.pac
-    columns = (rows["finger"].tolist(), rows["seq"].tolist(), rows["t_us"].tolist())
+    columns = (rows[name].tolist() for name in PAC_ROW[:-1])
     return [compact(row) for row in zip(*columns, with_null(rows["pac"], wire.INVALID_COUNT), strict=True)]
 
 
