@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
 from ..wire import messages_gen as wire
@@ -178,27 +179,15 @@ class Result:
     error: BiotacError | None = None
 
 
-def flash_every(
-    image: Image,
-    targets: Iterable[Target],
-    loaders: Sequence[Loader],
-    *,
-    keep: bool = True,
-    downgrade: bool = False,
-    say: Say = lambda text: None,
-    show: ShowBlocks = lambda done, of: None,
-) -> Iterator[Result]:
-    """Flash each of ``targets`` as ``flash`` does, unless it already runs this image.
+def flash_every(image: Image, targets: Iterable[Target], loaders: Sequence[Loader], **options: Any) -> Iterator[Result]:
+    """Flash each of ``targets`` as ``flash`` does with these ``options``, unless it already runs this image.
 
     A failure is reported in its Result, and the next board follows. Boards are flashed one after the other, because a
     loader does not say which board it is.
     """
     for target in targets:
         try:
-            if runs(image, target):
-                yield Result(target.port)
-                continue
-            outcome = flash(image, target, loaders, keep=keep, downgrade=downgrade, say=say, show=show)
+            outcome = None if runs(image, target) else flash(image, target, loaders, **options)
             yield Result(target.port, outcome)
         except BiotacError as error:
             yield Result(target.port, error=error)
