@@ -17,8 +17,8 @@ import biotac
 from biotac import FrameFlags
 from biotac.sim.loading import load_source
 from biotac.sim.source import Source
-from biotac.sim.tape import BAD_PARITY
 from biotac.wire import messages_gen as wire
+from biotac.wire.messages_gen import EmuFault
 from biotac.wire.slots import ELECTRODE_SLOT
 
 ROWS = [row for row in tomllib.loads((ROOT / "tests/faults/matrix.toml").read_text())["row"] if "play" in row]
@@ -73,7 +73,7 @@ def noisy(source: Source, a_bit: float) -> tuple[Source, np.ndarray, np.ndarray]
     high, low = high ^ flips >> 8, low ^ flips & 255
     wrong = ~(odd[high] & odd[low])
     samples = source.samples.copy()
-    samples[:, HURT] = np.where(wrong, BAD_PARITY, high >> 1 << 5 | low >> 3)
+    samples[:, HURT] = np.where(wrong, EmuFault.BAD_PARITY, high >> 1 << 5 | low >> 3)
     return replace(source, samples=samples), wrong, ~wrong & (samples[:, HURT] != counts)
 
 

@@ -121,8 +121,8 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     standstill = Overheard(still=True)
     hand._reader.add_tap(standstill)
     hand.link.release()
-    while not hand.link.board.wait():
-        pass
+    while not hand.link.board.over:
+        hand.link.board.hear(None)
     standstill.go_on.set()
     while hand._board.reader.silent_s < 0.5:  # there is no room for an answer before
         time.sleep(0.05)

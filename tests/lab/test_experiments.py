@@ -291,7 +291,7 @@ def test_the_closed_form_is_exact_and_the_mesh_is_not(monkeypatch: pytest.Monkey
 def test_every_name_has_a_module() -> None:
     for name in command.NAMES:
         module = command.load(name)
-        assert callable(module.run) and isinstance(module.TAKES, frozenset)
+        assert callable(module.run)
 
 
 @pytest.mark.parametrize("name", ["poke", "shear", "torsion"])

@@ -126,7 +126,7 @@ class Script:
             rest=_middle(rest),
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
-            pressure=sampling.PDC_REST + _middle(sampling.pressure(states)),
+            pressure=sampling.PDC_REST + _middle(sampling.Pressure()(sampling.spring_load(states))),
         )
 
 

@@ -11,7 +11,7 @@ import math
 import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
@@ -123,7 +123,7 @@ def page(port: str) -> None:
                 lost = True
                 say(lost=health["words"])
 
-    with Viewing(port, folder=Path(sys.argv[4])) as viewing:
+    with closing(Viewing(port, folder=Path(sys.argv[4]))) as viewing:
         threading.Thread(target=follow, args=(viewing.server.url,), daemon=True).start()
         over.wait()
 

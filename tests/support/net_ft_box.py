@@ -15,7 +15,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import numpy as np
 
 from biotac.calibrate.reference import rdt
-from biotac.sim.nano17 import COUNTS_PER_N, COUNTS_PER_NM, Nano17
+from biotac.sim.nano17 import COUNTS_PER_UNIT, Nano17
 from biotac.sim.source import Source
 
 BUFFERED_RECORDS = 40
@@ -57,7 +57,7 @@ class NetFtBox:
         self._socket.bind(("127.0.0.1", 0))
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
-        page = PAGE.format(force=COUNTS_PER_N, torque=COUNTS_PER_NM, rate=its.rate_hz).encode()
+        page = PAGE.format(force=COUNTS_PER_UNIT, torque=COUNTS_PER_UNIT, rate=its.rate_hz).encode()
         self._http = ThreadingHTTPServer(("127.0.0.1", 0), _handler(page))
         self.http_port = int(self._http.server_address[1])
         self._thread = threading.Thread(target=self._http.serve_forever, args=(0.01,), daemon=True)

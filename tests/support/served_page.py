@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import closing
 from urllib.request import urlopen
 
 from biotac.view.serving import Viewing
@@ -13,7 +14,7 @@ from biotac.view.serving import Viewing
 
 def fingers_shown(source: str) -> set[int]:
     """Serve ``source``, fetch the page and all that its files name, and read until five fingers sent."""
-    with Viewing(source, port=0) as viewing:
+    with closing(Viewing(source, port=0)) as viewing:
         wanted, fetched, seen = {"index.html"}, set(), set()
         while wanted:
             name = wanted.pop()

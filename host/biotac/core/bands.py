@@ -12,7 +12,7 @@ from ..wire import sensor_gen as sensor
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, bands_from_wire
 from ..wire.native import ffi, lib
-from .compiled import check_words
+from .compiled import c_pointers, checked_words
 
 #: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
@@ -42,7 +42,7 @@ def pac_bands(pac: Any) -> NDArray[np.float64]:
     round of 10 ms, and no rounds are missing. An energy is the sum of squares over the round's 22 samples. Raises
     ValueError for another shape, type or range.
     """
-    words = pac_words(pac)
+    words = checked_words("pac", pac, None, SAMPLES)
     sent = np.zeros(len(words), _WIRE)
     sent["good"], sent["energy_q4"] = _energies(words)
     rounds = np.arange(len(words))
@@ -50,23 +50,9 @@ def pac_bands(pac: Any) -> NDArray[np.float64]:
     return energy
 
 
-def pac_words(pac: Any) -> NDArray[np.uint16]:
-    """``pac`` as C takes it. Raises ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
-    words = np.asarray(pac)
-    if words.ndim != 2 or words.shape[1] != SAMPLES or words.dtype.kind not in "iu":
-        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of shape (n, {SAMPLES})")
-    return np.ascontiguousarray(check_words("pac", words), np.uint16)
-
-
 def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:
     words = np.ascontiguousarray(words)
     good = np.zeros(len(words), np.uint8)
     energy_q4 = np.zeros((len(words), len(BANDS_HZ)), np.uint32)
-    lib.bt_replay_bands(
-        ffi.new("bt_bands *"),
-        len(words),
-        ffi.from_buffer("uint16_t[]", words),
-        ffi.from_buffer("uint8_t[]", good),
-        ffi.from_buffer("uint32_t[]", energy_q4),
-    )
+    lib.bt_replay_bands(ffi.new("bt_bands *"), len(words), *c_pointers(words, good, energy_q4))
     return good, energy_q4

@@ -47,20 +47,9 @@ def on_board_q4(
     board = board_settings(settings)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
     n = len(raw)
-    poc_um = np.empty((n, 3), np.int16)
-    force_100un = np.empty((n, 3), np.int32)
-    torque_mnmm = np.empty((n, 3), np.int32)
-    flags = np.empty(n, np.uint32)
-    lib.bt_kernel_frames(
-        n,
-        ffi.from_buffer("uint16_t[]", raw),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        kernel,
-        ffi.from_buffer("int16_t[]", poc_um),
-        ffi.from_buffer("int32_t[]", force_100un),
-        ffi.from_buffer("int32_t[]", torque_mnmm),
-        ffi.from_buffer("uint32_t[]", flags),
-    )
+    force_100un, torque_mnmm = np.empty((2, n, 3), np.int32)
+    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
+    lib.bt_kernel_frames(n, *c_pointers(raw, tare_q4), kernel, *c_pointers(poc_um, force_100un, torque_mnmm, flags))
     return poc_um, force_100un, torque_mnmm, flags
 
 
@@ -75,27 +64,14 @@ def pressure_force_100un(
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(filtered_q4))
     board_settings({wire.Setting.PRESSURE_GAIN_NN: gain_nn})  # raises ValueError out of range
     out = np.empty(len(filtered_q4), np.int32)
-    lib.bt_pressure_forces(
-        len(out),
-        ffi.from_buffer("uint16_t[]", filtered_q4),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        gain_nn,
-        ffi.from_buffer("int32_t[]", out),
-    )
+    lib.bt_pressure_forces(len(out), *c_pointers(filtered_q4, tare_q4), gain_nn, *c_pointers(out))
     return out
 
 
-def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[np.uint16]:
-    """The board's filter over the PDC words (n,) of consecutive rounds, from its initial state; in 1/16 count.
-
-    Raises ValueError for other shapes or ranges.
-    """
-    pdc = integers("pdc", pdc, np.uint16, None)
-    board_settings({wire.Setting.PRESSURE_FILTER_MILLI: filter_milli})  # raises ValueError out of range
-    out = np.empty(len(pdc), np.uint16)
-    pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
-    lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
-    return out
+def c_pointers(*arrays: NDArray[Any]) -> list[Any]:
+    """The memory of contiguous arrays for C, which must not outlive them; that of structured ones as bytes."""
+    kinds = {"V": "uint8_t", "f": "double"}
+    return [ffi.from_buffer(f"{kinds.get(a.dtype.kind, f'{a.dtype.name}_t')}[]", a) for a in arrays]
 
 
 def board_settings(settings: Settings) -> Any:
@@ -119,15 +95,8 @@ def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settin
     """
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
-    gains = formula_settings(settings)
-    out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
-    lib.lin2013_frames(
-        len(raw),
-        ffi.from_buffer("uint16_t[]", raw),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        gains,
-        *(ffi.from_buffer("double[]", array) for array in out),
-    )
+    out = np.empty((3, len(raw), 3), np.float64)
+    lib.lin2013_frames(len(raw), *c_pointers(raw, tare_q4), formula_settings(settings), *c_pointers(*out))
     return Results(*out)
 
 
@@ -152,10 +121,7 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
 
     Raises ValueError for another shape, for values that are not integers, and for ones that do not fit ``dtype``.
     """
-    array = np.asarray(values)
-    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
-        wanted = ", ".join("n" if size is None else str(size) for size in shape)
-        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
+    array = _shaped(name, values, shape)
     if array.dtype != dtype:
         limits = np.iinfo(dtype)
         if array.dtype.kind not in "iu":
@@ -166,12 +132,26 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
     return np.ascontiguousarray(array, dtype)
 
 
-def check_words(name: str, words: NDArray[Any]) -> NDArray[Any]:
-    """``words`` as they are. Raises ValueError, naming the first bad row, unless all are 0..4095 or 0xFFFF."""
-    bad = (words != wire.INVALID_COUNT) & ~((words >= 0) & (words <= FULL_SCALE_COUNT))
+def checked_words(name: str, values: Any, *shape: int | None) -> NDArray[np.uint16]:
+    """The sensor's words for C, an array as integers() gives.
+
+    Raises ValueError, naming the first bad row, unless they are integers 0..4095 or 0xFFFF.
+    """
+    array = _shaped(name, values, shape)
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"{name} are {array.dtype}, expected integers")
+    bad = (array != wire.INVALID_COUNT) & ~((array >= 0) & (array <= FULL_SCALE_COUNT))
     if bad.any():
         raise ValueError(
-            f"{name} row {np.argwhere(bad)[0][0]} holds {words[bad][0]}, expected 0..{FULL_SCALE_COUNT}, or 0xFFFF "
+            f"{name} row {np.argwhere(bad)[0][0]} holds {array[bad][0]}, expected 0..{FULL_SCALE_COUNT}, or 0xFFFF "
             "where missing"
         )
-    return words
+    return np.ascontiguousarray(array, np.uint16)
+
+
+def _shaped(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    array = np.asarray(values)
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("n" if size is None else str(size) for size in shape) + ("," if len(shape) == 1 else "")
+        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
+    return array

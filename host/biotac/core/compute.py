@@ -81,7 +81,7 @@ def compute(
         for name in RESULT_DTYPE.names or ():
             out[name] = plain[name]
         return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
-    plan = _default_plan() if settings is None else _plan(settings)
+    plan = _default_plan() if settings is None else _plan_of(tuple(settings.items()))
     # The fast path for one frame with the types of a live frame: there the checks would take longer than the maths.
     # Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
@@ -130,7 +130,7 @@ def per_frame(
     Tare and settings are checked once, and every call fills and returns the same RESULT_DTYPE array of shape (): copy
     what has to last. This saves half of the time that compute() takes for one frame. Raises ValueError as compute().
     """
-    plan = _default_plan() if settings is None else _plan(settings)
+    plan = _default_plan() if settings is None else _plan_of(tuple(settings.items()))
     base = _checked_tare(tare, _ONE)
     out = np.empty((), RESULT_DTYPE)
     compute(np.zeros(_ONE, _COUNT), base, settings, out)  # raises for a tare that is out of range
@@ -155,11 +155,7 @@ _DEFAULTS = default_settings()
 
 @cache
 def _default_plan() -> Any:
-    return _plan(_DEFAULTS)
-
-
-def _plan(settings: Mapping[wire.Setting, int]) -> Any:
-    return _plan_of(tuple(settings.items()))
+    return _plan_of(tuple(_DEFAULTS.items()))
 
 
 @lru_cache(maxsize=16)
@@ -175,15 +171,12 @@ def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
         if not spec.low <= value <= spec.high:
             raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
     plan = ffi.new("bt_block_plan *")
-    if not lib.bt_block_plan_init(plan, formula_settings(chosen), _population(chosen)):
-        raise RuntimeError("host/binding/blocks.c mirrors a different geometry from the generated one")
-    return plan
-
-
-def _population(settings: Mapping[wire.Setting, int]) -> Any:
     from ..map import population  # here: everybody would wait for it at `import biotac`
 
-    return population.compiled_coefficients() if population.in_force(settings) else ffi.NULL
+    coefficients = population.compiled_coefficients() if population.in_force(chosen) else ffi.NULL
+    if not lib.bt_block_plan_init(plan, formula_settings(chosen), coefficients):
+        raise RuntimeError("host/binding/blocks.c mirrors a different geometry from the generated one")
+    return plan
 
 
 def _checked_counts(counts: Any) -> NDArray[np.uint16]:

@@ -21,10 +21,11 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
-from .compiled import Settings, board_settings, check_words, default_settings
-from .events import EVENT_DTYPE
+from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
 
 ROUND_US = 10_000
+#: An EVENT message's fields (protocol/MESSAGES.md), as the board sends them.
+EVENT_DTYPE = DTYPES[wire.Event.ID]
 _EVENTS_A_ROUND = 24  # more than there can be: a touch and a lift in every other slot
 
 #: What Finger.feed returns: the fields of a FRAME message as the board sends them (protocol/MESSAGES.md: integers, tare
@@ -33,17 +34,10 @@ _EVENTS_A_ROUND = 24  # more than there can be: a touch and a lift in every othe
 #: finger was first touched, 255: none), ``energy_count2`` (of the filtered signals of a finger at rest, in count^2; 0
 #: in other states, where it is not used), ``noise_count2`` (at rest; 0 until measured) and ``threshold_count2`` (the
 #: energy that counts as touched).
-FINGER_DTYPE = np.dtype(
-    [
-        *DTYPES[wire.Frame.ID].descr,
-        ("present", "u1"),
-        ("tare_reason", "u1"),
-        ("touch_slot", "u1"),
-        ("energy_count2", "=u4"),
-        ("noise_count2", "=u4"),
-        ("threshold_count2", "=u4"),
-    ]
-)
+FINGER_DTYPE = np.dtype([
+    *DTYPES[wire.Frame.ID].descr, ("present", "u1"), ("tare_reason", "u1"), ("touch_slot", "u1"),
+    ("energy_count2", "=u4"), ("noise_count2", "=u4"), ("threshold_count2", "=u4"),
+])  # fmt: skip
 
 _ELECTRODES = len(sensor.ELECTRODE_NAMES)
 if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
@@ -102,66 +96,46 @@ class Finger:
         before. A jump of 90 ms or more is a silence, during which drift went on. Raises ValueError for other shapes,
         types and ranges, before any round is processed.
         """
-        return self._run(*self._words_of(counts, pdc, tac, tdc, pac, t_us))
+        words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
+        rows = np.empty(len(words), FINGER_DTYPE)
+        if len(words):
+            own_map = ffi.NULL if self._map is None else self._map.handle
+            lib.bt_replay(self._finger, self._settings, own_map, len(words), *c_pointers(words, times, rows))
+        return rows
 
     def events(
         self, counts: Any, pdc: Any = None, tac: Any = None, tdc: Any = None, pac: Any = None, *, t_us: Any = None
     ) -> StructArray:
         """Give the finger n rounds, as ``feed`` does, and return the EVENTs that a board sends for them.
 
-        Returns EVENT_DTYPE (k,) of biotac.core.events. The finger's state advances, but no frames are computed.
+        Returns EVENT_DTYPE (k,). The finger's state advances, but no frames are computed.
         """
         words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
         events = np.zeros(_EVENTS_A_ROUND * len(words), EVENT_DTYPE)
         if not len(words):
             return events
-        told = lib.bt_replay_events(
-            self._finger,
-            self._settings,
-            len(words),
-            ffi.from_buffer("uint16_t[]", words),
-            ffi.from_buffer("uint32_t[]", times),
-            ffi.from_buffer("uint8_t[]", events),
-            len(events),
-        )
-        return events[:told]
+        pointers = c_pointers(words, times, events)
+        return events[: lib.bt_replay_events(self._finger, self._settings, len(words), *pointers, len(events))]
 
     def _words_of(
         self, counts: Any, pdc: Any, tac: Any, tdc: Any, pac: Any, t_us: Any
     ) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
-        electrodes = _words("counts", counts, None, _ELECTRODES)
+        electrodes = checked_words("counts", counts, None, _ELECTRODES)
         n = len(electrodes)
         words = np.full((n, slots.SLOTS_PER_FRAME), wire.INVALID_COUNT, np.uint16)
         words[:, slots.ELECTRODE_SLOT] = electrodes
         slow = (("pdc", slots.PDC_SLOT, pdc), ("tac", slots.TAC_SLOT, tac), ("tdc", slots.TDC_SLOT, tdc))
         for name, slot, channel in slow:
             if channel is not None:
-                words[:, slot] = _words(name, channel, n, None)
+                words[:, slot] = checked_words(name, channel, n)
         if pac is not None:
-            words[:, slots.PAC_SLOT] = _words("pac", pac, n, len(slots.PAC_SLOT))
-        return words, self._times(t_us, n)
-
-    def _times(self, t_us: Any, n: int) -> NDArray[np.uint32]:
+            words[:, slots.PAC_SLOT] = checked_words("pac", pac, n, len(slots.PAC_SLOT))
         times = self._next_us + ROUND_US * np.arange(n, dtype=np.int64) if t_us is None else np.asarray(t_us)
         if times.shape != (n,) or times.dtype.kind not in "iu":
             raise ValueError(f"t_us is {times.dtype} of shape {times.shape}, expected integers of shape ({n},)")
         if n:
             self._next_us = int(times[-1]) + ROUND_US
-        return (times.astype(np.int64) % 2**32).astype(np.uint32)
-
-    def _run(self, words: NDArray[np.uint16], times: NDArray[np.uint32]) -> StructArray:
-        rows = np.empty(len(words), FINGER_DTYPE)
-        if len(words):
-            lib.bt_replay(
-                self._finger,
-                self._settings,
-                ffi.NULL if self._map is None else self._map.handle,
-                len(words),
-                ffi.from_buffer("uint16_t[]", words),
-                ffi.from_buffer("uint32_t[]", times),
-                ffi.from_buffer("uint8_t[]", rows),
-            )
-        return rows
+        return words, (times.astype(np.int64) % 2**32).astype(np.uint32)
 
     def tare_now(self) -> None:
         """Do TARE_NOW: the latest means become the tare. Raises CommandRefusedError while the signals move."""
@@ -223,17 +197,6 @@ def to_frames(rows: StructArray) -> StructArray:
     """
     there = rows[rows["present"] != 0]
     return frames_from_wire(there, there["seq"], there["t_us"])
-
-
-def _words(name: str, values: Any, rows: int | None, columns: int | None) -> NDArray[np.uint16]:
-    array = np.asarray(values)
-    wanted = f"({'n' if rows is None else rows},{'' if columns is None else f' {columns}'})"
-    right = array.ndim == (1 if columns is None else 2) and (rows is None or len(array) == rows)
-    if not right or (columns is not None and array.shape[1] != columns):
-        raise ValueError(f"{name} have shape {array.shape}, expected {wanted}")
-    if array.dtype.kind not in "iu":
-        raise ValueError(f"{name} are {array.dtype}, expected integers")
-    return check_words(name, array).astype(np.uint16)
 
 
 def _accept(command: str, error: int) -> None:

@@ -7,11 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..wire.sensor_gen import CORE_RADIUS_UM
-
-RADIUS_MM = CORE_RADIUS_UM / 1000
-
-Floats = NDArray[np.float64]
+from .geometry import RADIUS_MM, Floats
 
 
 def unroll(points_mm: NDArray[Any]) -> tuple[Floats, Floats]:

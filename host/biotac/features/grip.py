@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import normals_at
+from ..core.geometry import Floats, normals_at
 from ..errors import InputError
 from ..wire.messages_gen import INVALID_COUNT
-
-Floats = npt.NDArray[np.float64]
 
 LAG = 8  # PAC samples over which a change is taken, as in the board's events
 EDGES = 4  # bin edges for each state

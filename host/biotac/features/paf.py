@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
-from .signals import ELECTRODE_DR_MM, Floats, signals
+from .signals import ELECTRODE_DR_MM, signals
 
 VOLT_PER_COUNT = 3.3 / _sensor.FULL_SCALE_COUNT
 EQ4_N_V, EQ4_V = 6.083, 1.976  # the paper: R^2 0.9615 for a 1 mm probe on one electrode

@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import geometry as surface
+from ..core.geometry import Floats
 from .paf import electrode_force
-from .signals import ELECTRODE_DR_MM, ELECTRODES, Floats
+from .signals import ELECTRODE_DR_MM, ELECTRODES
 
 REACH_MM = 5.5
 PASS_SHARE = 0.5  # of the lower summit

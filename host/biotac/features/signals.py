@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import geometry as surface
+from ..core.geometry import Floats
 from ..core.unroll import unroll
 from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
-
-Floats = npt.NDArray[np.float64]
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 

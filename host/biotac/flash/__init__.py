@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from .backup import Backup, Restored, read_backup
 from .image import Image, read_image
-from .loader import Loader
+from .interfaces import Loader, Target
 from .procedure import Outcome, flash
-from .target import Target
 
 __all__ = ["Backup", "Image", "Loader", "Outcome", "Restored", "Target", "flash", "read_backup", "read_image"]

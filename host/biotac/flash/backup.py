@@ -61,20 +61,15 @@ def read_settings(hand: Hand) -> dict[int, int]:
     return values
 
 
-def default_path(hello: wire.Hello) -> Path:
-    """A file in the working directory, named after the board's serial number and the time."""
-    return Path(f"biotac-settings-{serial_text(hello)}-{datetime.now():%Y%m%d-%H%M%S}.json")
-
-
 def save(hand: Hand, path: Path | None) -> Backup:
     """Save all of the board's settings, and the calibrations and maps in force, to a new file.
 
-    Raises InputError when the file exists or cannot be written.
+    Without ``path`` it is in the working directory, named after the board's serial number and the time. Raises
+    InputError when the file exists or cannot be written.
     """
     hello = hand.info
-    backup = Backup(
-        (path or default_path(hello)).resolve(), read_settings(hand), hand.board.calibrations(), hand.board.maps()
-    )
+    path = path or Path(f"biotac-settings-{serial_text(hello)}-{datetime.now():%Y%m%d-%H%M%S}.json")
+    backup = Backup(path.resolve(), read_settings(hand), hand.board.calibrations(), hand.board.maps())
     facts = {
         "format": FORMAT,
         "board": board_text(hello.board),
@@ -94,16 +89,14 @@ def save(hand: Hand, path: Path | None) -> Backup:
 
 def read_backup(path: Path) -> Backup:
     """Read a file that save() wrote. Raises InputError when it cannot be read or is not such a file."""
-    return read_document(
-        path, FORMAT, lambda content: _backup(path, content), "expected a file written by biotac flash"
-    )
 
+    def parse(content: dict[str, Any]) -> Backup:
+        values = {int(one["id"]): int(one["value"]) for one in content["settings"]}
+        calibrations = {int(finger): from_dict(tree) for finger, tree in content.get("calibrations", {}).items()}
+        maps = {int(finger): map_file.from_dict(tree) for finger, tree in content.get("maps", {}).items()}
+        return Backup(path.resolve(), values, calibrations, maps)
 
-def _backup(path: Path, content: dict[str, Any]) -> Backup:
-    values = {int(one["id"]): int(one["value"]) for one in content["settings"]}
-    calibrations = {int(finger): from_dict(tree) for finger, tree in content.get("calibrations", {}).items()}
-    maps = {int(finger): map_file.from_dict(tree) for finger, tree in content.get("maps", {}).items()}
-    return Backup(path.resolve(), values, calibrations, maps)
+    return read_document(path, FORMAT, parse, "expected a file written by biotac flash")
 
 
 def restore(hand: Hand, wanted: Backup) -> Restored:
@@ -113,17 +106,17 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
     refuses, and InputError when one does not read back.
     """
     found = read_settings(hand)
-    values = wanted.values
+    values, calibrations, maps = wanted.values, wanted.calibrations, wanted.maps
     changed = [key for key, value in values.items() if key in found and found[key] != value]
     for key in changed:
         hand.board.set_setting(key, values[key])
-    calibrations = wanted.calibrations
-    given = [finger for finger, its in calibrations.items() if hand.board.calibration(finger) != its]
+    given = [finger for finger, wish in calibrations.items() if hand.board.calibration(finger) != wish]
     for finger in given:
         hand.board.set_calibration(finger, calibrations[finger])
         if hand.board.calibration(finger) != calibrations[finger]:
-            raise InputError(f"{calibration_name(finger)} reads back differently after it was restored; set it by hand")
-    maps = wanted.maps
+            raise InputError(
+                f"calibration of finger {finger} reads back differently after it was restored; set it by hand"
+            )
     uploaded = [finger for finger, blob in maps.items() if hand.board.get_map(finger) != blob]
     for finger in uploaded:
         hand.board.set_map(finger, maps[finger])  # which reads it back
@@ -133,16 +126,6 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
     for key, value in values.items():
         if found.get(key, value) != value:
             raise InputError(f"{setting_name(key)} reads {found[key]} after {value} was restored; set it by hand")
-    unknown = [setting_name(key) for key in wanted.values if key not in found]
-    put_back = (*map(setting_name, changed), *map(calibration_name, given), *map(map_name, uploaded))
-    return Restored(put_back, tuple(unknown))
-
-
-def calibration_name(finger: int) -> str:
-    """The name of a finger's calibration in lists of settings."""
-    return f"calibration of finger {finger}"
-
-
-def map_name(finger: int) -> str:
-    """The name of a finger's wrench map in lists of settings."""
-    return f"wrench map of finger {finger}"
+    restored = [setting_name(key) for key in changed] + [f"calibration of finger {finger}" for finger in given]
+    restored += [f"wrench map of finger {finger}" for finger in uploaded]
+    return Restored(tuple(restored), tuple(setting_name(key) for key in values if key not in found))

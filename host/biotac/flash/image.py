@@ -13,8 +13,7 @@ from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire.identity import board_text
 from ..wire.sensor_gen import MAX_SENSORS
-from . import note
-from .note import Note
+from .note import Note, find
 
 BLOCK_BYTES = 512
 HEAD = struct.Struct("<8I")
@@ -32,6 +31,9 @@ FLASH_BYTES = 2 * 1024 * 1024  # of a Pico
 SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/keep/storage.h
 MAPS_BYTES = (2 * MAX_SENSORS + 1) * _map.MAX_BYTES  # before them: firmware/core/map/store.h
 BOOT2_BYTES = 252  # followed by its CRC
+
+CARRIED = Path(__file__).with_name("biotac-pico.uf2")  # host/CMakeLists.txt puts it there
+BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,22 @@ class Image:
         return (*self.blocks[1:], self.blocks[0])
 
 
+def find_image() -> Path:
+    """The image included in this package or, if there is none, the one built in the clone around the working directory.
+
+    Raises InputError when there is neither.
+    """
+    if CARRIED.is_file():
+        return CARRIED
+    for folder in (Path.cwd(), *Path.cwd().parents):
+        if (folder / BUILT).is_file():
+            return folder / BUILT
+    raise InputError(
+        f"this biotac-gateway was built without a board image, and no {BUILT} is in this folder or above; install a "
+        "released wheel, or name an IMAGE, a .uf2 file (to build one, see firmware/boards/pico)"
+    )
+
+
 def read_image(path: Path) -> Image:
     """Read and check a UF2 file. Raises InputError saying what is wrong with it."""
     try:
@@ -62,7 +80,7 @@ def read_image(path: Path) -> Image:
         blocks = split(data)
         payload = join_payloads(blocks)
         check_boot2(payload)
-        return Image(path, blocks, note.find(payload))
+        return Image(path, blocks, find(payload))
     except ValueError as error:
         raise InputError(f"{path} cannot be flashed: {error}") from error
 
@@ -121,6 +139,6 @@ def check_boot2(payload: bytes) -> None:
         )
 
 
-def note_text(its: Note) -> str:
+def note_text(note: Note) -> str:
     """A note as text for users."""
-    return f"{board_text(its.board)}, firmware {its.version}, wire {'.'.join(map(str, its.wire))}"
+    return f"{board_text(note.board)}, firmware {note.version}, wire {'.'.join(map(str, note.wire))}"

@@ -7,33 +7,27 @@ import os
 import re
 import string
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import FlashError
 from .image import Image
-from .loader import Loader, Show
+from .interfaces import Loader, Show
 
 LABEL = "RPI-RP2"
+DISK = Path("/dev/disk/by-label") / LABEL  # on Linux, of an attached drive, mounted or not
 INFO = "INFO_UF2.TXT"
 INFO_LINE = f"Board-ID: {LABEL}"
 FILE = "BIOTAC.UF2"
 
 
 class DriveLoader(Loader):
-    """Loader on a USB drive. ``folders`` lists mount points, ``attached`` tells whether a drive is there at all."""
+    """Loader on a USB drive."""
 
     name = f"drive {LABEL}"
 
-    def __init__(
-        self, folders: Callable[[], list[Path]] | None = None, attached: Callable[[], bool] | None = None
-    ) -> None:
-        self._folders = folders or mounted_folders
-        self._attached = attached or (lambda: disk_by_label().exists())
-
     def drives(self) -> list[Path]:
         """Mounted drives of boards in their loader."""
-        return [folder for folder in self._folders() if is_loader(folder)]
+        return [folder for folder in mounted_folders() if is_loader(folder)]
 
     def ready(self) -> bool:
         drives = self.drives()
@@ -44,11 +38,9 @@ class DriveLoader(Loader):
         return len(drives) == 1
 
     def cure(self) -> str:
-        if not self._attached():
+        if not DISK.exists():
             return f"no drive {LABEL} found: plug the board in with BOOTSEL held, or check the cable"
-        return (
-            f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {disk_by_label()}`, or mount it by hand"
-        )
+        return f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {DISK}`, or mount it by hand"
 
     def write(self, image: Image, show: Show) -> None:
         path = self.drives()[0] / FILE
@@ -104,8 +96,3 @@ def linux_folders(root: Path) -> list[Path]:
         if device.startswith("/dev/"):
             places.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), folder)))  # a space is \040
     return list(dict.fromkeys(place.resolve() for place in places))
-
-
-def disk_by_label() -> Path:
-    """Linux's path of an attached drive by its label, mounted or not."""
-    return Path("/dev/disk/by-label") / LABEL

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..sim.emulated import EmulatedBoard
 from .image import Image
-from .loader import Loader, Show
+from .interfaces import Loader, Show
 
 WRITE_S = 5.0  # of emulated time; an image of 48 KiB takes 0.7 s
 

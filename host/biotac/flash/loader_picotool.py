@@ -7,7 +7,7 @@ import subprocess
 
 from ..errors import FlashError
 from .image import Image
-from .loader import Loader, Show
+from .interfaces import Loader, Show
 
 TOOL = "picotool"
 ASK_S = 10

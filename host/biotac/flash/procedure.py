@@ -6,16 +6,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
-from ..hand.hand import Hand
 from ..wire import messages_gen as wire
 from ..wire.identity import board_text, serial_text, version_text
 from .backup import Backup, Restored, restore, save
 from .image import Image, note_text
-from .loader import Loader
-from .loader import Show as ShowBlocks
-from .target import Target
+from .interfaces import Loader, Target
+from .interfaces import Show as ShowBlocks
 from .waiting import wait_for
 
 LOADER_S = 20.0  # from the command to a mounted drive; desktops take some seconds
@@ -125,22 +124,15 @@ def leave(
         if backup is not None:
             say(f"saved {len(backup.values)} settings to {backup.path}")
         with step(backup):
-            knows = command_loader(hand)
-    if not knows:
-        with step(backup):
-            target.touch()
+            try:
+                hand.board.reboot_bootloader()
+                return hand.info, backup
+            except CommandRefusedError as refused:
+                if refused.error != wire.Error.UNKNOWN_COMMAND:
+                    raise
+    with step(backup):
+        target.touch()  # its firmware is too old to have that command
     return hand.info, backup
-
-
-def command_loader(hand: Hand) -> bool:
-    """Send the board to its loader; return False when its firmware is too old to have a command for that."""
-    try:
-        hand.board.reboot_bootloader()
-    except CommandRefusedError as refused:
-        if refused.error != wire.Error.UNKNOWN_COMMAND:
-            raise
-        return False
-    return True
 
 
 def firmware(hello: wire.Hello) -> tuple[int, int, int]:
@@ -187,27 +179,15 @@ class Result:
     error: BiotacError | None = None
 
 
-def flash_every(
-    image: Image,
-    targets: Iterable[Target],
-    loaders: Sequence[Loader],
-    *,
-    keep: bool = True,
-    downgrade: bool = False,
-    say: Say = lambda text: None,
-    show: ShowBlocks = lambda done, of: None,
-) -> Iterator[Result]:
-    """Flash each of ``targets`` as ``flash`` does, unless it already runs this image.
+def flash_every(image: Image, targets: Iterable[Target], loaders: Sequence[Loader], **options: Any) -> Iterator[Result]:
+    """Flash each of ``targets`` as ``flash`` does with these ``options``, unless it already runs this image.
 
     A failure is reported in its Result, and the next board follows. Boards are flashed one after the other, because a
     loader does not say which board it is.
     """
     for target in targets:
         try:
-            if runs(image, target):
-                yield Result(target.port)
-                continue
-            outcome = flash(image, target, loaders, keep=keep, downgrade=downgrade, say=say, show=show)
+            outcome = None if runs(image, target) else flash(image, target, loaders, **options)
             yield Result(target.port, outcome)
         except BiotacError as error:
             yield Result(target.port, error=error)

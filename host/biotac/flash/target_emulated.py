@@ -8,7 +8,7 @@ from ..link.serial_port import SerialLink
 from ..sim.emulated import EmulatedBoard
 from ..sim.loading import load_source
 from ..sim.ports import parse_sim
-from .target import Target
+from .interfaces import Target
 
 BACK_S = 10.0  # of emulated time
 WORLD_S = 600.0  # the tape must outlast everything done here: time stands still after its end

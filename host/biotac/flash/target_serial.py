@@ -10,7 +10,7 @@ from ..errors import BiotacError, DeviceLostError, PortError
 from ..hand.hand import Hand
 from ..link.discovery import boards
 from ..link.serial_port import SerialLink, open_error
-from .target import Target
+from .interfaces import Target
 from .waiting import wait_for
 
 BACK_S = 20.0

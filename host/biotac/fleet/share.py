@@ -24,7 +24,7 @@ PAUSE_S = 0.5  # how long the stream stays stopped after a command that needed i
 
 
 class Share:
-    """Shares ``hand`` as ``name`` on ``session`` until closed; use as a context manager.
+    """Shares ``hand`` as ``name`` on ``session`` until closed.
 
     Does not close ``hand`` or ``session``. The hand streams from now on, whether or not anybody listens. Raises
     PortError when the name is taken.
@@ -75,23 +75,20 @@ class Share:
         for declared in before:
             declared.undeclare()
 
-    # ---- what it sends -------------------------------------------------------------------------
+    # ---- what it sends, as a reader.Consumer and tap -------------------------------------------
 
     def put(self, batch: Batch) -> None:
-        """See reader.Consumer."""
         for message in batch.messages:
             if isinstance(message, Gap) and message.reason in ("unplugged", "silence", "rebooted"):
                 with self._publishing:
                     self._new_epoch()
 
     def wake(self) -> None:
-        """See reader.Consumer."""
         if not self._hand.connected:
             with self._publishing:
                 self._end_epoch()
 
     def is_full(self) -> bool:
-        """See reader.Consumer."""
         return False
 
     def put_raw(self, chunk: bytes) -> None:
@@ -232,12 +229,6 @@ class Share:
             for one in declared:
                 one.undeclare()
             self._end_epoch()
-
-    def __enter__(self) -> Share:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def _asked(part: bytes) -> bool:

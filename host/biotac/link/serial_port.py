@@ -33,7 +33,8 @@ class SerialLink(Link):
         self._serial: Any = None
         self._poll: Any = None
         self.reopen(path)
-        self._usb_serial = usb_serial(path)
+        real = os.path.realpath(path)  # its USB device, if it is one
+        self._usb_serial = next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
 
     def spoilt(self) -> str:
         if self.fd is None or not _is_cooked(self.fd):
@@ -46,19 +47,18 @@ class SerialLink(Link):
         return [self._path, *(path for path in moved if path != self._path)]
 
     def reopen(self, place: str) -> None:
-        self._close_port()
+        SerialLink.close(self)  # the port alone, not what a subclass closes with it
         try:
             rate = self.bits_per_s or USB_BITS_PER_S
-            self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive())
+            exclusive = True if os.name == "posix" else None  # on Windows access always is
+            self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive)
         except (serial.SerialException, OSError, ValueError) as error:
             raise open_error(place, error) from error
         if os.name == "posix":
             self.fd = self._serial.fileno()
-            with suppress(OSError):  # not a tty
-                _one_byte_at_least(self.fd)
-        if hasattr(select, "poll"):
-            self._poll = select.poll()
-            self._poll.register(self._serial.fileno(), select.POLLIN)
+            _one_byte_at_least(self.fd)
+            self._poll = select.poll()  # serves all waits; select() would build and take apart three lists for each
+            self._poll.register(self.fd, select.POLLIN)
 
     def read(self, timeout_s: float) -> bytes:
         try:
@@ -69,10 +69,7 @@ class SerialLink(Link):
             raise went_away(self.port, error) from error
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until something can be read; false when nothing can within timeout_s."""
-        # One poll() object serves all waits; select() would build and take apart three lists for each.
-        if self._poll is None:
-            return bool(select.select([self._serial.fileno()], [], [], timeout_s)[0])
+        """Wait until something can be read; false when nothing can within timeout_s. Not on Windows."""
         return bool(self._poll.poll(1000 * timeout_s))
 
     def _drain(self) -> bytes:
@@ -106,9 +103,6 @@ class SerialLink(Link):
             raise went_away(self.port, error) from error
 
     def close(self) -> None:
-        self._close_port()
-
-    def _close_port(self) -> None:
         if self._serial is not None:
             self._serial.close()
 
@@ -117,12 +111,10 @@ def _one_byte_at_least(fd: int) -> None:
     """Let a read without data wait, as cfmakeraw does: pyserial's setting, no wait, would stay for the next program."""
     import termios
 
-    settings = termios.tcgetattr(fd)
-    settings[6][termios.VMIN] = 1
-    try:
+    with suppress(termios.error):  # not a tty
+        settings = termios.tcgetattr(fd)
+        settings[6][termios.VMIN] = 1
         termios.tcsetattr(fd, termios.TCSANOW, settings)
-    except termios.error as error:
-        raise OSError(*error.args) from error
 
 
 def _is_cooked(fd: int) -> bool:
@@ -147,24 +139,6 @@ def open_uart(port: str) -> SerialLink:
 def went_away(port: str, error: Exception) -> DeviceLostError:
     """The DeviceLostError to raise when reading an open port failed with ``error``."""
     return DeviceLostError(f"{port} went away while it was open ({error}); plug the board in and open it again")
-
-
-def nowhere(fd: int) -> None:
-    """Point a descriptor to the null device, in this process only; its number stays in use."""
-    null = os.open(os.devnull, os.O_RDWR)
-    os.dup2(null, fd)
-    os.close(null)
-
-
-def usb_serial(path: str) -> str | None:
-    """Serial number of the USB device behind a port; None without one."""
-    real = os.path.realpath(path)
-    return next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
-
-
-def exclusive() -> bool | None:
-    """Whether to ask pyserial for exclusive access: True on POSIX; None on Windows, where access always is."""
-    return True if os.name == "posix" else None
 
 
 def open_error(path: str, error: Exception) -> PortError:

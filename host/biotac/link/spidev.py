@@ -15,8 +15,8 @@ from __future__ import annotations
 import secrets
 import threading
 import time
-from contextlib import suppress
-from typing import Any, Protocol
+from contextlib import ExitStack, suppress
+from typing import Any
 
 from ..errors import DeviceLostError, PortError
 from ..wire import sensor_gen as sensor
@@ -30,21 +30,8 @@ OUTBOX_BYTES = 262_144
 AWAKE_NS = 100_000
 
 
-class Clock(Protocol):
-    """Device time."""
-
-    def now_ns(self) -> int:
-        """Time since some fixed moment."""
-
-    def delay_ns(self, ns: int) -> None:
-        """Wait for at least ns."""
-
-    def wait_until(self, t_ns: int) -> bool:
-        """Wait for t_ns; false when it returns before, because the host may want something."""
-
-
-class MonotonicClock(Clock):
-    """The computer's monotonic clock."""
+class MonotonicClock:
+    """Device time: the computer's monotonic clock. Tests have another."""
 
     def now_ns(self) -> int:
         return time.monotonic_ns()
@@ -53,7 +40,7 @@ class MonotonicClock(Clock):
         self.wait_until(time.monotonic_ns() + ns)
 
     def wait_until(self, t_ns: int) -> bool:
-        """See Clock.wait_until; never false, because the next slot is always near."""
+        """Wait for t_ns; false if it returns before, as the host may want something. Here the next slot is near."""
         while (left_ns := t_ns - time.monotonic_ns()) > 0:
             if left_ns > AWAKE_NS:
                 time.sleep((left_ns - AWAKE_NS) / 1e9)
@@ -62,19 +49,16 @@ class MonotonicClock(Clock):
 
 def parse_spidev(port: str) -> list[tuple[int, int]]:
     """Bus and device of each finger of ``spidev:0.0,0.1``. Raises PortError for any other form."""
-    texts = port.removeprefix("spidev:").split(",")
     devices: list[tuple[int, int]] = []
-    for text in texts:
+    for text in port.removeprefix("spidev:").split(","):
         bus, dot, device = text.partition(".")
         if not (dot and bus.isdecimal() and device.isdecimal() and text.isascii()):
             raise PortError(f"{port}: {text!r} is not an SPI device; expected BUS.DEVICE per finger: spidev:0.0,0.1")
+        if (int(bus), int(device)) in devices:
+            raise PortError(f"{port}: {text} is listed twice; each finger needs its own chip select")
         devices.append((int(bus), int(device)))
     if len(devices) > sensor.MAX_SENSORS:
         raise PortError(f"{port}: {len(devices)} devices; expected at most {sensor.MAX_SENSORS}")
-    for bus_device in devices:
-        if devices.count(bus_device) > 1:
-            name = "{}.{}".format(*bus_device)
-            raise PortError(f"{port}: {name} is listed twice; each finger needs its own chip select")
     return devices
 
 
@@ -85,22 +69,18 @@ def open_devices(port: str) -> list[Any]:
         import spidev
     except ImportError as error:
         raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[bus]'") from error
-    opened: list[Any] = []
-    try:
-        for bus, device in places:
-            spi = spidev.SpiDev()
+    opened = [spidev.SpiDev() for _ in places]
+    with ExitStack() as on_failure:
+        for spi, (bus, device) in zip(opened, places, strict=True):
             try:
                 spi.open(bus, device)
-                opened.append(spi)
+                on_failure.callback(spi.close)
                 spi.mode = 0
                 spi.max_speed_hz = sensor.SPI_HZ
                 spi.bits_per_word = 8  # two bytes per 16-bit word: the Raspberry Pi's bus cannot do 16 bits
             except OSError as error:
                 raise PortError(describe_open_error(f"/dev/spidev{bus}.{device}", error)) from error
-    except BaseException:
-        for spi in opened:
-            spi.close()
-        raise
+        on_failure.pop_all()
     return opened
 
 
@@ -118,10 +98,10 @@ def describe_open_error(path: str, error: OSError) -> str:
 class SpidevLink(Link):
     """A Link to the gateway that runs in this process."""
 
-    def __init__(self, port: str, *, clock: Clock | None = None) -> None:
+    def __init__(self, port: str) -> None:
         self.port = port
         self._devices = open_devices(port)
-        self._clock: Clock = clock or MonotonicClock()
+        self._clock = MonotonicClock()
         self._start_ns = self._clock.now_ns()
         self._inbox = bytearray()
         self._outbox = bytearray()

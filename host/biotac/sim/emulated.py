@@ -53,7 +53,7 @@ class EmulatedBoard(SimBoard):
         self.uart_path = ""
         super().__init__(source, pace=pace, hold=hold)
 
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+    def _start(self, options: list[str]) -> Any:
         tools = self._tools
         command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors), *options]
         with ExitStack() as ptys:
@@ -81,14 +81,11 @@ class EmulatedBoard(SimBoard):
 
     def counters(self) -> dict[str, Any]:
         """The emulator's counters: time, resets, latency, violations of its rules."""
-        self.say("counters")
-        facts: dict[str, Any] = self._counted()[1]
-        return facts
+        return dict(self._asked("counters")[1])
 
     def arrivals(self) -> list[tuple[int, int, float]]:
         """For each FRAME: its t_us, its finger, and the board's time in us when its last byte reached the host."""
-        self.say("arrivals")
-        return [tuple(one) for one in self._counted()[1]]
+        return [tuple(one) for one in self._asked("arrivals")[1]]
 
     def until(self, seconds: float, **counters: Any) -> dict[str, Any]:
         """Wait until these counters have these values; return all counters.
@@ -96,17 +93,16 @@ class EmulatedBoard(SimBoard):
         Raises DeviceLostError if they do not within ``seconds`` of emulated time. Emulated time stands still while it
         is held, or waits for the program that has the link open to read.
         """
-        self.say(f"until {seconds:.6f} {json.dumps(counters)}")
-        word, told = self._counted()
-        facts: dict[str, Any] = told
+        word, facts = self._asked(f"until {seconds:.6f} {json.dumps(counters)}")
         if word == "never":
             seen = {name: facts.get(name) for name in counters}
             raise DeviceLostError(
                 f"the emulated board came to {seen} within {seconds:g} s of its time: expected {counters}"
             )
-        return facts
+        return dict(facts)
 
-    def _counted(self) -> tuple[str, Any]:
+    def _asked(self, line: str) -> tuple[str, Any]:
+        self.say(line)
         while not self._answers:
             self.hear(LISTEN_S)
         word, _, text = self._answers.pop(0).partition(" ")

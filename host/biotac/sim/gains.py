@@ -15,14 +15,11 @@ from ..core.geometry import Floats
 from ..wire.messages_gen import SETTINGS, Setting
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
-
-_AXES: tuple[tuple[str, Floats], ...] = (
-    ("force_gain_x_nn", surface.ELECTRODE_NORMAL[:, 0]),
-    ("force_gain_y_nn", surface.ELECTRODE_NORMAL[:, 1]),
-    ("force_gain_z_nn", surface.ELECTRODE_NORMAL[:, 2]),
-    ("torque_gain_y_nn", _ARMS_MM[:, 1]),
-    ("torque_gain_z_nn", _ARMS_MM[:, 2]),
-)
+_SETTINGS = (
+    Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN, Setting.TORQUE_GAIN_Y_NN,
+    Setting.TORQUE_GAIN_Z_NN,
+)  # fmt: skip
+_WEIGHTS = (*surface.ELECTRODE_NORMAL.T, *_ARMS_MM.T[1:])  # of each
 
 
 def fit_gains(signal: Floats, force_n: Floats, torque_nmm: Floats) -> dict[str, int]:
@@ -31,14 +28,13 @@ def fit_gains(signal: Floats, force_n: Floats, torque_nmm: Floats) -> dict[str, 
     An axis without truth (below 1 uN or 1 uN mm throughout) or without signal keeps its default and
     is left out. Values are held within the setting's range.
     """
-    truths = (force_n[:, 0], force_n[:, 1], force_n[:, 2], torque_nmm[:, 1], torque_nmm[:, 2])
     gains: dict[str, int] = {}
-    for (name, weights), truth in zip(_AXES, truths, strict=True):
+    for setting, weights, truth in zip(_SETTINGS, _WEIGHTS, (*force_n.T, *torque_nmm.T[1:]), strict=True):
         total = signal @ weights
         energy = float(total @ total)
         if np.abs(truth).max(initial=0.0) < 1e-6 or energy == 0.0:
             continue
         nano_per_count = 1e9 * float(total @ truth) / energy
-        spec = SETTINGS[Setting[name.upper()]]
-        gains[name] = round(min(max(nano_per_count, spec.low), spec.high))
+        spec = SETTINGS[setting]
+        gains[setting.name.lower()] = round(min(max(nano_per_count, spec.low), spec.high))
     return gains

@@ -39,9 +39,9 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     if lower.endswith(".toml"):
         return play(parse_scenario(_scenario_bytes(place), file=place.name), fingers=fingers, seconds=seconds)
     if lower.endswith(".npz"):
-        return load_npz(_existing(place), fingers=fingers, seconds=seconds)
+        return load_npz(place, fingers=fingers, seconds=seconds)
     if lower.endswith((".btd", ".btd.gz")):
-        return load_btd(_existing(place), fingers=fingers, seconds=seconds)
+        return load_btd(place, fingers=fingers, seconds=seconds)
     raise InputError(
         f"{path}: unknown kind of source: expected .toml (scenario), .npz, .btd or .btd.gz (recording); "
         f"bundled scenarios: {', '.join(bundled_scenarios())}"
@@ -53,21 +53,8 @@ def _scenario_bytes(place: Path) -> bytes:
         if not place.exists() and place.parent == Path() and place.name in bundled_scenarios():
             return (resources.files(__package__) / "scenarios" / place.name).read_bytes()
         return place.read_bytes()
-    except FileNotFoundError:
-        raise InputError(
-            f"{place}: no such file or bundled scenario: expected a scenario's path or one of "
-            f"{', '.join(bundled_scenarios())}"
-        ) from None
     except OSError as error:
         raise InputError(
-            f"{place}: cannot be read ({error.strerror}): expected a scenario file; check the path"
+            f"{place}: cannot be read ({error.strerror}): expected a scenario's path or one of "
+            f"{', '.join(bundled_scenarios())}"
         ) from error
-
-
-def _existing(place: Path) -> Path:
-    if not place.is_file():
-        seen = "not a file" if place.exists() else "no such file"
-        raise InputError(f"{place}: {seen}: expected a recording; check the path")
-    if place.stat().st_size == 0:
-        raise InputError(f"{place}: the file is empty: expected a recording; copy it again")
-    return place

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..calibrate.reference.mounting import Mounting
-from ..calibrate.reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, Scale
+from ..calibrate.reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, RdtDecoder, Scale
+from ..calibrate.reference.samples import ReaderStats, Samples
 from ..core.geometry import Floats
 from ..errors import InputError
 from ..wire.slots import FRAME_S
@@ -20,10 +21,9 @@ from .source import Source
 
 RESOLUTION: Floats = np.array([1 / 320] * 3 + [1 / 64] * 3)  # N, N mm
 RANGE: Floats = np.array([12.0, 12.0, 17.0, 120.0, 120.0, 120.0])
-COUNTS_PER_N = 1_000_000.0
-COUNTS_PER_NM = 1_000_000.0
+COUNTS_PER_UNIT = 1_000_000.0  # N or N m
 NOISE_STEPS = 0.7  # standard deviation, in steps of the resolution
-SENSOR = "emulated Nano17"
+_DATAGRAM_RECORDS = 20
 
 #: The sensor carries the finger from above, rotated so that none of its axes is one of Lin's. If it were behind the
 #: finger, a firm press on the tip would exceed its 120 N mm.
@@ -44,7 +44,7 @@ class Nano17:
     @property
     def scale(self) -> Scale:
         """Scale factors as configured in its box."""
-        return Scale(COUNTS_PER_N, COUNTS_PER_NM / NMM_PER_NM, self.rate_hz)
+        return Scale(COUNTS_PER_UNIT, COUNTS_PER_UNIT / NMM_PER_NM, self.rate_hz)
 
     def records(self, source: Source, finger: int) -> tuple[Floats, npt.NDArray[np.void]]:
         """Board times (m,) in s and RDT records (m,) while ``source`` plays. Raises InputError if it has no truth."""
@@ -68,3 +68,29 @@ class Nano17:
         per_unit = np.array([self.scale.counts_per_n] * 3 + [self.scale.counts_per_nmm] * 3)
         records["counts"] = np.rint(wrench * per_unit).astype(np.int32)
         return board_s, records
+
+
+class Nano17Reader:
+    """A Reader of what the sensor measures of ``source``, on the simulated board's time: no socket, no wall clock."""
+
+    sensor = "emulated Nano17"
+
+    def __init__(self, source: Source, finger: int, nano17: Nano17 | None = None) -> None:
+        self.nano17 = nano17 or Nano17()
+        self._at_s, self._records = self.nano17.records(source, finger)
+        self._decoder = RdtDecoder(self.nano17.scale)
+        self._next = 0
+
+    @property
+    def stats(self) -> ReaderStats:
+        """Counters of records lost, late and bad; nothing is lost here."""
+        decoder = self._decoder
+        return ReaderStats(decoder.lost, decoder.late, decoder.bad + decoder.refused)
+
+    def read(self, board_s: float) -> Samples:
+        """Samples measured since the last call, up to board time ``board_s``."""
+        end = int(self._at_s.searchsorted(board_s))
+        for begin in range(self._next, end, _DATAGRAM_RECORDS):
+            self._decoder.feed(self._records[begin : min(begin + _DATAGRAM_RECORDS, end)].tobytes())
+        self._next = max(self._next, end)
+        return self._decoder.take()

@@ -12,21 +12,13 @@ import subprocess
 import tempfile
 import threading
 from pathlib import Path
+from typing import Any
 
 from ..errors import DeviceLostError, PortError
 from ..link.serial_port import SerialLink
 from ..wire.native import BUILT
 from .source import Source
 from .tape import write_tape
-
-
-def executable() -> Path:
-    """The simulator in this package; the environment variable BIOTAC_SIM names another build."""
-    override = os.environ.get("BIOTAC_SIM")
-    path = Path(override) if override else BUILT / "bin" / "biotac-sim"
-    if not path.is_file():
-        raise PortError(f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set")
-    return path
 
 
 class SimBoard:
@@ -50,32 +42,34 @@ class SimBoard:
         except BaseException:
             self._folder.cleanup()
             raise
-        assert self._process.stdout is not None
         first = self._process.stdout.readline().decode().split()
         if len(first) != 2 or first[0] != "pty":
             error = self._last_words()
             self.close()
             raise PortError(f"the simulator did not start: {error or 'no message'}")
         self.path = first[1]
+        #: Of the board's stdout: readable when it has something to say, or is gone.
+        self.stdout_fd: int = self._process.stdout.fileno()
         # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()
 
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
-        command = [str(executable()), *options]
-        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-    def stdout_fd(self) -> int:
-        """File descriptor of the board's stdout: readable when it has something to say, or is gone."""
-        assert self._process.stdout is not None
-        return self._process.stdout.fileno()
+    def _start(self, options: list[str]) -> Any:
+        """The board's process, with three pipes; the environment variable BIOTAC_SIM names another build of it."""
+        path = Path(os.environ.get("BIOTAC_SIM") or BUILT / "bin" / "biotac-sim")
+        if not path.is_file():
+            raise PortError(
+                f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
+            )
+        pipe = subprocess.PIPE
+        return subprocess.Popen([str(path), *options], stdin=pipe, stdout=pipe, stderr=pipe)
 
     def hear(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
-        select.select([self.stdout_fd()], [], [], timeout_s)
+        select.select([self.stdout_fd], [], [], timeout_s)
         with self._hearing:  # another thread may have read it meanwhile
-            if not select.select([self.stdout_fd()], [], [], 0)[0]:
+            if not select.select([self.stdout_fd], [], [], 0)[0]:
                 return
-            text = os.read(self.stdout_fd(), 65536)
+            text = os.read(self.stdout_fd, 65536)
             if not text:
                 raise DeviceLostError(f"the simulated board died: {self._last_words() or 'no message'}")
             *lines, self._heard = (self._heard + text).split(b"\n")
@@ -87,7 +81,6 @@ class SimBoard:
 
     def say(self, line: str) -> None:
         """Send a line to the board's process, separately from the link."""
-        assert self._process.stdin is not None
         self._process.stdin.write(f"{line}\n".encode())
         self._process.stdin.flush()
 
@@ -95,25 +88,15 @@ class SimBoard:
         """Let a held board's time run."""
         self.say("run")
 
-    def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait at most timeout_s for output of the board; return True when the tape is over."""
-        self.hear(timeout_s)
-        return self.over
-
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
-        if self._process.poll() is None:
+        with self._process:  # which then closes its pipes and waits
             self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            if pipe is not None:
-                pipe.close()
         self._folder.cleanup()  # again, for a board that did not start
 
     def _last_words(self) -> str:
-        assert self._process.stderr is not None
         self._process.wait(timeout=60)
-        return self._process.stderr.read().decode(errors="replace").strip().replace("\n", " ")
+        return " ".join(self._process.stderr.read().decode(errors="replace").split("\n")).strip()
 
 
 class SimLink(SerialLink):
@@ -144,7 +127,7 @@ class SimLink(SerialLink):
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for bytes, or for the end of the source; return True if there are bytes to read."""
-        watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd()])
+        watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd])
         ready, _, _ = select.select(watched, [], [], timeout_s)
         if len(watched) > 1 and watched[1] in ready:
             self.board.hear(0)

@@ -61,13 +61,12 @@ def plate_recording(finger: Finger, loads: States, cell: npt.NDArray[np.int64], 
     at_rest = finger.rest_counts(np.zeros(1))
     warming = np.linspace(0.0, IDLE_DRIFT_COUNTS, IDLE_FRAMES)[:, None]
     loading = finger.drift_per_min / finger.drift_per_min.mean()
-    pressure = sampling.PDC_PER_N * loads.force_n * (1.0 + 0.15 * np.tanh(loads.contact_mm[:, 0] / 8.0))
     return {
         "E": read(finger.counts(loads), finger.noise_counts),
         "F": to_lin_frame(force),  # the same turn leads back to a recording's axes
         "M": to_lin_frame(torque),
         "torsion": loads.torsion_nmm,
-        "PDC": read(sampling.PDC_REST + pressure, sampling.PDC_NOISE),
+        "PDC": read(sampling.PDC_REST + sampling.spring_load(loads), sampling.PDC_NOISE),
         "E_base": read(np.repeat(at_rest, REST_FRAMES, axis=0), finger.noise_counts),
         "E_idle": read(at_rest + warming * loading, finger.noise_counts),
         "contact": cell,

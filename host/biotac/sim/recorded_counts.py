@@ -7,7 +7,6 @@ are not replayed.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +15,7 @@ from ..errors import RecordingError
 from ..recording.btd_file import read_btd
 from ..recording.npz_file import counts_field, read_npz, to_lin_frame
 from ..wire import slots
-from ..wire.messages_gen import INVALID_COUNT
-from . import tape
+from ..wire.messages_gen import INVALID_COUNT, EmuFault
 from .source import Source
 
 _TARE_FRACTION = 16  # TARE_SET: counts with four fractional bits
@@ -45,16 +43,23 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
         raise RecordingError(f"{path}: holds {seen}: expected a field E of shape (n, 19); save it as E")
     electrodes = counts_field(path, "E", fields["E"], None, len(slots.ELECTRODE_SLOT))
     frames = len(electrodes)
-    samples = np.full((frames, 1, slots.SLOTS_PER_FRAME), tape.NO_CHANNEL, dtype=np.uint16)
-    for name, its in _SLOTS_OF.items():
+    samples = np.full((frames, 1, slots.SLOTS_PER_FRAME), EmuFault.NO_CHANNEL, dtype=np.uint16)
+    for name, where in _SLOTS_OF.items():
         if name in fields:
-            columns = None if name in ("PDC", "TAC", "TDC") else len(its)
-            samples[:, 0, its] = counts_field(path, name, fields[name], frames, columns).reshape(frames, -1)
-    tare_q4 = None
+            columns = None if name in ("PDC", "TAC", "TDC") else len(where)
+            samples[:, 0, where] = counts_field(path, name, fields[name], frames, columns).reshape(frames, -1)
+    tare_q4 = force_n = None
     if "E_base" in fields:
         base = counts_field(path, "E_base", fields["E_base"], None, len(slots.ELECTRODE_SLOT))
         tare_q4 = np.rint(base.mean(axis=0) * _TARE_FRACTION).astype(np.uint16)[None, :]
-    force_n = _force(path, fields["F"], frames)[:, None, :] if "F" in fields else None
+    if "F" in fields:
+        force = fields["F"]
+        if force.shape != (frames, 3) or force.dtype.kind not in "iuf" or not np.isfinite(force).all():
+            raise RecordingError(
+                f"{path}: field F is {force.dtype} {force.shape}: expected ({frames}, 3) numbers in N without NaN or "
+                "inf; correct F"
+            )
+        force_n = to_lin_frame(force)[:, None, :]
     return _source(path, samples, fingers, seconds, tare_q4=tare_q4, force_n=force_n)
 
 
@@ -64,18 +69,8 @@ def load_btd(path: Path, *, fingers: int | None = None, seconds: float | None = 
     Raises RecordingError naming the line.
     """
     read = read_btd(path)
-    samples = np.where(read.samples == INVALID_COUNT, tape.BAD_PARITY, read.samples).astype(np.uint16)
+    samples = np.where(read.samples == INVALID_COUNT, EmuFault.BAD_PARITY, read.samples).astype(np.uint16)
     return _source(path, samples, fingers, seconds, skipped=read.skipped)
-
-
-def _force(path: Path, array: npt.NDArray[Any], rows: int) -> npt.NDArray[np.float64]:
-    """F (n, 3) as recorded -> force on the finger in Lin's frame: x = Fy, y = Fx, z = -Fz."""
-    if array.shape != (rows, 3) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise RecordingError(
-            f"{path}: field F is {array.dtype} {array.shape}: expected ({rows}, 3) numbers in N without NaN or inf; "
-            "correct F"
-        )
-    return to_lin_frame(array)
 
 
 def _source(

@@ -78,7 +78,7 @@ class _Reading:
         rngs = [np.random.default_rng([finger.seed, kind]) for kind in (1, 2, 3, 4, 5)]
         self._electrode_rng, self._glitch_rng, self._pac_rng, self._slow_rng, slip_rng = rngs
         self._ringing = Ringing(slip_rng)
-        self._creep, self._pressure, self._high_pass = Lag(CREEP_S), _Pressure(), _HighPass()
+        self._creep, self._pressure, self._high_pass = Lag(CREEP_S), Pressure(), _HighPass()
         self._hit = np.zeros((1, len(ELECTRODE_SLOT)), np.bool_)
         self._frame = 0
 
@@ -133,13 +133,8 @@ def spring_load(states: States) -> Floats:
     return load
 
 
-def pressure(states: States) -> Floats:
-    """Static pressure above rest (n,), in counts, without noise, of a finger that was at rest; see _Pressure."""
-    return _Pressure()(spring_load(states))
-
-
-class _Pressure:
-    """Static pressure above rest (n,), in counts, without noise: load, undershoot and creep.
+class Pressure:
+    """Static pressure above rest (n,), in counts, without noise: load, undershoot and creep, from rest on.
 
     p = f - U tanh(lag_0.8s(f) / 200) + 0.15 lag_60s(f), where f = 100 N^-1 F (1 + 0.15 tanh(x / 8 mm)) is
     the load, U = 9 counts and lag_T a first-order lag. The measured figures stand beside the constants.

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 from ..core import geometry as surface
 from ..errors import ScenarioError
 from ..wire import sensor_gen as _sensor
-from . import tape
+from ..wire.messages_gen import EmuFault
 from .physics import PROFILES, Profile
 from .source import MAX_SECONDS
 from .tables import Table, parse_toml
@@ -50,13 +50,13 @@ MOVING_MAX_S = 160.0  # likewise, with a load that changes: each frame of it cos
 FAULTS_MAX_S = 10_000.0  # all together; the time to play them grows with it
 
 FAULT_CODES = {
-    "bad_parity": tape.BAD_PARITY,
-    "stuck_low": tape.STUCK_LOW,
-    "stuck_high": tape.STUCK_HIGH,
-    "error_word": tape.ERROR_WORD,
-    "no_channel": tape.NO_CHANNEL,
-    "unplugged": tape.UNPLUGGED,
-    "swapped": tape.SWAPPED,
+    "bad_parity": EmuFault.BAD_PARITY,
+    "stuck_low": EmuFault.STUCK_LOW,
+    "stuck_high": EmuFault.STUCK_HIGH,
+    "error_word": EmuFault.TOO_EARLY,
+    "no_channel": EmuFault.NO_CHANNEL,
+    "unplugged": EmuFault.UNPLUGGED,
+    "swapped": EmuFault.SWAPPED,
 }
 
 STEP_KEYS: dict[str, tuple[str, ...]] = {
@@ -126,12 +126,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
         raise top.error("fault", "lasts too long", f"at most {FAULTS_MAX_S:g} s in total", "remove some")
     return Scenario(
-        name=name,
-        fit_gains="gains" in top,
-        fingers=specs,
-        tracks=tracks,
-        faults=faults,
-        seconds=tracks[0].seconds,
+        name=name, fit_gains="gains" in top, fingers=specs, tracks=tracks, faults=faults, seconds=tracks[0].seconds
     )
 
 

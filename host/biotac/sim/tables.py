@@ -154,10 +154,8 @@ class Table:
         """A list of distinct indices below ``count``."""
         expected = f"a list of distinct finger indices 0 to {count - 1}"
         value = self._value(key, expected)
-        good = isinstance(value, list) and len(value) > 0
-        if not good or not all(type(part) is int and 0 <= part < count for part in value):
-            raise self.error(key, f"is {_show(value)}", expected)
-        if len(set(value)) != len(value):
+        good = isinstance(value, list) and all(type(part) is int and 0 <= part < count for part in value)
+        if not good or not value or len(set(value)) != len(value):
             raise self.error(key, f"is {_show(value)}", expected)
         return tuple(value)
 

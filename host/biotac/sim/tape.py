@@ -13,19 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..wire import messages_gen as _wire
 from ..wire import sensor_gen as _sensor
+from ..wire.messages_gen import EmuFault
 from .source import Source
 
-# Codes in place of a count; see enum emu_fault (protocol/MESSAGES.md).
-NO_CHANNEL = _wire.EmuFault.NO_CHANNEL
-BAD_PARITY = _wire.EmuFault.BAD_PARITY
-STUCK_LOW = _wire.EmuFault.STUCK_LOW
-STUCK_HIGH = _wire.EmuFault.STUCK_HIGH
-ERROR_WORD = _wire.EmuFault.TOO_EARLY
-UNPLUGGED = _wire.EmuFault.UNPLUGGED
-SWAPPED = _wire.EmuFault.SWAPPED
-CODES = (NO_CHANNEL, BAD_PARITY, STUCK_LOW, STUCK_HIGH, ERROR_WORD, UNPLUGGED, SWAPPED)
+CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/MESSAGES.md)
 
 MAGIC = b"BTTAPE01"
 _HEADER = struct.Struct("<8sIIII")
@@ -44,12 +36,7 @@ def write_tape(path: str | Path, source: Source) -> None:
             f"source {source.name}: samples are {samples.dtype} {samples.shape}: expected uint16 "
             f"(frames, fingers, {_SLOTS}); load it with load_source"
         )
-    frames, fingers, slots = samples.shape
-    if not 1 <= fingers <= _sensor.MAX_SENSORS or frames < 1:
-        raise InputError(
-            f"source {source.name}: {frames} frames of {fingers} fingers: expected at least one frame "
-            f"and 1 to {_sensor.MAX_SENSORS} fingers; load it with load_source"
-        )
+    frames, fingers, slots = samples.shape  # the simulator checks that there are not too few or too many
     blocks = [samples[first : first + _BLOCK] for first in range(0, frames, _BLOCK)]
     for k, block in enumerate(blocks):
         wrong = (block > _sensor.FULL_SCALE_COUNT) & (block < min(CODES))
@@ -60,10 +47,9 @@ def write_tape(path: str | Path, source: Source) -> None:
                 f"{block[frame, finger, slot]}: expected a count 0..{_sensor.FULL_SCALE_COUNT} or a tape code from "
                 f"{min(CODES):#06X}; load it with load_source"
             )
-    header = _HEADER.pack(MAGIC, fingers, frames, slots, 0)
     try:
         with Path(path).open("wb") as file:
-            file.write(header)
+            file.write(_HEADER.pack(MAGIC, fingers, frames, slots, 0))
             for block in blocks:
                 file.write(block.astype("<u2").tobytes())
     except OSError as error:

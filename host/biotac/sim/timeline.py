@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -31,14 +32,6 @@ class Pose:
     celsius: float = REST_CELSIUS
     slip_mm_s: float = 0.0
 
-    def row(self) -> list[float]:
-        """As numbers, in field order."""
-        return [
-            self.x_mm, self.y_mm, self.force_n, self.shear_x_n, self.shear_y_n,
-            self.torsion_nmm, self.tip_mm, self.celsius,
-            self.slip_mm_s,
-        ]  # fmt: skip
-
     def released(self) -> Pose:
         """The same place and temperature, without load."""
         return replace(self, force_n=0.0, shear_x_n=0.0, shear_y_n=0.0, torsion_nmm=0.0)
@@ -51,27 +44,20 @@ class Track:
     pose: Pose = field(default_factory=Pose)
     seconds: float = 0.0
     moving_s: float = 0.0  #: part of ``seconds`` with a changing load, of which each frame must be computed
-    _starts_s: list[float] = field(default_factory=list)
-    _lengths_s: list[float] = field(default_factory=list)
-    _from: list[list[float]] = field(default_factory=list)
-    _to: list[list[float]] = field(default_factory=list)
+    _pieces: list[tuple[Any, ...]] = field(default_factory=list)  # start and length in s, first and last pose
 
     def ramp(self, seconds: float, end: Pose, start: Pose | None = None) -> None:
         """Go linearly to ``end``; with ``start``, jump there first (a jump without load has no effect)."""
         begin = start or self.pose
         if replace(begin, celsius=end.celsius, slip_mm_s=end.slip_mm_s) != end:
             self.moving_s += seconds
-        self._starts_s.append(self.seconds)
-        self._lengths_s.append(seconds)
-        self._from.append(begin.row())
-        self._to.append(end.row())
+        self._pieces.append((self.seconds, seconds, astuple(begin), astuple(end)))
         self.pose = end
         self.seconds += seconds
 
     def states(self, times_s: Floats) -> States:
         """States at times (n,) of 0..seconds; later times keep the last pose."""
-        starts, lengths = np.array(self._starts_s), np.array(self._lengths_s)
-        begin, end = np.array(self._from), np.array(self._to)
+        starts, lengths, begin, end = (np.array(column) for column in zip(*self._pieces, strict=True))
         piece = np.maximum(np.searchsorted(starts, times_s, side="right") - 1, 0)
         share = np.clip((times_s - starts[piece]) / lengths[piece], 0.0, 1.0)[:, None]
         pose = begin[piece] * (1.0 - share) + end[piece] * share

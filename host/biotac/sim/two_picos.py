@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
 from contextlib import ExitStack, closing
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class TwoPicos(EmulatedBoard):
         self._sensors = ExitStack()
         super().__init__("pico", source or NOTHING, pace=pace, hold=hold, image=image)
 
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+    def _start(self, options: list[str]) -> Any:
         image = self._tools.image.parent.parent / "sensor-board" / "biotac-sensor.bin"
         if not image.is_file():
             raise PortError(f"no image at {image}; build it as firmware/sensor_board/README.md says")
@@ -49,9 +49,8 @@ class TwoPicos(EmulatedBoard):
             raise
         return process
 
-    def _plug(self, process: subprocess.Popen[bytes], path: str) -> None:
+    def _plug(self, process: Any, path: str) -> None:
         """Plug in the sensors and feed the start of their tape, before the gateway gets power."""
-        assert process.stdout is not None and process.stdin is not None
         if process.stdout.readline().split() != [b"sensor", path.encode()]:
             return  # the code that waits for the gateway's pty reports the error
         if not self._alone:

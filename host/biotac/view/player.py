@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from ..errors import CommandRefusedError, InputError
 from ..hand.hand import Hand
@@ -15,14 +15,6 @@ from ..recording.replay.link import ReplayLink
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.identity import version_text
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """A recording being written."""
-
-    path: str
-    seconds: float  # device time since it began
 
 
 class Player:
@@ -65,11 +57,11 @@ class Player:
         """Health of the link."""
         return self._hand.stats
 
-    def recording(self) -> Recorded | None:
-        """The recording being written now, if any."""
+    def recording(self) -> dict[str, Any] | None:
+        """``path`` and ``seconds``, device time, of the recording being written now, if any."""
         if self._recorder is None or self._recorder.closed or self._recording_since_us is None:
             return None
-        return Recorded(str(self._recorder.path), (self._last_us - self._recording_since_us) / 1e6)
+        return {"path": str(self._recorder.path), "seconds": (self._last_us - self._recording_since_us) / 1e6}
 
     def do(self, command: str, finger: int | None) -> str:
         """Carry out a command of ``COMMANDS``; return what was done, in words.

@@ -100,7 +100,7 @@ class Reader:
             kept = player.recording()
             self._loss = f"Connection lost: {error}. "
             if kept:
-                self._loss += f"The recording {kept.path} is kept up to that point. "
+                self._loss += f"The recording {kept['path']} is kept up to that point. "
             was_taken = isinstance(error, StreamTakenError)
         self._close(player)
         if was_taken:  # to open the board again would take it back

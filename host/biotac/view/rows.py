@@ -20,50 +20,29 @@ from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM
 #: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing. ``map_um``: the point of contact on the
 #: unrolled skin, across and along, in um; null where it is invalid.
 FRAME_ROW = (
-    "finger",
-    "seq",
-    "t_us",
-    "flags",
-    "tare_state",
-    "signal_q4",
-    "pdc",
-    "tac",
-    "tdc",
-    "poc_um",
-    "force_100un",
-    "torque_mnmm",
-    "map_um",
-)
+    "finger", "seq", "t_us", "flags", "tare_state", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un",
+    "torque_mnmm", "map_um",
+)  # fmt: skip
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
-SCALES = {
-    "signal_q4": Q4_PER_COUNT,
-    "poc_um": UM_PER_MM,
-    "force_100un": FORCE_LSB_PER_N,
-    "torque_mnmm": MNMM_PER_NMM,
-}
+SCALES = {"signal_q4": Q4_PER_COUNT, "poc_um": UM_PER_MM, "force_100un": FORCE_LSB_PER_N, "torque_mnmm": MNMM_PER_NMM}
 
 
 def frame_rows(batch: Batch) -> list[str]:
     """One JSON text per FRAME and per heartbeat, oldest first."""
-    messages, frames, idle = batch.wire, batch.frames, batch.idle
-    signals = with_null(signal_q4(messages), wire.INVALID_I32)
+    messages, frames = batch.wire, batch.frames
     columns = zip(
-        frames["finger"].tolist(),
-        frames["seq"].tolist(),
-        frames["t_us"].tolist(),
-        frames["flags"].tolist(),
+        *(frames[name].tolist() for name in ("finger", "seq", "t_us", "flags")),
         messages["tare_state"].tolist(),
-        signals,
+        with_null(signal_q4(messages), wire.INVALID_I32),
         *(with_null(messages[name], wire.INVALID_COUNT) for name in ("pdc", "tac", "tdc")),
         with_null(messages["poc_um"], wire.INVALID_I16),
-        with_null(messages["force_100un"], wire.INVALID_I32),
-        with_null(messages["torque_mnmm"], wire.INVALID_I32),
+        *(with_null(messages[name], wire.INVALID_I32) for name in ("force_100un", "torque_mnmm")),
         map_um(frames),
         strict=True,
     )
     timed = [(row[2], compact(row)) for row in columns]
-    for row in idle:
+    for row in batch.idle:
         values = {name: row[name].item() for name in ("finger", "seq", "t_us", "flags")}
         values |= {name: with_null(row[name], wire.INVALID_COUNT) for name in ("pdc", "tdc")}
         timed.append((values["t_us"], compact([values.get(name) for name in FRAME_ROW])))
@@ -73,7 +52,7 @@ def frame_rows(batch: Batch) -> list[str]:
 def pac_rows(batch: Batch) -> list[str]:
     """One JSON text per PAC block."""
     rows = batch.pac
-    columns = (rows["finger"].tolist(), rows["seq"].tolist(), rows["t_us"].tolist())
+    columns = (rows[name].tolist() for name in PAC_ROW[:-1])
     return [compact(row) for row in zip(*columns, with_null(rows["pac"], wire.INVALID_COUNT), strict=True)]
 
 
@@ -88,9 +67,8 @@ def signal_q4(messages: StructArray) -> NDArray[np.int32]:
 
 def map_um(frames: StructArray) -> list[list[int] | None]:
     """The column ``map_um`` for FRAME_DTYPE rows."""
-    across, along = unroll(frames["poc_mm"])
-    places = np.stack([across, along], axis=1) * UM_PER_MM
-    good = np.isfinite(across + along)
+    places = np.column_stack(unroll(frames["poc_mm"])) * UM_PER_MM
+    good = np.asarray(np.isfinite(places).all(axis=1))
     whole = np.rint(np.where(good[:, None], places, 0.0)).astype(np.int64).tolist()
     return [place if ok else None for place, ok in zip(whole, good.tolist(), strict=True)]
 
@@ -135,11 +113,5 @@ def facts() -> dict[str, Any]:
 
 
 #: Flags that are informational; every other one is a warning.
-CALM = (
-    wire.FrameFlags.CONTACT
-    | wire.FrameFlags.MX_DERIVED
-    | wire.FrameFlags.FX_WEAK
-    | wire.FrameFlags.TORSION_OK
-    | wire.FrameFlags.TARE_CHANGED
-    | wire.FrameFlags.NOT_ASKED
-)
+_F = wire.FrameFlags
+CALM = _F.CONTACT | _F.MX_DERIVED | _F.FX_WEAK | _F.TORSION_OK | _F.TARE_CHANGED | _F.NOT_ASKED

@@ -59,7 +59,8 @@ class ViewServer(ThreadingHTTPServer):
         self.state = state
         self.reader = reader
         self.token = secrets.token_urlsafe(24)
-        self.files = static_files()
+        folder = resources.files("biotac.view").joinpath("static")
+        self.files = {one.name: one.read_bytes() for one in folder.iterdir() if one.name.endswith(tuple(TYPES))}
         self._counting = threading.Lock()
         self._asking: dict[Any, None] = {}  # connections that do not get events, oldest first
         self._pages: set[Any] = set()  # connections that get events
@@ -210,9 +211,3 @@ def parse_command(body: bytes) -> tuple[str, int | None]:
     if not isinstance(name, str) or not (finger is None or type(finger) is int):
         raise ValueError('expected {"do": NAME, "finger": NUMBER or null}')
     return name, finger
-
-
-def static_files() -> dict[str, bytes]:
-    """The page's files by name; no other files are served."""
-    folder = resources.files("biotac.view").joinpath("static")
-    return {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name.endswith(tuple(TYPES))}

@@ -23,7 +23,7 @@ RECORDING_SUFFIX = ".mcap"
 
 
 class Viewing:
-    """A page being served; use as a context manager.
+    """A page being served until it is closed.
 
     ``source`` is a PORT or a recording (.mcap). ``port``: the page's TCP port; None: the default one, or any free one
     if that is taken. ``folder``: where recordings go. ``again``: start over after the end.
@@ -36,7 +36,12 @@ class Viewing:
         opener = opener_of(source, writable(folder or Path()))
         self.state = State(source)
         self.reader = Reader(opener, self.state, again=again)
-        self.server = serve(self.state, self.reader, port)
+        try:  # the default port first, so that a page left open reconnects when the program runs again
+            self.server = ViewServer(self.state, self.reader, DEFAULT_PORT if port is None else port)
+        except PortError:
+            if port is not None:
+                raise
+            self.server = ViewServer(self.state, self.reader, 0)
         self._thread = threading.Thread(target=self.server.serve_forever, name="biotac-view-http", daemon=True)
         self._thread.start()
         self.reader.start()
@@ -60,23 +65,6 @@ class Viewing:
         self.server.shutdown()
         self.server.server_close()
         self._thread.join()
-
-    def __enter__(self) -> Viewing:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-
-def serve(state: State, reader: Reader, port: int | None) -> ViewServer:
-    """The server on ``port``; None: on the default port, or any free one if that is taken."""
-    if port is not None:
-        return ViewServer(state, reader, port)
-    try:
-        # The default one, so that a page left open reconnects when the program runs again.
-        return ViewServer(state, reader, DEFAULT_PORT)
-    except PortError:
-        return ViewServer(state, reader, 0)
 
 
 def opener_of(source: str, folder: Path) -> Opener:

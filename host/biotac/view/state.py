@@ -94,7 +94,7 @@ class State:
         self._health_number = 0
         self._health_due_s = 0.0
         self._arrived: deque[tuple[float, int]] = deque()
-        self._closed = False
+        self.closed = False  # nothing more will come
         with self._news:
             self._publish()
 
@@ -135,8 +135,7 @@ class State:
                 self._finger(finger)["t_us"] = t_us
             if now_s >= self._health_due_s:
                 self._measure(player.stats(), now_s)
-                recorded = player.recording()
-                self._health.recording = asdict(recorded) if recorded else None
+                self._health.recording = player.recording()
                 self._publish()
             elif frames or pac:
                 self._news.notify_all()
@@ -182,15 +181,10 @@ class State:
     def close(self) -> None:
         """Release all waiting threads."""
         with self._news:
-            self._closed = True
+            self.closed = True
             self._news.notify_all()
 
     # ---- the browsers' side --------------------------------------------------------------------
-
-    @property
-    def closed(self) -> bool:
-        """True when nothing more will come."""
-        return self._closed
 
     def cursor(self) -> Cursor:
         """Cursor of a new browser: at the rows still kept, so that it shows something even if nothing new comes."""
@@ -200,7 +194,7 @@ class State:
     def wait(self, cursor: Cursor, timeout_s: float) -> str:
         """Wait for news; return them as one JSON text and advance ``cursor``. Empty after timeout_s without any."""
         with self._news:
-            self._news.wait_for(lambda: self._closed or self._is_news(cursor), timeout_s)
+            self._news.wait_for(lambda: self.closed or self._is_news(cursor), timeout_s)
             if not self._is_news(cursor):
                 return ""
             frames, lost = self._frames.since(cursor.frames)
@@ -212,8 +206,7 @@ class State:
         return f'{{{parts},"health":{health},"dropped":{cursor.dropped}}}'
 
     def _is_news(self, cursor: Cursor) -> bool:
-        mine = (cursor.frames, cursor.pac, cursor.health)
-        return mine != (self._frames.end, self._pac.end, self._health_number)
+        return (cursor.frames, cursor.pac, cursor.health) != (self._frames.end, self._pac.end, self._health_number)
 
 
 def tared(finger: int, facts: dict[str, Any]) -> dict[str, Any]:

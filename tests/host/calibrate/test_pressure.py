@@ -18,9 +18,9 @@ from biotac.calibrate.press.force_source import MAX_LAG_ROWS, Series, check_alig
 from biotac.calibrate.press.guide import ask_forces
 from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
 from biotac.calibrate.press.rows import ROW_DTYPE
-from biotac.core.compiled import pressure_filtered_q4
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import Q4_PER_COUNT
+from biotac.wire.native import ffi, lib
 
 K = 0.0125  # N per count
 REST = 1300.0
@@ -69,7 +69,9 @@ def its_fit(rows: Any) -> Fit:
 
 def test_the_filter_is_the_papers_by_hand() -> None:
     def filtered(words: list[int], filter_milli: int) -> list[float]:
-        return (pressure_filtered_q4(np.array(words, np.uint16), filter_milli) / Q4_PER_COUNT).tolist()
+        filtered_q4 = ffi.new("uint16_t[]", len(words))
+        lib.bt_pressure_filter(len(words), ffi.new("uint16_t[]", words), filter_milli, filtered_q4)
+        return [value / Q4_PER_COUNT for value in filtered_q4]
 
     assert filtered([100, 200, 200, 60], 500) == [100, 150, 175, 117.5]
     assert filtered([100, 200], 1000) == [100, 200]

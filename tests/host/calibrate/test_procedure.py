@@ -18,8 +18,7 @@ from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording.reader import Recording
 from biotac.sim.loading import load_source
-from biotac.sim.nano17 import Nano17
-from biotac.sim.nano17_reader import Nano17Reader
+from biotac.sim.nano17 import Nano17, Nano17Reader
 from biotac.wire.frames import FRAME_DTYPE
 from biotac.wire.messages_gen import FrameFlags
 

@@ -84,7 +84,7 @@ def calibration(serial: str) -> dict[str, object]:
 CASES: list[tuple[int, str, str]] = [
     (2, "expected a scenario's path or one of", "demo nowhere.toml --out +out"),
     (2, "expected 1 to 5", "demo press.toml --fingers 9 --out +out"),
-    (2, "expected a recording", "demo +no.npz --out +out"),
+    (2, "check the path", "demo +no.npz --out +out"),
     (2, "choose another --out", "demo press.toml --seconds 1 --out @list.json"),
     (2, "add one", "demo @bad.toml --out +out"),
     (3, "`biotac list`", f"info {NO_PORT}"),

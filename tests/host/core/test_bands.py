@@ -65,8 +65,8 @@ def test_rounds_without_a_word_have_no_energy() -> None:
 @pytest.mark.parametrize(
     ("pac", "words"),
     [
-        (np.zeros((3, 21), int), r"int64 of shape \(3, 21\), expected integers of shape \(n, 22\)"),
-        (np.zeros((3, 22)), r"float64 of shape \(3, 22\), expected integers"),
+        (np.zeros((3, 21), int), r"pac have shape \(3, 21\), expected \(n, 22\)"),
+        (np.zeros((3, 22)), "pac are float64, expected integers"),
         (np.full((3, 22), 5000), "pac row 0 holds 5000, expected 0..4095"),
     ],
 )

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pac_events import pac_events
 
 import biotac
 from biotac import EventKind
-from biotac.core.events import pac_events
 
 SHARED = Path(__file__).parents[4] / "shared/data"
 SLIDING_M_S = 0.002
@@ -85,11 +85,3 @@ def test_a_finger_tells_its_events_in_order() -> None:
     slip = told(events, EventKind.SLIP)[0]
     assert 0 <= int(slip["onset_us"]) - 3_200_000 <= 5000 and slip["peak_count"] > 60
     assert told(events, EventKind.TOUCH)["seq"][0] in (300, 301)
-
-
-@pytest.mark.parametrize(
-    "pac", [np.zeros((3, 21), int), np.zeros((3, 22)), np.full((3, 22), 5000), np.full((3, 22), -1)]
-)
-def test_what_is_no_pac_is_refused(pac: Any) -> None:
-    with pytest.raises(ValueError, match="expected"):
-        pac_events(pac)

@@ -11,7 +11,8 @@ from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_
 
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
-from biotac.flash import Backup, carried, flash, loader_drive, read_backup, read_image
+from biotac.flash import Backup, flash, loader_drive, read_backup, read_image
+from biotac.flash import image as uf2_image
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
 from biotac.flash.procedure import flash_every
@@ -275,7 +276,7 @@ def test_without_an_image_one_is_asked_for(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(carried, "CARRIED", tmp_path / "carried.uf2")
+    monkeypatch.setattr(uf2_image, "CARRIED", tmp_path / "carried.uf2")
     without = refused(capsys, 2)
     assert "built without a board image" in without and "name an IMAGE" in without
     assert "cannot be read" in refused(capsys, 2, "nowhere.uf2")
@@ -283,8 +284,8 @@ def test_without_an_image_one_is_asked_for(
     built.parent.mkdir(parents=True)
     built.write_bytes(b"none")
     assert f"{built} cannot be flashed: 4 bytes are not a UF2" in refused(capsys, 2)
-    carried.CARRIED.write_bytes(b"mine")
-    assert f"{carried.CARRIED} cannot be flashed: 4 bytes" in refused(capsys, 2)  # whatever is around
+    uf2_image.CARRIED.write_bytes(b"mine")
+    assert f"{uf2_image.CARRIED} cannot be flashed: 4 bytes" in refused(capsys, 2)  # whatever is around
 
 
 def test_ports_that_cannot_be_flashed(

@@ -16,17 +16,18 @@ from biotac.flash.loader_picotool import PicotoolLoader
 from biotac.flash.target_serial import SerialTarget
 
 
-def drive_loader(root: Path, *, attached: bool = False) -> DriveLoader:
-    return DriveLoader(lambda: linux_folders(root), lambda: attached)
+@pytest.fixture(autouse=True)
+def drives_of_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loader_drive, "mounted_folders", lambda: linux_folders(tmp_path))
 
 
 @pytest.mark.parametrize("place", ["media/me/RPI-RP2", "media/RPI-RP2", "run/media/me/RPI-RP21"])
 def test_a_drive_is_found_where_desktops_mount_it(tmp_path: Path, place: str) -> None:
     make_drive(tmp_path / "media/me/CAMERA", "SAMD51")
     (tmp_path / "media/me/empty").mkdir()
-    assert not drive_loader(tmp_path).ready()
+    assert not DriveLoader().ready()
     drive = make_drive(tmp_path / place)
-    assert drive_loader(tmp_path).drives() == [drive]
+    assert DriveLoader().drives() == [drive]
 
 
 def test_a_drive_is_found_where_somebody_mounted_it(tmp_path: Path) -> None:
@@ -34,19 +35,20 @@ def test_a_drive_is_found_where_somebody_mounted_it(tmp_path: Path) -> None:
     mounts = tmp_path / "proc/mounts"
     mounts.parent.mkdir()
     mounts.write_text(f"proc /proc proc rw 0 0\n/dev/sdb1 {str(drive).replace(' ', chr(92) + '040')} vfat rw 0 0\n")
-    assert drive_loader(tmp_path).drives() == [drive]
+    assert DriveLoader().drives() == [drive]
 
 
 def test_two_drives_are_one_too_many(tmp_path: Path) -> None:
     make_drive(tmp_path / "media/me/RPI-RP2")
     make_drive(tmp_path / "media/me/RPI-RP21")
     with pytest.raises(FlashError, match="2 boards are in their loader"):
-        drive_loader(tmp_path).ready()
+        DriveLoader().ready()
 
 
-def test_a_drive_that_is_not_mounted_is_told_apart_from_none(tmp_path: Path) -> None:
-    assert "udisksctl mount -b /dev/disk/by-label/RPI-RP2" in drive_loader(tmp_path, attached=True).cure()
-    assert "BOOTSEL" in drive_loader(tmp_path).cure()
+def test_a_drive_that_is_not_mounted_is_told_apart_from_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "BOOTSEL" in DriveLoader().cure()
+    monkeypatch.setattr(loader_drive, "DISK", tmp_path)
+    assert f"udisksctl mount -b {tmp_path}" in DriveLoader().cure()
 
 
 def test_a_drive_gets_the_whole_file_with_the_boot_block_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,7 +57,7 @@ def test_a_drive_gets_the_whole_file_with_the_boot_block_last(tmp_path: Path, mo
     synced: list[int] = []
     monkeypatch.setattr(loader_drive.os, "fsync", lambda fd: synced.append((drive / "BIOTAC.UF2").stat().st_size))
     shown: list[int] = []
-    drive_loader(tmp_path).write(image, lambda done, of: shown.append(done))
+    DriveLoader().write(image, lambda done, of: shown.append(done))
     assert (drive / "BIOTAC.UF2").read_bytes() == b"".join(image.boot_last())
     assert synced == [19 * BLOCK_BYTES, 20 * BLOCK_BYTES]  # the boot block goes out after all others are
     assert shown[-1] == 20
@@ -75,10 +77,10 @@ def test_a_drive_that_vanishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(loader_drive.os, "fsync", fsync)
     image = read_image(make_image(tmp_path))
     if call == 2:
-        drive_loader(tmp_path).write(image, lambda done, of: None)
+        DriveLoader().write(image, lambda done, of: None)
     else:
         with pytest.raises(FlashError, match=r"took 19 of 20 blocks .*the board stays in its loader"):
-            drive_loader(tmp_path).write(image, lambda done, of: None)
+            DriveLoader().write(image, lambda done, of: None)
 
 
 # ---- picotool ----------------------------------------------------------------------------------------

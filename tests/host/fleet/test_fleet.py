@@ -43,7 +43,7 @@ class Shared:
     def start(self) -> None:
         self.session = self.stack.enter_context(closing(network.open_session(self.name, listen=self.endpoint)))
         self.hand = self.stack.enter_context(biotac.open(self.source, reconnect=True))
-        self.share = self.stack.enter_context(Share(self.hand, self.session, self.name))
+        self.share = self.stack.enter_context(closing(Share(self.hand, self.session, self.name)))
 
     def port(self, more: str = "") -> str:
         return f"zenoh:{self.name}?connect={self.endpoint}{more}"
@@ -92,7 +92,7 @@ def test_it_is_a_port_like_any_other(shared, tmp_path, capsys) -> None:
     assert len(recording.frames) >= 100 and not recording.problems
     assert main(["check", str(path)]) == 0
     assert main(["info", shared.port(), "--json"]) == 0
-    with Viewing(shared.port(), port=0) as viewing:
+    with closing(Viewing(shared.port(), port=0)) as viewing:
         assert viewing.server.token
 
 

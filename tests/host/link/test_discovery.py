@@ -212,8 +212,7 @@ def test_another_major_names_the_command_that_cures_it(scripted_board, hello, ch
 
 
 @pytest.mark.parametrize(
-    ("changes", "cure"),
-    [({}, "biotac flash"), ({"wire_minor": wire.WIRE_MINOR + 1}, "pip install -U biotac-gateway")],
+    ("changes", "cure"), [({}, "biotac flash"), ({"wire_minor": wire.WIRE_MINOR + 1}, "pip install -U biotac-gateway")]
 )
 def test_another_schema_is_a_warning_and_no_error(scripted_board, hello, capsys, changes, cure: str) -> None:
     different = {"schema_hash": wire.SCHEMA_HASH ^ 1}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
+import fake_smbus
+import fake_spidev
 import numpy as np
 import pytest
 from overheard import Overheard
@@ -19,16 +20,6 @@ from biotac.link import spidev as spidev_link
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
-
-_spec = importlib.util.spec_from_file_location("fake_spidev", Path(__file__).parents[2] / "support" / "fake_spidev.py")
-assert _spec is not None and _spec.loader is not None
-fake_spidev = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(fake_spidev)
-
-_spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).parents[2] / "support" / "fake_smbus.py")
-assert _spec is not None and _spec.loader is not None
-fake_smbus = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(fake_smbus)
 
 Board = Callable[..., tuple[biotac.Hand, "fake_spidev.Bus"]]
 SECONDS = 2.0
@@ -190,7 +181,7 @@ def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> Non
         ("spidev:0.x", r"'0\.x' is not an SPI device"),
         ("spidev:0.-1", r"'0\.-1' is not an SPI device"),
         ("spidev:0.0,0.0", r"0\.0 is listed twice; each finger needs"),
-        ("spidev:0.0,0.00", r"0\.0 is listed twice"),
+        ("spidev:0.0,0.00", r"0\.00 is listed twice"),
         ("spidev:0.0,0.1,0.2,1.0,1.1,1.2", "6 devices; expected at most 5"),
     ],
 )

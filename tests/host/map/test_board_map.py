@@ -14,7 +14,7 @@ import wrench_run
 import biotac
 from biotac.calibrate.wrench import models
 from biotac.calibrate.wrench.run import Run, load_run
-from biotac.core.compiled import default_settings, on_board_q4, pressure_filtered_q4, pressure_force_100un
+from biotac.core.compiled import default_settings, on_board_q4, pressure_force_100un
 from biotac.errors import InputError
 from biotac.map import board_map, bound, columns, file
 from biotac.map.board_map import BoardBlock, BoardMap, from_blob
@@ -159,8 +159,6 @@ def test_c_is_given_what_it_expects_or_nothing() -> None:
     for one, other, gain_nn in [(q4, q4[:3], 1), (q4[:, None], q4, 1), (q4 / 2, q4, 1), (q4, q4, -1), (q4, q4, 2**31)]:
         with pytest.raises((ValueError, OverflowError)):
             pressure_force_100un(one, other, gain_nn)
-    with pytest.raises(ValueError, match="PRESSURE_FILTER_MILLI is 0, expected 10 to 1000"):
-        pressure_filtered_q4(q4, 0)
 
 
 def test_a_map_beyond_the_formats_is_refused_by_name() -> None:

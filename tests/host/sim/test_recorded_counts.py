@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError, RecordingError
-from biotac.sim import load_source, tape
+from biotac.sim import load_source
 from biotac.wire import sensor_gen as _sensor
 from biotac.wire import slots
+from biotac.wire.messages_gen import EmuFault
 
 DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 PDC, TAC, TDC = (_sensor.SLOTS.index(name) for name in ("PDC", "TAC", "TDC"))
@@ -75,7 +76,7 @@ def test_missing_channels_are_channels_the_sensor_does_not_have(tmp_path: Path) 
     np.savez(tmp_path / "a.npz", E=arrays()["E"])
     source = load_source(tmp_path / "a.npz")
     other = [k for k in range(44) if k not in slots.ELECTRODE_SLOT]
-    assert len(other) == 25 and (source.samples[:, 0, other] == tape.NO_CHANNEL).all()
+    assert len(other) == 25 and (source.samples[:, 0, other] == EmuFault.NO_CHANNEL).all()
     assert source.tare_q4 is None and source.truth_force_n is None
 
 
@@ -144,10 +145,10 @@ def test_files_that_are_no_npz_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["none.npz", "none.btd", "none.btd.gz"])
 def test_missing_and_empty_recordings_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match=r"No such file.*check the path"):
         load_source(tmp_path / name)
     (tmp_path / name).touch()
-    with pytest.raises(InputError, match="is empty"):
+    with pytest.raises(InputError, match=r"expected an? "):
         load_source(tmp_path / name)
 
 
@@ -204,8 +205,8 @@ def test_bad_parity_becomes_its_code_whatever_was_read(tmp_path: Path) -> None:
     lines = btd_lines()
     lines[44 + 3][6:8] = [65535, 1]  # frame 1, place 3: E2
     samples = load_source(write_btd(tmp_path / "a.btd", lines)).samples
-    assert samples[1, 0, _sensor.SLOTS.index("E2")] == tape.BAD_PARITY
-    assert (samples == tape.BAD_PARITY).sum() == 1
+    assert samples[1, 0, _sensor.SLOTS.index("E2")] == EmuFault.BAD_PARITY
+    assert (samples == EmuFault.BAD_PARITY).sum() == 1
 
 
 def test_incomplete_frames_are_left_out_and_counted(tmp_path: Path) -> None:
@@ -292,4 +293,4 @@ def test_the_real_plate_recording_has_pressure_and_no_tare() -> None:
     source = load_source(needs("robotic_finger/trial_15330.npz"), seconds=10.0)
     assert source.samples.shape == (1000, 1, 44) and source.tare_q4 is None
     assert (source.samples[:, 0, PDC] < 4096).all()
-    assert (source.samples[:, 0, TDC] == tape.NO_CHANNEL).all()
+    assert (source.samples[:, 0, TDC] == EmuFault.NO_CHANNEL).all()

@@ -18,6 +18,7 @@ from biotac.sim.scenario import FAULT_CODES, parse_scenario
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as _wire
 from biotac.wire import slots
+from biotac.wire.messages_gen import EmuFault
 from biotac.wire.slots import ELECTRODE_SLOT, FRAME_S
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
@@ -161,12 +162,12 @@ def test_a_fault_replaces_exactly_the_words_it_covers(tmp_path: Path) -> None:
         expected[50:60, 1, :] = code
         np.testing.assert_array_equal(words, expected)
     words = play(tmp_path, text + fault.format("bad_parity") + 'channel = "PAC"\n').samples
-    assert (words[50:60, 1, slots.PAC_SLOT] == tape.BAD_PARITY).all()
-    assert (words == tape.BAD_PARITY).sum() == 220
+    assert (words[50:60, 1, slots.PAC_SLOT] == EmuFault.BAD_PARITY).all()
+    assert (words == EmuFault.BAD_PARITY).sum() == 220
     # between frames: 4400 slots a second, so 0.502 s is slot 2209, the tenth of frame 50 (from 0: 9)
     words = play(tmp_path, text + fault.format("stuck_low").replace("0.5", "0.502", 1)).samples
-    assert (words[50, 1, :9] < 4096).all() and (words[50, 1, 9:] == tape.STUCK_LOW).all()
-    assert (words[60, 1, :9] == tape.STUCK_LOW).all() and (words[60, 1, 9:] < 4096).all()
+    assert (words[50, 1, :9] < 4096).all() and (words[50, 1, 9:] == EmuFault.STUCK_LOW).all()
+    assert (words[60, 1, :9] == EmuFault.STUCK_LOW).all() and (words[60, 1, 9:] < 4096).all()
 
 
 # ---- gains -------------------------------------------------------------------------------------
@@ -260,7 +261,7 @@ def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
 def test_faults_shows_each_kind_once_on_one_of_three_fingers() -> None:
     samples = load_source("faults.toml").samples
     assert samples.shape[1] == 3 and (samples[:, [0, 2]] < 4096).all()
-    for code in set(tape.CODES) - {tape.UNPLUGGED, tape.SWAPPED}:  # a sensor that is away is no fault of a word
+    for code in set(tape.CODES) - {EmuFault.UNPLUGGED, EmuFault.SWAPPED}:  # a sensor that is away is no fault of a word
         frames = np.flatnonzero((samples[:, 1] == code).any(axis=1))
         assert len(frames) > 0 and (np.diff(frames) == 1).all()  # one stretch
 
@@ -289,7 +290,7 @@ def test_an_unknown_suffix_is_refused() -> None:
 def test_a_folder_is_refused(tmp_path: Path) -> None:
     for name in ("a.toml", "a.npz"):
         (tmp_path / name).mkdir()
-        with pytest.raises(InputError, match="expected a"):
+        with pytest.raises(InputError, match="Is a directory"):
             load_source(tmp_path / name)
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pac_events import pac_events
 
 import biotac
 from biotac import EventKind
-from biotac.core.events import pac_events
 from biotac.sim.stick_slip import Ringing
 
 HELD = 60  # rounds

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import biotac
-from biotac.view.player import Opener, Recorded
+from biotac.view.player import Opener
 from biotac.view.serving import Viewing
 from biotac.wire.batches import Batch, LinkStats, join
 
@@ -49,7 +49,7 @@ class ScriptedPlayer:
     def stats(self) -> LinkStats:
         return LinkStats(0, 0, frames_lost=7, pac_lost=0, disordered=0, crc_errors=3, other_errors=0)
 
-    def recording(self) -> Recorded | None:
+    def recording(self) -> None:
         return None
 
     def do(self, command: str, finger: int | None) -> str:

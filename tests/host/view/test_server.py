@@ -343,7 +343,7 @@ def test_a_browser_gets_every_file_and_all_fingers() -> None:
     ("words", "code", "told"),
     [
         (["nowhere.mcap"], 2, "nowhere.mcap cannot be read"),
-        (["sim:nowhere.toml"], 2, "no such file"),
+        (["sim:nowhere.toml"], 2, "No such file"),
         (["sim:press.toml", "--folder", "/nowhere"], 2, "is not a writable folder"),
         (["sim:press.toml", "--port", "99999"], 2, "expected 0 to 65535"),
     ],

@@ -78,10 +78,6 @@ class Board:
         with suppress(BlockingIOError):
             del ring[: os.write(self._master, ring)]
 
-    def wait(self) -> None:
-        """Block until something arrives."""
-        select.select([self._master], [], [])
-
 
 def answer(message: Any) -> bytes:
     """The encoded answer: HELLO, or a Reply of success."""
@@ -126,7 +122,7 @@ def main() -> None:
     ring = bytearray()
     print("ready", flush=True)
     while True:
-        board.wait()
+        select.select([master], [], [])  # until something arrives
         try:
             started = board.serve(ring)
             board.send(ring)

@@ -243,22 +243,11 @@ def _panel(axes: Any, outcome: Outcome, core: str) -> None:
         axes.plot(x, point.error_n, "o", color=color, markersize=9, label=label)
         for three in point.rmse_n.values():
             axes.plot(x, np.linalg.norm(three), "_", color=color, markersize=9, alpha=0.6)
-        _name(axes, point, x, color)
+        below, left = point.name in BELOW, point.name in LEFT
+        axes.annotate(f"{point.name}: {x:,}, {point.error_n:.2f} N", (x, point.error_n), textcoords="offset points",
+                      xytext=(-8 if left else 8, -12 if below else 4), fontsize=8, color=color,
+                      ha="right" if left else "left", va="top" if below else "bottom")  # fmt: skip
     axes.set(xscale="log", yscale="log")
     cycles = [point.cycles[core] for point in outcome.points]
     axes.set_xlim(min(cycles) / 1.6, max(cycles) * 14)
     axes.grid(alpha=0.25, which="both")
-
-
-def _name(axes: Any, point: Point, x: int, color: str) -> None:
-    below, left = point.name in BELOW, point.name in LEFT
-    axes.annotate(
-        f"{point.name}: {x:,}, {point.error_n:.2f} N",
-        (x, point.error_n),
-        xytext=(-8 if left else 8, -12 if below else 4),
-        textcoords="offset points",
-        fontsize=8,
-        color=color,
-        ha="right" if left else "left",
-        va="top" if below else "bottom",
-    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from biotac.calibrate.population import Population
 from biotac.calibrate.press import Scale, pulled, scale_of
-from biotac.calibrate.wrench import Run
+from biotac.calibrate.wrench import Run, rmse
 
 from .training import FingerSums, Floats, mirrored, sums, train
 
@@ -49,7 +49,7 @@ def worth(population: Population, run: Run) -> Worth:
     truth = run.truth
     published, by_map = population.published(run.counts, run.tare), population.force(run.counts, run.tare)
     scales, scale5 = _scaled(by_map, truth)
-    return Worth(_rms(published - truth), scale5, _minute(population, run), published, by_map, truth, scales)
+    return Worth(rmse(published, truth), scale5, _minute(population, run), published, by_map, truth, scales)
 
 
 def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
@@ -73,7 +73,7 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
 
 def worth_of_force(population: Population, run: Run) -> tuple[Floats, Floats]:
     """RMSE (3,) in N as the map is and after five presses; the former twice where the run has no such presses."""
-    raw = _rms(population.published(run.counts, run.tare) - run.truth)
+    raw = rmse(population.published(run.counts, run.tare), run.truth)
     _, scale5 = _scaled(population.force(run.counts, run.tare), run.truth)
     return raw, raw if scale5 is None else scale5
 
@@ -133,9 +133,4 @@ def _minute(population: Population, run: Run) -> Floats | None:
         rest = np.r_[: max(start - ROWS_PER_S, 0), min(start + rows + ROWS_PER_S, n) : n]
         found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest]) ** 2).mean(axis=0))
     result: Floats = np.sqrt(np.mean(found, axis=0))
-    return result
-
-
-def _rms(error: Floats) -> Floats:
-    result: Floats = np.sqrt((error**2).mean(axis=0))
     return result

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol, cast
+from types import ModuleType
+from typing import Any
 
 from biotac import InputError
 
-from ..report import Options, Report, Show, check_free, write
+from ..report import Options, Show, check_free, write
 
 ABOUT = "Repeat a paper's experiment: figure, table against the paper, JSON."
 EXAMPLE = "biotac-lab experiment poke --out poked --check"
@@ -32,25 +34,13 @@ NAMES = {
 }
 
 
-class Experiment(Protocol):
-    """The module of an experiment.
+def load(name: str) -> ModuleType:
+    """The module of the experiment ``name``, with a function run() from Options to a Report.
 
-    ``RECORDING`` says what a recording must hold, empty where none makes sense; ``TAKES`` names the options among
-    ``maps``, ``real`` and ``quick`` that apply.
+    ``RECORDING`` says what a recording must hold; without it none makes sense. ``TAKES`` are the options among
+    ``maps``, ``real`` and ``quick`` that apply, if any do.
     """
-
-    @property
-    def RECORDING(self) -> str: ...
-
-    @property
-    def TAKES(self) -> frozenset[str]: ...
-
-    def run(self, options: Options) -> Report: ...
-
-
-def load(name: str) -> Experiment:
-    """The module of the experiment ``name``."""
-    return cast(Experiment, importlib.import_module(f"{__package__}.{name.replace('-', '_')}"))
+    return importlib.import_module(f"{__package__}.{name.replace('-', '_')}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,13 +78,14 @@ def run(args: argparse.Namespace, show: Show) -> int:
         finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, recording=args.recording,
         show=show,
     )  # fmt: skip
-    _check(name, experiment, options, args.seed)
+    takes = getattr(experiment, "TAKES", ())
+    _check(name, hasattr(experiment, "RECORDING"), takes, options, args.seed)
     if args.out is not None:
         check_free(args.out, name, overwrite=args.force)
     report = experiment.run(replace(options, seed=1 if args.seed is None else args.seed))
     show("")
     if args.check and not report.checks:
-        cure = "give --map FILE" if "maps" in experiment.TAKES and args.recording is None else "drop --check"
+        cure = "give --map FILE" if "maps" in takes and args.recording is None else "drop --check"
         raise InputError(f"--check: {name} on {report.source} has no figure with a target; {cure}")
     written = [] if args.out is None else write(report, args.out, name, NAMES[name], overwrite=args.force)
     if args.json:
@@ -104,14 +95,14 @@ def run(args: argparse.Namespace, show: Show) -> int:
     return 1 if args.check and not all(one["met"] for one in report.checks) else 0
 
 
-def _check(name: str, experiment: Experiment, options: Options, seed: int | None) -> None:
+def _check(name: str, has_recordings: bool, takes: Collection[str], options: Options, seed: int | None) -> None:
     """Raise InputError before seconds of work, not after."""
-    if options.recording is not None and not experiment.RECORDING:
+    if options.recording is not None and not has_recordings:
         raise InputError(f"{name} runs only on the emulated sensor, but got {options.recording}: drop it")
     if options.recording is not None and seed is not None:
         raise InputError("--seed chooses an emulated finger, but a recording is given: drop one of them")
     if seed is not None and not 0 <= seed <= SEED_MAX:
         raise InputError(f"--seed is {seed}: expected 0 to {SEED_MAX}")
     for what, option in (("maps", "map"), ("real", "real"), ("quick", "quick")):
-        if getattr(options, what) and what not in experiment.TAKES:
+        if getattr(options, what) and what not in takes:
             raise InputError(f"{name} does not use --{option}: drop it")

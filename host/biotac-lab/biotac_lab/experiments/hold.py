@@ -23,7 +23,6 @@ from .plate_normal import emulated
 from .trial import Floats, Rows, Words
 
 RECORDING = "E and PDC of presses"
-TAKES: frozenset[str] = frozenset()
 
 SHARES = (0.5, 0.3, 0.2, 0.1, 0.05, 0.04, 0.03)
 SAFE_SHARE = 0.1  # holds of this share of the peak and more are never tared

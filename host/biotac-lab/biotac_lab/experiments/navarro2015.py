@@ -45,9 +45,6 @@ from biotac.sim import PROFILES, Profile, load_source
 
 from ..report import Options, Report, Show, Table, check, claim
 
-RECORDING = ""
-TAKES: frozenset[str] = frozenset()
-
 NAMES = ("thumb", "fore", "middle", "ring", "little")
 PAPER_GAIN_N = (0.016, 0.010, 0.013, 0.009, 0.009)  # Table I
 PAPER_REST_COUNTS = (85.0, 86.0, 106.0, 57.0, 70.0)

@@ -12,9 +12,6 @@ from biotac.core import geometry as surface
 from ..report import Options, Report, Table
 from .trial import Floats
 
-RECORDING = ""
-TAKES: frozenset[str] = frozenset()
-
 CONTACTS = 4000
 # Noise added to the wrench, in N and N mm: none, a Nano17's resolution, and that of a worse plate.
 NOISES = (("exact wrench", 0.0, 0.0), ("Nano17's resolution", 1 / 320, 1 / 64), ("20 mN, 0.2 N mm", 0.02, 0.2))

@@ -25,17 +25,12 @@ from .poke import COLORS, SHIPPED, WEIGHTS, WORDS, called
 from .trial import Bools, Floats, Script, Trial, play
 
 RECORDING = "E, PDC and z_dir, a plate's unit normal"
-TAKES: frozenset[str] = frozenset()
 
 CONTACT_COUNTS = 40.0
 THRESHOLDS_COUNTS = (0.0, 20.0, 40.0, 80.0, 200.0)
 LIMIT_MEDIAN_DEG, LIMIT_P90_DEG = 8.9, 14.7
 # the same trial in float64, median and 90th percentile
-KNOWN_DEG = {
-    PocWeights.ABS_N2: (21.1, 56.6),
-    PocWeights.COMPRESS_N1: (8.7, 14.7),
-    PocWeights.COMPRESS_N2: (11.0, 19.4),
-}
+KNOWN_DEG = {PocWeights.ABS_N2: (21.1, 56.6), PocWeights.COMPRESS_N1: (8.7, 14.7), PocWeights.COMPRESS_N2: (11.0, 19.4)}
 EMULATED_CONTACTS = 40
 APART_ROWS = 15  # frames without contact that separate two contacts
 

@@ -26,7 +26,6 @@ from . import laboratory
 from .trial import Bools, Floats, Script, Trial, play
 
 RECORDING = "E and F, or an .mcap with good scales: 19 contacts above 1 N in the order of the electrodes"
-TAKES: frozenset[str] = frozenset()
 
 PROBE_MM = 2.0
 FLOOR_N = 1.0
@@ -195,14 +194,9 @@ def run(options: Options) -> Report:
 
 def _tables(result: Result) -> list[Table]:
     rows: list[list[Any]] = [
-        [
-            case.profile,
-            called(case.weights),
-            k,
-            *[values.mean() for values in (its.std_mm, its.axis_std_mm, its.bias_mm)],
-        ]
+        [case.profile, called(case.weights), k, trial.std_mm.mean(), trial.axis_std_mm.mean(), trial.bias_mm.mean()]
         for case in result.cases
-        for k, its in enumerate(case.trials, start=1)
+        for k, trial in enumerate(case.trials, start=1)
     ]
     paper = [float(np.mean(column)) for column in PAPER_MM]
     rows += [["paper", PAPER_TRIALS[k].rstrip("12 "), k % 2 + 1, mean, None, None] for k, mean in enumerate(paper)]
@@ -220,19 +214,12 @@ def _tables(result: Result) -> list[Table]:
     shipped = [case for case in result.cases if case.weights == SHIPPED]
     columns = [trial.std_mm.tolist() for case in shipped for trial in case.trials] + [list(one) for one in PAPER_MM]
     names = [f"{case.profile} {k + 1}" for case in shipped for k in range(len(case.trials))]
-    each: list[list[Any]] = [
-        [name, *[column[k] for column in columns]] for k, name in enumerate(sensor.ELECTRODE_NAMES)
-    ]
+    each: list[list[Any]] = [[name, *row] for name, *row in zip(sensor.ELECTRODE_NAMES, *columns, strict=True)]
     each.append(["**average**", *[float(np.mean(column)) for column in columns]])
     head2 = ["electrode", *names, *[f"paper {name}" for name in PAPER_TRIALS]]
     return [
         Table("Point of contact", head, rows, text),
-        Table(
-            "By force",
-            ["sensor", "weights", "mm", *bands],
-            banded,
-            "Within each band of force, means over the electrodes.",
-        ),
+        Table("By force", ["sensor", "weights", "mm", *bands], banded, "Within each band, means over the electrodes."),
         Table("Table 2, with the board's default weights", head2, each, "In mm.", digits=4),
     ]
 
@@ -279,9 +266,8 @@ def _draw_electrodes(axes: Any, result: Result) -> None:
     series += [(f"paper, trial {k + 1}", np.array(PAPER_MM[k]), color) for k, color in ((0, "#57534e"), (1, "#a8a29e"))]
     place, width = np.arange(len(sensor.ELECTRODE_NAMES)), 0.84 / len(series)
     for k, (label, std, color) in enumerate(series):
-        axes.bar(
-            place + (k - (len(series) - 1) / 2) * width, std, width, color=color, label=f"{label}: {std.mean():.3f}"
-        )
+        at = place + (k - (len(series) - 1) / 2) * width
+        axes.bar(at, std, width, color=color, label=f"{label}: {std.mean():.3f}")
     axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
     axes.set_xticks(place, sensor.ELECTRODE_NAMES)
     axes.set(ylabel="std of the point of contact [mm]", yscale="log", xlim=(-0.6, 18.6))

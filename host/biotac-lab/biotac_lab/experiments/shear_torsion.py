@@ -26,9 +26,6 @@ from . import torsion_shear, weight
 from .estimates import torsion
 from .trial import Bools, Floats
 
-RECORDING = ""
-TAKES: frozenset[str] = frozenset()
-
 FRAMES = 9000
 FY, TORSION = 1, 6
 PAPER, CALIBRATED = "paper", "calibrated"

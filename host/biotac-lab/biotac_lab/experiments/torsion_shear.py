@@ -21,7 +21,7 @@ from .trial import Bools, Floats, Trial
 from .weight import E17_MM, WEIGHT_N, Result
 
 RECORDING = "E, F and M"
-TAKES = frozenset({"maps"})
+TAKES = ("maps",)
 
 SHEAR_N = 1.5  # the paper gives none
 REGIONS = {"I": 1.0, "II": 0.0, "III": -1.0}  # push along +y

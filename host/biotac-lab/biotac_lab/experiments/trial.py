@@ -122,14 +122,7 @@ class Script:
         self.phases.append(Phase(name, begin_s, self.track.seconds))
 
 
-def play(
-    name: str,
-    script: Script,
-    *,
-    seed: int,
-    profile: Profile = "new",
-    take: int = 0,
-) -> Trial:
+def play(name: str, script: Script, *, seed: int, profile: Profile = "new", take: int = 0) -> Trial:
     """The trial of an emulated finger that goes through ``script`` and is read by a board.
 
     ``take`` counts how often the same finger was used before: its noise differs, the sensor does not.

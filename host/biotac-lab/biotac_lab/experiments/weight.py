@@ -58,13 +58,7 @@ class Result:
 
 
 def emulated(
-    figure: str,
-    steps: Iterable[Step],
-    hold_s: float,
-    seed: int,
-    *,
-    at_mm: tuple[float, float] = E17_MM,
-    **finger: Any,
+    figure: str, steps: Iterable[Step], hold_s: float, seed: int, *, at_mm: tuple[float, float] = E17_MM, **finger: Any
 ) -> Trial:
     """Two seconds at rest (A), then each step's load at ``at_mm``, reached in RAMP_S and held for ``hold_s``.
 

@@ -28,8 +28,7 @@ from . import wettels_roc as roc
 from .trial import Floats
 from .wettels_tables import EQUATION, PAPER_PLACES, details, overview, paf_row, text
 
-RECORDING = ""
-TAKES = frozenset({"real", "quick"})
+TAKES = ("real", "quick")
 
 ROC_ASKED, D_ASKED_MM, R_ASKED_MM, BAR_ASKED_DEG = 0.947, 2.3, 2.2, 5.0
 

@@ -45,12 +45,7 @@ class Probe:
 
 
 #: The paper's four, in its order: classes 1 to 4 of its figure 7.
-PROBES = (
-    Probe("1 mm", 1.0, 5.0),
-    Probe("3.6 mm", 3.6, 5.0),
-    Probe("10 mm", 10.0, 10.0),
-    Probe("flat", np.inf, 10.0),
-)
+PROBES = (Probe("1 mm", 1.0, 5.0), Probe("3.6 mm", 3.6, 5.0), Probe("10 mm", 10.0, 10.0), Probe("flat", np.inf, 10.0))
 BAR = Probe("bar", 1.0, 10.0, bar=True)
 
 

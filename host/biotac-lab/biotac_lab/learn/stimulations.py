@@ -57,12 +57,7 @@ class Stimulations:
 
 
 def stimulate(
-    finger: Finger,
-    places: Sequence[int],
-    *,
-    seed: int,
-    frames: int = 16,
-    peak_n: tuple[float, float] = PEAK_N,
+    finger: Finger, places: Sequence[int], *, seed: int, frames: int = 16, peak_n: tuple[float, float] = PEAK_N
 ) -> Stimulations:
     """``places`` says how many contacts each of PROBES makes, of five stimulations of ``frames`` rows."""
     rng = np.random.default_rng([seed, 33])

@@ -11,8 +11,7 @@ from typing import Any
 
 from ...errors import FlashError, InputError, PortError
 from ...flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
-from ...flash.carried import find_image
-from ...flash.image import note_text
+from ...flash.image import find_image, note_text
 from ...flash.procedure import flash_every
 from ...wire.identity import serial_text, version_text
 from .. import outputs, values

@@ -14,8 +14,7 @@ from ...calibrate.reference.samples import Reader
 from ...calibrate.wrench.guided import Files, Procedure, walk
 from ...calibrate.wrench.sources import check_serial
 from ...errors import BiotacError, InputError
-from ...sim.nano17 import Nano17
-from ...sim.nano17_reader import Nano17Reader
+from ...sim.nano17 import Nano17, Nano17Reader
 from ...sim.source import Source
 from ...wire.identity import ascii_text
 from .. import outputs

@@ -54,7 +54,7 @@ def serve(args: argparse.Namespace) -> int:
     with (
         closing(network.open_session(name, connect=args.connect, listen=args.listen, config=args.config)) as session,
         biotac.open(args.port, pace=1.0, reconnect=True) as hand,
-        Share(hand, session, name),
+        closing(Share(hand, session, name)),
     ):
         facts = {"port": f"zenoh:{name}", "board": hand.port, "fingers": hand.fingers}
         say(args, facts, f"{hand.port} is shared as zenoh:{name}; Ctrl-C stops")

@@ -62,8 +62,8 @@ def run(args: argparse.Namespace) -> int:
         prepare(board)
         facts = {"source": source.name, "fingers": source.samples.shape[1]}
         tell(board, args, source.name, facts)
-        while not board.wait():
-            pass
+        while not board.over:
+            board.hear(None)
         tell_over(source.name)
         signal.pause()
     return 0

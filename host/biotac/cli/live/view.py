@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
     source = args.source or choose()
     from ...view.serving import Viewing  # here, because other verbs need no HTTP server
 
-    with Viewing(source, port=args.port, folder=args.folder, again=not args.once) as viewing:
+    viewing = Viewing(source, port=args.port, folder=args.folder, again=not args.once)
+    with contextlib.closing(viewing):
         say(args, {"url": viewing.url, "source": source}, f"{viewing.url} shows {source}; Ctrl-C stops")
         if not args.no_browser:
             webbrowser.open(viewing.url)

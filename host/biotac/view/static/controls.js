@@ -1,5 +1,7 @@
 // Buttons and keys. A key does what its button does, and is refused when that is.
 
+import { byId, make } from "./readout.js";
+
 const KEYS = [
   ["T", "tare the finger shown"],
   ["A", "tare all fingers"],
@@ -15,15 +17,13 @@ const KEYS = [
 const BUTTONS = { t: "tare", a: "tare-all", r: "record", p: "pause", g: "again", d: "theme", "?": "help" };
 
 export function wireControls({ actions, pick, step }) {
-  const byId = (id) => document.getElementById(id);
   for (const [id, act] of Object.entries(actions)) byId(id).addEventListener("click", act);
   const keys = byId("keys");
   byId("help").addEventListener("click", () => keys.showModal());
   byId("key-list").replaceChildren(...KEYS.flatMap(([key, words]) => {
-    const term = document.createElement("dt");
-    const kbd = Object.assign(document.createElement("kbd"), { textContent: key });
-    term.append(kbd);
-    return [term, Object.assign(document.createElement("dd"), { textContent: words })];
+    const term = make("dt");
+    term.append(make("kbd", { textContent: key }));
+    return [term, make("dd", { textContent: words })];
   }));
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || keys.open) return;
@@ -55,7 +55,7 @@ export class ThemeSwitch {
     localStorage.setItem("theme", this.theme);
     if (this.theme === "system") delete document.documentElement.dataset.theme;
     else document.documentElement.dataset.theme = this.theme;
-    document.getElementById("theme-words").textContent = this.theme;
+    byId("theme-words").textContent = this.theme;
     this.changed();
   }
 }

@@ -18,9 +18,7 @@ export class Fingertip {
     this.large = large;
     this.electrodes = electrodes;
     this.context = canvas.getContext("2d");
-    this.field = document.createElement("canvas");
-    this.field.width = FIELD_W;
-    this.field.height = FIELD_H;
+    this.field = Object.assign(document.createElement("canvas"), { width: FIELD_W, height: FIELD_H });
     this.fieldContext = this.field.getContext("2d");
     this.pixels = this.fieldContext.createImageData(FIELD_W, FIELD_H);
     this.words = new Uint32Array(this.pixels.data.buffer);

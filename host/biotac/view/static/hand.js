@@ -1,7 +1,7 @@
 // The fingers side by side, each a button that shows it large.
 
 import { Fingertip } from "./fingertip.js";
-import { number } from "./readout.js";
+import { make, number } from "./readout.js";
 
 export class HandRow {
   constructor(place, about, pick) {
@@ -21,13 +21,12 @@ export class HandRow {
     if (fingers.size === this.entries.size) return;
     this.clear();
     for (const index of [...fingers.keys()].sort((a, b) => a - b)) {
-      const button = Object.assign(document.createElement("button"), { type: "button", className: "finger" });
-      button.dataset.finger = index;
+      const button = make("button", { type: "button", className: "finger" }, { finger: index });
       button.setAttribute("aria-keyshortcuts", String(index));
-      const canvas = document.createElement("canvas");
+      const canvas = make("canvas");
       canvas.setAttribute("aria-hidden", "true");
-      const force = Object.assign(document.createElement("span"), { className: "force" });
-      const name = Object.assign(document.createElement("b"), { textContent: String(index) });
+      const force = make("span", { className: "force" });
+      const name = make("b", { textContent: String(index) });
       name.setAttribute("aria-label", `Finger ${index}`);
       button.append(canvas, name, force);
       button.addEventListener("click", () => this.pick(index));

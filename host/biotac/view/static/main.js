@@ -6,14 +6,12 @@ import { Fingertip } from "./fingertip.js";
 import { HandRow } from "./hand.js";
 import { Model, SPECTRUM_SAMPLES } from "./model.js";
 import { SpectrogramPlot, SpectrumPlot, TimePlot } from "./plots.js";
-import { Flags, Link, Results, number, showLink, showTare, tell } from "./readout.js";
+import { Flags, Link, Results, byId, number, showLink, showTare, tell } from "./readout.js";
 import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
 
 const READ_MS = 100; // numbers that change faster cannot be read
 const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
-
-const byId = (id) => document.getElementById(id);
 
 class Page {
   constructor() {

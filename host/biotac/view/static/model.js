@@ -67,7 +67,8 @@ export class Finger {
   constructor() {
     this.latest = null;
     this.addedMs = 0; // when the latest came, by the browser's clock
-    this.history = { t: ring(HISTORY_ROWS), x: ring(HISTORY_ROWS), y: ring(HISTORY_ROWS), z: ring(HISTORY_ROWS), pdc: ring(HISTORY_ROWS) };
+    const ring = () => new Float64Array(HISTORY_ROWS).fill(NaN);
+    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring() };
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
     this.pacSamples = 0;
@@ -108,8 +109,4 @@ export class Finger {
   *order() {
     for (let k = Math.max(0, this.rows - HISTORY_ROWS); k < this.rows; k++) yield k % HISTORY_ROWS;
   }
-}
-
-function ring(length) {
-  return new Float64Array(length).fill(NaN);
 }

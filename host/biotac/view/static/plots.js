@@ -51,6 +51,10 @@ class Area {
     if (y !== undefined) c.fillText(text, this.left - 6, y);
     else c.fillText(text, Math.min(Math.max(x, this.left + 10), this.right - 14), this.bottom + 6);
   }
+
+  timeTicks(theme) {
+    for (let s = -HISTORY_S; s <= 0; s += 2) this.tick(theme, { x: this.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
+  }
 }
 
 export class TimePlot {
@@ -71,9 +75,7 @@ export class TimePlot {
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
       area.tick(theme, { y: area.y((v - low) / (high - low)), text: v.toFixed(step < 1 ? this.digits : 0).replace("-", "−") });
     }
-    for (let s = -HISTORY_S; s <= 0; s += 2) {
-      area.tick(theme, { x: area.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
-    }
+    area.timeTicks(theme);
     for (const mark of marks) this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / HISTORY_S, mark.name);
     c.lineWidth = 1.75;
     c.lineJoin = "round";
@@ -187,9 +189,7 @@ export class SpectrogramPlot {
       c.drawImage(this.picture, area.left, area.top, area.right - area.left, area.bottom - area.top);
     }
     for (let hz = 0; hz <= top; hz += 250) area.tick(theme, { y: area.y(hz / top), text: hz ? String(hz) : "0 Hz" });
-    for (let s = -HISTORY_S; s <= 0; s += 2) {
-      area.tick(theme, { x: area.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
-    }
+    area.timeTicks(theme);
   }
 
   paint(columns, paPerCount, colour) {

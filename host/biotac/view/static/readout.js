@@ -16,7 +16,7 @@ export function age(ms) {
   return `${Math.floor(s / 3600)} h ago`;
 }
 
-const byId = (id) => document.getElementById(id);
+export const byId = (id) => document.getElementById(id);
 
 // Writing what stands there already costs a layout all the same.
 function write(element, text) {
@@ -28,7 +28,7 @@ function put(element, value, digits) {
   element.dataset.value = String(value);
 }
 
-function make(tag, properties = {}, data = {}) {
+export function make(tag, properties = {}, data = {}) {
   const element = Object.assign(document.createElement(tag), properties);
   Object.assign(element.dataset, data);
   return element;
@@ -100,7 +100,6 @@ export class Flags {
     if (flags === this.shown) return;
     this.shown = flags;
     const active = this.flags.filter(({ mask }) => flags & mask);
-    active.sort((a, b) => a.mask - b.mask);
     const items = (wanted) => active.filter(({ warns }) => warns === wanted).map(({ name, words, warns }) => {
       const item = make("li", {}, { flag: name, kind: warns ? "warn" : "calm" });
       item.append(make("b", { textContent: name.replaceAll("_", " ") }), words);
@@ -126,14 +125,14 @@ export function showTare(about, facts) {
 }
 
 const HEALTH = [
-  { key: "framesPerS", name: "Frames per second", digits: 0 },
-  { key: "lost", name: "Frames lost", digits: 0, warns: true },
-  { key: "crc", name: "CRC errors", digits: 0, warns: true },
-  { key: "other", name: "Other wire errors", digits: 0, warns: true },
-  { key: "late", name: "Late slots on the board", digits: 0, warns: true },
-  { key: "boardDropped", name: "Messages dropped by the board", digits: 0, warns: true },
-  { key: "dropped", name: "Frames dropped by this page", digits: 0, warns: true },
-  { key: "draws", name: "Redraws per second", digits: 0 },
+  { key: "framesPerS", name: "Frames per second", of: (health) => health.frames_per_s },
+  { key: "lost", name: "Frames lost", warns: true, of: ({ stats }) => stats.frames_lost },
+  { key: "crc", name: "CRC errors", warns: true, of: ({ stats }) => stats.crc_errors },
+  { key: "other", name: "Other wire errors", warns: true, of: ({ stats }) => stats.other_errors },
+  { key: "late", name: "Late slots on the board", warns: true, of: ({ status }) => status.slots_late },
+  { key: "boardDropped", name: "Messages dropped by the board", warns: true, of: ({ status }) => status.messages_dropped },
+  { key: "dropped", name: "Frames dropped by this page", warns: true, of: (_, dropped) => dropped },
+  { key: "draws", name: "Redraws per second", of: (_, dropped, draws) => draws },
 ];
 
 export class Link {
@@ -142,20 +141,10 @@ export class Link {
   }
 
   show(health, dropped, draws) {
-    const { stats, status } = health;
-    const values = {
-      framesPerS: health.frames_per_s,
-      lost: stats.frames_lost,
-      crc: stats.crc_errors,
-      other: stats.other_errors,
-      late: status.slots_late,
-      boardDropped: status.messages_dropped,
-      dropped,
-      draws,
-    };
-    for (const { key, digits, warns } of HEALTH) {
-      put(this.values[key], values[key], digits);
-      this.values[key].dataset.kind = warns && values[key] > 0 ? "warn" : "calm";
+    for (const { key, warns, of } of HEALTH) {
+      const value = of(health, dropped, draws);
+      put(this.values[key], value, 0);
+      this.values[key].dataset.kind = warns && value > 0 ? "warn" : "calm";
     }
     write(byId("board"), health.board);
     write(byId("source"), health.source);

@@ -1,10 +1,11 @@
-"""The interface that flashing needs to reach a board in its loader."""
+"""The interfaces that flashing needs: to a board running its firmware, before and after, and to one in its loader."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Protocol
 
+from ..hand.hand import Hand
 from .image import Image
 
 #: Called with the number of blocks written so far and the total.
@@ -25,3 +26,26 @@ class Loader(Protocol):
 
     def cure(self) -> str:
         """What the user can do when this way is not ready although a board should be there."""
+
+
+class Target(Protocol):
+    """A board on its link, which goes away and comes back."""
+
+    #: For messages.
+    port: str
+
+    def there(self) -> bool:
+        """True if its port exists, whatever is connected to it."""
+
+    def open(self) -> Hand:
+        """Open the board. Raises what biotac.open raises."""
+
+    def touch(self) -> None:
+        """Open the port at 1200 baud and close it: the usual way to send a board to its loader."""
+
+    def reopen(self) -> Hand:
+        """Wait for the flashed board and open it. Raises DeviceLostError when it does not come back."""
+
+    def close(self) -> None:
+        """Release all resources."""
+        return
