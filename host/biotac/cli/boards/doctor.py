@@ -32,7 +32,6 @@ Exit code 0: healthy; 1: there are findings. Their codes are fixed:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, time and the expected number of sensors."""
     parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
@@ -91,7 +90,6 @@ def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
 def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
     """The report to send in: the findings and the facts behind them, except the frames."""
     board = facts.board
-    told = {} if board is None else {**vars(board), "frames": len(board.frames), "idle": len(board.idle)}
     return {
         "library": __version__,
         "python": sys.version,
@@ -99,7 +97,7 @@ def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
         **summary(facts, findings),
         "system": vars(facts.system),
         "error": facts.error and str(facts.error),
-        "board": told,
+        "board": {**vars(board), "frames": len(board.frames), "idle": len(board.idle)} if board is not None else {},
         "sensor_board": facts.pair and vars(facts.pair),
     }
 
@@ -146,8 +144,7 @@ def words(facts: Facts, findings: list[Finding]) -> str:
             lines.append(textwrap.fill(f"{title}: {text}", 100, initial_indent="    ", subsequent_indent="    "))
         if finding.code == "no_permission":
             lines.append(textwrap.indent(udev.rule().rstrip(), "    "))
-    seen = measured(facts)
-    if seen:
+    if seen := measured(facts):
         rates = ", ".join(f"finger {f}: {r:.0f} slots per second" for f, r in seen["slots_per_s"].items() if r)
         drift = ""
         if "drift_ppm" in seen:

@@ -23,7 +23,6 @@ EMULATED = "emu:pico?source=press.toml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, image and what happens to the settings."""
     parser.add_argument(
         "port",
         metavar="PORT",
@@ -65,11 +64,12 @@ def run(args: argparse.Namespace) -> int:
 
 def how(args: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     """What one board and every board are flashed with."""
-
-    def show(done: int, of: int) -> None:
-        progress.show(f"{done} of {of} blocks")
-
-    return {"keep": not args.no_backup, "downgrade": args.downgrade, "say": say, "show": show}
+    return {
+        "keep": not args.no_backup,
+        "downgrade": args.downgrade,
+        "say": say,
+        "show": lambda done, of: progress.show(f"{done} of {of} blocks"),
+    }
 
 
 def say(text: str) -> None:
@@ -95,8 +95,7 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
             print(summary(result.outcome) if result.outcome else f"{result.port} already runs this image")
     if args.json:
         ends = [(result, facts(image, result.outcome) if result.outcome else {}) for result in results]
-        told = [{"port": end.port, "error": end.error and str(end.error), **outcome} for end, outcome in ends]
-        print(json.dumps(told))
+        print(json.dumps([{"port": end.port, "error": end.error and str(end.error), **more} for end, more in ends]))
     failed = [result.port for result in results if result.error is not None]
     if failed:
         raise FlashError(f"{len(failed)} of {len(results)} boards were not flashed: {', '.join(failed)}; see above")

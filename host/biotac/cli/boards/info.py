@@ -21,7 +21,6 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the port."""
     values.add_port(parser)
 
 

@@ -11,7 +11,6 @@ from ...hand.hand import Hand
 from ...link import open_link
 from ...link.discovery import SerialPort, serial_ports
 from ...sim.loading import bundled_scenarios
-from ...wire import messages_gen as wire
 from ...wire.identity import board_text, serial_text, version_text
 from ..outputs import say
 
@@ -20,7 +19,7 @@ NO_DESCRIPTION = "n/a"  # of pyserial
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options. --all is not the default: bytes sent to an unknown device may mean something to it."""
+    # --all is not the default: bytes sent to an unknown device may mean something to it.
     parser.add_argument(
         "--zenoh",
         metavar="ENDPOINT",
@@ -67,21 +66,16 @@ def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
     if ask:
         try:
             with Hand(open_link(port.device)) as hand:
-                facts |= as_facts(hand.info, hand.fingers)
+                facts |= {
+                    "is_board": True,
+                    "serial_number": serial_text(hand.info),
+                    "board": board_text(hand.info.board),
+                    "firmware": version_text(hand.info),
+                    "fingers": hand.fingers,
+                }
         except BiotacError as error:
             facts["problem"] = str(error)
     return facts
-
-
-def as_facts(hello: wire.Hello, fingers: list[int]) -> dict[str, Any]:
-    """A port that answered, as JSON types."""
-    return {
-        "is_board": True,
-        "serial_number": serial_text(hello),
-        "board": board_text(hello.board),
-        "firmware": version_text(hello),
-        "fingers": fingers,
-    }
 
 
 def as_line(facts: dict[str, Any]) -> str:

@@ -8,23 +8,18 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ...errors import PortError
 from ..outputs import say
 
-
-class Board(Protocol):
-    """The board on the pty."""
-
-    path: str
-
-    def close(self) -> None:
-        """End it."""
+if TYPE_CHECKING:
+    from ...recording.replay.pty import ReplayPty
+    from ...sim.process import SimBoard
 
 
 @contextmanager
-def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
+def until_ctrl_c(board: SimBoard | ReplayPty, link: Path | None) -> Iterator[None]:
     """Run until Ctrl-C, the usual way to stop; then, as after an error, close the board and remove the link to it."""
     try:
         yield
@@ -36,7 +31,7 @@ def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
         board.close()
 
 
-def tell(board: Board, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
+def tell(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
     """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port."""
     if args.link is not None:
         make_link(args.link, board.path)

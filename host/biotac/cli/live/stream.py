@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
 
 import biotac
 
@@ -15,14 +16,12 @@ from ...wire.frames import Frame
 from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
 from .. import values
 from ..outputs import note
-from .reading import batches, tell_lost
 from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, time and rate."""
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, help="stop after this much device time")
     parser.add_argument(
@@ -47,6 +46,27 @@ def run(args: argparse.Namespace) -> int:
             show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
         tell_lost(hand)
     return 0
+
+
+def batches(hand: biotac.Hand, seconds: float | None) -> Iterator[tuple[biotac.Batch, float]]:
+    """Batches, each with the device time since the first, until ``seconds`` of it have passed."""
+    first_us: int | None = None
+    passed_s = 0.0
+    for batch in hand.batches():
+        last_us = batch.last_t_us()
+        if last_us is not None:
+            first_us = batch.first_t_us() if first_us is None else first_us
+            passed_s = (last_us - (first_us or 0)) / 1e6
+        yield batch, passed_s
+        if seconds is not None and passed_s >= seconds:
+            break
+
+
+def tell_lost(hand: biotac.Hand) -> None:
+    """Say on stderr how many frames were lost, if any."""
+    if hand.stats.frames_lost:
+        cure = "close other programs, or use a faster computer"
+        note(f"{hand.stats.frames_lost} frame(s) lost; {cure}")
 
 
 def watch(hand: biotac.Hand, *, seconds: float | None) -> None:

@@ -16,7 +16,6 @@ EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to show, and where."""
     parser.add_argument(
         "source",
         metavar="PORT|RECORDING",

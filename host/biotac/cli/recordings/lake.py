@@ -35,7 +35,6 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the subverbs of a lake."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     check = values.add_subverb(
         what,

@@ -17,7 +17,6 @@ EXAMPLE = "biotac replay grasp.mcap --from 12.5 --pace 2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, which part of it, how fast and where to."""
     parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
     parser.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first frame")
     parser.add_argument("--to", dest="to_s", type=moment, help="seconds since its first frame")
