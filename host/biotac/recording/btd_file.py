@@ -53,13 +53,11 @@ def read_btd(path: Path) -> BtdFrames:
 
     present = (parity == 0).any(axis=0)
     if not present.any():
-        raise RecordingError(
-            f"{path}: no value has good parity: expected at least one sensor; record again with one connected"
-        )
+        cure = "expected at least one sensor; record again with one connected"
+        raise RecordingError(f"{path}: no value has good parity: {cure}")
     if int(present.sum()) > _sensor.MAX_SENSORS:
-        raise RecordingError(
-            f"{path}: {present.sum()} sensors: expected at most {_sensor.MAX_SENSORS}; remove the columns of the others"
-        )
+        cure = f"expected at most {_sensor.MAX_SENSORS}; remove the columns of the others"
+        raise RecordingError(f"{path}: {present.sum()} sensors: {cure}")
     values, good = values[:, present], parity[:, present] == 0
     wrong = good & ((values < 0) | (values > _sensor.FULL_SCALE_COUNT) | (values != np.floor(values)))
     if wrong.any():
@@ -106,15 +104,11 @@ def _complete_frames(
 
 
 def _bytes(path: Path) -> bytes:
-    limit = _MAX_BYTES
+    packed = path.name.lower().endswith(".gz")
     try:
-        if path.name.lower().endswith(".gz"):
-            limit = min(_MAX_BYTES, _PACKED_FREE_BYTES + _PACKED_RATIO * path.stat().st_size)
-            with gzip.open(path) as packed:
-                data = packed.read(limit + 1)
-        else:
-            with path.open("rb") as plain:
-                data = plain.read(limit + 1)
+        limit = min(_MAX_BYTES, _PACKED_FREE_BYTES + _PACKED_RATIO * path.stat().st_size) if packed else _MAX_BYTES
+        with gzip.open(path) if packed else path.open("rb") as file:
+            data = file.read(limit + 1)
     except (OSError, EOFError, zlib.error) as error:
         seen = getattr(error, "strerror", None)  # only errors of the operating system have it, not damaged data
         cure = "check the path" if seen else "copy it again"
@@ -134,12 +128,9 @@ def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64
         table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None, encoding="latin-1")
     except ValueError:
         table = np.empty((0, 0))
-    columns = table.shape[1]
-    well_formed = columns >= _FIRST_PAIR + 2 and columns % 2 == 0 and bool(np.isfinite(table).all())
-    if well_formed:
-        parity = table[:, _FIRST_PAIR + 1 :: 2]
-        well_formed = bool(((parity == 0) | (parity == 1)).all())
-    if not well_formed:
+    columns, parity = table.shape[1], table[:, _FIRST_PAIR + 1 :: 2]
+    paired = columns >= _FIRST_PAIR + 2 and columns % 2 == 0
+    if not paired or not np.isfinite(table).all() or not np.isin(parity, (0, 1)).all():
         raise RecordingError(f"{path}: {_first_fault(body, first_line)}")
     return table
 
