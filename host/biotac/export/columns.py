@@ -74,6 +74,12 @@ class Table:
                 yield name, column, values[:, k]
 
 
+def in_order(made: list[Table]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The rows of tables that stand one after the other: each row's table, and their order by time, then table."""
+    of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])
+    return of_table, np.lexsort((of_table, np.concatenate([table.arrays["t_us"] for table in made])))
+
+
 def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORTED) -> list[Table]:
     """Tables of the given ``kinds`` for every finger that has such rows, ordered by finger."""
     made = []
