@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from functools import partial
-
-
-class Severity(Enum):
-    """How severe a finding is."""
-
-    ERROR = "error"  # no data, or data that must not be trusted
-    WARNING = "warning"  # data arrive, but something is not as it should be
+from typing import Literal
 
 
 @dataclass(frozen=True)
 class Entry:
     """One kind of finding."""
 
-    severity: Severity
+    severity: Literal["error", "warning"]  # no data to be trusted; or data arrive, but something is not as it should be
     meaning: str
     cure: str
 
@@ -36,7 +29,7 @@ class Finding:
         return CATALOGUE[self.code]
 
 
-error, warning = partial(Entry, Severity.ERROR), partial(Entry, Severity.WARNING)
+error, warning = partial(Entry, "error"), partial(Entry, "warning")
 
 CATALOGUE: dict[str, Entry] = {
     # ---- connection

@@ -40,7 +40,6 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
 
 
 def frame_ids(made: list[Table]) -> Label:
-    """The tables' coordinate frames."""
     return Label("frame_id", "coordinate frame of vectors", tuple(table.frame_id for table in made))
 
 

@@ -45,7 +45,6 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
 
 
 def rows(lake: Lake, text: str) -> list[dict[str, Any]]:
-    """The rows of a query as dictionaries."""
     names, found = query(lake, text)
     return [dict(zip(names, row, strict=True)) for row in found]
 

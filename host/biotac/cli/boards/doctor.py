@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def udev_rule(args: argparse.Namespace) -> int:
-    """Install the rule or print it."""
     installed, text = args.udev_rule == "install", udev.rule().rstrip()
     if installed:
         udev.install()
@@ -84,7 +83,8 @@ def examine_pair(port: str | None, sensor_port: str, seconds: float) -> Facts:
 
 def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
     """The result as JSON types."""
-    return {"port": facts.port, "measured": measured(facts), "findings": [as_facts(f) for f in findings]}
+    found = [{"code": f.code, "severity": f.entry.severity, "seen": f.seen} | vars(f.entry) for f in findings]
+    return {"port": facts.port, "measured": measured(facts), "findings": found}
 
 
 def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
@@ -107,18 +107,6 @@ def plain(value: object) -> object:
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
 
 
-def as_facts(finding: Finding) -> dict[str, str]:
-    """A finding as JSON types."""
-    entry = finding.entry
-    return {
-        "code": finding.code,
-        "severity": entry.severity.value,
-        "seen": finding.seen,
-        "meaning": entry.meaning,
-        "cure": entry.cure,
-    }
-
-
 def measured(facts: Facts) -> dict[str, Any]:
     """What was measured, healthy or not; empty if nothing could be measured."""
     board = facts.board
@@ -139,7 +127,7 @@ def words(facts: Facts, findings: list[Finding]) -> str:
     """The result for people."""
     lines = []
     for finding in findings:
-        lines.append(f"{finding.entry.severity.value} {finding.code}: {finding.seen}")
+        lines.append(f"{finding.entry.severity} {finding.code}: {finding.seen}")
         for title, text in (("meaning", finding.entry.meaning), ("cure", finding.entry.cure)):
             lines.append(textwrap.fill(f"{title}: {text}", 100, initial_indent="    ", subsequent_indent="    "))
         if finding.code == "no_permission":

@@ -43,7 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Flash a board and print what it reports afterwards."""
     if args.backup is not None and args.no_backup:
         raise InputError("--backup and --no-backup contradict each other; use only one")
     port, path = sort_out(args.port, args.image, alone=args.emulated or args.all)
@@ -138,7 +137,6 @@ def usb_loaders() -> list[Loader]:
 
 
 def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
-    """The outcome as JSON types."""
     before, settings = outcome.before, outcome.settings
     return {
         "image": str(image.path),
@@ -163,7 +161,6 @@ def known(backup: Backup, settings: Restored) -> str:
 
 
 def summary(outcome: Outcome) -> str:
-    """The outcome for people."""
     after, settings = outcome.after, outcome.settings
     lines = [
         f"{outcome.port} runs firmware {version_text(after)}, boot {after.boot_id:08x}, serial {serial_text(after)}"

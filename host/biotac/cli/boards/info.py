@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what the board reports about itself."""
     with biotac.open(args.port) as hand:
         hello = hand.info
         sensors = [hand.sensor_info(f) for f in hand.fingers]

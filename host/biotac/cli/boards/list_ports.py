@@ -31,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the ports and scenarios."""
     ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []

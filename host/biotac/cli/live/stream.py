@@ -70,7 +70,6 @@ def tell_lost(hand: biotac.Hand) -> None:
 
 
 def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
-    """Show a table, updated in place."""
     words = "nothing yet"
     with LiveTable(hand, hand.port) as table:
         for _, passed_s in batches(hand, seconds):
@@ -113,7 +112,6 @@ def event_as_json(event: Event) -> dict[str, object]:
 
 
 def event_as_line(event: Event) -> str:
-    """One line for people."""
     line = f"{event.t_us / 1e6:9.3f} s finger {event.finger}  {kind_name(event).lower()}"
     if event.peak_count != INVALID_COUNT:
         line += f", peak {event.peak_count} counts"
@@ -122,7 +120,6 @@ def event_as_line(event: Event) -> str:
 
 
 def as_line(frame: Frame) -> str:
-    """Columns for people."""
     poc = " ".join(f"{v:7.2f}" for v in frame.poc_mm)
     force = " ".join(f"{v:7.3f}" for v in frame.force_n)
     torque = " ".join(f"{v:8.2f}" for v in frame.torque_nmm)

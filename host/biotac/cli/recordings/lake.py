@@ -24,7 +24,6 @@ EXAMPLE = 'biotac lake sql "SELECT board, count(*) FROM frames GROUP BY board" t
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the lake, and the number of workers."""
     parser.add_argument("--lake", metavar="DIR", type=Path, help="a folder of Parquet files to add every REC to")
     _add_workers(parser)
 
@@ -123,7 +122,6 @@ def run_check(args: argparse.Namespace) -> int:
 
 
 def run_sql(args: argparse.Namespace) -> int:
-    """Print the query's result."""
     folder = args.folder or Path()
     if args.folder is None and not (folder / room("folder").SUMS).is_file():
         raise InputError("this folder is not a lake; name the lake's folder: biotac lake sql QUERY DIR")

@@ -136,14 +136,14 @@ class Playback:
         req_id = payload[0]
         if message_id in (wire.Ping.ID, wire.Stop.ID):
             self.playing = self.playing and message_id != wire.Stop.ID
-            return _ok(req_id, message_id)
+            return _reply(req_id, message_id)
         if message_id == wire.HelloRequest.ID:
             hello = wire.HelloRequest.unpack(payload)
             return _message(dataclasses.replace(self.recording.info, req_id=req_id, nonce=hello.nonce))
         if message_id == wire.Start.ID:
             self._asked = wire.Start.unpack(payload)
             self.playing = True
-            return _ok(req_id, message_id)
+            return _reply(req_id, message_id)
         if message_id == wire.GetSetting.ID:
             return self._setting(wire.GetSetting.unpack(payload))
         if message_id == wire.GetCalibration.ID:
@@ -156,14 +156,12 @@ class Playback:
             infos = {info.finger: info for info in self.recording.sensors}
             return _again(infos.get(payload[1]), req_id) or _reply(req_id, message_id, wire.Error.NO_SUCH_FINGER)
         if message_id == wire.GetStatus.ID:
-            return _again(self._status and dataclasses.replace(self._status, streams=self._streams()), req_id)
+            # The streams that are on here; those of the recording are of another program.
+            streams = self._asked.streams if self._asked is not None and self.playing else 0
+            return _again(self._status and dataclasses.replace(self._status, streams=streams), req_id)
         if message_id == wire.GetSensorStatus.ID:
             return _again(self._sensor_status.get(payload[1]), req_id)
         return None
-
-    def _streams(self) -> int:
-        """The streams that are on here; those of the recording are of another program."""
-        return self._asked.streams if self._asked is not None and self.playing else 0
 
     def refusal(self, message_id: int, payload: bytes) -> bytes:
         """The reply to a command for which ``answer`` returned None."""
@@ -205,9 +203,5 @@ def _again(message: Any, req_id: int) -> bytes | None:
     return None if message is None else _message(dataclasses.replace(message, req_id=req_id))
 
 
-def _ok(req_id: int, message_id: int) -> bytes:
-    return _reply(req_id, message_id, wire.Error.OK)
-
-
-def _reply(req_id: int, message_id: int, error: wire.Error) -> bytes:
+def _reply(req_id: int, message_id: int, error: wire.Error = wire.Error.OK) -> bytes:
     return _message(wire.Reply(req_id, message_id, error))
