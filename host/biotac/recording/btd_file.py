@@ -21,6 +21,8 @@ from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
 
 _FIRST_PAIR = 4
+# Channel numbers (44,) of our slots; a command byte is 1SSSSSSP, S the channel.
+_SLOT_CHANNELS = np.array([(_sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in _sensor.SLOTS])
 _BEGIN = b"Begin File"
 _MAX_BYTES = 1 << 30  # a day of three sensors is larger
 # Real files compress to a tenth of their size; in memory each byte becomes four.
@@ -77,15 +79,10 @@ def read_btd(path: Path) -> BtdFrames:
     rows = starts[:, None] + np.arange(len(_sensor.SLOTS))
     # a stable sort by channel aligns the k-th sample of a channel in the file with its k-th slot in SLOTS
     here = np.argsort(channel[rows], axis=1, kind="stable")
-    there = np.argsort(_slot_channels(), kind="stable")
+    there = np.argsort(_SLOT_CHANNELS, kind="stable")
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
     samples[:, :, there] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
     return BtdFrames(samples=samples, t_s=table[starts, 0], skipped=skipped)
-
-
-def _slot_channels() -> npt.NDArray[np.float64]:
-    """Channel numbers (44,) of our slots; a command byte is 1SSSSSSP, S the channel."""
-    return np.array([(_sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in _sensor.SLOTS], dtype=np.float64)
 
 
 def _complete_frames(
@@ -97,7 +94,7 @@ def _complete_frames(
     lengths = np.diff(np.append(starts, len(batch)))
     slots = len(_sensor.SLOTS)
     whole = starts[lengths == slots]
-    expected = np.sort(_slot_channels())
+    expected = np.sort(_SLOT_CHANNELS)
     found = np.sort(channel[whole[:, None] + np.arange(slots)], axis=1)
     complete = whole[(found == expected).all(axis=1)]
     return complete, len(starts) - len(complete)

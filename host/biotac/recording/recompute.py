@@ -66,7 +66,12 @@ def recompute(
     calibrations = {finger: calibration.changed(changes) for finger, calibration in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
     board_maps = {f: opened(own_map) for f, own_map in (recording.maps if maps is None else maps).items()}
-    _check_maps(recording, board_maps)
+    for finger in np.unique(recording.wire["finger"][(recording.wire["flags"] & wire.FrameFlags.MAPPED) != 0]).tolist():
+        if finger not in board_maps:
+            raise InputError(
+                f"finger {finger} of {recording.path} used a wrench map that is not available; expected that "
+                "map: record again with the board that has it"
+            )
     notes: list[str] = []
     if keep_tare:
         if idle := sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS):
@@ -85,16 +90,6 @@ def recompute(
     metadata = recording.metadata | in_force(settings, calibrations, blobs) | {"recomputed": json.dumps(made)}
     _write(recording, out, metadata, new, tares, lambda share: show(0.5 + share / 2))
     return notes
-
-
-def _check_maps(recording: Recording, maps: Mapping[int, BoardMap]) -> None:
-    mapped = np.unique(recording.wire["finger"][(recording.wire["flags"] & wire.FrameFlags.MAPPED) != 0])
-    missing = [int(finger) for finger in mapped if int(finger) not in maps]
-    if missing:
-        raise InputError(
-            f"finger {missing[0]} of {recording.path} used a wrench map that is not available; expected that "
-            "map: record again with the board that has it"
-        )
 
 
 def _with_kept_tares(
