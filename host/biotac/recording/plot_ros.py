@@ -38,20 +38,13 @@ def _definition(fields: str, *parts: str) -> str:
 
 _LEVELS = "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
 _LOG_FIELDS = "uint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n"
-_POSE_PARTS = ("std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Pose")
+_ARRAY_PARTS = ("std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension")
+_HEADER_PARTS = ("std_msgs/Header", "builtin_interfaces/Time")
+_POSE_PARTS = ("geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion")
 #: ROS 2 message definitions by type name.
 SCHEMAS = {
-    ARRAY: _definition(
-        "std_msgs/MultiArrayLayout layout\nfloat64[] data\n",
-        "std_msgs/MultiArrayLayout",
-        "std_msgs/MultiArrayDimension",
-    ),
-    POSE: _definition(
-        "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
-        *_POSE_PARTS,
-        "geometry_msgs/Point",
-        "geometry_msgs/Quaternion",
-    ),
+    ARRAY: _definition("std_msgs/MultiArrayLayout layout\nfloat64[] data\n", *_ARRAY_PARTS),
+    POSE: _definition("std_msgs/Header header\ngeometry_msgs/Pose pose\n", *_HEADER_PARTS, *_POSE_PARTS),
     FLAGS: _definition("uint32 data\n"),
     LOG: _definition(f"{_LEVELS}builtin_interfaces/Time stamp\n{_LOG_FIELDS}", "builtin_interfaces/Time"),
 }
