@@ -16,7 +16,9 @@ def check(facts: Facts) -> Iterator[Finding]:
     board, pair = facts.board, facts.pair
     if board is None or pair is None:
         return
-    good = [finger for finger in range(MAX_SENSORS) if _well(board, finger)]
+    # More than half of its words were good; one or two may date from before a lead came off.
+    bad = [sum(board.more(finger, kind) for kind in WORDS) for finger in range(MAX_SENSORS)]
+    good = [finger for finger in range(MAX_SENSORS) if board.more(finger, "words_good") > bad[finger]]
     if good:
         yield from _selects(board, pair, good)
     elif not (words := pair.more("words")):
@@ -25,11 +27,6 @@ def check(facts: Facts) -> Iterator[Finding]:
         yield Finding("lead_mosi", f"{words} words were read, but the sensors understood no command")
     else:
         yield Finding("lead_miso", f"the sensors sent {words} words, but none reached the gateway")
-
-
-def _well(board: BoardFacts, finger: int) -> bool:
-    """More than half of its words were good; one or two may date from before a lead came off."""
-    return board.more(finger, "words_good") > sum(board.more(finger, kind) for kind in WORDS)
 
 
 def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Finding]:

@@ -43,7 +43,14 @@ def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
         rate = slots_per_s(board, finger)
         if rate is not None and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE:
             yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} slots per second, expected {board.hello.slot_hz}")
-    yield from _clock(board)
+    if board.clock is None:
+        return
+    if board.clock_resets:
+        yield Finding("clock_jumped", f"{board.clock_resets} jump(s)")
+    drift_ppm, bound_ppm = board.clock.drift_ppm, board.clock.drift_uncertainty_ppm
+    if board.clock.known and abs(drift_ppm) - bound_ppm > CRYSTAL_PPM:
+        seen = f"{drift_ppm:+.0f} ppm, +/- {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} ppm is normal"
+        yield Finding("clock_drift", seen)
 
 
 def slots_per_s(board: BoardFacts, finger: int) -> float | None:
@@ -59,14 +66,3 @@ def slots_per_s(board: BoardFacts, finger: int) -> float | None:
     if not good.any():
         return None
     return float(np.median(steps[good] * len(sensor.SLOTS) / (times_us[good] / 1e6)))
-
-
-def _clock(board: BoardFacts) -> Iterator[Finding]:
-    if board.clock is None:
-        return
-    if board.clock_resets:
-        yield Finding("clock_jumped", f"{board.clock_resets} jump(s)")
-    drift_ppm, bound_ppm = board.clock.drift_ppm, board.clock.drift_uncertainty_ppm
-    if board.clock.known and abs(drift_ppm) - bound_ppm > CRYSTAL_PPM:
-        seen = f"{drift_ppm:+.0f} ppm, +/- {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} ppm is normal"
-        yield Finding("clock_drift", seen)

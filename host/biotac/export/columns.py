@@ -36,12 +36,10 @@ COLUMNS = (*_stamped(FRAME_FIELDS), GAP)
 PAC_COLUMNS = _stamped(PAC_FIELDS)
 #: One row per finger and round: a spectrogram of PAC, in octaves.
 BANDS_COLUMNS = _stamped(BANDS_FIELDS)
-#: One row per heartbeat of an untouched finger.
-IDLE_COLUMNS = _stamped(IDLE_FIELDS)
 
 #: Tables in every export. A lake has heartbeats, too.
 EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS, "bands": BANDS_COLUMNS}
-HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": IDLE_COLUMNS}
+HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": _stamped(IDLE_FIELDS)}
 
 
 @dataclass(frozen=True)

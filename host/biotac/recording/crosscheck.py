@@ -142,13 +142,14 @@ class CrossCheck:
             ("torsion", "N*mm", messages["torsion_mnmm"][:, None], 1000, torsion, torsion_bound),
         )
         largest = {}
-        for name, unit, sent, per_unit, values, bound in quantities:
+        for quantity in quantities:
+            name, _, sent, per_unit, values, _ = quantity
             values[untared | not_asked(messages, sent)] = np.nan  # without a tare there is no true value
             error = np.abs(to_units(sent, per_unit) - values)
             if name == "PoC":  # the PoC is one point: its error is a distance; force and torque count per axis
                 error = np.sqrt((error**2).sum(axis=1, keepdims=True))
             largest[name] = worst(error)
-            self._judge(name, unit, messages, sent, values, error, bound)
+            self._judge(messages, quantity, error)
         self.poc_um_max = max(self.poc_um_max, largest["PoC"])
         self.force_mn_max = max(self.force_mn_max, largest["force"])
         self.torque_nmm_max = max(self.torque_nmm_max, largest["torque"], largest["torsion"])
@@ -179,16 +180,8 @@ class CrossCheck:
             place = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
             self.findings.append(f"{place}: {what}")
 
-    def _judge(
-        self,
-        name: str,
-        unit: str,
-        messages: StructArray,
-        sent: NDArray[Any],
-        truth: NDArray[np.float64],
-        error: NDArray[np.float64],
-        bound: NDArray[np.float64] | float,
-    ) -> None:
+    def _judge(self, messages: StructArray, quantity: Quantity, error: NDArray[np.float64]) -> None:
+        name, unit, sent, _, truth, bound = quantity
         one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
         outside = np.any(error > bound, axis=1)
         for k in np.flatnonzero(one_sided | outside):

@@ -7,6 +7,8 @@ import math
 from pathlib import Path
 
 from ...errors import InputError
+from ...hand.opening import shake_hands
+from ...recording.replay.link import ReplayLink
 from ...recording.replay.playback import Playback
 from .. import values
 from ..live import stream
@@ -40,14 +42,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--link is for a pty; add --pty")
     recording = load(args.recording)
     playback = Playback(recording, from_s=args.from_s, to_s=args.to_s)
-    return on_pty(args, playback) if args.pty else on_stdout(args, playback)
-
-
-def on_stdout(args: argparse.Namespace, playback: Playback) -> int:
-    """Print frames as biotac stream does."""
-    from ...hand.opening import shake_hands
-    from ...recording.replay.link import ReplayLink
-
+    if args.pty:
+        return on_pty(args, playback)
     with shake_hands(ReplayLink(f"replay:{args.recording}", playback, pace=args.pace)) as hand:
         stream.show(hand, rate=args.rate, as_json=args.json)
     return 0
