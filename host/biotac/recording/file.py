@@ -29,7 +29,7 @@ class RecordingFile:
     """A recording being written to ``stream``. Closing it closes ``stream``, as does a failure to begin it."""
 
     def __init__(self, stream: BinaryIO, metadata: dict[str, str]) -> None:
-        self._stream = stream
+        self.stream = stream
         self._sequence = 0
         self._tail = b""  # of a message whose end has not arrived yet
         self._gaps: list[dict[str, Any]] = []  # to be written with the next block
@@ -118,18 +118,9 @@ class RecordingFile:
             self._writer.flush()  # type: ignore[no-untyped-call]
         self._sequence += 1
 
-    @property
-    def closed(self) -> bool:
-        """True when nothing more is written."""
-        return self._stream.closed
-
-    def fileno(self) -> int:
-        """File descriptor of the file."""
-        return self._stream.fileno()
-
     def close(self) -> None:
         """Write the file's index. Safe to call twice."""
-        if self._stream.closed:
+        if self.stream.closed:
             return
         try:
             if self._gaps:
@@ -139,4 +130,4 @@ class RecordingFile:
             self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
-            self._stream.close()  # also on a full disk, or the interpreter would try again at exit
+            self.stream.close()  # also on a full disk, or the interpreter would try again at exit

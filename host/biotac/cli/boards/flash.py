@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FlashError, InputError, PortError
-from ...flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
+from ...flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
 from ...flash.carried import find_image
 from ...flash.image import note_text
 from ...flash.procedure import flash_every
@@ -153,13 +153,6 @@ def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def known(backup: Backup, settings: Restored) -> str:
-    """How many of a backup's settings, calibrations and maps the firmware knows."""
-    more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
-    count = len(backup.values) + sum(more.values()) - len(settings.unknown)
-    return f"{count} {', '.join(['settings', *(name for name, held in more.items() if held)])}"
-
-
 def summary(outcome: Outcome) -> str:
     after, settings = outcome.after, outcome.settings
     lines = [
@@ -168,9 +161,12 @@ def summary(outcome: Outcome) -> str:
     if settings is None or outcome.backup is None:
         lines.append("no settings were backed up or restored; the board uses those in its flash")
     else:
-        changed = ", ".join(settings.changed)
-        lines.append(f"all {known(outcome.backup, settings)} match {outcome.backup.path}")
+        changed, backup = ", ".join(settings.changed), outcome.backup
+        more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
+        kinds = ", ".join(["settings", *(name for name, held in more.items() if held)])
+        count = len(backup.values) + sum(more.values()) - len(settings.unknown)
+        lines.append(f"all {count} {kinds} match {backup.path}")
         lines[-1] += f"; restored and saved: {changed}" if changed else ", nothing had to be restored"
         if settings.unknown:
-            lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {outcome.backup.path}")
+            lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {backup.path}")
     return "\n".join(lines)
