@@ -19,7 +19,13 @@ def check(facts: Facts) -> Iterator[Finding]:
     for place in system.loaders:
         yield Finding("in_loader", f"a board waits in its loader at {place}")
     if facts.port is None:
-        yield from _nothing_to_open(facts)
+        if len(system.boards) > 1:
+            there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
+            yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
+        elif system.usb_boards:
+            yield Finding("no_serial_port", "a device with our USB ids is plugged in, but it has no serial port")
+        elif not system.loaders:
+            yield Finding("no_board", "no serial port has our USB ids")
         return
     if not system.permitted:
         yield Finding("no_permission", f"no permission to open {facts.port}; it is owned by {system.owner}")
@@ -43,17 +49,6 @@ def check(facts: Facts) -> Iterator[Finding]:
         hello = facts.board.hello
         if (hello.firmware_major, hello.firmware_minor, hello.firmware_patch) < release(__version__):
             yield Finding("firmware_older", f"firmware {version_text(hello)}, this package {__version__}")
-
-
-def _nothing_to_open(facts: Facts) -> Iterator[Finding]:
-    system = facts.system
-    if len(system.boards) > 1:
-        there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
-        yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
-    elif system.usb_boards:
-        yield Finding("no_serial_port", "a device with our USB ids is plugged in, but it has no serial port")
-    elif not system.loaders:
-        yield Finding("no_board", "no serial port has our USB ids")
 
 
 def release(version: str) -> tuple[int, ...]:

@@ -124,7 +124,10 @@ class Rest:
 def take_apart(data: bytes, batch: Batch) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
     """Tables by finger, the order and the packets of ``data``, whole messages whose decoded rows are ``batch``."""
     pieces = data.split(b"\0")[:-1]
-    tables = [_frames(batch), batch.pac, batch.idle]
+    frames = np.empty(len(batch.wire), ROWS[FRAME])
+    for name in ROWS[FRAME].names or ():
+        frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
+    tables = [frames, batch.pac, batch.idle]
     # COBS's first byte precedes the id. A row is at least as long as here; it is longer from a newer board.
     ids = [piece[1] if len(piece) > 1 else 0 for piece in pieces]
     order = np.full(len(pieces), PACKET, np.uint16)
@@ -140,13 +143,6 @@ def take_apart(data: bytes, batch: Batch) -> tuple[dict[int, bytes], NDArray[np.
     fingers = np.unique(order[order != PACKET] & 0xFF).tolist()
     packets = b"".join(pieces[k] + b"\0" for k in np.flatnonzero(order == PACKET).tolist())
     return {f: _table([rows[rows["finger"] == f] for rows in tables]) for f in fingers}, order, packets
-
-
-def _frames(batch: Batch) -> StructArray:
-    rows = np.empty(len(batch.wire), ROWS[FRAME])
-    for name in ROWS[FRAME].names or ():
-        rows[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
-    return rows
 
 
 def as_sent(rows: StructArray, kind: int) -> StructArray:

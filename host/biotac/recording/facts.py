@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import struct
 from collections.abc import Mapping
@@ -39,14 +40,14 @@ class Facts:
         """Facts from a recording's metadata. Raises ValueError if it is damaged."""
         try:
             named = json.loads(metadata["settings"])
-            own = json.loads(metadata.get("calibrations", "{}"))
+            own, maps = (json.loads(metadata.get(name, "{}")) for name in ("calibrations", "maps"))
             facts = cls(
                 wire.Hello(**_tuples({"image_crc32": NO_IMAGE} | json.loads(metadata["hello"]))),
                 [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
                 # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
                 {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
                 {int(finger): from_dict(calibration) for finger, calibration in own.items()},
-                {finger: as_blob(data) for finger, data in layout.maps_of(metadata.get("maps", "{}")).items()},
+                {int(finger): as_blob(base64.b64decode(blob, validate=True)) for finger, blob in maps.items()},
                 layout.names_of(metadata),
             )
             messages: list[Any] = [facts.info, *facts.sensors]

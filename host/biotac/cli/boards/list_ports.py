@@ -15,7 +15,6 @@ from ...wire.identity import board_text, serial_text, version_text
 from ..outputs import say
 
 EXAMPLE = "biotac list"
-NO_DESCRIPTION = "n/a"  # of pyserial
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,7 +82,7 @@ def as_line(facts: dict[str, Any]) -> str:
         return f"{facts['port']}  {facts['problem']}"
     if "firmware" not in facts:
         known = [str(facts[key]) for key in ("port", "description", "serial_number") if facts[key]]
-        return "  ".join("not our USB id" if text == NO_DESCRIPTION else text for text in known)
+        return "  ".join("not our USB id" if text == "n/a" else text for text in known)  # pyserial's for no description
     fingers = ", ".join(map(str, facts["fingers"])) or "none"
     words = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
     return "  ".join([facts["port"], *words])

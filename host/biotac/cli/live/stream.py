@@ -65,8 +65,7 @@ def batches(hand: biotac.Hand, seconds: float | None) -> Iterator[tuple[biotac.B
 def tell_lost(hand: biotac.Hand) -> None:
     """Say on stderr how many frames were lost, if any."""
     if hand.stats.frames_lost:
-        cure = "close other programs, or use a faster computer"
-        note(f"{hand.stats.frames_lost} frame(s) lost; {cure}")
+        note(f"{hand.stats.frames_lost} frame(s) lost; close other programs, or use a faster computer")
 
 
 def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
