@@ -27,7 +27,7 @@ def page() -> str:
     """The whole page."""
     parts = [HEAD]
     for code, entry in CATALOGUE.items():
-        parts.append(f"## {code}\n\n*{entry.severity.value}.* {entry.meaning}\n\n**Cure:** {entry.cure}\n")
+        parts.append(f"## {code}\n\n*{entry.severity}.* {entry.meaning}\n\n**Cure:** {entry.cure}\n")
     return "\n".join(parts)
 
 

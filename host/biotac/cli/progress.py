@@ -30,6 +30,5 @@ class Progress:
         self._width = max(self._width, len(text))
 
     def done(self) -> None:
-        """Clear the line."""
         if self._width:
             print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)

@@ -22,7 +22,6 @@ def number(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """A time above 0."""
     value = number(text)
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds above 0")
@@ -71,7 +70,6 @@ def finger(text: str) -> int:
 
 
 def fingers(text: str) -> tuple[int, ...]:
-    """Several fingers, separated by commas."""
     return tuple(finger(part) for part in text.split(","))
 
 
@@ -104,7 +102,6 @@ def check_answers(hand: Hand, finger: int) -> None:
 
 
 def add_save(parser: argparse._ActionsContainer) -> None:
-    """Add --save."""
     text = "save it on the board, with all current settings, so that it survives a restart"
     parser.add_argument("--save", action="store_true", help=text)
 

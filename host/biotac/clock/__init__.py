@@ -13,8 +13,7 @@ True
 
 from __future__ import annotations
 
-from .arrivals import Arrivals
-from .device_clock import DeviceClock
+from .device_clock import Arrivals, DeviceClock
 from .sample_times import LAST_SAMPLE_US, channel_t_us, electrode_t_us, pac_t_us
 from .segment import Fit, Segment
 

@@ -33,9 +33,7 @@ class SystemClock:
     unix_ns = staticmethod(time.time_ns)
 
     def sleep(self, seconds: float) -> None:
-        """See HostClock."""
         self._awake.wait(seconds)
 
     def wake(self) -> None:
-        """See HostClock."""
         self._awake.set()

@@ -6,15 +6,18 @@ finding's code is listed in ``catalogue`` and, for people, in host/docs/referenc
 
 from __future__ import annotations
 
-from . import bus, connection, leads, sensors, signals, tare, timing, version
+from . import connection, leads, sensors, signals, timing
 from .catalogue import CATALOGUE, Finding
 from .facts import BoardFacts, Facts, PairFacts, SystemFacts
 
 
 def judge(facts: Facts) -> list[Finding]:
     """All findings, in the order in which to cure them."""
-    of = (connection, version, leads, sensors, bus, timing, tare, signals)
-    return [finding for module in of for finding in module.check(facts)]
+    board = facts.board
+    if board is None:
+        return list(connection.check(facts))
+    of_board = *sensors.check(board, facts.expected_fingers), *timing.check(board, facts.pair), *signals.check(board)
+    return [*connection.check(facts), *leads.check(facts), *of_board]
 
 
 __all__ = ["CATALOGUE", "BoardFacts", "Facts", "Finding", "PairFacts", "SystemFacts", "judge"]

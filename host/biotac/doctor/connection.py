@@ -1,22 +1,31 @@
-"""Checks everything from the plug to the first answer."""
+"""Checks everything from the plug to the first answer, and the firmware against the library."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
-from ..errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError
+from ..errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
 from ..link.holders import in_words
+from ..version import __version__
+from ..wire.identity import version_text
 from .catalogue import Finding
 from .facts import Facts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Boot loader, permission, other programs, ModemManager, and whether a gateway answers."""
+    """Boot loader, permission, other programs, ModemManager, whether a gateway answers, and of which release it is."""
     system, error = facts.system, facts.error
     for place in system.loaders:
         yield Finding("in_loader", f"a board waits in its loader at {place}")
     if facts.port is None:
-        yield from _nothing_to_open(facts)
+        if len(system.boards) > 1:
+            there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
+            yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
+        elif system.usb_boards:
+            yield Finding("no_serial_port", "a device with our USB ids is plugged in, but it has no serial port")
+        elif not system.loaders:
+            yield Finding("no_board", "no serial port has our USB ids")
         return
     if not system.permitted:
         yield Finding("no_permission", f"no permission to open {facts.port}; it is owned by {system.owner}")
@@ -32,14 +41,17 @@ def check(facts: Facts) -> Iterator[Finding]:
         yield Finding("not_a_gateway", str(error))
     if isinstance(error, DeviceLostError):
         yield Finding("board_lost", str(error))
+    if isinstance(error, WireVersionError):
+        yield Finding("wire_version", str(error))
+    if facts.board is not None:
+        for warning in facts.board.warnings:
+            yield Finding(warning.code, warning.text)
+        hello = facts.board.hello
+        if (hello.firmware_major, hello.firmware_minor, hello.firmware_patch) < release(__version__):
+            yield Finding("firmware_older", f"firmware {version_text(hello)}, this package {__version__}")
 
 
-def _nothing_to_open(facts: Facts) -> Iterator[Finding]:
-    system = facts.system
-    if len(system.boards) > 1:
-        there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
-        yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
-    elif system.usb_boards:
-        yield Finding("no_serial_port", "a device with our USB ids is plugged in, but it has no serial port")
-    elif not system.loaders:
-        yield Finding("no_board", "no serial port has our USB ids")
+def release(version: str) -> tuple[int, ...]:
+    """The numbers of a version, without a development version's suffix."""
+    numbers = re.match(r"\d+(\.\d+)*", version)
+    return tuple(map(int, numbers[0].split("."))) if numbers else ()

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from ..wire.identity import ascii_text
 from ..wire.sensor_gen import MAX_SENSORS
-from .bus import KINDS
 from .catalogue import Finding
 from .facts import BoardFacts, Facts, PairFacts
+from .sensors import WORDS
 
 
 def check(facts: Facts) -> Iterator[Finding]:
@@ -16,30 +16,24 @@ def check(facts: Facts) -> Iterator[Finding]:
     board, pair = facts.board, facts.pair
     if board is None or pair is None:
         return
-    good = [finger for finger in range(MAX_SENSORS) if _well(board, finger)]
+    # More than half of its words were good; one or two may date from before a lead came off.
+    bad = [sum(board.more(finger, kind) for kind in WORDS) for finger in range(MAX_SENSORS)]
+    good = [finger for finger in range(MAX_SENSORS) if board.more(finger, "words_good") > bad[finger]]
     if good:
         yield from _selects(board, pair, good)
-    elif not pair.more("words"):
+    elif not (words := pair.more("words")):
         yield Finding("lead_clock", "the sensor board saw no clock while any of its selects was low")
     elif sum(board.more(finger, "words_error") for finger in range(MAX_SENSORS)):
-        seen = f"{pair.more('words')} words were read, but the sensors understood no command"
-        yield Finding("lead_mosi", seen)
+        yield Finding("lead_mosi", f"{words} words were read, but the sensors understood no command")
     else:
-        yield Finding("lead_miso", f"the sensors sent {pair.more('words')} words, but none reached the gateway")
-
-
-def _well(board: BoardFacts, finger: int) -> bool:
-    """More than half of its words were good; one or two may date from before a lead came off."""
-    return board.more(finger, "words_good") > sum(board.more(finger, kind) for kind in KINDS)
+        yield Finding("lead_miso", f"the sensors sent {words} words, but none reached the gateway")
 
 
 def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Finding]:
     for finger in range(MAX_SENSORS):
         if finger not in good:
-            yield Finding(
-                "lead_select",
-                f"finger {finger} gives few good words or none, unlike fingers {', '.join(map(str, good))}",
-            )
+            others = ", ".join(map(str, good))
+            yield Finding("lead_select", f"finger {finger} gives few good words or none, unlike fingers {others}")
     for sensor in board.sensors:
         serial = ascii_text(sensor.serial)
         if serial in pair.serials and serial != pair.serials[sensor.finger]:

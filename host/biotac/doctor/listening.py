@@ -20,24 +20,21 @@ def examine(port: str | None, *, seconds: float = 3.0, expected_fingers: int | N
     device = device_of(port, system.boards)
     if device is None and port is not None and system.boards:
         there = ", ".join(f"{SERIAL_PREFIX}{b.serial_number}" for b in system.boards)
-        error = PortError(
-            f"no board has serial number {port.removeprefix(SERIAL_PREFIX).upper()}; expected one of {there}"
-        )
-        return Facts(port, system, error, None, expected_fingers)
+        number = port.removeprefix(SERIAL_PREFIX).upper()
+        return Facts(port, system, PortError(f"no board has serial number {number}; expected one of {there}"))
     if device is None:
-        return Facts(None, system, None, None, expected_fingers)
+        return Facts(None, system)
     try:
         # pace=1.0: a simulated board runs in real time, unless its PORT says otherwise.
         with open_board(device, pace=1.0) as hand:
             return Facts(device, system, None, listen(hand, seconds), expected_fingers)
     except BiotacError as error:
-        return Facts(device, system, error, None, expected_fingers)
+        return Facts(device, system, error)
 
 
 def listen(hand: Hand, seconds: float) -> BoardFacts:
     """Counters, then a stream, then the counters again."""
-    told = [hand.sensor_info(finger) for finger in range(MAX_SENSORS)]
-    sensors = [its for its in told if any(its.serial)]
+    infos = [hand.sensor_info(finger) for finger in range(MAX_SENSORS)]
     hand.sync()
     before = hand.status()
     sensors_before = [hand.sensor_status(finger) for finger in range(MAX_SENSORS)]
@@ -49,7 +46,7 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
     batch = join(batches)
     return BoardFacts(
         hello=hand.info,
-        sensors=sensors,
+        sensors=[info for info in infos if any(info.serial)],
         before=before,
         after=hand.status(),
         sensors_before=sensors_before,

@@ -1,4 +1,4 @@
-"""Checks which sensors are there, and whether they belong together."""
+"""Checks which sensors are there, whether they belong together, and the words received from them."""
 
 from __future__ import annotations
 
@@ -7,37 +7,35 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..wire import messages_gen as wire
+from ..wire import sensor_gen
 from ..wire.identity import ascii_text
 from .catalogue import Finding
-from .facts import BoardFacts, Facts
+from .facts import BoardFacts
+
+WORDS = {"words_stuck": "are 0x0000 or 0xFFFF", "words_parity": "have bad parity", "words_error": "are error words"}
 
 
-def check(facts: Facts) -> Iterator[Finding]:
-    """Wrong type, none, too few, lost or changed while listening, equal serial numbers, different versions."""
-    board = facts.board
-    if board is None:
-        return
+def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
+    """Wrong type, none, fewer than ``expected``, lost or changed while listening, equal serials, damaged words."""
     for sensor in board.sensors:
         if not sensor.present and (serial := ascii_text(sensor.serial)):
-            yield Finding(
-                "wrong_sensor", f"finger {sensor.finger} is {serial}, which is not a BioTac with 19 electrodes"
-            )
+            what = "which is not a BioTac with 19 electrodes"
+            yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, {what}")
     if not board.present:
         yield Finding("no_sensor", "no sensor answers on any of the five chip selects")
         return
-    expected = facts.expected_fingers
     if expected is not None and len(board.present) < expected:
         there = ", ".join(map(str, board.present))
         yield Finding("sensor_missing", f"{len(board.present)} of {expected} sensors answer: finger {there}")
     yield from _lost(board)
     yield from _changed(board)
     yield from _serials(board)
+    yield from _words(board)
 
 
 def _lost(board: BoardFacts) -> Iterator[Finding]:
     for finger in board.present:
-        came = (board.frames["finger"] == finger).any() or (board.idle["finger"] == finger).any()
-        if not came:
+        if not (board.frames["finger"] == finger).any() and not (board.idle["finger"] == finger).any():
             yield Finding("sensor_lost", f"finger {finger} sent no frame")
         elif not board.after.fingers_present >> finger & 1:
             yield Finding("sensor_lost", f"finger {finger} stopped answering")
@@ -60,7 +58,7 @@ def _changed(board: BoardFacts) -> Iterator[Finding]:
 def _serials(board: BoardFacts) -> Iterator[Finding]:
     by_serial: dict[str, list[int]] = {}
     kinds: dict[tuple[str, str], list[int]] = {}
-    for sensor in (its for its in board.sensors if its.present):
+    for sensor in (info for info in board.sensors if info.present):
         by_serial.setdefault(ascii_text(sensor.serial), []).append(sensor.finger)
         kind = ascii_text(sensor.flex_version), ascii_text(sensor.software_version)
         kinds.setdefault(kind, []).append(sensor.finger)
@@ -70,3 +68,16 @@ def _serials(board: BoardFacts) -> Iterator[Finding]:
     if len(kinds) > 1:
         words = [f"finger {', '.join(map(str, f))}: flex {flex}, software {sw}" for (flex, sw), f in kinds.items()]
         yield Finding("mixed_sensors", "; ".join(words))
+
+
+def _words(board: BoardFacts) -> Iterator[Finding]:
+    """Stuck words, parity errors and error words, of sensors that are present: an open chip select reads as stuck."""
+    for finger in board.present:
+        words = {kind: board.more(finger, kind) for kind in ("words_good", *WORDS)}
+        for kind, what in WORDS.items():
+            if words[kind]:
+                seen = f"finger {finger}: {words[kind]} of {sum(words.values())} words {what}"
+                last = board.sensors_after[finger].last_error_word
+                if kind == "words_error" and last:
+                    seen += f", the last 0x{last:04X} ({sensor_gen.ERROR_WORD.get(last, 'not in the manual')})"
+                yield Finding(kind, seen)

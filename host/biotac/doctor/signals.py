@@ -1,4 +1,4 @@
-"""Checks what each sensor's channels say: no word, the end of the range, always the same, or mostly noise."""
+"""Checks tares, and what each channel says: no word, the end of the range, always the same, or mostly noise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..wire import messages_gen as wire
 from ..wire.native import lib
 from .catalogue import Finding
-from .facts import BoardFacts, Facts
+from .facts import BoardFacts
 
 #: The limits of FrameFlags.RAIL.
 RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()
@@ -26,15 +26,26 @@ NOISE_COUNTS = 40.0
 NOISE_RATIO = 8.0
 
 
-def check(facts: Facts) -> Iterator[Finding]:
-    """The electrodes, PDC, TDC, TAC and PAC of the fingers that sent frames."""
-    board = facts.board
-    for finger in board.present if board else []:
-        assert board is not None
-        counts = _channels(board, finger)
-        for code, names in _judge(counts).items():
+def check(board: BoardFacts) -> Iterator[Finding]:
+    """The tares; then electrodes, PDC, TDC, TAC and PAC of the fingers that sent frames."""
+    for finger in board.present:
+        yield from _tare(board, finger)
+    for finger in board.present:
+        for code, names in _judge(_channels(board, finger)).items():
             if names:
                 yield Finding(code, f"finger {finger}: {', '.join(names)}")
+
+
+def _tare(board: BoardFacts, finger: int) -> Iterator[Finding]:
+    state = board.sensors_after[finger]
+    age = f"{state.tare_age_ms / 1000:.0f} s old"
+    if state.tare_state == wire.TareState.INIT:
+        yield Finding("no_tare", f"finger {finger} has not been still since it was plugged in")
+    if state.tare_state == wire.TareState.FAULT:
+        yield Finding("tare_fault", f"finger {finger}: its tare is frozen, {age}")
+    last = [rows["flags"][rows["finger"] == finger][-1:] for rows in (board.frames, board.idle)]
+    if any((flags & wire.FrameFlags.BASE_OLD).any() for flags in last):
+        yield Finding("base_old", f"finger {finger} has been touched for over a minute; its tare is {age}")
 
 
 def _channels(board: BoardFacts, finger: int) -> dict[str, NDArray[np.integer]]:

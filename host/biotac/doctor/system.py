@@ -77,7 +77,6 @@ def owner(path: Path) -> str:
 
 
 def modem_manager_runs(root: Path) -> bool:
-    """Whether a ModemManager process runs."""
     for name in (root / "proc").glob("[0-9]*/comm"):
         with suppress(OSError):
             if name.read_text().strip() == "ModemManager":

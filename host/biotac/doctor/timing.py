@@ -12,7 +12,7 @@ from ..hand.views import DEFAULT_NAMES
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from .catalogue import Finding
-from .facts import BoardFacts, Facts, grown
+from .facts import BoardFacts, PairFacts, grown
 
 #: A crystal stays within 100 ppm over age and temperature.
 CRYSTAL_PPM = 100.0
@@ -20,27 +20,22 @@ CRYSTAL_PPM = 100.0
 RATE_SHARE = 0.01
 
 
-def check(facts: Facts) -> Iterator[Finding]:
+def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
     """Restarts, latched faults, late slots, losses on either side, slot rate, clock drift."""
-    board = facts.board
-    if board is None:
-        return
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters restarted and tell nothing
     earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # set on every board
-    if facts.pair is not None:  # a sensor board is silent until it has a tape
+    if pair is not None:  # a sensor board is silent until it has a tape
         earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)
     if faults := faults_of(earlier, DEFAULT_NAMES):
         yield Finding("faults_latched", str(faults).replace("\n", "; "))
     for counter, what in (("slots_late", "slots were too late"), ("messages_dropped", "messages did not fit the link")):
-        more = grown(board.before, board.after, counter)
-        if more:
+        if more := grown(board.before, board.after, counter):
             yield Finding(counter, f"{more} {what}")
     if board.stats.frames_lost or board.stats.pac_lost:
-        yield Finding(
-            "frames_lost", f"{board.stats.frames_lost} frames and {board.stats.pac_lost} PAC blocks are missing"
-        )
+        seen = f"{board.stats.frames_lost} frames and {board.stats.pac_lost} PAC blocks are missing"
+        yield Finding("frames_lost", seen)
     if board.stats.crc_errors or board.stats.other_errors:
         seen = f"{board.stats.crc_errors} frames with a bad CRC, {board.stats.other_errors} otherwise damaged"
         yield Finding("bytes_damaged", seen)
@@ -48,7 +43,14 @@ def check(facts: Facts) -> Iterator[Finding]:
         rate = slots_per_s(board, finger)
         if rate is not None and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE:
             yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} slots per second, expected {board.hello.slot_hz}")
-    yield from _clock(board)
+    if board.clock is None:
+        return
+    if board.clock_resets:
+        yield Finding("clock_jumped", f"{board.clock_resets} jump(s)")
+    drift_ppm, bound_ppm = board.clock.drift_ppm, board.clock.drift_uncertainty_ppm
+    if board.clock.known and abs(drift_ppm) - bound_ppm > CRYSTAL_PPM:
+        seen = f"{drift_ppm:+.0f} ppm, +/- {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} ppm is normal"
+        yield Finding("clock_drift", seen)
 
 
 def slots_per_s(board: BoardFacts, finger: int) -> float | None:
@@ -64,15 +66,3 @@ def slots_per_s(board: BoardFacts, finger: int) -> float | None:
     if not good.any():
         return None
     return float(np.median(steps[good] * len(sensor.SLOTS) / (times_us[good] / 1e6)))
-
-
-def _clock(board: BoardFacts) -> Iterator[Finding]:
-    if board.clock is None:
-        return
-    if board.clock_resets:
-        yield Finding("clock_jumped", f"{board.clock_resets} jump(s)")
-    drift_ppm, bound_ppm = board.clock.drift_ppm, board.clock.drift_uncertainty_ppm
-    if board.clock.known and abs(drift_ppm) - bound_ppm > CRYSTAL_PPM:
-        yield Finding(
-            "clock_drift", f"{drift_ppm:+.0f} ppm, +/- {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} ppm is normal"
-        )

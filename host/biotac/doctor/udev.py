@@ -12,7 +12,6 @@ RULES = Path("/etc/udev/rules.d/70-biotac.rules")
 
 
 def rule() -> str:
-    """The text of the file."""
     ours = f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"'
     loader = f'ATTRS{{idVendor}}=="{wire.USB_LOADER_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_LOADER_PRODUCT:04x}"'
     ignore = 'ENV{ID_MM_DEVICE_IGNORE}="1", ENV{ID_MM_PORT_IGNORE}="1"'

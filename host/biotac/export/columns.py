@@ -36,12 +36,10 @@ COLUMNS = (*_stamped(FRAME_FIELDS), GAP)
 PAC_COLUMNS = _stamped(PAC_FIELDS)
 #: One row per finger and round: a spectrogram of PAC, in octaves.
 BANDS_COLUMNS = _stamped(BANDS_FIELDS)
-#: One row per heartbeat of an untouched finger.
-IDLE_COLUMNS = _stamped(IDLE_FIELDS)
 
 #: Tables in every export. A lake has heartbeats, too.
 EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS, "bands": BANDS_COLUMNS}
-HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": IDLE_COLUMNS}
+HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": _stamped(IDLE_FIELDS)}
 
 
 @dataclass(frozen=True)
@@ -72,6 +70,12 @@ class Table:
                 yield column.name, column, values
             for k, name in enumerate(column.flat_names() if column.parts else ()):
                 yield name, column, values[:, k]
+
+
+def in_order(made: list[Table]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The rows of tables that stand one after the other: each row's table, and their order by time, then table."""
+    of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])
+    return of_table, np.lexsort((of_table, np.concatenate([table.arrays["t_us"] for table in made])))
 
 
 def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORTED) -> list[Table]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..recording.reader import Recording
-from .columns import Show, Table
+from .columns import Show, Table, in_order
 
 KINDS_APART = True
 _ROWS = 10_000
@@ -18,10 +18,8 @@ _ROWS = 10_000
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write the file, with numbers in their shortest exact form and NaN as ``nan``."""
     names = ["finger", "frame_id", *(name for name, _, _ in made[0].flat())]
-    stamps = np.concatenate([table.arrays["t_us"] for table in made])
-    of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])
+    of_table, order = in_order(made)
     row_of = np.concatenate([np.arange(len(table)) for table in made])
-    order = np.lexsort((of_table, stamps))
     with place.open("w", newline="", encoding="ascii") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(names)

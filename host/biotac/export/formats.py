@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import import_module
@@ -13,9 +12,6 @@ from ..errors import InputError
 from ..partial_file import whole
 from ..recording.reader import Recording
 from .columns import Show, Table, tables
-
-#: Writes tables to a path; called only by export().
-Write = Callable[[Path, list[Table], Recording, Show], None]
 
 
 @dataclass(frozen=True)
@@ -46,10 +42,9 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
     if not any(len(table) for table in made):
         raise InputError(f"{recording.path} holds no frames and no PAC; there is nothing to export")
     written: list[Path] = []
-    write: Write = module.write
     with ExitStack() as together:  # no file is put in place before all are complete
         for path, part in parts(out, made, apart=module.KINDS_APART):
-            write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
+            module.write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
             written.append(path)
     return written
 

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..recording.reader import Recording
-from .columns import Show, Table
+from .columns import Show, Table, in_order
 
 KINDS_APART = True
 
@@ -40,7 +40,6 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
 
 
 def frame_ids(made: list[Table]) -> Label:
-    """The tables' coordinate frames."""
     return Label("frame_id", "coordinate frame of vectors", tuple(table.frame_id for table in made))
 
 
@@ -51,38 +50,28 @@ def write_labelled(
 
     Integers are delta-encoded, so that zstd compresses them well.
     """
-    times = np.concatenate([table.arrays["t_us"] for table in made])
-    of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])
+    of_table, order = in_order(made)
     fingers = None
     fields = []
     if made[0].finger is not None:
         fingers = np.array([table.finger for table in made], np.uint8)
         fields = [pa.field("finger", pa.uint8(), metadata={"unit": "1", "what": "chip select index"})]
-    order = np.lexsort((of_table if fingers is None else fingers[of_table], times))
     fields += [
         pa.field(label.name, pa.dictionary(pa.int8(), pa.string()), metadata={"what": label.what}) for label in labels
     ]
     for name, column, values in made[0].flat():
-        fields.append(
-            pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"unit": column.unit, "what": column.what})
-        )
+        about = {"unit": column.unit, "what": column.what}
+        fields.append(pa.field(name, pa.from_numpy_dtype(values.dtype), metadata=about))
     schema = pa.schema(fields, metadata=dict(metadata))
     sorting = [(name, "ascending") for name in ("t_us", *(["finger"] if fingers is not None else []))]
+    how = {
+        "compression": "zstd",
+        "use_dictionary": [f.name for f in fields if not pa.types.is_integer(f.type)],
+        "column_encoding": {f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
+        "sorting_columns": pq.SortingColumn.from_ordering(schema, sorting),
+    }
     # Opened here: pyarrow takes no path that is not UTF-8.
-    with (
-        place.open("wb") as file,
-        pq.ParquetWriter(
-            file,
-            schema,
-            compression="zstd",
-            use_dictionary=[
-                *(label.name for label in labels),
-                *(f.name for f in fields if pa.types.is_floating(f.type)),
-            ],
-            column_encoding={f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
-            sorting_columns=pq.SortingColumn.from_ordering(schema, sorting),
-        ) as out,
-    ):
+    with place.open("wb") as file, pq.ParquetWriter(file, schema, **how) as out:
         for begin in range(0, len(order), _ROWS):
             chosen = order[begin : begin + _ROWS]
             columns = list(_columns(made, labels, fingers, of_table, chosen))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,28 +17,46 @@ KINDS_APART = False
 _SHOW_ROWS = 1000
 _LOG = "rcl_interfaces/msg/Log"
 _WARN = 30
+_COUNTS = "std_msgs/msg/UInt16MultiArray"
+#: By kind of table: its topics, with their types.
+_TOPICS = {
+    "frames": {
+        "wrench": "geometry_msgs/msg/WrenchStamped",
+        "poc": "geometry_msgs/msg/PointStamped",
+        "flags": "std_msgs/msg/UInt32",
+        "counts": _COUNTS,
+    },
+    "pac": {"pac": _COUNTS},
+    "bands": {"bands": "std_msgs/msg/Float64MultiArray"},
+}
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write a bag with topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``
     and ``bands``, and ``/biotac/log`` with the gaps.
     """
+    store = get_typestore(Stores.ROS2_HUMBLE)
     total = sum(len(table) for table in made)
     done = 0
     with Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+
+        def topic(name: str, kind: str) -> Callable[[int, Any], None]:
+            connection = bag.add_connection(f"/biotac/{name}", kind, typestore=store)
+            return lambda stamp_ns, message: bag.write(connection, stamp_ns, store.serialize_cdr(message, kind))
+
         for table in made:
-            topics = _Topics(bag, table)
-            for row in range(len(table)):
-                topics.add(row)
-                if row % _SHOW_ROWS == 0:
-                    show((done + row) / total)
-            done += len(table)
+            topics = {name: topic(f"finger{table.finger}/{name}", kind) for name, kind in _TOPICS[table.kind].items()}
+            for stamp_ns, messages in _messages(table, store.types):
+                for name, message in messages.items():
+                    topics[name](stamp_ns, message)
+                if done % _SHOW_ROWS == 0:
+                    show(done / total)
+                done += 1
         if recording.gaps:
-            store = get_typestore(Stores.ROS2_HUMBLE)
-            log = bag.add_connection("/biotac/log", _LOG, typestore=store)
+            log = topic("log", _LOG)
             for gap in recording.gaps:
-                text = store.types[_LOG](_time(store.types, gap.back_at_ns), _WARN, "biotac", gap.words(), "", "", 0)
-                bag.write(log, gap.back_at_ns, store.serialize_cdr(text, _LOG))
+                stamp = _time(store.types, gap.back_at_ns)
+                log(gap.back_at_ns, store.types[_LOG](stamp, _WARN, "biotac", gap.words(), "", "", 0))
 
 
 def _time(types: Any, stamp_ns: int) -> Any:
@@ -45,65 +64,29 @@ def _time(types: Any, stamp_ns: int) -> Any:
     return types["builtin_interfaces/msg/Time"](min(stamp_ns // 10**9, 2**31 - 1), stamp_ns % 10**9)
 
 
-class _Topics:
-    """One finger's connections."""
-
-    def __init__(self, bag: Any, table: Table) -> None:
-        self._bag = bag
-        self._table = table
-        self._store = get_typestore(Stores.ROS2_HUMBLE)
-        self._types = self._store.types
-        kinds = {
-            "frames": {
-                "wrench": "geometry_msgs/msg/WrenchStamped",
-                "poc": "geometry_msgs/msg/PointStamped",
-                "flags": "std_msgs/msg/UInt32",
-                "counts": "std_msgs/msg/UInt16MultiArray",
+def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Each row's stamp in ns, and its messages by topic."""
+    layout = types["std_msgs/msg/MultiArrayLayout"]([], 0)
+    vector, point = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Point"]
+    arrays = table.arrays
+    stamps_ns = arrays["stamp_ns"].tolist()
+    if table.kind != "frames":
+        values = arrays["pac" if table.kind == "pac" else "energy_count2"]
+        for stamp_ns, row in zip(stamps_ns, values, strict=True):
+            yield stamp_ns, {table.kind: types[_TOPICS[table.kind][table.kind]](layout, row)}
+        return
+    force_n, torque_nm, poc_m = arrays["force_n"], arrays["torque_nmm"] / 1000, arrays["poc_mm"] / 1000  # REP 103
+    counts = np.column_stack([arrays[name] for name in ("counts", "pdc", "tac", "tdc")])
+    lists = stamps_ns, force_n.tolist(), torque_nm.tolist(), poc_m.tolist(), arrays["flags"].tolist(), counts
+    for stamp_ns, force, torque, poc, flags, row in zip(*lists, strict=True):
+        header = types["std_msgs/msg/Header"](_time(types, stamp_ns), table.frame_id)
+        wrench = types["geometry_msgs/msg/Wrench"](vector(*force), vector(*torque))
+        yield (
+            stamp_ns,
+            {
+                "wrench": types[_TOPICS["frames"]["wrench"]](header, wrench),
+                "poc": types[_TOPICS["frames"]["poc"]](header, point(*poc)),
+                "flags": types[_TOPICS["frames"]["flags"]](flags),
+                "counts": types[_COUNTS](layout, row),
             },
-            "pac": {"pac": "std_msgs/msg/UInt16MultiArray"},
-            "bands": {"bands": "std_msgs/msg/Float64MultiArray"},
-        }[table.kind]
-        self._connections = {
-            name: (bag.add_connection(f"/biotac/finger{table.finger}/{name}", kind, typestore=self._store), kind)
-            for name, kind in kinds.items()
-        }
-        columns = ("stamp_ns", *(("force_n", "torque_nmm", "poc_mm", "flags") if table.kind == "frames" else ()))
-        # REP 103 asks for m and N*m
-        self._lists = {
-            name: (table.arrays[name] / 1000 if name.endswith("mm") else table.arrays[name]).tolist()
-            for name in columns
-        }
-        listed = {"frames": ("counts", "pdc", "tac", "tdc"), "pac": ("pac",), "bands": ("energy_count2",)}[table.kind]
-        self._numbers = np.column_stack([table.arrays[name] for name in listed])
-
-    def add(self, row: int) -> None:
-        """Write all messages of one row."""
-        stamp_ns = self._lists["stamp_ns"][row]
-        if self._table.kind != "frames":
-            self._write(self._table.kind, stamp_ns, self._array(self._table.kind, row))
-            return
-        header = self._make(
-            "std_msgs/msg/Header",
-            _time(self._types, stamp_ns),
-            self._table.frame_id,
         )
-        force, torque = (
-            self._make("geometry_msgs/msg/Vector3", *self._lists[n][row]) for n in ("force_n", "torque_nmm")
-        )
-        wrench = self._make("geometry_msgs/msg/Wrench", force, torque)
-        self._write("wrench", stamp_ns, self._make("geometry_msgs/msg/WrenchStamped", header, wrench))
-        point = self._make("geometry_msgs/msg/Point", *self._lists["poc_mm"][row])
-        self._write("poc", stamp_ns, self._make("geometry_msgs/msg/PointStamped", header, point))
-        self._write("flags", stamp_ns, self._make("std_msgs/msg/UInt32", self._lists["flags"][row]))
-        self._write("counts", stamp_ns, self._array("counts", row))
-
-    def _make(self, name: str, *values: Any) -> Any:
-        return self._types[name](*values)
-
-    def _array(self, name: str, row: int) -> Any:
-        layout = self._make("std_msgs/msg/MultiArrayLayout", [], 0)
-        return self._make(self._connections[name][1], layout, self._numbers[row])
-
-    def _write(self, name: str, stamp_ns: int, message: Any) -> None:
-        connection, kind = self._connections[name]
-        self._bag.write(connection, stamp_ns, self._store.serialize_cdr(message, kind))

@@ -3,5 +3,3 @@
 There is one file per topic and recording, ``DIR/TOPIC/board=SERIAL/date=YYYY-MM-DD/RECORDING.parquet``, and a list of
 their checksums, ``DIR/SHA256SUMS``; see host/docs/guides/lake.md. Needs the extra ``lake``.
 """
-
-from __future__ import annotations

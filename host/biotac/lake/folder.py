@@ -108,9 +108,9 @@ def writing(folder: Path) -> Iterator[Lake]:
     if folder.is_dir() and not (folder / SUMS).exists() and not any(_files(folder)):
         (folder / SUMS).touch()
     lake = opened(folder)
-    if any(not _FILE.fullmatch(path) for path in lake.unlisted):
-        path = next(path for path in lake.unlisted if not _FILE.fullmatch(path))
-        raise InputError(f"no part of the lake: {folder / path}; move it elsewhere")
+    for path in lake.unlisted:
+        if not _FILE.fullmatch(path):
+            raise InputError(f"no part of the lake: {folder / path}; move it elsewhere")
     with (folder / _LOCK).open("w") as lock:
         try:
             if fcntl is not None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from statistics import fmean, median
 from typing import Any
 
-from ..keep.calibration import Calibration
 from ..recording.facts import Facts
 from ..wire import messages_gen as wire
 from ..wire.sensor_gen import ELECTRODE_NAMES
@@ -59,7 +58,10 @@ def _sensor(lake: Lake, recordings: list[dict[str, Any]]) -> dict[str, Any]:
     noise = [row["noise_count2"] and (row["noise_count2"] / len(ELECTRODE_NAMES)) ** 0.5 for row in recordings]
     drift = [_drift_count(row["tares"], [one["tares"] for one in recordings[:-1]]) for row in recordings]
     residues = [(row["residues"] or 0) / row["hours"] if row["hours"] else 0.0 for row in recordings]
-    calibration = _calibration(lake, last)
+    calibration = None
+    if last["calibration"] is not None:
+        (found,) = rows(lake, f"SELECT metadata FROM recordings WHERE recording = '{last['recording']}'")
+        calibration = Facts.read(found["metadata"]).calibrations.get(last["finger"])
     return {
         "sensor": last["sensor"],
         "board": last["board"],
@@ -79,13 +81,6 @@ def _sensor(lake: Lake, recordings: list[dict[str, Any]]) -> dict[str, Any]:
         + _unusual("drift", "counts", drift)
         + _unusual("residue", "per hour", residues),
     }
-
-
-def _calibration(lake: Lake, row: dict[str, Any]) -> Calibration | None:
-    if row["calibration"] is None:
-        return None
-    (found,) = rows(lake, f"SELECT metadata FROM recordings WHERE recording = '{row['recording']}'")
-    return Facts.read(found["metadata"]).calibrations.get(row["finger"])
 
 
 def _drift_count(tares: list[float | None], earlier: list[list[float | None]]) -> float | None:

@@ -37,15 +37,17 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
         raise InputError(f"{lake.folder} has a name that is not UTF-8, which DuckDB cannot open; rename it") from error
     except duckdb.Error as error:
         known = ", ".join(sorted(topics))
+        # Its sentences, such as the columns that there are, without the query that follows them.
+        sentences = str(error).partition("\nLINE ")[0].splitlines()
+        reason = "; ".join(line.rstrip("!") for line in sentences if line).replace(": :", ":")
         raise InputError(
-            f"DuckDB rejects the query: {_reason(error)}; topics are {known}; the query 'DESCRIBE TOPIC' lists columns"
+            f"DuckDB rejects the query: {reason}; topics are {known}; the query 'DESCRIBE TOPIC' lists columns"
         ) from error
     names = [column[0] for column in result.description or ()]
     return names, _rows(result)
 
 
 def rows(lake: Lake, text: str) -> list[dict[str, Any]]:
-    """The rows of a query as dictionaries."""
     names, found = query(lake, text)
     return [dict(zip(names, row, strict=True)) for row in found]
 
@@ -57,9 +59,3 @@ def _rows(result: Any) -> Iterator[tuple[Any, ...]]:
     except duckdb.Error as error:
         first_line = str(error).strip().splitlines()[0]
         raise InputError(f"DuckDB stopped: {first_line}; look for damaged files with `biotac lake check`") from error
-
-
-def _reason(error: Exception) -> str:
-    """DuckDB's sentences, such as the columns that there are, without the query that follows them."""
-    sentences, *_ = str(error).partition("\nLINE ")
-    return "; ".join(line.rstrip("!") for line in sentences.splitlines() if line).replace(": :", ":")

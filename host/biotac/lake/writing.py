@@ -23,23 +23,20 @@ from .folder import PARTIAL, RECORDINGS
 
 SIZE = b"biotac.size_bytes"  # of the source: a recording that has grown is exported again
 
+_TEXT, _BY_FINGER = pa.string(), pa.map_(pa.uint8(), pa.string())
 _RECORDINGS = pa.schema(
     [
-        pa.field("recording", pa.string(), metadata={"what": "id, the name of its files"}),
-        pa.field("source", pa.string(), metadata={"what": "name of the file it was exported from"}),
+        pa.field("recording", _TEXT, metadata={"what": "id, the name of its files"}),
+        pa.field("source", _TEXT, metadata={"what": "name of the file it was exported from"}),
         pa.field("begin_ns", pa.int64(), metadata={"unit": "ns", "what": "when it began, Unix time"}),
         pa.field("duration_s", pa.float64(), metadata={"unit": "s", "what": "by the board's clock"}),
         pa.field("size_bytes", pa.int64(), metadata={"unit": "B", "what": "of the source"}),
         pa.field("frames_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
         pa.field("pac_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
-        pa.field(
-            "problems", pa.list_(pa.string()), metadata={"what": "what is missing from the source or damaged in it"}
-        ),
-        pa.field("sensors", pa.map_(pa.uint8(), pa.string()), metadata={"what": "serial numbers by finger"}),
-        pa.field("calibrations", pa.map_(pa.uint8(), pa.string()), metadata={"what": "ids by finger"}),
-        pa.field(
-            "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as in host/docs/guides/recording.md"}
-        ),
+        pa.field("problems", pa.list_(_TEXT), metadata={"what": "what is missing from the source or damaged in it"}),
+        pa.field("sensors", _BY_FINGER, metadata={"what": "serial numbers by finger"}),
+        pa.field("calibrations", _BY_FINGER, metadata={"what": "ids by finger"}),
+        pa.field("metadata", pa.map_(_TEXT, _TEXT), metadata={"what": "as in host/docs/guides/recording.md"}),
     ]
 )
 
@@ -115,14 +112,11 @@ def _write(path: Path, made: list[Table], recording: Recording, name: str) -> No
     fingers = [table.finger for table in made if table.finger is not None]
     labels = [Label("recording", "id of the recording", (name,) * len(made))]
     if len(fingers) == len(made):
+        of_fingers = tuple(map(calibrations.get, fingers))
         labels += [
             frame_ids(made),
             Label("sensor", "serial number, null where unknown", tuple(map(sensors.get, fingers))),
-            Label(
-                "calibration",
-                "id of the calibration and map in force, null if none",
-                tuple(map(calibrations.get, fingers)),
-            ),
+            Label("calibration", "id of the calibration and map in force, null if none", of_fingers),
         ]
     write_labelled(path, made, labels, {"biotac.recording": name})
 

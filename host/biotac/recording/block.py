@@ -65,9 +65,8 @@ _COLUMNS = tuple(
 def schema() -> bytes:
     """The columns of a table as JSON; stored in the recording."""
     kinds = zip(KINDS, _COLUMNS, strict=True)
-    return json.dumps(
-        {_name(message_id): [[c.name, c.dtype.str, c.parts] for c in columns] for message_id, columns in kinds}
-    ).encode()
+    columns = {_name(message_id): [[c.name, c.dtype.str, c.parts] for c in columns] for message_id, columns in kinds}
+    return json.dumps(columns).encode()
 
 
 def _name(message_id: int) -> str:
@@ -125,7 +124,10 @@ class Rest:
 def take_apart(data: bytes, batch: Batch) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
     """Tables by finger, the order and the packets of ``data``, whole messages whose decoded rows are ``batch``."""
     pieces = data.split(b"\0")[:-1]
-    tables = [_frames(batch), batch.pac, batch.idle]
+    frames = np.empty(len(batch.wire), ROWS[FRAME])
+    for name in ROWS[FRAME].names or ():
+        frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
+    tables = [frames, batch.pac, batch.idle]
     # COBS's first byte precedes the id. A row is at least as long as here; it is longer from a newer board.
     ids = [piece[1] if len(piece) > 1 else 0 for piece in pieces]
     order = np.full(len(pieces), PACKET, np.uint16)
@@ -143,13 +145,6 @@ def take_apart(data: bytes, batch: Batch) -> tuple[dict[int, bytes], NDArray[np.
     return {f: _table([rows[rows["finger"] == f] for rows in tables]) for f in fingers}, order, packets
 
 
-def _frames(batch: Batch) -> StructArray:
-    rows = np.empty(len(batch.wire), ROWS[FRAME])
-    for name in ROWS[FRAME].names or ():
-        rows[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
-    return rows
-
-
 def as_sent(rows: StructArray, kind: int) -> StructArray:
     """Messages of one kind with ``seq`` and ``t_us`` wrapped again; ``rows`` itself if it already has that dtype."""
     sent = DTYPES[KINDS[kind]]
@@ -163,7 +158,9 @@ def as_sent(rows: StructArray, kind: int) -> StructArray:
 
 def packets_of(rest: Rest, rows: list[StructArray]) -> Iterator[Packet]:
     """All messages of a block in order of arrival; ``rows`` by kind."""
-    of_kind = [iter(_payloads(as_sent(table, kind))) for kind, table in enumerate(rows)]
+    of_kind = [
+        iter(as_sent(table, kind).view(f"V{DTYPES[KINDS[kind]].itemsize}").tolist()) for kind, table in enumerate(rows)
+    ]
     others = iter(rest.packets.split(b"\0"))
     for kind in (rest.order >> 8).tolist():
         if kind < len(KINDS):
@@ -172,11 +169,6 @@ def packets_of(rest: Rest, rows: list[StructArray]) -> Iterator[Packet]:
         else:
             data = next(others)
             yield Packet(data + b"\0", *(open_frame(data) or (None, b"")))
-
-
-def _payloads(sent: StructArray) -> Iterator[bytes]:
-    data, size = sent.tobytes(), sent.dtype.itemsize
-    return (data[at : at + size] for at in range(0, len(data), size))
 
 
 # ---- tables -----------------------------------------------------------------------------------------
@@ -259,9 +251,6 @@ class _KindReader:
 
     def read(self, planes: memoryview, rows: StructArray, at: NDArray[np.uint32]) -> None:
         """Decode ``len(at) * row_bytes`` bytes into the rows ``at``."""
-        source, index, out = (
-            ffi.from_buffer("uint8_t[]", planes),
-            ffi.from_buffer("uint32_t[]", at),
-            ffi.from_buffer("uint8_t[]", rows),
-        )
+        source, out = (ffi.from_buffer("uint8_t[]", data) for data in (planes, rows))
+        index = ffi.from_buffer("uint32_t[]", at)
         lib.bt_columns(source, len(at), self._columns, len(self._columns), index, out, rows.dtype.itemsize)

@@ -21,6 +21,8 @@ from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
 
 _FIRST_PAIR = 4
+# Channel numbers (44,) of our slots; a command byte is 1SSSSSSP, S the channel.
+_SLOT_CHANNELS = np.array([(_sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in _sensor.SLOTS])
 _BEGIN = b"Begin File"
 _MAX_BYTES = 1 << 30  # a day of three sensors is larger
 # Real files compress to a tenth of their size; in memory each byte becomes four.
@@ -53,13 +55,11 @@ def read_btd(path: Path) -> BtdFrames:
 
     present = (parity == 0).any(axis=0)
     if not present.any():
-        raise RecordingError(
-            f"{path}: no value has good parity: expected at least one sensor; record again with one connected"
-        )
+        cure = "expected at least one sensor; record again with one connected"
+        raise RecordingError(f"{path}: no value has good parity: {cure}")
     if int(present.sum()) > _sensor.MAX_SENSORS:
-        raise RecordingError(
-            f"{path}: {present.sum()} sensors: expected at most {_sensor.MAX_SENSORS}; remove the columns of the others"
-        )
+        cure = f"expected at most {_sensor.MAX_SENSORS}; remove the columns of the others"
+        raise RecordingError(f"{path}: {present.sum()} sensors: {cure}")
     values, good = values[:, present], parity[:, present] == 0
     wrong = good & ((values < 0) | (values > _sensor.FULL_SCALE_COUNT) | (values != np.floor(values)))
     if wrong.any():
@@ -79,15 +79,10 @@ def read_btd(path: Path) -> BtdFrames:
     rows = starts[:, None] + np.arange(len(_sensor.SLOTS))
     # a stable sort by channel aligns the k-th sample of a channel in the file with its k-th slot in SLOTS
     here = np.argsort(channel[rows], axis=1, kind="stable")
-    there = np.argsort(_slot_channels(), kind="stable")
+    there = np.argsort(_SLOT_CHANNELS, kind="stable")
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
     samples[:, :, there] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
     return BtdFrames(samples=samples, t_s=table[starts, 0], skipped=skipped)
-
-
-def _slot_channels() -> npt.NDArray[np.float64]:
-    """Channel numbers (44,) of our slots; a command byte is 1SSSSSSP, S the channel."""
-    return np.array([(_sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in _sensor.SLOTS], dtype=np.float64)
 
 
 def _complete_frames(
@@ -99,22 +94,18 @@ def _complete_frames(
     lengths = np.diff(np.append(starts, len(batch)))
     slots = len(_sensor.SLOTS)
     whole = starts[lengths == slots]
-    expected = np.sort(_slot_channels())
+    expected = np.sort(_SLOT_CHANNELS)
     found = np.sort(channel[whole[:, None] + np.arange(slots)], axis=1)
     complete = whole[(found == expected).all(axis=1)]
     return complete, len(starts) - len(complete)
 
 
 def _bytes(path: Path) -> bytes:
-    limit = _MAX_BYTES
+    packed = path.name.lower().endswith(".gz")
     try:
-        if path.name.lower().endswith(".gz"):
-            limit = min(_MAX_BYTES, _PACKED_FREE_BYTES + _PACKED_RATIO * path.stat().st_size)
-            with gzip.open(path) as packed:
-                data = packed.read(limit + 1)
-        else:
-            with path.open("rb") as plain:
-                data = plain.read(limit + 1)
+        limit = min(_MAX_BYTES, _PACKED_FREE_BYTES + _PACKED_RATIO * path.stat().st_size) if packed else _MAX_BYTES
+        with gzip.open(path) if packed else path.open("rb") as file:
+            data = file.read(limit + 1)
     except (OSError, EOFError, zlib.error) as error:
         seen = getattr(error, "strerror", None)  # only errors of the operating system have it, not damaged data
         cure = "check the path" if seen else "copy it again"
@@ -134,12 +125,9 @@ def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64
         table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None, encoding="latin-1")
     except ValueError:
         table = np.empty((0, 0))
-    columns = table.shape[1]
-    well_formed = columns >= _FIRST_PAIR + 2 and columns % 2 == 0 and bool(np.isfinite(table).all())
-    if well_formed:
-        parity = table[:, _FIRST_PAIR + 1 :: 2]
-        well_formed = bool(((parity == 0) | (parity == 1)).all())
-    if not well_formed:
+    columns, parity = table.shape[1], table[:, _FIRST_PAIR + 1 :: 2]
+    paired = columns >= _FIRST_PAIR + 2 and columns % 2 == 0
+    if not paired or not np.isfinite(table).all() or not np.isin(parity, (0, 1)).all():
         raise RecordingError(f"{path}: {_first_fault(body, first_line)}")
     return table
 

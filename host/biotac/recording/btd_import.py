@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -77,8 +76,7 @@ def _write(
         boot_id=0, slot_hz=sensor.SLOT_HZ, fingers_present=(1 << fingers) - 1,
         image_crc32=NO_IMAGE,
     )  # fmt: skip
-    unknown = wire.SensorInfo(0, 0, 1, (0,) * 2, (0,) * 4, (0,) * 16, 0, 0)
-    sensors = [dataclasses.replace(unknown, finger=finger) for finger in range(fingers)]
+    sensors = [wire.SensorInfo(0, finger, 1, (0,) * 2, (0,) * 4, (0,) * 16, 0, 0) for finger in range(fingers)]
     metadata = Facts(hello, sensors, settings).metadata(f"btd:{path.name}")
     with out.open("xb") as stream:
         file = RecordingFile(stream, metadata)

@@ -108,17 +108,13 @@ class CrossCheck:
         mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
         for finger in np.unique(messages["finger"][mapped]).tolist():
             rows = messages[mapped & (messages["finger"] == finger)]
-            if finger not in maps:
-                for k in range(len(rows)):
-                    self._find(rows, k, "MAPPED is set, but this finger's wrench map is unknown")
-                continue
-            self._add(rows, own.get(finger, settings), opened(maps[finger]))
-        shared = ~mapped
-        for finger, its_own in own.items():
-            of_finger = ~mapped & (messages["finger"] == finger)
-            self._add(messages[of_finger], its_own)
-            shared &= ~of_finger
-        self._add(messages[shared], settings)
+            if finger in maps:
+                self._add(rows, own.get(finger, settings), opened(maps[finger]))
+            else:
+                self._find_all(rows, np.ones(len(rows), bool), "MAPPED is set, but this finger's wrench map is unknown")
+        for finger, calibrated in own.items():
+            self._add(messages[~mapped & (messages["finger"] == finger)], calibrated)
+        self._add(messages[~mapped & ~np.isin(messages["finger"], list(own))], settings)
 
     def _add(self, messages: StructArray, settings: Settings, own_map: BoardMap | None = None) -> None:
         if not len(messages):
@@ -127,15 +123,15 @@ class CrossCheck:
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
         torsion, torsion_bound = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
-        if own_map is None and population.in_force(settings):
-            force_bound, torque_bound = _by_population(messages, truth, settings)
-            self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
-            self._judge_model(messages)
-        elif own_map is None:
-            torque_bound = torque_bound_nmm(messages, truth, settings)
-        else:
+        if own_map is not None:
             force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, own_map, truth, settings)
             self.mapped += len(messages)
+        elif population.in_force(settings):
+            force_bound, torque_bound = _by_population(messages, truth, settings)
+            self._judge_model(messages)
+        else:
+            torque_bound = torque_bound_nmm(messages, truth, settings)
+        if not isinstance(force_bound, float):
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
         for own_bound in (torque_bound, torsion_bound):
             self.torque_nmm_bound = max(self.torque_nmm_bound, float(own_bound[~untared].max(initial=0.0)))
@@ -146,39 +142,37 @@ class CrossCheck:
             ("torsion", "N*mm", messages["torsion_mnmm"][:, None], 1000, torsion, torsion_bound),
         )
         largest = {}
-        for name, unit, sent, per_unit, values, bound in quantities:
+        for quantity in quantities:
+            name, _, sent, per_unit, values, _ = quantity
             values[untared | not_asked(messages, sent)] = np.nan  # without a tare there is no true value
             error = np.abs(to_units(sent, per_unit) - values)
             if name == "PoC":  # the PoC is one point: its error is a distance; force and torque count per axis
                 error = np.sqrt((error**2).sum(axis=1, keepdims=True))
             largest[name] = worst(error)
-            self._judge(name, unit, messages, sent, values, error, bound)
+            self._judge(messages, quantity, error)
         self.poc_um_max = max(self.poc_um_max, largest["PoC"])
         self.force_mn_max = max(self.force_mn_max, largest["force"])
         self.torque_nmm_max = max(self.torque_nmm_max, largest["torque"], largest["torsion"])
-        self._judge_flag(messages)
+        flagged = (messages["flags"] & wire.FrameFlags.POC_INVALID) != 0
+        marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
+        wrong = (flagged != marked) & ~not_asked(messages, messages["poc_um"])
+        self._find_all(messages, wrong, "the POC_INVALID flag contradicts the PoC")
         for row, what in self.pressure.add(messages, settings):
             self._find(messages, row, what)
         self.frames += len(messages)
-
-    def _judge_flag(self, messages: StructArray) -> None:
-        """POC_INVALID must be set exactly where the PoC is marked invalid."""
-        flagged = (messages["flags"] & wire.FrameFlags.POC_INVALID) != 0
-        marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
-        skipped = not_asked(messages, messages["poc_um"])
-        for k in np.flatnonzero((flagged != marked) & ~skipped):
-            self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
 
     def _judge_model(self, messages: StructArray) -> None:
         """With a force POPULATION must be set, and OUTSIDE exactly where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
         signals = tared(messages["counts"], messages["tare_q4"])
         unlike = population.likeness(signals.e, population.pattern_weights()).outside
-        outside = np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
-        wanted = wire.FrameFlags.POPULATION | outside
+        wanted = wire.FrameFlags.POPULATION | np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
-        for k in np.flatnonzero(made & (seen != wanted)):
-            self._find(messages, int(k), "POPULATION or OUTSIDE contradicts the signals")
+        self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
+
+    def _find_all(self, messages: StructArray, wrong: NDArray[np.bool_], what: str) -> None:
+        for k in np.flatnonzero(wrong):
+            self._find(messages, int(k), what)
 
     def _find(self, messages: StructArray, k: int, what: str) -> None:
         self.violations += 1
@@ -186,16 +180,8 @@ class CrossCheck:
             place = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
             self.findings.append(f"{place}: {what}")
 
-    def _judge(
-        self,
-        name: str,
-        unit: str,
-        messages: StructArray,
-        sent: NDArray[Any],
-        truth: NDArray[np.float64],
-        error: NDArray[np.float64],
-        bound: NDArray[np.float64] | float,
-    ) -> None:
+    def _judge(self, messages: StructArray, quantity: Quantity, error: NDArray[np.float64]) -> None:
+        name, unit, sent, _, truth, bound = quantity
         one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
         outside = np.any(error > bound, axis=1)
         for k in np.flatnonzero(one_sided | outside):

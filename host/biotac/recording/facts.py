@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import struct
 from collections.abc import Mapping
@@ -38,28 +39,25 @@ class Facts:
     def read(cls, metadata: Mapping[str, str]) -> Facts:
         """Facts from a recording's metadata. Raises ValueError if it is damaged."""
         try:
-            facts = cls._read(metadata)
+            named = json.loads(metadata["settings"])
+            own, maps = (json.loads(metadata.get(name, "{}")) for name in ("calibrations", "maps"))
+            facts = cls(
+                wire.Hello(**_tuples({"image_crc32": NO_IMAGE} | json.loads(metadata["hello"]))),
+                [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
+                # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
+                {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
+                {int(finger): from_dict(calibration) for finger, calibration in own.items()},
+                {int(finger): as_blob(base64.b64decode(blob, validate=True)) for finger, blob in maps.items()},
+                layout.names_of(metadata),
+            )
             messages: list[Any] = [facts.info, *facts.sensors]
             for message in messages:
                 message.pack()  # so that every number fits its field, and every text has its length
             return facts
+        except InputError as error:
+            raise ValueError(error) from error
         except (KeyError, TypeError, AttributeError, RecursionError, OverflowError, struct.error) as error:
             raise ValueError(f"{type(error).__name__}: {error}") from error
-
-    @classmethod
-    def _read(cls, metadata: Mapping[str, str]) -> Facts:
-        hello: dict[str, Any] = {"image_crc32": NO_IMAGE} | json.loads(metadata["hello"])
-        named = json.loads(metadata["settings"])
-        own = json.loads(metadata.get("calibrations", "{}"))
-        return cls(
-            wire.Hello(**_tuples(hello)),
-            [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
-            # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
-            {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
-            {int(finger): from_dict(facts) for finger, facts in own.items()},
-            _maps(metadata.get("maps", "{}")),
-            layout.names_of(metadata),
-        )
 
     def metadata(self, port: str) -> dict[str, str]:
         """The metadata record: everything needed to read and interpret the wire later."""
@@ -83,14 +81,6 @@ def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: 
         "calibrations": json.dumps({finger: to_dict(own) for finger, own in calibrations.items()}),
         "maps": layout.maps_text(maps),
     }
-
-
-def _maps(text: str) -> dict[int, bytes]:
-    """Maps by finger from their JSON text. Raises ValueError if one is invalid."""
-    try:
-        return {finger: as_blob(data) for finger, data in layout.maps_of(text).items()}
-    except InputError as error:
-        raise ValueError(error) from error
 
 
 def _tuples(fields: dict[str, Any]) -> dict[str, Any]:

@@ -29,40 +29,36 @@ class RecordingFile:
     """A recording being written to ``stream``. Closing it closes ``stream``, as does a failure to begin it."""
 
     def __init__(self, stream: BinaryIO, metadata: dict[str, str]) -> None:
-        self._stream = stream
+        self.stream = stream
         self._sequence = 0
-        try:
-            self._begin(metadata)
-        except OSError:
-            with contextlib.suppress(OSError):  # the disk is still full
-                stream.close()
-            raise
-
-    def _begin(self, metadata: dict[str, str]) -> None:
-        self._writer = Writer(
-            self._stream,
-            chunk_size=_CHUNK_BYTES,
-            compression=CompressionType.ZSTD,
-            index_types=IndexType.ALL,
-            enable_data_crcs=True,
-        )
-        self._writer.start(profile="", library=f"biotac-gateway {__version__}")
         self._tail = b""  # of a message whose end has not arrived yet
         self._gaps: list[dict[str, Any]] = []  # to be written with the next block
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
         self._last_ns: int | None = None  # when the last block's bytes had all arrived
         self.frames = 0  #: FRAMEs written so far
-        wire_schema = (BUILT / "schema.json").read_bytes()
-        self._packets_schema = self._writer.register_schema(
-            layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, wire_schema
-        )
-        self._table_schema = self._writer.register_schema(layout.TABLE_SCHEMA, layout.TABLE_ENCODING, schema())
         self._channels: dict[str, int] = {}
-        self._plots = Plots(self._writer)
         self._metadata = layout.signed(metadata)
-        self._writer.add_metadata(layout.METADATA_NAME, self._metadata)
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        wire_schema = (BUILT / "schema.json").read_bytes()
+        writer = self._writer = Writer(
+            stream,
+            chunk_size=_CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL,
+            enable_data_crcs=True,
+        )
+        self._plots = Plots(writer)
+        try:
+            writer.start(profile="", library=f"biotac-gateway {__version__}")
+            names = layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING
+            self._packets_schema = writer.register_schema(*names, wire_schema)
+            self._table_schema = writer.register_schema(layout.TABLE_SCHEMA, layout.TABLE_ENCODING, schema())
+            writer.add_metadata(layout.METADATA_NAME, self._metadata)
+            writer.flush()  # type: ignore[no-untyped-call]
+        except OSError:
+            with contextlib.suppress(OSError):  # the disk is still full
+                stream.close()
+            raise
 
     @property
     def frames_lost(self) -> int:
@@ -122,18 +118,9 @@ class RecordingFile:
             self._writer.flush()  # type: ignore[no-untyped-call]
         self._sequence += 1
 
-    @property
-    def closed(self) -> bool:
-        """True when nothing more is written."""
-        return self._stream.closed
-
-    def fileno(self) -> int:
-        """File descriptor of the file."""
-        return self._stream.fileno()
-
     def close(self) -> None:
         """Write the file's index. Safe to call twice."""
-        if self._stream.closed:
+        if self.stream.closed:
             return
         try:
             if self._gaps:
@@ -143,4 +130,4 @@ class RecordingFile:
             self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
-            self._stream.close()  # also on a full disk, or the interpreter would try again at exit
+            self.stream.close()  # also on a full disk, or the interpreter would try again at exit

@@ -40,13 +40,8 @@ def frame_id(finger: int) -> str:
 
 
 def maps_text(maps: Mapping[int, bytes]) -> str:
-    """Maps by finger as text for the metadata; ``maps_of`` reads it."""
+    """Maps by finger as text for the metadata; Facts.read reads it."""
     return json.dumps({finger: base64.b64encode(blob).decode() for finger, blob in maps.items()})
-
-
-def maps_of(text: str) -> dict[int, bytes]:
-    """Inverse of maps_text. Raises ValueError for invalid text."""
-    return {int(finger): base64.b64decode(blob, validate=True) for finger, blob in json.loads(text).items()}
 
 
 def names_of(metadata: Mapping[str, str]) -> dict[str, int]:

@@ -20,53 +20,33 @@ FLAGS = "std_msgs/msg/UInt32"
 LOG = "rcl_interfaces/msg/Log"
 INFO, WARN = 20, 30  # levels of a log
 _LAST_S = 2**31 - 1  # that ROS's time can say, in 2038
-_RULE = "=" * 80 + "\n"
-_TIME = f"{_RULE}MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+#: Fields of the types that messages are made of.
+_FIELDS = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+    "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "std_msgs/MultiArrayDimension": "string label\nuint32 size\nuint32 stride\n",
+    "std_msgs/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n",
+}
 
+
+def _definition(fields: str, *parts: str) -> str:
+    return fields + "".join(f"{'=' * 80}\nMSG: {part}\n{_FIELDS[part]}" for part in parts)
+
+
+_LEVELS = "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
+_LOG_FIELDS = "uint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n"
+_ARRAY_PARTS = ("std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension")
+_HEADER_PARTS = ("std_msgs/Header", "builtin_interfaces/Time")
+_POSE_PARTS = ("geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion")
 #: ROS 2 message definitions by type name.
 SCHEMAS = {
-    ARRAY: f"""std_msgs/MultiArrayLayout layout
-float64[] data
-{_RULE}MSG: std_msgs/MultiArrayLayout
-std_msgs/MultiArrayDimension[] dim
-uint32 data_offset
-{_RULE}MSG: std_msgs/MultiArrayDimension
-string label
-uint32 size
-uint32 stride
-""",
-    POSE: f"""std_msgs/Header header
-geometry_msgs/Pose pose
-{_RULE}MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{_TIME}{_RULE}MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-{_RULE}MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-{_RULE}MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-""",
-    FLAGS: "uint32 data\n",
-    LOG: f"""byte DEBUG=10
-byte INFO=20
-byte WARN=30
-byte ERROR=40
-byte FATAL=50
-builtin_interfaces/Time stamp
-uint8 level
-string name
-string msg
-string file
-string function
-uint32 line
-{_TIME}""",
+    ARRAY: _definition("std_msgs/MultiArrayLayout layout\nfloat64[] data\n", *_ARRAY_PARTS),
+    POSE: _definition("std_msgs/Header header\ngeometry_msgs/Pose pose\n", *_HEADER_PARTS, *_POSE_PARTS),
+    FLAGS: _definition("uint32 data\n"),
+    LOG: _definition(f"{_LEVELS}builtin_interfaces/Time stamp\n{_LOG_FIELDS}", "builtin_interfaces/Time"),
 }
 
 

@@ -46,13 +46,13 @@ _LABELS = {
 
 
 class _Message(NamedTuple):
-    """A message to be written; ``encode`` builds its bytes, given its stamp in ns."""
+    """A message to be written: its bytes, or what builds them from its stamp in ns."""
 
     topic: str
     finger: int
     t_us: int
     seq: int
-    encode: Callable[[int], bytes]
+    data: bytes | Callable[[int], bytes]
 
 
 class Plots:
@@ -83,7 +83,8 @@ class Plots:
         stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
         for message, stamp_ns in zip(messages, np.maximum(stamps, 0).tolist(), strict=True):
             channel = self._channel(message.topic, f"/biotac/finger{message.finger}/{message.topic}")
-            self._writer.add_message(channel, stamp_ns, message.encode(stamp_ns), stamp_ns, message.seq)
+            data = message.data if isinstance(message.data, bytes) else message.data(stamp_ns)
+            self._writer.add_message(channel, stamp_ns, data, stamp_ns, message.seq)
 
     def gap(self, gap: Gap) -> None:
         """Write a log of a time without the board."""
@@ -96,7 +97,7 @@ class Plots:
         yield from _arrays("force", rows, np.column_stack([rows["force_n"], rows["pressure_force_n"]]))
         yield from _arrays("torque", rows, np.column_stack([rows["torque_nmm"], rows["torsion_nmm"]]) / 1000)
         for row in rows:
-            yield _Message("flags", *_whose(row), partial(_ignoring_stamp, plot_ros.flags(int(row["flags"]))))
+            yield _Message("flags", *_whose(row), plot_ros.flags(int(row["flags"])))
         chosen = self._thinned("counts", frames)
         rows = frames[chosen]
         counts = np.column_stack([rows["counts"], rows["pdc"], rows["tac"], rows["tdc"]])
@@ -135,11 +136,7 @@ def _whose(row: Any) -> tuple[int, int, int]:
 
 def _arrays(topic: str, rows: StructArray, values: Any) -> Iterator[_Message]:
     for row, own in zip(rows, values, strict=True):
-        yield _Message(topic, *_whose(row), partial(_ignoring_stamp, plot_ros.array(_LABELS[topic], own)))
-
-
-def _ignoring_stamp(data: bytes, stamp_ns: int) -> bytes:
-    return data
+        yield _Message(topic, *_whose(row), plot_ros.array(_LABELS[topic], own))
 
 
 def _without_invalid(counts: Any) -> Any:
@@ -150,8 +147,8 @@ def _logs(batch: Batch, decoder: StreamDecoder) -> Iterator[_Message]:
     for message in batch.messages:
         if isinstance(message, (wire.Tare, wire.Event)):
             text = _tare_text(message) if isinstance(message, wire.Tare) else _event_text(message)
-            encode = partial(plot_ros.log, f"finger{message.finger}", text)
-            yield _Message("log", message.finger, decoder.unwrap_t_us(message.t_us), message.seq, encode)
+            log = partial(plot_ros.log, f"finger{message.finger}", text)
+            yield _Message("log", message.finger, decoder.unwrap_t_us(message.t_us), message.seq, log)
 
 
 def _tare_text(tare: wire.Tare) -> str:

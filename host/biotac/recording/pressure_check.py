@@ -65,25 +65,18 @@ class PressureCheck:
         error = np.abs(sent - truth)
         self.force_n_max = max(self.force_n_max, float(np.nanmax(error, initial=0.0)))
         one_sided = np.isnan(sent) != np.isnan(truth)
-        return [
-            (int(k), "force from pressure is valid on one side only")
-            if one_sided[k]
-            else (int(k), f"force from pressure off by {error[k] * 1e3:.4g} mN, bound {FORCE_BOUND_N * 1e3:.4g} mN")
-            for k in np.flatnonzero(one_sided | (error > FORCE_BOUND_N + SLACK))
-        ]
+        return _findings("force from pressure", "mN", 1e3, one_sided, error, FORCE_BOUND_N)
 
     def _filters(self, finger: int, rows: StructArray, at: NDArray[np.intp], settings: Settings) -> Findings:
         alpha = settings[wire.Setting.PRESSURE_FILTER_MILLI] / 1000
-        last = self._last.get(finger)
+        # Without a row before it, the first one follows itself, which no row does.
+        before = np.concatenate([self._last.get(finger, rows[:1]), rows[:-1]])
         self._last[finger] = rows[-1:]
-        known = last is not None
-        before = np.concatenate([last if last is not None else rows[:1], rows[:-1]])
         follows = (rows["seq"] - before["seq"] == 1) & (rows["t_us"] - before["t_us"] < 1.5 * ROUND_US)
-        follows[0] &= known
         good, good_before = usable(rows["pdc"]), usable(before["pdc"])
         sent = to_units(rows["pdc_filtered_q4"], Q4_PER_COUNT)
-        told_before = to_units(before["pdc_filtered_q4"], Q4_PER_COUNT)
-        truth = np.where(good_before, alpha * rows["pdc"] + (1.0 - alpha) * told_before, rows["pdc"])
+        sent_before = to_units(before["pdc_filtered_q4"], Q4_PER_COUNT)
+        truth = np.where(good_before, alpha * rows["pdc"] + (1.0 - alpha) * sent_before, rows["pdc"])
         not_asked = np.isnan(sent) & ((rows["flags"] & wire.FrameFlags.NOT_ASKED) != 0)
         one_sided = (np.isnan(sent) == good) & ~not_asked
         checked = good & follows & ~np.isnan(sent) & ~np.isnan(truth)
@@ -93,9 +86,16 @@ class PressureCheck:
         if checked.any():
             self.filter_max = max(self.filter_max, float(error.max()))
             self.filter_bound = max(self.filter_bound, bound)
-        return [
-            (int(at[k]), "filtered pressure is valid on one side only")
-            if one_sided[k]
-            else (int(at[k]), f"filtered pressure off by {error[k]:.4g} counts, bound {bound:.4g} counts")
-            for k in np.flatnonzero(one_sided | (error > bound + SLACK))
-        ]
+        found = _findings("filtered pressure", "counts", 1, one_sided, error, bound)
+        return [(int(at[row]), what) for row, what in found]
+
+
+def _findings(
+    name: str, unit: str, scale: float, one_sided: NDArray[np.bool_], error: NDArray[np.float64], bound: float
+) -> Findings:
+    return [
+        (int(k), f"{name} is valid on one side only")
+        if one_sided[k]
+        else (int(k), f"{name} off by {error[k] * scale:.4g} {unit}, bound {bound * scale:.4g} {unit}")
+        for k in np.flatnonzero(one_sided | (error > bound + SLACK))
+    ]

@@ -14,19 +14,20 @@ from numpy.typing import NDArray
 
 from ..board.gap import Gap
 from ..clock import LAST_SAMPLE_US, DeviceClock
+from ..core.bands import bands_of
 from ..errors import RecordingError
 from ..keep.calibration import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import StreamDecoder
-from ..wire.frames import StructArray, frames_from_wire
+from ..wire.dtypes_gen import DTYPES
+from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire, frames_from_wire
 from ..wire.messages_gen import Setting
 from . import layout
-from .bands import recorded_bands
 from .block import FRAME, IDLE, PAC, ROWS, Packet, as_sent
 from .blocks import Block, Blocks, lost_between
 from .facts import Facts
 from .layout import finger_of
-from .stamps import Stamps
+from .stamps import Stamps, unwrapped_us
 from .tabular import to_pandas, to_xarray
 
 
@@ -119,7 +120,16 @@ class Recording:
     @cached_property
     def bands(self) -> StructArray:
         """Energy of PAC per octave, BANDS_DTYPE (n,), finger by finger: as recorded, or else computed from ``pac``."""
-        return recorded_bands(self.pac, self.messages, self.begin_us)
+        recorded = [message for message in self.messages if isinstance(message, wire.Bands)]
+        parts = [np.empty(0, BANDS_DTYPE)]
+        for finger in sorted({m.finger for m in recorded} | set(np.unique(self.pac["finger"]).tolist())):
+            sent = np.frombuffer(b"".join(m.pack() for m in recorded if m.finger == finger), DTYPES[wire.Bands.ID])
+            if len(sent):
+                seq = np.unwrap(sent["seq"].astype(np.int64), period=2**16)
+                parts.append(bands_from_wire(sent, seq, unwrapped_us(self.begin_us, sent["t_us"])))
+            else:
+                parts.append(bands_of(self.pac[self.pac["finger"] == finger]))
+        return np.concatenate(parts)
 
     @cached_property
     def blocks(self) -> list[bytes]:
@@ -177,10 +187,10 @@ class Recording:
         try:
             gap = Gap(**facts)
             self.problems.append(gap.words())
+            return gap
         except TypeError as error:
             self.problems.append(f"a gap is marked in {self.path.name}, but its entry is damaged ({error})")
             return None
-        return gap
 
     def _without_metadata(self, damaged: bool) -> str:
         if damaged:
@@ -243,8 +253,7 @@ class Recording:
         numbers = {block.number for block in self._blocks}
         if not self.problems and len(numbers) != max(numbers, default=-1) + 1:
             self.problems.append(f"{self.path.name} is damaged: seconds of it are missing")
-        counts = self.counts
-        if counts.bad:
+        if (counts := self.counts).bad:
             self.problems.append(
                 f"{counts.bad} packet(s) rejected: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"

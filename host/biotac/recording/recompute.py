@@ -32,20 +32,8 @@ Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
 
 #: Settings used by the maths after the tare; all others act on the tare machine and the stream.
-RESULT_SETTINGS = frozenset(
-    {
-        wire.Setting.POC_WEIGHTS,
-        wire.Setting.FORCE_GAIN_X_NN,
-        wire.Setting.FORCE_GAIN_Y_NN,
-        wire.Setting.FORCE_GAIN_Z_NN,
-        wire.Setting.TORQUE_GAIN_Y_NN,
-        wire.Setting.TORQUE_GAIN_Z_NN,
-        wire.Setting.PRESSURE_GAIN_NN,
-        wire.Setting.FORCE_MODEL,
-    }
-)
+RESULT_SETTINGS = {wire.Setting.FORCE_MODEL, *wire.CALIBRATION_SETTINGS} - {wire.Setting.THERMAL_GAIN_MILLI}
 _KERNEL_FLAGS = wire.FrameFlags.POC_INVALID | wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
-_HOST_REASONS = (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET)
 _ACTIVE_Q4: int = lib.bt_active_q4()
 _ACTIVE_FOR_TORSION: int = lib.bt_active_for_torsion()
 
@@ -78,11 +66,15 @@ def recompute(
     calibrations = {finger: calibration.changed(changes) for finger, calibration in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
     board_maps = {f: opened(own_map) for f, own_map in (recording.maps if maps is None else maps).items()}
-    _check_maps(recording, board_maps)
+    for finger in np.unique(recording.wire["finger"][(recording.wire["flags"] & wire.FrameFlags.MAPPED) != 0]).tolist():
+        if finger not in board_maps:
+            raise InputError(
+                f"finger {finger} of {recording.path} used a wrench map that is not available; expected that "
+                "map: record again with the board that has it"
+            )
     notes: list[str] = []
     if keep_tare:
-        idle = sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS)
-        if idle:
+        if idle := sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS):
             raise InputError(f"{idle[0]} has no effect when tares are kept; omit --keep-tare")
         new, tares = _with_kept_tares(recording, settings, own, board_maps), None
         show(0.5)
@@ -98,16 +90,6 @@ def recompute(
     metadata = recording.metadata | in_force(settings, calibrations, blobs) | {"recomputed": json.dumps(made)}
     _write(recording, out, metadata, new, tares, lambda share: show(0.5 + share / 2))
     return notes
-
-
-def _check_maps(recording: Recording, maps: Mapping[int, BoardMap]) -> None:
-    mapped = np.unique(recording.wire["finger"][(recording.wire["flags"] & wire.FrameFlags.MAPPED) != 0])
-    missing = [int(finger) for finger in mapped if int(finger) not in maps]
-    if missing:
-        raise InputError(
-            f"finger {missing[0]} of {recording.path} used a wrench map that is not available; expected that "
-            "map: record again with the board that has it"
-        )
 
 
 def _with_kept_tares(
@@ -138,11 +120,9 @@ def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | Non
     frames["pressure_force_100un"] = pressure_force_100un(
         frames["pdc_filtered_q4"], frames["pdc_tare_q4"], settings[wire.Setting.PRESSURE_GAIN_NN]
     )
-    flags = frames["flags"] & ~np.uint32(
-        _KERNEL_FLAGS | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED | wire.FrameFlags.MAPPED
-    )
+    computed = _KERNEL_FLAGS | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED | wire.FrameFlags.MAPPED
+    flags = frames["flags"] & ~np.uint32(computed) | kernel_flags & np.uint32(_KERNEL_FLAGS)
     flags |= np.uint32(0 if own_map is None else wire.FrameFlags.MAPPED)
-    flags |= kernel_flags & np.uint32(_KERNEL_FLAGS)
     flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
     frames["flags"] = flags
     return frames
@@ -211,18 +191,28 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     finger = int(sent["finger"][0])
     row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
     tares: dict[int, HostTare] = {}
+    # Hold, release and lapsed hold of the finger, by row: from the flag HELD, release from its TARE message.
+    edges = np.diff(((sent["flags"] & wire.FrameFlags.HELD) != 0).astype(np.int8), prepend=np.int8(0))
+    words = {
+        int(row): wire.TareReason.HOST_HOLD if edges[row] > 0 else wire.TareReason.HOLD_LAPSED
+        for row in np.flatnonzero(edges)
+    }
     for message in recording.messages:
-        if isinstance(message, wire.Tare) and message.finger == finger and message.reason in _HOST_REASONS:
+        if not isinstance(message, wire.Tare) or message.finger != finger or message.seq not in row_of:
+            continue
+        row = row_of[message.seq]
+        if message.reason == wire.TareReason.HOST_RELEASE:
+            words[row] = wire.TareReason.HOST_RELEASE
+        elif message.reason in (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET):
             q16 = np.array([*message.tare_q16, message.pdc_tare_q16])
             counts = np.where(q16 == INVALID_U32, np.nan, q16 / 65536)
-            _give(tares, row_of.get(message.seq), counts, message.reason == wire.TareReason.HOST_NOW)
+            _give(tares, row, counts, message.reason == wire.TareReason.HOST_NOW)
     if 0 not in tares and not int(sent["flags"][0]) & wire.FrameFlags.UNTARED:
         q4 = np.append(sent["tare_q4"][0], sent["pdc_tare_q4"][0])
         _give(tares, 0, np.where(q4 == wire.INVALID_COUNT, np.nan, q4 / 16), False)
         notes.append(
             f"finger {finger} was tared before the recording began; its first frame's tare is used at the start"
         )
-    words = _host_words(recording, sent, row_of)
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
@@ -231,26 +221,9 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     )
 
 
-def _host_words(recording: Recording, sent: StructArray, row_of: Mapping[int, int]) -> dict[int, wire.TareReason]:
-    """Hold, release and lapsed hold of a finger, by row: from the flag HELD, RELEASE from its TARE message."""
-    held = (sent["flags"] & wire.FrameFlags.HELD) != 0
-    edges = np.diff(held.astype(np.int8), prepend=np.int8(0))
-    words = {
-        int(row): wire.TareReason.HOST_HOLD if edges[row] > 0 else wire.TareReason.HOLD_LAPSED
-        for row in np.flatnonzero(edges)
-    }
-    finger = int(sent["finger"][0])
-    for message in recording.messages:
-        if isinstance(message, wire.Tare) and message.finger == finger:
-            row = row_of.get(message.seq)
-            if row is not None and message.reason == wire.TareReason.HOST_RELEASE:
-                words[row] = wire.TareReason.HOST_RELEASE
-    return words
-
-
-def _give(tares: dict[int, HostTare], row: int | None, values: NDArray[np.float64], now: bool) -> None:
+def _give(tares: dict[int, HostTare], row: int, values: NDArray[np.float64], now: bool) -> None:
     """Add a tare of 19 electrodes and pressure to ``tares``; one without all electrodes cannot be set again."""
-    if row is not None and not np.isnan(values[:-1]).any():
+    if not np.isnan(values[:-1]).any():
         tares[row] = HostTare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]), now)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -35,12 +36,10 @@ class HostTare:
 
     def give(self, finger: Finger) -> None:
         """Set it on ``finger``; if that has no means to tare now, it gets those that the board took."""
-        try:
+        with suppress(CommandRefusedError):
             if self.now:
                 finger.tare_now()
                 return
-        except CommandRefusedError:
-            pass
         finger.set_tare(self.counts, self.pdc)
 
 

@@ -36,7 +36,7 @@ _HEAD_BYTES = 9  # of a record: opcode, length
 _START = struct.Struct("<BQH")  # a record's head, and the channel that a message index begins with
 # As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
 _CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
-_DATA_END, _FOOTER = int(Opcode.DATA_END), int(Opcode.FOOTER)
+_FOOTER = int(Opcode.FOOTER)
 _FOOTER_BYTES = _HEAD_BYTES + 16  # the part of the footer that its checksum covers, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
@@ -54,13 +54,12 @@ def _content(stream: BinaryIO, at: int, length: int) -> ReadDataStream:
 
 
 def _crc32(stream: BinaryIO, begin: int, end: int) -> int:
-    """CRC-32 of the file's bytes from begin to end; leaves the stream's position as it was."""
-    here, crc = stream.tell(), 0
+    """CRC-32 of the file's bytes from begin to end."""
+    crc = 0
     stream.seek(begin)
     while begin < end and (data := stream.read(min(end - begin, 1 << 20))):
         crc = zlib.crc32(data, crc)
         begin += len(data)
-    stream.seek(here)
     return crc
 
 
@@ -124,12 +123,13 @@ class Scan:
                 if opcode == _CHUNK and whole:
                     held, channels = (at, length), set()
                 else:
-                    if whole and opcode in (_DATA_END, _FOOTER):
-                        self._prove(stream, opcode, at, length)
+                    record = self._read(opcode, _content(stream, at, length)) if whole and opcode in _READ else None
+                    if isinstance(record, (DataEnd, Footer)):
+                        self._prove(stream, record, at, length)
+                    elif record is not None:
+                        yield from self._take([record])
                     if not whole or opcode == _FOOTER:
                         break
-                    if opcode in _READ and opcode != _DATA_END:
-                        yield from self._one(opcode, _content(stream, at, length))
                 good_until = at + length
                 self.share = good_until / self._size
                 stream.seek(good_until)
@@ -144,22 +144,19 @@ class Scan:
                 f"{self.path.name} is damaged: it lacks its statistics or end record, so losses may go unnoticed"
             )
 
-    def _prove(self, stream: BinaryIO, opcode: int, at: int, length: int) -> None:
-        """Verify the checksum in a DataEnd or Footer; 0 means that the program that wrote it made none."""
-        record = self._read(opcode, _content(stream, at, length))
+    def _prove(self, stream: BinaryIO, record: DataEnd | Footer, at: int, length: int) -> None:
+        """Verify the checksum in ``record``; 0 means that the program that wrote it made none."""
         if isinstance(record, DataEnd):
             self._data_end = at + length
-            begin, end, expected = 0, at - _HEAD_BYTES, record.data_section_crc
-        elif isinstance(record, Footer):
-            begin, end, expected = record.summary_start, at - _HEAD_BYTES + _FOOTER_BYTES, record.summary_crc
+            what, begin, end, expected = "records", 0, at - _HEAD_BYTES, record.data_section_crc
+        else:
+            what, begin, expected = "index", record.summary_start, record.summary_crc
+            end = at - _HEAD_BYTES + _FOOTER_BYTES
             if begin != self._data_end:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return
-        else:
-            return
         if self._check and expected and _crc32(stream, begin, end) != expected:
             self.wrong_checksums += 1
-            what = "records" if opcode == Opcode.DATA_END else "index"
             self.problems.append(f"{self.path.name} is damaged: the checksum of its {what} is wrong")
 
     def _read(self, opcode: int, content: ReadDataStream) -> Any:
@@ -170,19 +167,12 @@ class Scan:
             self.problems.append(f"a record of {self.path.name} is damaged and was skipped ({error})")
             return None
 
-    def _one(self, opcode: int, content: ReadDataStream) -> Iterator[Metadata | tuple[str, Message]]:
-        record = self._read(opcode, content)
-        if record is None:
-            return
-        if isinstance(record, Metadata):
-            self._metadata += 1
-            yield record
-        else:
-            yield from self._take([record])
-
-    def _take(self, records: Iterable[McapRecord]) -> Iterator[tuple[str, Message]]:
+    def _take(self, records: Iterable[McapRecord]) -> Iterator[Metadata | tuple[str, Message]]:
         for record in records:
-            if isinstance(record, Schema):
+            if isinstance(record, Metadata):
+                self._metadata += 1
+                yield record
+            elif isinstance(record, Schema):
                 self._schema.setdefault(record.id, record.data)
             elif isinstance(record, Channel):
                 self._topics[record.id] = record.topic
@@ -213,7 +203,9 @@ class Scan:
                 f"{sum(expected.get(channel, 0) for channel in wanted)}: the file is damaged"
             )
 
-    def _open(self, stream: BinaryIO, at: int, length: int, *, unwanted: bool) -> Iterator[tuple[str, Message]]:
+    def _open(
+        self, stream: BinaryIO, at: int, length: int, *, unwanted: bool
+    ) -> Iterator[Metadata | tuple[str, Message]]:
         try:
             chunk = Chunk.read(_content(stream, at, length))
             self._weigh(chunk)

@@ -6,10 +6,8 @@ import os
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, RecordingError, RecordingWarning, printable
 from ..wire.fields import FRAME_FIELDS, Field, dtype_of, values_of
@@ -53,7 +51,9 @@ def load(
         if begin_us is None:
             continue
         rows = block.rows[FRAME]
-        inside = _within(rows["t_us"], begin_us, start_s, stop_s)
+        inside = rows["t_us"] >= begin_us + start_s * 1e6
+        if stop_s is not None:
+            inside &= rows["t_us"] < begin_us + stop_s * 1e6
         rows = rows if inside.all() else rows[inside]
         out = np.empty(len(rows), dtype)
         for field in chosen:
@@ -76,8 +76,7 @@ def _fingers(path: Path, fingers: Iterable[int | str]) -> set[int]:
     names: dict[str, int] = {}
     if any(isinstance(finger, str) for finger in wanted):
         blocks = Blocks(path, {}, (), check=False)
-        for _ in blocks:
-            break
+        next(iter(blocks), None)
         try:
             names = layout.names_of(blocks.metadata or {})
         except (TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
@@ -86,11 +85,6 @@ def _fingers(path: Path, fingers: Iterable[int | str]) -> set[int]:
         return {layout.finger_of(finger, names) for finger in wanted}
     except KeyError as error:
         raise InputError(f"{path}: {error.args[0]}") from None
-
-
-def _within(t_us: NDArray[Any], begin_us: int, start_s: float, stop_s: float | None) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = t_us >= begin_us + start_s * 1e6
-    return inside if stop_s is None else inside & (t_us < begin_us + stop_s * 1e6)
 
 
 def _check(blocks: Blocks, path: Path, gaps: int) -> None:

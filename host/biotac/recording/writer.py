@@ -79,7 +79,7 @@ class Writer:
 
         Does nothing once closed: the stream may outlast the recording.
         """
-        if self._file.closed:
+        if self.closed:
             return
         if self._skip_to_delimiter:
             _, delimiter, chunk = chunk.partition(b"\0")
@@ -103,7 +103,7 @@ class Writer:
 
     def write_gap(self, gap: Gap) -> None:
         """Record that the board was away, before the bytes that come next."""
-        if not self._file.closed:
+        if not self.closed:
             self.flush()
             self._file.add_gap(gap)
 
@@ -122,7 +122,7 @@ class Writer:
 
         Raises OSError when that fails, or when the file was deleted: its contents would be lost when it is closed.
         """
-        if os.fstat(self.fileno()).st_nlink == 0:
+        if os.fstat(self._file.stream.fileno()).st_nlink == 0:
             self._file.close()  # so that this is reported only once
             raise FileNotFoundError(errno.ENOENT, "was deleted during recording", str(self.path))
         self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns())
@@ -131,15 +131,11 @@ class Writer:
     @property
     def closed(self) -> bool:
         """True when nothing more is written."""
-        return self._file.closed
-
-    def fileno(self) -> int:
-        """File descriptor of the file being written."""
-        return self._file.fileno()
+        return self._file.stream.closed
 
     def close(self) -> None:
         """Write the last block and the file's index. Safe to call twice."""
-        if self._file.closed:
+        if self.closed:
             return
         try:
             self.flush()

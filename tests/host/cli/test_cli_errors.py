@@ -29,6 +29,10 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
 NO_PORT = "/dev/ttyNOWHERE7"
+PORTS = (
+    "a device path, serial:NUMBER, uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, "
+    "sim:SOURCE, emu:pico, replay:REC or zenoh:NAME"
+)
 #: Verbs with no BiotacError of their own, and why.
 NEVER = {
     "list": "a port that fails is a fact of its own line",
@@ -85,11 +89,14 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected a scenario's path or one of", "demo nowhere.toml --out +out"),
     (2, "expected 1 to 5", "demo press.toml --fingers 9 --out +out"),
     (2, "check the path", "demo +no.npz --out +out"),
+    (2, "nowhere.btd", "demo nowhere.btd --out +out"),
+    (2, "data.csv", "demo data.csv --out +out"),
     (2, "choose another --out", "demo press.toml --seconds 1 --out @list.json"),
     (2, "add one", "demo @bad.toml --out +out"),
     (3, "`biotac list`", f"info {NO_PORT}"),
     (3, "plug one in", "info serial:FFFF"),
-    (3, "expected a device path", "info telnet:1"),
+    (3, f"expected {PORTS}", "info telnet:1"),
+    (3, f"expected {PORTS}", "stream telnet:1"),
     (3, "expected BUS.DEVICE", "info spidev:zero"),
     (3, "expected emu:pico", "info emu:teensy?source=press.toml"),
     (3, "expected sim:SOURCE?pace=X&fingers=N", "info sim:press.toml?finger=2"),

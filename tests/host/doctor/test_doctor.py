@@ -19,7 +19,7 @@ from biotac import HandWarning
 from biotac.cli.main import main
 from biotac.clock import Fit
 from biotac.doctor import CATALOGUE, BoardFacts, Facts, PairFacts, SystemFacts, judge, leads, udev
-from biotac.doctor.version import release
+from biotac.doctor.connection import release
 from biotac.errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
 from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder

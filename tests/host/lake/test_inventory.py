@@ -89,8 +89,3 @@ def test_two_recordings_are_no_history(first, tmp_path, capsys) -> None:
     assert sensor["findings"] == []
     assert main(["lake", "inventory", str(lake)]) == 0
     assert ": no history yet\n" in capsys.readouterr().out
-
-
-def test_no_lake_is_one_line(tmp_path, capsys) -> None:
-    assert main(["lake", "inventory", str(tmp_path)]) == 2
-    assert "is not a lake" in capsys.readouterr().err

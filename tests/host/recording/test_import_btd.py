@@ -97,13 +97,6 @@ def test_an_interrupted_import_leaves_nothing(imported, tmp_path, capsys, monkey
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_no_btd_is_refused(tmp_path, capsys) -> None:
-    (tmp_path / "a.btd").write_text("nothing")
-    assert main(["export", str(tmp_path / "a.btd"), str(tmp_path / "b.mcap")]) == 2
-    assert "Begin File" in capsys.readouterr().err
-    assert not (tmp_path / "b.mcap").exists()
-
-
 def test_a_real_file_with_gaps(tmp_path) -> None:
     if not DATA.exists():
         pytest.skip(f"needs a recording whose licence keeps it out of this project; not at {DATA}")

@@ -123,10 +123,8 @@ def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: 
 def test_settings_come_from_a_file(folder, recorded, capsys) -> None:
     (folder / "s.json").write_text(json.dumps({"settings": {"force_gain_z_nn": 4_524_468}}))
     out = folder / "gain.mcap"
-    assert (
-        main(["export", "--recompute", str(recorded.path), str(out), "--settings", str(folder / "s.json"), "--json"])
-        == 0
-    )
+    words = ["export", "--recompute", str(recorded.path), str(out)]
+    assert main([*words, "--settings", str(folder / "s.json"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == len(recorded.frames)
     new = biotac.Recording(out)
     truth = reference_q4(new.wire["counts"], new.wire["tare_q4"], new.settings)
@@ -190,19 +188,8 @@ def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
 )
 def test_settings_that_are_none_are_refused(folder, recorded, capsys, text: str, seen: str) -> None:
     (folder / "bad.json").write_text(text)
-    assert (
-        main(
-            [
-                "export",
-                "--recompute",
-                str(recorded.path),
-                str(folder / "x.mcap"),
-                "--settings",
-                str(folder / "bad.json"),
-            ]
-        )
-        == 2
-    )
+    words = ["export", "--recompute", str(recorded.path), str(folder / "x.mcap")]
+    assert main([*words, "--settings", str(folder / "bad.json")]) == 2
     error = capsys.readouterr().err
     assert seen in error and error.count("\n") == 1
     assert not (folder / "x.mcap").exists()

@@ -186,12 +186,6 @@ def test_a_file_that_is_no_recording_exits_2_in_one_line(tmp_path, content: byte
     assert done.stderr.count("\n") == 1
 
 
-def test_a_missing_file_exits_2(tmp_path) -> None:
-    done = check(tmp_path / "nowhere.mcap")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "No such file" in done.stderr
-
-
 def test_a_finger_that_told_only_bands_is_there(recorded, tmp_path) -> None:
     bands = wire.Bands(3, 30_227, 1, 22, (1, 2, 3, 4, 5, 6))
     rewrite(recorded[0], tmp_path / "bands.mcap", lambda _: encode(bands.ID, bands.pack()))
@@ -266,13 +260,6 @@ def test_a_damaged_second_is_left_out_and_counted(recorded, tmp_path, part: str)
     done = check(damaged)
     assert done.returncode == 1
     assert "damaged and was skipped" in done.stderr
-
-
-def test_an_existing_recording_is_not_overwritten(recorded) -> None:
-    before = recorded[0].read_bytes()
-    with biotac.open("sim:drift.toml?seconds=1") as hand, pytest.raises(biotac.InputError, match=r"exists.*--force"):
-        hand.record(recorded[0])
-    assert recorded[0].read_bytes() == before
 
 
 def facts_of(recording: biotac.Recording) -> Facts:

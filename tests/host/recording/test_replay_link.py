@@ -226,8 +226,3 @@ def test_another_kind_of_file_is_refused(tmp_path) -> None:
     (tmp_path / "a.txt").write_text("hello, I am no recording")
     with pytest.raises(biotac.RecordingError, match="not an MCAP file"):
         open_link(f"replay:{tmp_path / 'a.txt'}")
-
-
-def test_a_link_needs_a_pty(recorded, tmp_path, capsys) -> None:
-    assert main(["replay", str(recorded[0]), "--link", str(tmp_path / "x")]) == 2
-    assert "add --pty" in capsys.readouterr().err

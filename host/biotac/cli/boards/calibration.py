@@ -52,33 +52,26 @@ def _write_calibration(board: Configuration, finger: int, calibration: Calibrati
     board.set_calibration(finger, replace(calibration, serial="") if force else calibration)
 
 
-def _write_map(board: Configuration, finger: int, blob: bytes, force: bool) -> None:
-    board.set_map(finger, blob, force=force)
-
-
 def _title(calibration: Calibration) -> str:
     sensor = f"sensor {calibration.serial}" if calibration.serial else "any sensor"
     return f"for {sensor}, {made_text(calibration.made_s)}"
 
 
-def _lines(calibration: Calibration) -> list[str]:
-    return [f"  {setting_text(setting, value)}" for setting, value in calibration.settings().items()]
-
-
 KINDS = {
     "calibration": Kind(
         "calibration", calibration_file, Configuration.calibration, Configuration.calibration_state,
-        _write_calibration, Configuration.clear_calibration, _title, _lines,
+        _write_calibration, Configuration.clear_calibration, _title,
+        lambda content: [f"  {setting_text(setting, value)}" for setting, value in content.settings().items()],
     ),
     "map": Kind(
         "wrench map", map_file, Configuration.get_map, Configuration.map_state,
-        _write_map, Configuration.clear_map, map_file.title,
+        lambda board, finger, blob, force: board.set_map(finger, blob, force=force),
+        Configuration.clear_map, map_file.title,
     ),
 }  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the subverbs, each with its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
 
     def add(name: str, action: Callable[..., int], text: str, example: str) -> argparse.ArgumentParser:

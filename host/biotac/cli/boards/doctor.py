@@ -32,7 +32,6 @@ Exit code 0: healthy; 1: there are findings. Their codes are fixed:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, time and the expected number of sensors."""
     parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
@@ -65,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def udev_rule(args: argparse.Namespace) -> int:
-    """Install the rule or print it."""
     installed, text = args.udev_rule == "install", udev.rule().rstrip()
     if installed:
         udev.install()
@@ -85,13 +83,13 @@ def examine_pair(port: str | None, sensor_port: str, seconds: float) -> Facts:
 
 def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
     """The result as JSON types."""
-    return {"port": facts.port, "measured": measured(facts), "findings": [as_facts(f) for f in findings]}
+    found = [{"code": f.code, "severity": f.entry.severity, "seen": f.seen} | vars(f.entry) for f in findings]
+    return {"port": facts.port, "measured": measured(facts), "findings": found}
 
 
 def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
     """The report to send in: the findings and the facts behind them, except the frames."""
     board = facts.board
-    told = {} if board is None else {**vars(board), "frames": len(board.frames), "idle": len(board.idle)}
     return {
         "library": __version__,
         "python": sys.version,
@@ -99,7 +97,7 @@ def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
         **summary(facts, findings),
         "system": vars(facts.system),
         "error": facts.error and str(facts.error),
-        "board": told,
+        "board": {**vars(board), "frames": len(board.frames), "idle": len(board.idle)} if board is not None else {},
         "sensor_board": facts.pair and vars(facts.pair),
     }
 
@@ -107,18 +105,6 @@ def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
 def plain(value: object) -> object:
     """A part of the facts as JSON types."""
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
-
-
-def as_facts(finding: Finding) -> dict[str, str]:
-    """A finding as JSON types."""
-    entry = finding.entry
-    return {
-        "code": finding.code,
-        "severity": entry.severity.value,
-        "seen": finding.seen,
-        "meaning": entry.meaning,
-        "cure": entry.cure,
-    }
 
 
 def measured(facts: Facts) -> dict[str, Any]:
@@ -141,13 +127,12 @@ def words(facts: Facts, findings: list[Finding]) -> str:
     """The result for people."""
     lines = []
     for finding in findings:
-        lines.append(f"{finding.entry.severity.value} {finding.code}: {finding.seen}")
+        lines.append(f"{finding.entry.severity} {finding.code}: {finding.seen}")
         for title, text in (("meaning", finding.entry.meaning), ("cure", finding.entry.cure)):
             lines.append(textwrap.fill(f"{title}: {text}", 100, initial_indent="    ", subsequent_indent="    "))
         if finding.code == "no_permission":
             lines.append(textwrap.indent(udev.rule().rstrip(), "    "))
-    seen = measured(facts)
-    if seen:
+    if seen := measured(facts):
         rates = ", ".join(f"finger {f}: {r:.0f} slots per second" for f, r in seen["slots_per_s"].items() if r)
         drift = ""
         if "drift_ppm" in seen:

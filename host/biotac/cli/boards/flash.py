@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FlashError, InputError, PortError
-from ...flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
+from ...flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
 from ...flash.image import find_image, note_text
 from ...flash.procedure import flash_every
 from ...wire.identity import serial_text, version_text
@@ -22,7 +22,6 @@ EMULATED = "emu:pico?source=press.toml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, image and what happens to the settings."""
     parser.add_argument(
         "port",
         metavar="PORT",
@@ -43,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Flash a board and print what it reports afterwards."""
     if args.backup is not None and args.no_backup:
         raise InputError("--backup and --no-backup contradict each other; use only one")
     port, path = sort_out(args.port, args.image, alone=args.emulated or args.all)
@@ -64,11 +62,12 @@ def run(args: argparse.Namespace) -> int:
 
 def how(args: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     """What one board and every board are flashed with."""
-
-    def show(done: int, of: int) -> None:
-        progress.show(f"{done} of {of} blocks")
-
-    return {"keep": not args.no_backup, "downgrade": args.downgrade, "say": say, "show": show}
+    return {
+        "keep": not args.no_backup,
+        "downgrade": args.downgrade,
+        "say": say,
+        "show": lambda done, of: progress.show(f"{done} of {of} blocks"),
+    }
 
 
 def say(text: str) -> None:
@@ -94,8 +93,7 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
             print(summary(result.outcome) if result.outcome else f"{result.port} already runs this image")
     if args.json:
         ends = [(result, facts(image, result.outcome) if result.outcome else {}) for result in results]
-        told = [{"port": end.port, "error": end.error and str(end.error), **outcome} for end, outcome in ends]
-        print(json.dumps(told))
+        print(json.dumps([{"port": end.port, "error": end.error and str(end.error), **more} for end, more in ends]))
     failed = [result.port for result in results if result.error is not None]
     if failed:
         raise FlashError(f"{len(failed)} of {len(results)} boards were not flashed: {', '.join(failed)}; see above")
@@ -138,7 +136,6 @@ def usb_loaders() -> list[Loader]:
 
 
 def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
-    """The outcome as JSON types."""
     before, settings = outcome.before, outcome.settings
     return {
         "image": str(image.path),
@@ -155,15 +152,7 @@ def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def known(backup: Backup, settings: Restored) -> str:
-    """How many of a backup's settings, calibrations and maps the firmware knows."""
-    more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
-    count = len(backup.values) + sum(more.values()) - len(settings.unknown)
-    return f"{count} {', '.join(['settings', *(name for name, held in more.items() if held)])}"
-
-
 def summary(outcome: Outcome) -> str:
-    """The outcome for people."""
     after, settings = outcome.after, outcome.settings
     lines = [
         f"{outcome.port} runs firmware {version_text(after)}, boot {after.boot_id:08x}, serial {serial_text(after)}"
@@ -171,9 +160,12 @@ def summary(outcome: Outcome) -> str:
     if settings is None or outcome.backup is None:
         lines.append("no settings were backed up or restored; the board uses those in its flash")
     else:
-        changed = ", ".join(settings.changed)
-        lines.append(f"all {known(outcome.backup, settings)} match {outcome.backup.path}")
+        changed, backup = ", ".join(settings.changed), outcome.backup
+        more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
+        kinds = ", ".join(["settings", *(name for name, held in more.items() if held)])
+        count = len(backup.values) + sum(more.values()) - len(settings.unknown)
+        lines.append(f"all {count} {kinds} match {backup.path}")
         lines[-1] += f"; restored and saved: {changed}" if changed else ", nothing had to be restored"
         if settings.unknown:
-            lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {outcome.backup.path}")
+            lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {backup.path}")
     return "\n".join(lines)

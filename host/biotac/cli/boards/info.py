@@ -21,12 +21,10 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the port."""
     values.add_port(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what the board reports about itself."""
     with biotac.open(args.port) as hand:
         hello = hand.info
         sensors = [hand.sensor_info(f) for f in hand.fingers]

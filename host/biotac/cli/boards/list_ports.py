@@ -11,16 +11,14 @@ from ...hand.hand import Hand
 from ...link import open_link
 from ...link.discovery import SerialPort, serial_ports
 from ...sim.loading import bundled_scenarios
-from ...wire import messages_gen as wire
 from ...wire.identity import board_text, serial_text, version_text
 from ..outputs import say
 
 EXAMPLE = "biotac list"
-NO_DESCRIPTION = "n/a"  # of pyserial
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options. --all is not the default: bytes sent to an unknown device may mean something to it."""
+    # --all is not the default: bytes sent to an unknown device may mean something to it.
     parser.add_argument(
         "--zenoh",
         metavar="ENDPOINT",
@@ -32,7 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the ports and scenarios."""
     ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []
@@ -67,21 +64,16 @@ def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
     if ask:
         try:
             with Hand(open_link(port.device)) as hand:
-                facts |= as_facts(hand.info, hand.fingers)
+                facts |= {
+                    "is_board": True,
+                    "serial_number": serial_text(hand.info),
+                    "board": board_text(hand.info.board),
+                    "firmware": version_text(hand.info),
+                    "fingers": hand.fingers,
+                }
         except BiotacError as error:
             facts["problem"] = str(error)
     return facts
-
-
-def as_facts(hello: wire.Hello, fingers: list[int]) -> dict[str, Any]:
-    """A port that answered, as JSON types."""
-    return {
-        "is_board": True,
-        "serial_number": serial_text(hello),
-        "board": board_text(hello.board),
-        "firmware": version_text(hello),
-        "fingers": fingers,
-    }
 
 
 def as_line(facts: dict[str, Any]) -> str:
@@ -90,7 +82,7 @@ def as_line(facts: dict[str, Any]) -> str:
         return f"{facts['port']}  {facts['problem']}"
     if "firmware" not in facts:
         known = [str(facts[key]) for key in ("port", "description", "serial_number") if facts[key]]
-        return "  ".join("not our USB id" if text == NO_DESCRIPTION else text for text in known)
+        return "  ".join("not our USB id" if text == "n/a" else text for text in known)  # pyserial's for no description
     fingers = ", ".join(map(str, facts["fingers"])) or "none"
     words = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
     return "  ".join([facts["port"], *words])

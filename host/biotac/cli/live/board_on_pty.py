@@ -8,23 +8,18 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ...errors import PortError
 from ..outputs import say
 
-
-class Board(Protocol):
-    """The board on the pty."""
-
-    path: str
-
-    def close(self) -> None:
-        """End it."""
+if TYPE_CHECKING:
+    from ...recording.replay.pty import ReplayPty
+    from ...sim.process import SimBoard
 
 
 @contextmanager
-def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
+def until_ctrl_c(board: SimBoard | ReplayPty, link: Path | None) -> Iterator[None]:
     """Run until Ctrl-C, the usual way to stop; then, as after an error, close the board and remove the link to it."""
     try:
         yield
@@ -36,28 +31,25 @@ def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
         board.close()
 
 
-def tell(board: Board, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
-    """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port."""
-    if args.link is not None:
-        make_link(args.link, board.path)
+def tell(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
+    """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port.
+
+    Replaces a link left over from before, never anything else. Raises PortError when it leads to a port that is there:
+    that of another simulator.
+    """
+    link: Path | None = args.link
+    if link is not None and link.is_symlink():
+        if link.exists():
+            raise PortError(f"{link} leads to {os.readlink(link)}, which another program has; choose another --link")
+        link.unlink()
+    if link is not None:
+        try:
+            os.symlink(board.path, link)
+        except OSError as error:
+            raise PortError(f"link {link} cannot be created ({error.strerror}); choose another path") from error
     say(args, {"port": board.path, **facts}, f"{board.path} plays {plays}; Ctrl-C stops")
 
 
 def tell_over(plays: str) -> None:
     """Say that the source is over: the board goes on answering."""
     print(f"{plays} has ended; the board keeps answering until Ctrl-C", file=sys.stderr)
-
-
-def make_link(link: Path, target: str) -> None:
-    """Make the link; replaces a link left over from before, never anything else.
-
-    Raises PortError when it leads to a port that is there: that of another simulator.
-    """
-    if link.is_symlink():
-        if link.exists():
-            raise PortError(f"{link} leads to {os.readlink(link)}, which another program has; choose another --link")
-        link.unlink()
-    try:
-        os.symlink(target, link)
-    except OSError as error:
-        raise PortError(f"link {link} cannot be created ({error.strerror}); choose another path") from error

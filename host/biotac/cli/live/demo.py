@@ -14,7 +14,6 @@ EXAMPLE = "biotac demo press.toml --out my-demo"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add source, length and folder."""
     parser.add_argument(
         "source", metavar="SOURCE", nargs="?", default="press.toml", help="scenario or recorded counts (press.toml)"
     )

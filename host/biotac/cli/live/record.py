@@ -12,14 +12,13 @@ import biotac
 from .. import values
 from ..outputs import note, say
 from ..progress import Progress
-from .reading import batches
+from .stream import batches
 from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, file and time."""
     parser.add_argument(
         "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
     )

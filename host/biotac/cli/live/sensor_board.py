@@ -21,7 +21,6 @@ KINDS = ", ".join(fault.name.lower() for fault in wire.EmuFault)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add its port, how the tape is kept, and faults."""
     group = parser.add_argument_group("as the sensors of a gateway, by a second Pico (firmware/sensor_board)")
     group.add_argument("--sensor-port", metavar="PORT", help="of the sensor board, which plays SOURCE or its last tape")
     group.add_argument(

@@ -12,14 +12,13 @@ import biotac
 from ...errors import InputError
 from .. import values
 from ..outputs import note, say
-from .reading import batches, tell_lost
+from .stream import batches, tell_lost
 
 EXAMPLE = "biotac share /dev/ttyACM0 --zenoh left"
 LOOK_S = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the port, what to share it by, and where Zenoh is."""
     values.add_port(parser)
     by = parser.add_mutually_exclusive_group(required=True)
     by.add_argument("--zenoh", metavar="NAME", help="share the board itself: others open it as zenoh:NAME")

@@ -21,7 +21,6 @@ SCENARIO_S = 600.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add source and pace."""
     parser.add_argument("source", metavar="SOURCE", nargs="?", help="scenario (.toml) or recorded counts (.npz, .btd)")
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
     parser.add_argument(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
 
 import biotac
 
@@ -15,14 +16,12 @@ from ...wire.frames import Frame
 from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
 from .. import values
 from ..outputs import note
-from .reading import batches, tell_lost
 from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add port, time and rate."""
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, help="stop after this much device time")
     parser.add_argument(
@@ -49,8 +48,27 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def batches(hand: biotac.Hand, seconds: float | None) -> Iterator[tuple[biotac.Batch, float]]:
+    """Batches, each with the device time since the first, until ``seconds`` of it have passed."""
+    first_us: int | None = None
+    passed_s = 0.0
+    for batch in hand.batches():
+        last_us = batch.last_t_us()
+        if last_us is not None:
+            first_us = batch.first_t_us() if first_us is None else first_us
+            passed_s = (last_us - (first_us or 0)) / 1e6
+        yield batch, passed_s
+        if seconds is not None and passed_s >= seconds:
+            break
+
+
+def tell_lost(hand: biotac.Hand) -> None:
+    """Say on stderr how many frames were lost, if any."""
+    if hand.stats.frames_lost:
+        note(f"{hand.stats.frames_lost} frame(s) lost; close other programs, or use a faster computer")
+
+
 def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
-    """Show a table, updated in place."""
     words = "nothing yet"
     with LiveTable(hand, hand.port) as table:
         for _, passed_s in batches(hand, seconds):
@@ -93,7 +111,6 @@ def event_as_json(event: Event) -> dict[str, object]:
 
 
 def event_as_line(event: Event) -> str:
-    """One line for people."""
     line = f"{event.t_us / 1e6:9.3f} s finger {event.finger}  {kind_name(event).lower()}"
     if event.peak_count != INVALID_COUNT:
         line += f", peak {event.peak_count} counts"
@@ -102,7 +119,6 @@ def event_as_line(event: Event) -> str:
 
 
 def as_line(frame: Frame) -> str:
-    """Columns for people."""
     poc = " ".join(f"{v:7.2f}" for v in frame.poc_mm)
     force = " ".join(f"{v:7.3f}" for v in frame.force_n)
     torque = " ".join(f"{v:8.2f}" for v in frame.torque_nmm)

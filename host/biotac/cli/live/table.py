@@ -14,20 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 REDRAW_S = 0.1
-COLUMNS = (
-    "finger",
-    "force x",
-    "y",
-    "z N",
-    "|force| N",
-    "point x",
-    "y",
-    "z mm",
-    "pressure",
-    "tac",
-    "tdc",
-    "notes",
-)
+COLUMNS = ("finger", "force x", "y", "z N", "|force| N", "point x", "y", "z mm", "pressure", "tac", "tdc", "notes")
 #: Flags that are not shown, as they say only that a finger is at rest or a result was not asked for.
 DULL = FrameFlags.CONTACT | FrameFlags.NOT_ASKED | FrameFlags.POC_INVALID
 

@@ -16,7 +16,6 @@ EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to show, and where."""
     parser.add_argument(
         "source",
         metavar="PORT|RECORDING",
@@ -32,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until Ctrl-C."""
     if args.port is not None and not 0 <= args.port <= 65535:
         raise InputError(f"--port is {args.port}, expected 0 to 65535")
     source = args.source or choose()

@@ -16,7 +16,6 @@ EXAMPLE = "biotac check grasp.mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording."""
     parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
 
 

@@ -29,7 +29,6 @@ RECORDING = ".mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recordings, the output, what to recompute, and whether to overwrite."""
     parser.add_argument(
         "recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record, or SynTouch's .btd(.gz)"
     )
@@ -80,7 +79,9 @@ def run(args: argparse.Namespace) -> int:
                 made: dict[str, Any] = import_btd(source, place, show)
                 text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
-            changes = _changes(args)
+            changes = read_settings(args.settings) if args.settings else {}
+            if args.poc_weights:
+                changes[wire.Setting.POC_WEIGHTS] = int(wire.PocWeights[args.poc_weights.upper()])
             recording = load(source)
             with _recording_at(out, args.force, written) as place:
                 notes = recompute(recording, place, changes, keep_tare=args.keep_tare, show=show)
@@ -114,13 +115,6 @@ def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]
             written += export(Recording(place), out, overwrite=force)
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt(*interrupt.args or (f"{out} was not written",)) from None
-
-
-def _changes(args: argparse.Namespace) -> dict[wire.Setting, int]:
-    changes = read_settings(args.settings) if args.settings else {}
-    if args.poc_weights:
-        changes[wire.Setting.POC_WEIGHTS] = int(wire.PocWeights[args.poc_weights.upper()])
-    return changes
 
 
 def read_settings(path: Path) -> dict[wire.Setting, int]:

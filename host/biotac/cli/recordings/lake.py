@@ -24,7 +24,6 @@ EXAMPLE = 'biotac lake sql "SELECT board, count(*) FROM frames GROUP BY board" t
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the lake, and the number of workers."""
     parser.add_argument("--lake", metavar="DIR", type=Path, help="a folder of Parquet files to add every REC to")
     _add_workers(parser)
 
@@ -35,30 +34,17 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the subverbs of a lake."""
-    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    check = values.add_subverb(
-        what,
-        "check",
-        run_check,
-        "Check all files against their checksums, and every on-board result against the float64 reference.",
-    )
+    add = functools.partial(values.add_subverb, parser.add_subparsers(dest="what", required=True, metavar="WHAT"))
+    text = "Check all files against their checksums, and every on-board result against the float64 reference."
+    check = add("check", run_check, text)
     check.add_argument("folder", metavar="DIR", type=Path, help="the lake")
     _add_workers(check)
-    sql = values.add_subverb(
-        what,
-        "sql",
-        run_sql,
-        "Query with DuckDB; each topic is a table. Prints CSV, with --json one object per line.",
-    )
+    text = "Query with DuckDB; each topic is a table. Prints CSV, with --json one object per line."
+    sql = add("sql", run_sql, text)
     sql.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
     sql.add_argument("folder", metavar="DIR", nargs="?", type=Path, help="the lake")
-    inventory = values.add_subverb(
-        what,
-        "inventory",
-        run_inventory,
-        "List boards and sensors, their ages, and their health against their own history.",
-    )
+    text = "List boards and sensors, their ages, and their health against their own history."
+    inventory = add("inventory", run_inventory, text)
     inventory.add_argument("folder", metavar="DIR", type=Path, help="the lake")
 
 
@@ -124,7 +110,6 @@ def run_check(args: argparse.Namespace) -> int:
 
 
 def run_sql(args: argparse.Namespace) -> int:
-    """Print the query's result."""
     folder = args.folder or Path()
     if args.folder is None and not (folder / room("folder").SUMS).is_file():
         raise InputError("this folder is not a lake; name the lake's folder: biotac lake sql QUERY DIR")

@@ -7,6 +7,8 @@ import math
 from pathlib import Path
 
 from ...errors import InputError
+from ...hand.opening import shake_hands
+from ...recording.replay.link import ReplayLink
 from ...recording.replay.playback import Playback
 from .. import values
 from ..live import stream
@@ -17,7 +19,6 @@ EXAMPLE = "biotac replay grasp.mcap --from 12.5 --pace 2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, which part of it, how fast and where to."""
     parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
     parser.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first frame")
     parser.add_argument("--to", dest="to_s", type=moment, help="seconds since its first frame")
@@ -41,14 +42,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--link is for a pty; add --pty")
     recording = load(args.recording)
     playback = Playback(recording, from_s=args.from_s, to_s=args.to_s)
-    return on_pty(args, playback) if args.pty else on_stdout(args, playback)
-
-
-def on_stdout(args: argparse.Namespace, playback: Playback) -> int:
-    """Print frames as biotac stream does."""
-    from ...hand.opening import shake_hands
-    from ...recording.replay.link import ReplayLink
-
+    if args.pty:
+        return on_pty(args, playback)
     with shake_hands(ReplayLink(f"replay:{args.recording}", playback, pace=args.pace)) as hand:
         stream.show(hand, rate=args.rate, as_json=args.json)
     return 0

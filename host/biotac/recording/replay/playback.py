@@ -21,14 +21,6 @@ from ...wire.framing import encode
 from ..block import Packet
 from ..reader import Recording
 
-
-def _offset(message: type[Any], name: str) -> int:
-    """Where a field begins in a message's payload."""
-    fields = DTYPES[message.ID].fields
-    assert fields is not None
-    return int(fields[name][1])
-
-
 _STREAM_OF = {
     wire.Frame.ID: wire.StreamFlags.FRAMES,
     wire.Idle.ID: wire.StreamFlags.FRAMES,
@@ -41,10 +33,9 @@ _STREAM_OF = {
     wire.SensorStatus.ID: wire.StreamFlags.STATUS,
 }
 _TIME = struct.Struct("<I")
-_TIME_AT = _offset(wire.Frame, "t_us")  # in all stream messages
-_FINGER_AT = _offset(wire.Frame, "finger")  # in all of one finger except SENSOR_STATUS, which has its req_id there
-_FINGER_AT_IN_STATUS = _offset(wire.SensorStatus, "finger")
-_REQ_ID_AT = _offset(wire.Status, "req_id")  # in SENSOR_STATUS, too
+_OFFSETS: Any = {message_id: dtype.fields for message_id, dtype in DTYPES.items()}  # of a field: [id][name][1]
+_TIME_AT = _OFFSETS[wire.Frame.ID]["t_us"][1]  # in all stream messages
+_REQ_ID_AT = _OFFSETS[wire.Status.ID]["req_id"][1]  # in SENSOR_STATUS, too
 # Only these arrive in order of their times: a PAC can begin later than the FRAME that it precedes.
 _CLOCKS = (wire.Frame.ID, wire.Idle.ID)
 
@@ -131,7 +122,7 @@ class Playback:
         if message_id == wire.SensorStatus.ID:
             status = wire.SensorStatus.unpack(payload[: wire.SensorStatus.STRUCT.size])
             self._sensor_status[status.finger] = status
-        at = _FINGER_AT_IN_STATUS if message_id == wire.SensorStatus.ID else _FINGER_AT
+        at = _OFFSETS[message_id]["finger"][1]
         return packet.data if self._asked.fingers >> payload[at] & 1 else None
 
     # ---- what it answers -----------------------------------------------------------------------
@@ -143,37 +134,34 @@ class Playback:
     def answer(self, message_id: int, payload: bytes) -> bytes | None:
         """The reply to one command; None if a recording cannot execute it (see ``refusal``)."""
         req_id = payload[0]
-        known = wire.MESSAGES.get(message_id)
         if message_id in (wire.Ping.ID, wire.Stop.ID):
             self.playing = self.playing and message_id != wire.Stop.ID
-            return _ok(req_id, message_id)
-        if known is wire.HelloRequest:
+            return _reply(req_id, message_id)
+        if message_id == wire.HelloRequest.ID:
             hello = wire.HelloRequest.unpack(payload)
             return _message(dataclasses.replace(self.recording.info, req_id=req_id, nonce=hello.nonce))
-        if known is wire.Start:
+        if message_id == wire.Start.ID:
             self._asked = wire.Start.unpack(payload)
             self.playing = True
-            return _ok(req_id, message_id)
-        if known is wire.GetSetting:
+            return _reply(req_id, message_id)
+        if message_id == wire.GetSetting.ID:
             return self._setting(wire.GetSetting.unpack(payload))
-        if known is wire.GetCalibration:
+        if message_id == wire.GetCalibration.ID:
             return self._calibration(req_id, payload[1])
-        if known is wire.GetMap:
+        if message_id == wire.GetMap.ID:
             return self._map(req_id, payload[1])
-        if known is wire.ReadMap:
+        if message_id == wire.ReadMap.ID:
             return self._map_part(wire.ReadMap.unpack(payload))
-        if known is wire.GetSensorInfo:
+        if message_id == wire.GetSensorInfo.ID:
             infos = {info.finger: info for info in self.recording.sensors}
             return _again(infos.get(payload[1]), req_id) or _reply(req_id, message_id, wire.Error.NO_SUCH_FINGER)
-        if known is wire.GetStatus:
-            return _again(self._status and dataclasses.replace(self._status, streams=self._streams()), req_id)
-        if known is wire.GetSensorStatus:
+        if message_id == wire.GetStatus.ID:
+            # The streams that are on here; those of the recording are of another program.
+            streams = self._asked.streams if self._asked is not None and self.playing else 0
+            return _again(self._status and dataclasses.replace(self._status, streams=streams), req_id)
+        if message_id == wire.GetSensorStatus.ID:
             return _again(self._sensor_status.get(payload[1]), req_id)
         return None
-
-    def _streams(self) -> int:
-        """The streams that are on here; those of the recording are of another program."""
-        return self._asked.streams if self._asked is not None and self.playing else 0
 
     def refusal(self, message_id: int, payload: bytes) -> bytes:
         """The reply to a command for which ``answer`` returned None."""
@@ -215,9 +203,5 @@ def _again(message: Any, req_id: int) -> bytes | None:
     return None if message is None else _message(dataclasses.replace(message, req_id=req_id))
 
 
-def _ok(req_id: int, message_id: int) -> bytes:
-    return _reply(req_id, message_id, wire.Error.OK)
-
-
-def _reply(req_id: int, message_id: int, error: wire.Error) -> bytes:
+def _reply(req_id: int, message_id: int, error: wire.Error = wire.Error.OK) -> bytes:
     return _message(wire.Reply(req_id, message_id, error))

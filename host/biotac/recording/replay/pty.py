@@ -6,6 +6,7 @@ import os
 import pty
 import select
 import tty
+from contextlib import suppress
 
 from ...clock.host_clock import HostClock, SystemClock
 from ...errors import PortError
@@ -41,25 +42,15 @@ class ReplayPty:
         if not self._out and wait_s is not None:
             timeout_s = min(timeout_s, wait_s)
         readable, writable, _ = select.select([self._master], [self._master] if self._out else [], [], timeout_s)
-        if readable:
-            self._listen()
+        playback = self._pacer.playback
+        for message_id, payload in playback.requests(os.read(self._master, CHUNK_BYTES)) if readable else ():
+            answer = playback.answer(message_id, payload)
+            self._out += playback.refusal(message_id, payload) if answer is None else answer
         if not self._out:
             self._out = self._pacer.due()
         if writable or self._out:
-            self._speak()
-
-    def _listen(self) -> None:
-        playback = self._pacer.playback
-        for message_id, payload in playback.requests(os.read(self._master, CHUNK_BYTES)):
-            answer = playback.answer(message_id, payload)
-            self._out += playback.refusal(message_id, payload) if answer is None else answer
-
-    def _speak(self) -> None:
-        try:
-            sent = os.write(self._master, self._out)
-        except BlockingIOError:
-            sent = 0  # the reader is behind; nothing is dropped, playback waits
-        self._out = self._out[sent:]
+            with suppress(BlockingIOError):  # the reader is behind; nothing is dropped, playback waits
+                self._out = self._out[os.write(self._master, self._out) :]
 
     def close(self) -> None:
         """Close the pty. Safe to call twice."""
