@@ -13,7 +13,7 @@ import biotac
 from biotac.calibrate.press.detector import Step
 from biotac.calibrate.press.force_source import load_csv
 from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
-from biotac.calibrate.press.pressure_procedure import Plan, calibrate
+from biotac.calibrate.press.pressure_procedure import calibrate
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.recording.reader import Recording
@@ -112,7 +112,7 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) 
     """As a real one: stopped and set, with what each finger has of its own left as it was."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
-        outcome = calibrate(hand, Plan((0,)), Silent(), made_s=77)
+        outcome = calibrate(hand, Silent(), fingers=(0,), made_s=77)
         assert hand.board.calibration(0) == outcome.calibrations[0]
     its = outcome.calibrations[0]
     assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
@@ -130,7 +130,7 @@ def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) ->
     """As on a real port: nothing behind it that knows a truth."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.link.source = None
-        outcome = calibrate(hand, Plan((0,)), Scale(), made_s=1, save=True)
+        outcome = calibrate(hand, Scale(), fingers=(0,), made_s=1, save=True)
     assert outcome.verified[0].board_error <= 0.059
     assert outcome.fits[0].press_forces_n == CALIBRATION_FORCES_N
     assert outcome.not_saved is None
@@ -160,7 +160,7 @@ def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
         biotac.open("sim:fingers.toml?fingers=2") as hand,
         pytest.raises(biotac.InputError, match=r"no sensor on finger 3 \(0, 1 are there\)"),
     ):
-        calibrate(hand, Plan((0, 3)), Silent(), made_s=0)
+        calibrate(hand, Silent(), fingers=(0, 3), made_s=0)
 
 
 def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
@@ -168,7 +168,7 @@ def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
         biotac.open("sim:fingers.toml?fingers=1&seconds=9") as hand,
         pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"),
     ):
-        calibrate(hand, Plan((0,)), Silent(), made_s=0)
+        calibrate(hand, Silent(), fingers=(0,), made_s=0)
 
 
 # ---- recordings ----------------------------------------------------------------------------------

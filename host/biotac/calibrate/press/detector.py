@@ -120,11 +120,6 @@ class Presses:
         self._window: deque[float] = deque(maxlen=WINDOW_ROWS)
         self._enter(Phase.REST)
 
-    @property
-    def done(self) -> bool:
-        """Whether every press was seen and released (after finish(), the last need not be)."""
-        return self.phase is Phase.DONE
-
     def feed(self, rows: StructArray) -> int:
         """Take rows (n,) of this finger, up to the one that ends its last press; returns how many were taken.
 
@@ -224,22 +219,19 @@ class Presses:
         self._kept.append(float(row["pressure"]))
         self._most_kept = max(self._most_kept, len(self._kept))
         sigma = noise(self._kept[-REST_ROWS:])
-        if not self._is_steady(self._kept[-1], 0.0, sigma) or len(self._kept) < REST_ROWS:
-            return
-        still = self._kept[-REST_ROWS:]
-        self.rest = Rest(float(np.mean(still)), sigma, len(still))
-        self._enter(Phase.PRESS)
+        if self._is_steady(self._kept[-1], 0.0, sigma) and len(self._kept) >= REST_ROWS:
+            self.rest = Rest(float(np.mean(self._kept[-REST_ROWS:])), sigma, REST_ROWS)
+            self._enter(Phase.PRESS)
 
     def _pressing(self, row: Any, above: float) -> None:
         assert self.rest is not None
         if above < PRESS_COUNTS:
             self._begin_again()
             return
-        if not self._is_steady(float(row["pressure"]), above, self.rest.sigma):
-            self._kept = []
-            return
-        if self._needs_force and np.isnan(row["force_n"]):
-            self._forceless += 1
+        steady = self._is_steady(float(row["pressure"]), above, self.rest.sigma)
+        forceless = self._needs_force and np.isnan(row["force_n"])
+        self._forceless += bool(steady and forceless)
+        if not steady or forceless:
             self._kept = []
             return
         self._kept.append(row)
@@ -280,7 +272,7 @@ class Procedure:
                 raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
         self.needs_force = needs_force
         self._turns = [
-            (Presses(finger, len(forces_n), needs_force=needs_force), tuple(float(force) for force in forces_n))
+            (Presses(finger, len(forces_n), needs_force=needs_force), tuple(map(float, forces_n)))
             for forces_n in series_n
             for finger in fingers
         ]
@@ -288,7 +280,7 @@ class Procedure:
     @property
     def step(self) -> Step | None:
         """What to do now; None when all is done."""
-        machine, forces_n = next((turn for turn in self._turns if not turn[0].done), (None, ()))
+        machine, forces_n = next((turn for turn in self._turns if turn[0].phase is not Phase.DONE), (None, ()))
         if machine is None:
             return None
         number = len(machine.presses) + (machine.phase is not Phase.RELEASE)
@@ -326,11 +318,11 @@ class Procedure:
         Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
         """
         for machine, _ in self._turns:
-            if machine.done:
+            if machine.phase is Phase.DONE:
                 continue
             own = rows[rows["finger"] == machine.finger]
             taken = machine.feed(own)
-            if not machine.done:
+            if machine.phase is not Phase.DONE:
                 return
             # The next finger begins after this row, even if later rows came in the same call.
             rows = rows[rows["t_us"] > own["t_us"][taken - 1]] if taken else rows

@@ -26,8 +26,7 @@ class Face(Protocol):
 class Unattended:
     """A Face for scenarios, which press by themselves."""
 
-    def show(self, step: Step | None) -> None:
-        pass
+    def show(self, step: Step | None) -> None: ...
 
     def force_n(self, step: Step) -> float:
         raise InputError(f"finger {step.finger}, press {step.press} has no force; expected a reference")

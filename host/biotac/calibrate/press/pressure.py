@@ -49,7 +49,7 @@ class Fit:
     press_forces_n: tuple[float, ...]
     press_gains_n: tuple[float, ...]
     relative_error: float
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @property
     def gain_nn(self) -> int:
@@ -101,9 +101,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
             f"{where}: K of single presses is {min(gains):.4g} to {max(gains):.4g} N/count, a spread of {spread:.0%}, "
             f"expected at most {SPREAD_MAX:.0%}; is the reference for this finger, and were all presses at one place?"
         )
-    notes = []
-    if spread > SPREAD_NOTED:
-        notes.append(f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place")
+    note = f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place"
     return Fit(
         finger=finger,
         gain_n=gain_n,
@@ -113,7 +111,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
         press_forces_n=tuple(float(press.rows["force_n"].mean()) for press in presses),
         press_gains_n=tuple(gains),
         relative_error=relative_error(above * gain_n, force),
-        notes=tuple(notes),
+        notes=(note,) if spread > SPREAD_NOTED else (),
     )
 
 
@@ -149,11 +147,9 @@ def with_board_force(press: Press, gain_nn: int) -> Press:
     return press.with_column("board_n", to_units(pressure_force_100un(filtered_q4, rest_q4, gain_nn), FORCE_LSB_PER_N))
 
 
-def gain_of(above_rest: Any, force_n: Any) -> float:
+def gain_of(above_rest: Floats, force_n: Floats) -> float:
     """Eq 6: K in N per count, the pseudo-inverse of the column P - P0 (n,) times F (n,) in N."""
-    column = np.asarray(above_rest, np.float64).reshape(-1, 1)
-    (solved,) = np.linalg.pinv(column) @ np.asarray(force_n, np.float64)
-    return float(solved)
+    return float((np.linalg.pinv(above_rest[:, None]) @ force_n)[0])
 
 
 def relative_error(seen_n: Floats, force_n: Floats) -> float:
@@ -193,10 +189,10 @@ class Outcome:
     not save the calibrations, None if it did or was not asked to.
     """
 
-    fits: dict[int, Fit]
-    calibrations: dict[int, Calibration]
-    provenance: dict[int, Provenance]
-    verified: dict[int, Verification]
+    fits: dict[int, Fit] = field(default_factory=dict)
+    calibrations: dict[int, Calibration] = field(default_factory=dict)
+    provenance: dict[int, Provenance] = field(default_factory=dict)
+    verified: dict[int, Verification] = field(default_factory=dict)
     lag_rows: dict[int, int] = field(default_factory=dict)
     not_saved: CommandRefusedError | None = None
 
@@ -205,14 +201,9 @@ class Outcome:
         fitted = fit(rest, presses[:-1])
         self.fits[fitted.finger] = fitted
         self.verified[fitted.finger] = verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
-        self.provenance[fitted.finger] = provenance(fitted, **source)
+        made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
+        self.provenance[fitted.finger] = {**made, **source, **_numbers(fitted)}
         return fitted
-
-
-def provenance(fitted: Fit, **source: str) -> Provenance:
-    """How K was made, for a calibration's file: its ``source`` and the numbers of the fit."""
-    made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
-    return {**made, **source, **_numbers(fitted)}
 
 
 def _numbers(fitted: Fit) -> Provenance:
