@@ -38,12 +38,11 @@ ROWS_AT_ONCE = 4096
 
 FAMILIES = (GATED, CONDUCTANCE_QUADRATIC)
 ALL_COLUMNS = map_columns.width(with_pdc=False)
-INDEX: tuple[npt.NDArray[np.intp], ...] = tuple(family.index(ALL_COLUMNS) for family in FAMILIES)
+INDEX = [family.index(ALL_COLUMNS) for family in FAMILIES]
 COLUMNS = sum(len(index) for index in INDEX)
 _STACKED = np.concatenate(INDEX)
 PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
-_OWN = map_columns.blocks(with_pdc=False)
-_BLOCKS = [block for family in FAMILIES for block in _OWN if block in family.blocks]
+_BLOCKS = [block for family in FAMILIES for block in map_columns.blocks(with_pdc=False) if block in family.blocks]
 _BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in _BLOCKS]
 
 
@@ -120,13 +119,11 @@ class Trained:
 
         They are None if the map was trained on one of the files.
         """
+        note = f"regularized towards the population map of {self.fingers}"
         if self.made_of(files):
-            return None, (
-                f"not regularized towards the population map of {self.fingers}, which was made from this recording"
-            )
+            return None, f"not {note}, which was made from this recording"
         # any tare will do: the columns mean the same with every tare
-        coefficients = self.population.wrench_map(np.zeros(ELECTRODES)).coefficients
-        return coefficients, f"regularized towards the population map of {self.fingers}"
+        return self.population.wrench_map(np.zeros(ELECTRODES)).coefficients, note
 
 
 def provenance_of(files: Sequence[Path], source: str, *, symmetric: bool) -> dict[str, Any]:
@@ -158,13 +155,10 @@ def dumps(trained: Trained) -> str:
             "coefficients_n_and_variance": [_short(row) for row in rows],
         }
     )
-    lines = []
-    for key, value in document.items():
-        text = json.dumps(value)
-        if key == "coefficients_n_and_variance":
-            text = "[\n" + ",\n".join(f"  {json.dumps(row)}" for row in value) + "\n ]"
-        lines.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    last = "coefficients_n_and_variance"
+    texts = {key: json.dumps(value) for key, value in document.items()}
+    texts[last] = "[\n" + ",\n".join(f"  {json.dumps(row)}" for row in document[last]) + "\n ]"
+    return "{\n" + ",\n".join(f' "{key}": {text}' for key, text in texts.items()) + "\n}\n"
 
 
 def load(path: Path | None) -> Trained:

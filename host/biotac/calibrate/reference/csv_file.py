@@ -63,8 +63,16 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
     except (OSError, UnicodeDecodeError) as error:
         seen = error.strerror if isinstance(error, OSError) else "it is not text"
         raise RecordingError(f"{path}: cannot be read ({seen}): expected a CSV file of a force/torque sensor") from None
-    own, head, body = _split(text)
-    if head is None:
+    own, head, body = {}, "", ""
+    for match in re.finditer(r"[^\n]*\n?", text):
+        line = match[0].strip()
+        if line and not line.startswith("#"):
+            head, body = line, text[match.end() :]
+            break
+        key, colon, value = line.lstrip("# ").partition(":")
+        if colon:
+            own[key.strip()] = value.strip()
+    if not head:
         raise RecordingError(f"{path}: no header line: expected one that names every column")
     separator = max(",;\t", key=head.count)
 
@@ -79,20 +87,6 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
             ) from None
 
     return own, [name.strip().strip('"') for name in head.split(separator)], read
-
-
-def _split(text: str) -> tuple[dict[str, str], str | None, str]:
-    """The values of '# key: value' lines, the header line, and the text after it."""
-    own: dict[str, str] = {}
-    for match in re.finditer(r"[^\n]*\n?", text):
-        line = match[0].strip()
-        if line.startswith("#"):
-            key, colon, value = line.lstrip("# ").partition(":")
-            if colon:
-                own[key.strip()] = value.strip()
-        elif line:
-            return own, line, text[match.end() :]
-    return own, None, ""
 
 
 def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[int], Floats]:

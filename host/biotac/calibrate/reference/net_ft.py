@@ -54,12 +54,10 @@ def parse_address(text: str) -> Address:
         numbers = {key: float(value) for key, value in options.items()}
     except ValueError:
         raise InputError(f"{text}: an option is not a number: expected {_FORM}") from None
-    scale = None
     given = [key for key in ("cpf", "cpt", "rate") if key in numbers]
     if given and len(given) < 3:
         raise InputError(f"{text}: only {' and '.join(given)} given: expected cpf, cpt and rate, or none of them")
-    if given:
-        scale = Scale(numbers["cpf"], numbers["cpt"] / rdt.NMM_PER_NM, numbers["rate"])
+    scale = Scale(numbers["cpf"], numbers["cpt"] / rdt.NMM_PER_NM, numbers["rate"]) if given else None
     return Address(match[1], int(match[2] or rdt.PORT), int(numbers.get("http", 80)), scale)
 
 
@@ -108,8 +106,7 @@ class NetFtReader:
 
     def __init__(self, address: Address, *, steady_s: Callable[[], float] = time.monotonic) -> None:
         where = f"{address.host}:{address.port}"
-        number = ""
-        scale = address.scale
+        number, scale = "", address.scale
         if scale is None:
             url = f"http://{address.host}:{address.http_port}/netftapi2.xml"
             try:

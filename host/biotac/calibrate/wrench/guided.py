@@ -66,7 +66,7 @@ class Procedure:
 
     def __post_init__(self) -> None:
         self._means: deque[tuple[float, float]] = deque()  # time in s, mean over the electrodes
-        self._half: list[tuple[float, Floats]] = []
+        self._half: list[tuple[float, float]] = []
         self._begin_s: float | None = None
         self._untouched = 0
         self._asked = False
@@ -90,11 +90,18 @@ class Procedure:
                 "the reference has no torque: expected six axes, to locate contacts; use a six-axis sensor"
             )
         if self.step in (Step.WARM_UP, Step.TARE):
-            self._keep(samples)
+            self._recent.append(samples)
+            while len(self._recent) > 1 and samples.t_s[-1] - self._recent[1].t_s[0] > TARE_SAMPLES_S:
+                self._recent.popleft()
         elif self.step is Step.LOADS and self.zero is not None:
             step_s = float(np.median(np.diff(samples.t_s))) if len(samples) > 1 else 0.0
             self.coverage.add(self.mounting.to_finger(samples.wrench - self.zero), step_s)
-            self._report_progress()
+            text = self.status()
+            if self.coverage.complete:
+                self._go(Step.DONE, f"covered: {self.coverage.summary()}")
+            elif text != self._last_status:
+                self._last_status = text
+                self.events.append(text)
 
     def tared(self, *, accepted: bool) -> None:
         """Take the board's answer; if it refused, it is asked again after TARE_FRAMES untouched frames."""
@@ -115,8 +122,7 @@ class Procedure:
             return f"{Step.WARM_UP.value}: {self.drift_counts_per_min:+.0f} counts/min"
         if self.step is Step.LOADS:
             return f"{self.coverage.summary()}; missing: {next(iter(self.coverage.missing()), 'nothing')}"
-        text: str = self.step.value
-        return text
+        return str(self.step.value)
 
     def take_events(self) -> list[str]:
         """The events since the last call."""
@@ -155,11 +161,11 @@ class Procedure:
             # the board reports a touch for a finger that drifts fast enough, too: either way, keep waiting
             self._half.clear()
             return
-        self._half.append((at_s, row["counts"].astype(np.float64)))
+        self._half.append((at_s, float(row["counts"].mean())))
         if len(self._half) < MEAN_FRAMES:
             return
-        mean_s = float(np.mean([t for t, _ in self._half]))
-        self._means.append((mean_s, float(np.mean([counts.mean() for _, counts in self._half]))))
+        mean_s, mean_counts = (float(np.mean(values)) for values in zip(*self._half, strict=True))
+        self._means.append((mean_s, mean_counts))
         self._half.clear()
         while mean_s - self._means[0][0] > DRIFT_OVER_S:
             self._means.popleft()
@@ -171,38 +177,19 @@ class Procedure:
         if long_enough and enough and abs(self.drift_counts_per_min) <= self.max_drift_counts_per_min:
             self._go(Step.TARE, f"warm: {self.drift_counts_per_min:+.1f} counts/min over the last minute")
 
-    def _keep(self, samples: Samples) -> None:
-        self._recent.append(samples)
-        newest_s = float(samples.t_s[-1])
-        while len(self._recent) > 1 and newest_s - float(self._recent[1].t_s[0]) > TARE_SAMPLES_S:
-            self._recent.popleft()
-
     def _zero_reference(self) -> None:
-        if not self._recent:
-            return
-        wrench = np.concatenate([samples.wrench for samples in self._recent])
+        wrench = np.concatenate([np.empty((0, 6)), *(samples.wrench for samples in self._recent)])
         wrench = wrench[np.isfinite(wrench).all(axis=1)]
         if not len(wrench):
             return
-        low, high = np.percentile(wrench[:, :3], (10, 90), axis=0)
-        if float((high - low).max()) > MAX_ZERO_SPREAD_N:
+        spread_n = float(np.ptp(np.percentile(wrench[:, :3], (10, 90), axis=0), axis=0).max())
+        if spread_n > MAX_ZERO_SPREAD_N:
             self._tared_frames = 0
-            self.events.append(f"the reference moves by {float((high - low).max()):.2f} N: let go of everything")
+            self.events.append(f"the reference moves by {spread_n:.2f} N: let go of everything")
             return
         self.zero = np.median(wrench, axis=0)
         self._recent.clear()
         self._go(Step.LOADS, Step.LOADS.value)
-
-    # ---- loads ---------------------------------------------------------------------------------
-
-    def _report_progress(self) -> None:
-        if self.coverage.complete:
-            self._go(Step.DONE, f"covered: {self.coverage.summary()}")
-            return
-        text = self.status()
-        if text != self._last_status:
-            self._last_status = text
-            self.events.append(text)
 
     def _go(self, step: Step, event: str) -> None:
         self.last_step, self.step = self.step, step

@@ -120,10 +120,17 @@ def lin(sums: Sums, *, offset: bool = True) -> Floats:
 
 def solve(sums: Sums, lam: float) -> Floats:
     """Ridge coefficients (q, axes) with ``lam``, shrunk towards zero except for the offset, which is last."""
-    mean, gram, cross, scale = _levelled(sums)
+    rows = sums.rows
+    # columns are centred, as the offset is free, and scaled to variance 1
+    mean = sums.gram[-1, :-1] / rows
+    gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
+    cross = sums.cross[:-1] / rows - mean[:, None] * (sums.cross[-1] / rows)
+    variance = np.diag(gram)
+    scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
+    gram = gram * scale[:, None] * scale
     gram.flat[:: len(gram) + 1] += lam
-    found = np.linalg.solve(gram, cross) * scale[:, None]
-    return np.concatenate([found, (sums.cross[-1] / sums.rows - mean @ found)[None]])
+    found = np.linalg.solve(gram, cross * scale[:, None]) * scale[:, None]
+    return np.concatenate([found, (sums.cross[-1] / rows - mean @ found)[None]])
 
 
 def pulled(sums: Sums, families: Sequence[Family]) -> list[Floats]:
@@ -151,17 +158,6 @@ def _pulled_to(known: Floats, sums: Sums, families: Sequence[Family], lambdas: S
             found[k, np.append(index, -1)] += solve(own, lam)
         result.append(found)
     return result
-
-
-def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:
-    """Mean, gram, cross and scale of columns that are centred, as the offset is free, and scaled to variance 1."""
-    rows = sums.rows
-    mean = sums.gram[-1, :-1] / rows
-    gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
-    cross = sums.cross[:-1] / rows - mean[:, None] * (sums.cross[-1] / rows)
-    variance = np.diag(gram)
-    scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
-    return mean, gram * scale[:, None] * scale, cross * scale[:, None], scale
 
 
 def weights(error: Floats) -> Floats:

@@ -121,6 +121,9 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
     drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes assumed to drift alike"
     if "E_idle" in fields:
         drift, note = drift_of("E_idle", _counts(path, "E_idle", fields))
+    serial = fields.get("serial", np.array(""))
+    if serial.dtype.kind != "U" or serial.size != 1:
+        raise RecordingError(f"{path}: field serial is {serial.dtype}: expected one string; save it as str")
     return Run(
         path.name,
         counts,
@@ -130,7 +133,7 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
         drift,
         rest,
         (*notes, note, *about_torsion),
-        serial=_serial(path, fields),
+        serial=str(serial.reshape(())),
         air=_counts(path, "E_base", fields) if "E_base" in fields else None,
         contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
     )
@@ -162,14 +165,6 @@ def check_rows(where: object, rows: int) -> None:
             f"{where}: {rows} rows: expected at least {MIN_ROWS}, for {BLOCKS} blocks of twice the guard of "
             f"{GUARD_ROWS} rows; record longer"
         )
-
-
-def _serial(path: Path, fields: dict[str, npt.NDArray[Any]]) -> str:
-    if "serial" not in fields:
-        return ""
-    if fields["serial"].dtype.kind != "U" or fields["serial"].size != 1:
-        raise RecordingError(f"{path}: field serial is {fields['serial'].dtype}: expected one string; save it as str")
-    return str(fields["serial"].reshape(()))
 
 
 def check_clipping(path: object, name: str, force: Floats) -> None:
@@ -266,8 +261,6 @@ def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
     mean = float(first.mean())
     # loadings of both signs mean a touch or a broken electrode, and dividing by their mean would inflate them
     if share < MIN_DRIFT_SHARE or mean < 0.5 * float(np.abs(first).mean()):
-        return (
-            common,
-            f"drift: {name} ({share:.0%} in its first component) shows no common drift; electrodes assumed alike",
-        )
+        note = f"drift: {name} ({share:.0%} in its first component) shows no common drift; electrodes assumed alike"
+        return common, note
     return first / mean, f"drift: first component of {name}, {share:.1%} of its variance"

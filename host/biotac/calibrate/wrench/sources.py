@@ -7,7 +7,6 @@ give the same hash, and a single changed count gives another.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,27 +21,6 @@ from ...wire.identity import ascii_text
 from ..reference.samples import Reference
 from .joined import Joined, board_of, choose_finger, join
 from .run import Run, load_run
-
-
-def provenance_of(
-    serial: str, files: Sequence[Path], reference: str, *, made_s: int, **more: dict[str, Any]
-) -> Provenance:
-    """The provenance of a map made from ``files``, which it reads, at ``made_s`` in seconds since 1970 UTC.
-
-    ``serial`` is the sensor's, "" if unknown.
-    """
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.read_bytes())
-    return {
-        "serial": serial,
-        "made_s": made_s,
-        "software": f"biotac-gateway {__version__}",
-        "files": [path.name for path in files],
-        "data_sha256": digest.hexdigest(),
-        "reference": reference,
-        **more,
-    }
 
 
 def check_serial(where: str, made_for: str, serial: str, *, force: bool = False) -> None:
@@ -66,15 +44,23 @@ class Loaded:
     joined: Joined | None = None
 
     def provenance(self, made_s: int) -> Provenance:
-        """The provenance of a map made from this run."""
-        joined = self.joined
-        if joined is None:
-            return provenance_of(self.run.serial, self.files, "in the same file", made_s=made_s)
-        reference = f"{joined.reference.name} {joined.reference.sensor}".strip()
-        mounting, alignment = joined.reference.mounting.facts(), asdict(joined.alignment)
-        return provenance_of(
-            self.run.serial, self.files, reference, made_s=made_s, mounting=mounting, alignment=alignment
-        )
+        """The provenance of a map made from this run, whose files it reads, at ``made_s`` in seconds since 1970 UTC."""
+        digest = hashlib.sha256()
+        for path in self.files:
+            digest.update(path.read_bytes())
+        made = {
+            "serial": self.run.serial,
+            "made_s": made_s,
+            "software": f"biotac-gateway {__version__}",
+            "files": [path.name for path in self.files],
+            "data_sha256": digest.hexdigest(),
+            "reference": "in the same file",
+        }
+        if self.joined is None:
+            return made
+        reference = self.joined.reference
+        made["reference"] = f"{reference.name} {reference.sensor}".strip()
+        return made | {"mounting": reference.mounting.facts(), "alignment": asdict(self.joined.alignment)}
 
     def facts(self) -> dict[str, Any]:
         """Results of joining, as JSON types; empty for an .npz."""

@@ -50,12 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
     values.add_finger(parser, required=False, text="of a recording with several: name or chip select")
-    parser.add_argument(
-        "--population",
-        metavar="FILE",
-        default=None,
-        help="regularize towards this map of other fingers, or none (default: the package's)",
-    )
+    text = "regularize towards this map of other fingers, or none (default: the package's)"
+    parser.add_argument("--population", metavar="FILE", help=text)
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data from any other sensor")
     parser.add_argument("--force", action="store_true", help="overwrite existing files; accept another sensor's data")
     guided = parser.add_argument_group("guided, on a board")
