@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core.geometry import Floats
 from ...documents import parse_document, read_document, sealed

@@ -97,7 +97,7 @@ class RdtDecoder:
         numbers, records = numbers[fresh], records[fresh]
         assert self._newest is not None
         ready = numbers <= self._newest - (0 if all_of_them else HOLD_RECORDS)
-        self._waiting = [(numbers[~ready], records[~ready])]
+        self._waiting = [(numbers[~ready], records[~ready])] if (~ready).any() else []
         numbers, records = numbers[ready], records[ready]
         if len(numbers):
             if self._released >= 0:
