@@ -59,7 +59,6 @@ JSON: dict[str, tuple[Callable[[Path], Any], Any]] = {
     "calibration": (calibration_file.load, CALIBRATION | EDITED),
     "map": (map_file.load, MAP | EDITED),
     "fitted map": (map_file.load_fitted, FITTED | EDITED),
-    "provenance": (map_file.read_provenance, FITTED | EDITED),
     "settings": (read_settings, SETTINGS),
     "backup": (read_backup, KEPT | EDITED),
     "mounting": (lambda path: from_json(path.read_text(errors="replace"), "here"), MOUNTING),

@@ -47,20 +47,9 @@ def on_board_q4(
     board = board_settings(settings)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
     n = len(raw)
-    poc_um = np.empty((n, 3), np.int16)
-    force_100un = np.empty((n, 3), np.int32)
-    torque_mnmm = np.empty((n, 3), np.int32)
-    flags = np.empty(n, np.uint32)
-    lib.bt_kernel_frames(
-        n,
-        ffi.from_buffer("uint16_t[]", raw),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        kernel,
-        ffi.from_buffer("int16_t[]", poc_um),
-        ffi.from_buffer("int32_t[]", force_100un),
-        ffi.from_buffer("int32_t[]", torque_mnmm),
-        ffi.from_buffer("uint32_t[]", flags),
-    )
+    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
+    force_100un, torque_mnmm = np.empty((n, 3), np.int32), np.empty((n, 3), np.int32)
+    lib.bt_kernel_frames(n, *pointers(raw, tare_q4), kernel, *pointers(poc_um, force_100un, torque_mnmm, flags))
     return poc_um, force_100un, torque_mnmm, flags
 
 
@@ -75,13 +64,7 @@ def pressure_force_100un(
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(filtered_q4))
     board_settings({wire.Setting.PRESSURE_GAIN_NN: gain_nn})  # raises ValueError out of range
     out = np.empty(len(filtered_q4), np.int32)
-    lib.bt_pressure_forces(
-        len(out),
-        ffi.from_buffer("uint16_t[]", filtered_q4),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        gain_nn,
-        ffi.from_buffer("int32_t[]", out),
-    )
+    lib.bt_pressure_forces(len(out), *pointers(filtered_q4, tare_q4), gain_nn, *pointers(out))
     return out
 
 
@@ -93,8 +76,7 @@ def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[
     pdc = integers("pdc", pdc, np.uint16, None)
     board_settings({wire.Setting.PRESSURE_FILTER_MILLI: filter_milli})  # raises ValueError out of range
     out = np.empty(len(pdc), np.uint16)
-    pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
-    lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
+    lib.bt_pressure_filter(len(out), *pointers(pdc), filter_milli, *pointers(out))
     return out
 
 
@@ -121,13 +103,8 @@ def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settin
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
     gains = formula_settings(settings)
     out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
-    lib.lin2013_frames(
-        len(raw),
-        ffi.from_buffer("uint16_t[]", raw),
-        ffi.from_buffer("uint16_t[]", tare_q4),
-        gains,
-        *(ffi.from_buffer("double[]", array) for array in out),
-    )
+    results = [ffi.from_buffer("double[]", array) for array in out]
+    lib.lin2013_frames(len(raw), *pointers(raw, tare_q4), gains, *results)
     return Results(*out)
 
 
@@ -164,6 +141,11 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
         if bad.any():
             raise ValueError(f"{name} hold {array[bad][0]}, expected integers {limits.min} to {limits.max}")
     return np.ascontiguousarray(array, dtype)
+
+
+def pointers(*arrays: NDArray[Any]) -> list[Any]:
+    """Pointers for C to contiguous arrays of integers, which they keep alive."""
+    return [ffi.from_buffer(f"{array.dtype}_t[]", array) for array in arrays]
 
 
 def check_words(name: str, words: NDArray[Any]) -> NDArray[Any]:

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..documents import Provenance, parse_document, read_document, sealed, write_new
+from ..documents import Provenance, parse_document, read_document, sealed
 from ..wire import messages_gen as wire
 from .calibration import Calibration
 
@@ -79,10 +79,3 @@ def loads(text: str, where: str) -> Calibration:
 def load(path: Path) -> Calibration:
     """The calibration in a file. Raises InputError when it cannot be read or used."""
     return read_document(path, FORMAT, from_dict, _CURE)
-
-
-def save(
-    path: Path, calibration: Calibration, provenance: Provenance | None = None, *, overwrite: bool = False
-) -> None:
-    """Write a file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
-    write_new(path, dumps(calibration, provenance), overwrite=overwrite)

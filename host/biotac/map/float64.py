@@ -12,7 +12,7 @@ from ..core.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArray, tare_to_q4
-from .board_map import BoardBlock, BoardMap
+from .board_map import BoardMap
 from .columns import Signals, summed, tared
 from .quantise import unit
 
@@ -69,7 +69,10 @@ def exact(
     board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Floats:
     """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results()."""
-    blocks = [(block.kind, block.gate, unrounded(block)) for block in board_map.blocks]
+    blocks = [
+        (block.kind, block.gate, block.coefficients * (unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)))
+        for block in board_map.blocks
+    ]
     parts = [summed(blocks, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
     result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(board_map.axes)
@@ -86,9 +89,3 @@ def tared_chunks(
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
         yield Signals(every.e[rows], every.tare[rows], pressure[rows])
-
-
-def unrounded(block: BoardBlock) -> Floats:
-    """A block's coefficients (columns, axes) as real numbers, in the results' units per 1 of a column."""
-    scale = unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)
-    return np.asarray(block.coefficients * scale, dtype=np.float64)
