@@ -19,8 +19,7 @@ from .chip import Chip
 
 SLOT_BYTES = 128
 SLOTS = 2
-CRC = struct.Struct("<I")
-GENERATION = struct.Struct("<I")
+CRC = GENERATION = struct.Struct("<I")
 
 
 class Kept(NamedTuple):
@@ -45,10 +44,7 @@ def load(chip: Chip) -> Calibration:
 
 
 def store(chip: Chip, calibration: Calibration) -> bool:
-    """Store the calibration; False if it was there already, and nothing is written to spare the chip.
-
-    Raises PortError when it is not stored.
-    """
+    """Store the calibration; False if it was there already, and nothing is written to spare the chip."""
     newest = _newest([_read(chip, slot) for slot in range(SLOTS)])
     body = flash_record.pack(calibration).ljust(SLOT_BYTES - CRC.size - GENERATION.size, b"\xff")
     if newest is not None and newest.record == body:

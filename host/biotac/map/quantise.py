@@ -40,11 +40,7 @@ def unit(kind: Kind, gate: Gate) -> float:
 
 
 def quantise(blocks: Unrounded, serial: str = "", made_s: int = 0) -> BoardMap:
-    """The board's map of the ``blocks`` that are not all 0.
-
-    Raises InputError when a coefficient is beyond the board's formats (it names the block), when all are 0, or when
-    there is no room for all of them.
-    """
+    """The board's map of the ``blocks`` that are not all 0."""
     kept = tuple(_block(kind, gate, values) for (kind, gate), values in blocks.items() if np.any(values != 0.0))
     if not kept:
         raise InputError("every coefficient of the map is 0: expected a fitted map; calibrate again")

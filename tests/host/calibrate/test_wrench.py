@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -345,80 +346,60 @@ def test_figures_of_known_errors() -> None:
 # ---- refusals ----------------------------------------------------------------------------------
 
 
-def _spoil(arrays: dict[str, Any], how: str) -> None:
-    force, counts = arrays["F"], arrays["E"]
-    if how == "short":
-        arrays |= {"E": counts[:1234], "F": force[:1234]}
-    elif how == "no force":
-        del arrays["F"]
-    elif how == "nan":
-        force[[17, 90], 1] = np.nan
-    elif how == "no rest":
-        del arrays["E_base"]
-    elif how == "base touched":
-        arrays["E_base"] = counts[:2000]
-    elif how == "grams":
-        force *= 101.97
-    elif how == "millinewton":
-        force *= 1000.0
-    elif how == "kilonewton":
-        force /= 1000.0
-    elif how == "railed":
-        counts[:200, 16] = 0
-    elif how == "stuck":
-        counts[:, 6] = 1800 + np.arange(len(counts)) % 2
-    elif how == "clipped":
-        np.clip(force, None, 1.0, out=force)
-    elif how == "other file":
-        arrays["F"] = wrench_run.fields(len(force), seed=9, rests=False)["F"]
-    elif how == "zero":
-        force[:] = 0.0
-    elif how == "nan counts":
-        arrays["E"] = counts.astype(np.float32)
-        arrays["E"][40, 3] = np.nan
-    elif how == "other finger's base":
-        its = wrench_run.fields(len(force))
-        arrays |= its | {"E_base": wrench_run.fields(len(force), seed=9)["E_base"]}
-    elif how == "strange serial":
-        arrays["serial"] = np.array([1, 2])
-    elif how == "torque rows differ":
-        arrays["M"] = force[:-1]
-    elif how == "fractions of counts":
-        arrays["E"] = counts + 0.5
-    elif how == "rows differ":
-        arrays["F"] = force[:-1]
+def scaled(factor: float) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    return lambda a: {"F": a["F"] * factor}
+
+
+def put(name: str, rows: Any, value: Any, dtype: Any = None) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    """Other values in some rows, or rows and columns, of a field."""
+
+    def change(arrays: dict[str, Any]) -> dict[str, Any]:
+        array = arrays[name].astype(dtype or arrays[name].dtype)
+        array[rows] = value
+        return {name: array}
+
+    return change
 
 
 @pytest.mark.parametrize(
-    ("how", "words"),
+    ("change", "words"),
     [
-        ("short", rf"1234 rows: expected at least {MIN_ROWS}"),
-        ("no force", r"holds E, E_base, E_idle: expected E .* and F"),
-        ("nan", r"F is not finite in 2 of 4000 rows, first in row 17"),
-        ("no rest", r"never at rest: 0 rows below 0.1 N, the lowest force is 1\.\d\d N"),
-        ("base touched", r"E_base is not at rest: E\d+ varies by \d{3,4} counts"),
-        ("grams", r"units of F per RMS count .* gf or mN"),
-        ("millinewton", r"units of F per RMS count .* gf or mN"),
-        ("kilonewton", r"units of F per RMS count .* kN or kgf"),
-        ("railed", r"E17 is saturated .* 5\.0% of the rows"),
-        ("stuck", r"E7 varies by 1 count\(s\) in 4000 rows: expected more than 2.* stuck"),
-        ("clipped", r"read exactly 1 N along [xyz], the extreme: .* saturated"),
-        ("other file", r"not aligned: .* lag of -?\d+ rows, .* held-out R2 of -?\d\.\d\d:"),
-        ("zero", r"F is 0 in every row"),
-        ("nan counts", r"field E row 40 holds nan: expected whole counts"),
-        ("fractions of counts", r"field E row 0 holds \d+\.5: expected whole counts"),
-        ("other finger's base", r"E at rest and E_base do not match: .* differ by \d\d+ RMS \(E\d+ by"),
-        ("strange serial", r"field serial is int64: expected one string"),
-        ("torque rows differ", r"field M is float32 \(3999, 3\): expected \(4000, 3\) in N mm"),
-        ("rows differ", r"field F is float32 \(3999, 3\): expected \(4000, 3\)"),
+        (lambda a: {"E": a["E"][:1234], "F": a["F"][:1234]}, rf"1234 rows: expected at least {MIN_ROWS}"),
+        (lambda a: {"F": None}, r"holds E, E_base, E_idle: expected E .* and F"),
+        (put("F", ([17, 90], 1), np.nan), r"F is not finite in 2 of 4000 rows, first in row 17"),
+        (lambda a: {"E_base": None}, r"never at rest: 0 rows below 0.1 N, the lowest force is 1\.\d\d N"),
+        (lambda a: {"E_base": a["E"][:2000]}, r"E_base is not at rest: E\d+ varies by \d{3,4} counts"),
+        (scaled(101.97), r"units of F per RMS count .* gf or mN"),
+        (scaled(1000.0), r"units of F per RMS count .* gf or mN"),
+        (scaled(0.001), r"units of F per RMS count .* kN or kgf"),
+        (put("E", (slice(200), 16), 0), r"E17 is saturated .* 5\.0% of the rows"),
+        (
+            put("E", (slice(None), 6), 1800 + np.arange(4000) % 2),
+            r"E7 varies by 1 count\(s\) in 4000 rows: expected more than 2.* stuck",
+        ),
+        (lambda a: {"F": np.clip(a["F"], None, 1.0)}, r"read exactly 1 N along [xyz], the extreme: .* saturated"),
+        (
+            lambda a: {"F": wrench_run.fields(4000, seed=9, rests=False)["F"]},
+            r"not aligned: .* lag of -?\d+ rows, .* held-out R2 of -?\d\.\d\d:",
+        ),
+        (scaled(0.0), r"F is 0 in every row"),
+        (put("E", (40, 3), np.nan, np.float32), r"field E row 40 holds nan: expected whole counts"),
+        (lambda a: {"E": a["E"] + 0.5}, r"field E row 0 holds \d+\.5: expected whole counts"),
+        (
+            lambda a: wrench_run.fields(4000) | {"E_base": wrench_run.fields(4000, seed=9)["E_base"]},
+            r"E at rest and E_base do not match: .* differ by \d\d+ RMS \(E\d+ by",
+        ),
+        (lambda a: {"serial": np.array([1, 2])}, r"field serial is int64: expected one string"),
+        (lambda a: {"M": a["F"][:-1]}, r"field M is float32 \(3999, 3\): expected \(4000, 3\) in N mm"),
+        (lambda a: {"F": a["F"][:-1]}, r"field F is float32 \(3999, 3\): expected \(4000, 3\)"),
     ],
 )
 def test_a_bad_recording_is_refused_with_the_number_that_shows_it(
-    how: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: Callable[[dict[str, Any]], dict[str, Any]], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arrays = wrench_run.fields(4000, rests=False)
-    _spoil(arrays, how)
-    path = wrench_run.save(tmp_path / "bad.npz", arrays)
+    arrays |= change(arrays)
+    path = wrench_run.save(tmp_path / "bad.npz", {name: array for name, array in arrays.items() if array is not None})
     with pytest.raises(RecordingError, match=words):
         validate(load_run(path))
     assert main(["calibrate", "wrench", str(path)]) == 2

@@ -154,9 +154,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
 
 def test_a_record_is_that_of_the_specification() -> None:
     data = SERIAL.encode() + struct.pack("<I8i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600, 9_500_000)
-    header = struct.pack("<IHHI", 0x52544F42, 2, 1, 52)
-    crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
-    assert flash_record.pack(ODD) == header + struct.pack("<I", crc) + data
+    assert flash_record.pack(ODD) == sealed(2, 1, data)
     assert flash_record.unpack(flash_record.pack(ODD), "it") == ODD
     assert flash_record.unpack(flash_record.pack(ODD).ljust(256, b"\xff"), "it") == ODD
 

@@ -23,10 +23,7 @@ PULL = 1000.0  # weight of the population map against the finger's own data, in 
 
 @dataclass(frozen=True)
 class Scale:
-    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x.
-
-    The defaults change nothing.
-    """
+    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x."""
 
     gain: float = 1.0
     balance: float = 0.0

@@ -15,14 +15,9 @@ from .force_source import Reference
 #: contact or a fault, ``railed`` a PDC at an end of its range.
 ROW_DTYPE = np.dtype(
     [
-        ("finger", "u1"),
-        ("t_us", "<i8"),
-        ("pressure", "<f8"),
-        ("rest", "<f8"),
-        ("board_n", "<f8"),
-        ("force_n", "<f8"),
-        ("touched", "?"),
-        ("railed", "?"),
+        *(("finger", "u1"), ("t_us", "<i8")),
+        *((name, "<f8") for name in ("pressure", "rest", "board_n", "force_n")),
+        *(("touched", "?"), ("railed", "?")),
     ]
 )
 

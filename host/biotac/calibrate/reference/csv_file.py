@@ -32,10 +32,7 @@ _WANTED = "t in s, forces in N, torques in N mm or N m"
 
 
 def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
-    """The reference in ``path``; ``mounting`` replaces the file's own.
-
-    Raises RecordingError for what cannot be read or is not plausible, InputError for a wrong mounting in the file.
-    """
+    """The reference in ``path``; ``mounting`` replaces the file's own."""
     own, head, read = open_table(path)
     chosen = mounting
     if chosen is None and "mounting" in own:
@@ -122,10 +119,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
 
 
 class CsvWriter:
-    """Writes a reference; every ``add`` is flushed to the operating system, so that killing the process loses nothing.
-
-    Raises InputError when ``path`` exists and may not be overwritten, or cannot be written.
-    """
+    """Writes a reference; every ``add`` is flushed to the operating system, so that a kill loses nothing."""
 
     def __init__(self, path: Path, mounting: Mounting, sensor: str, *, overwrite: bool = False) -> None:
         self.path = path

@@ -62,10 +62,7 @@ def parse_address(text: str) -> Address:
 
 
 def read_configuration(xml: bytes, where: str) -> tuple[Scale, str]:
-    """Scale and calibration number from the box's netftapi2.xml.
-
-    Raises InputError for units that it cannot convert, RDT switched off, or XML that is not such a box's.
-    """
+    """Scale and calibration number from the box's netftapi2.xml."""
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:

@@ -174,11 +174,8 @@ def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> F
 
 def _folds(blocks: Blocks, numbers: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
     """For each inner fold, the strips to train on and those to test on."""
-    result = []
-    for fold in range(INNER_FOLDS):
-        out = numbers[fold::INNER_FOLDS]
-        result.append((strips & blocks.kept_from(out), strips & blocks.own(out)))
-    return result
+    outs = [numbers[fold::INNER_FOLDS] for fold in range(INNER_FOLDS)]
+    return [(strips & blocks.kept_from(out), strips & blocks.own(out)) for out in outs]
 
 
 class _Timing:

@@ -223,10 +223,7 @@ def _zero(where: str, board: Board, rows: Floats) -> Floats:
 
 
 def _on_skin(where: str, truth: Floats) -> float:
-    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere.
-
-    Raises RecordingError when the share is too low, or torque and force do not fit each other.
-    """
+    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere."""
     firm = truth[np.linalg.norm(truth[:, :3], axis=1) > FIRM_N]
     if not len(firm):
         raise RecordingError(f"{where}: no force above {FIRM_N:g} N: expected firm presses; press harder")

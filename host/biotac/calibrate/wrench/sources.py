@@ -79,10 +79,7 @@ def load(
     serial: str = "",
     force: bool = False,
 ) -> Loaded:
-    """A checked run from ``path``. ``serial`` is the sensor it is for; a run of another is refused unless forced.
-
-    Raises InputError, RecordingError for the content of files.
-    """
+    """A checked run from ``path``. ``serial`` is the sensor it is for; a run of another is refused unless forced."""
     if path.suffix.lower() != ".mcap":
         if reference is not None:
             raise InputError(f"{path} contains its force: expected no --reference; that is for .mcap recordings")

@@ -191,22 +191,19 @@ def _write(
     written = _outputs(folder, path)
     with contextlib.ExitStack() as stack:
         page, picture, map_file = (stack.enter_context(whole(out, overwrite=overwrite)) for out in written)
-        page.write_text(report.markdown(validation, written[1].name) + _origin(origin), encoding="utf-8")
+        made_from = [
+            f"* sensor: {origin['serial'] or 'not stated in the recording'}",
+            f"* software: {origin['software']}, {made_text(origin['made_s'])}",
+            f"* data: {', '.join(origin['files'])}, SHA-256 {origin['data_sha256']}",
+            f"* reference: {origin['reference']}",
+        ]
+        text = report.markdown(validation, written[1].name)
+        page.write_text("\n".join([text, "## Provenance", "", *made_from, ""]), encoding="utf-8")
         with drawn(picture) as figure:
             report.draw(validation, figure)
         text = dumps_fitted(validation.wrench_map, serial=origin["serial"], made_s=origin["made_s"], provenance=origin)
         map_file.write_text(text, encoding="utf-8")
     return written
-
-
-def _origin(origin: Provenance) -> str:
-    rows = [
-        ("sensor", origin["serial"] or "not stated in the recording"),
-        ("software", f"{origin['software']}, {made_text(origin['made_s'])}"),
-        ("data", f"{', '.join(origin['files'])}, SHA-256 {origin['data_sha256']}"),
-        ("reference", origin["reference"]),
-    ]
-    return "\n".join(["", "## Provenance", "", *[f"* {name}: {what}" for name, what in rows], ""])
 
 
 def _text(facts: dict[str, Any]) -> str:
