@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -221,47 +222,37 @@ def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
     assert len(table) == 3 and "BTSIM00000000011" in table[1]
 
 
-def changed_csv(pressed: Path, tmp_path: Path, change: str) -> Path:
-    with (pressed / "plate.csv").open(newline="") as f:
-        head, *rows = list(csv.reader(f))
-    values = np.array(rows, np.float64)
-    if change == "mN":
-        values[:, 1:] *= 1000
-    elif change == "grams":
-        values[:, 1:] *= 20
-    elif change == "late":
-        values[:, 0] += 0.6
-    elif change == "elsewhere":
-        values[:, 0] += 1e4
-    elif change == "nan":
-        values[100, 2] = np.nan
-    elif change == "noise":
-        values[:, 1:] = np.random.default_rng(1).normal(0, 1, values[:, 1:].shape)
-    elif change == "short":
-        values = values[:900]
-    out = tmp_path / f"{change}.csv"
-    with out.open("w", newline="") as f:
-        csv.writer(f).writerows([["t_ms", *head[1:]] if change == "columns" else head, *values.tolist()])
-    return out
+def noisy(values: np.ndarray) -> np.ndarray:
+    force = np.random.default_rng(1).normal(0, 1, values[:, 1:].shape)
+    return np.column_stack([values[:, 0], force])
+
+
+def without_one(values: np.ndarray) -> np.ndarray:
+    values[100, 2] = np.nan
+    return values
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("mN", "forces up to 5000, expected newtons, at most 200"),
-        ("grams", "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
-        ("late", "they agree best with pressure -59 rows after the force"),
-        ("elsewhere", "covers none of"),
-        ("nan", "1 of 3110 rows with NaN"),
-        ("noise", "correlation 0."),
-        ("short", "has no reference: it gave no force in "),
-        ("columns", "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
+        (lambda v: v * [1, 1000, 1000, 1000], "forces up to 5000, expected newtons, at most 200"),
+        (lambda v: v * [1, 20, 20, 20], "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
+        (lambda v: np.add(v, [0.6, 0, 0, 0]), "they agree best with pressure -59 rows after the force"),
+        (lambda v: np.add(v, [1e4, 0, 0, 0]), "covers none of"),
+        (without_one, "1 of 3110 rows with NaN"),
+        (noisy, "correlation 0."),
+        (lambda v: v[:900], "has no reference: it gave no force in "),
+        (None, "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
     ],
 )
 def test_a_reference_that_is_none_is_refused_with_its_number(
-    pressed: Path, tmp_path: Path, capsys, change: str, words: str
+    pressed: Path, tmp_path: Path, capsys, change: Callable[[np.ndarray], np.ndarray] | None, words: str
 ) -> None:
-    place = changed_csv(pressed, tmp_path, change)
+    with (pressed / "plate.csv").open(newline="") as f:
+        head, *rows = list(csv.reader(f))
+    place, values = tmp_path / "changed.csv", np.array(rows, np.float64)
+    with place.open("w", newline="") as out:
+        csv.writer(out).writerows([head, *change(values).tolist()] if change else [["t_ms", *head[1:]], *rows])
     assert run(pressed, str(place), "--out", str(tmp_path / "out")) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

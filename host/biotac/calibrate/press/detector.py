@@ -120,6 +120,11 @@ class Presses:
         self._window: deque[float] = deque(maxlen=WINDOW_ROWS)
         self._enter(Phase.REST)
 
+    @property
+    def done(self) -> bool:
+        """Whether every press was seen and released (after finish(), the last need not be)."""
+        return self.phase is Phase.DONE
+
     def feed(self, rows: StructArray) -> int:
         """Take rows (n,) of this finger, up to the one that ends its last press; returns how many were taken.
 
@@ -280,7 +285,7 @@ class Procedure:
     @property
     def step(self) -> Step | None:
         """What to do now; None when all is done."""
-        machine, forces_n = next((turn for turn in self._turns if turn[0].phase is not Phase.DONE), (None, ()))
+        machine, forces_n = next((turn for turn in self._turns if not turn[0].done), (None, ()))
         if machine is None:
             return None
         number = len(machine.presses) + (machine.phase is not Phase.RELEASE)
@@ -318,11 +323,11 @@ class Procedure:
         Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
         """
         for machine, _ in self._turns:
-            if machine.phase is Phase.DONE:
+            if machine.done:
                 continue
             own = rows[rows["finger"] == machine.finger]
             taken = machine.feed(own)
-            if machine.phase is not Phase.DONE:
+            if not machine.done:
                 return
             # The next finger begins after this row, even if later rows came in the same call.
             rows = rows[rows["t_us"] > own["t_us"][taken - 1]] if taken else rows

@@ -199,32 +199,24 @@ class Procedure:
 Show = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Files:
-    """Paths for the board's recording (.mcap) and the reference (.csv)."""
-
-    recording: Path
-    reference: Path
-
-
 def walk(
     hand: Hand,
     reader: Reader,
     procedure: Procedure,
-    files: Files,
+    path: Path,
     *,
     overwrite: bool = False,
     show: Show = lambda event: None,
     progress: Show = lambda text: None,
 ) -> None:
-    """Run and record the procedure until it is done, the board's source ends, or a KeyboardInterrupt, which ends it.
+    """Run the procedure until it is done, the board's source ends, or a KeyboardInterrupt, which ends it.
 
-    The board does not stream afterwards. Raises InputError when a file exists or cannot be written, when the finger
-    keeps drifting or the reference has no torque, and DeviceLostError when the board or the reference is lost; what was
-    recorded until then is kept.
+    The board is recorded to ``path``, the reference to a .csv beside it. The board does not stream afterwards. Raises
+    InputError when a file exists or cannot be written, when the finger keeps drifting or the reference has no torque,
+    and DeviceLostError when the board or the reference is lost; what was recorded until then is kept.
     """
-    reference = CsvWriter(files.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
-    with closing(reference) as writer, closing(hand.record(files.recording, overwrite=overwrite)):
+    reference = CsvWriter(path.with_suffix(".csv"), procedure.mounting, reader.sensor, overwrite=overwrite)
+    with closing(reference) as writer, closing(hand.record(path, overwrite=overwrite)):
         try:
             _loop(hand, reader, procedure, writer, show, progress)
             if procedure.step is not Step.DONE:

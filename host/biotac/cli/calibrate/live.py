@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import contextlib
 from collections.abc import Iterator
+from pathlib import Path
 
 import biotac
 
 from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
 from ...calibrate.reference.samples import Reader
-from ...calibrate.wrench.guided import Files, Procedure, walk
+from ...calibrate.wrench.guided import Procedure, walk
 from ...calibrate.wrench.sources import check_serial
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
@@ -24,16 +25,15 @@ from ..progress import Progress
 EMULATED = "nano17"
 
 
-def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Files, list[str]]:
-    """Guide through the procedure; return the files, and what is missing.
+def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Path, list[str]]:
+    """Guide through the procedure; return the recording, with the reference's .csv beside it, and what is missing.
 
     Raises KeyboardInterrupt, with a message, if it was ended before there was anything to fit.
     """
     serial = ascii_text(hand.sensor_info(finger).serial)
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
-    name = serial or f"finger{finger}"
-    files = Files(args.out / f"{name}.mcap", args.out / f"{name}.csv")
-    recorded = f"the recorded data is in {files.recording} and {files.reference}"
+    path = args.out / f"{serial or f'finger{finger}'}.mcap"
+    recorded = f"the recorded data is in {path} and {path.with_suffix('.csv')}"
     progress = Progress()
 
     def show(event: str) -> None:
@@ -44,9 +44,9 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Fi
         outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
-            walk(hand, reader, procedure, files, overwrite=args.force, show=show, progress=progress.show)
+            walk(hand, reader, procedure, path, overwrite=args.force, show=show, progress=progress.show)
         except BiotacError:
-            if files.recording.exists():
+            if path.exists():
                 outputs.note(recorded)
             raise
         finally:
@@ -56,7 +56,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Fi
         outputs.note(f"reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad")
     if procedure.zero is None:
         raise KeyboardInterrupt(f"ended while {procedure.last_step.value.partition(':')[0]}; {recorded}")
-    return files, procedure.coverage.missing()
+    return path, procedure.coverage.missing()
 
 
 def open_board(args: argparse.Namespace) -> biotac.Hand:

@@ -195,7 +195,7 @@ def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[we
     if not loads and args.readings is None:
         raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
     forces_n = [load.size_n for load in loads] or [value * UNITS_N[args.unit] for value in args.readings]
-    return known_force.recorded(recording, *args.finger, forces_n, [load.toward for load in loads] or None)
+    return known_force.recorded(recording, args.finger[0], forces_n, [load.toward for load in loads] or None)
 
 
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:

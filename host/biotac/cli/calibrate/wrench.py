@@ -95,13 +95,13 @@ def _live(args: argparse.Namespace) -> int:
         raise InputError("--live saves its recording: expected --out FOLDER")
     with live.open_board(args) as hand:
         values.check_answers(hand, args.finger)
-        files, missing = live.record(args, hand, args.finger)
+        path, missing = live.record(args, hand, args.finger)
         for line in missing:
             outputs.note(f"not covered: {line}")
         if not args.force:
-            _check_out(args.out, [files.recording], overwrite=False)
-        reference = files.reference, read_reference(str(files.reference))
-        calibrated = _fit(args, load(files.recording, reference, finger=args.finger))
+            _check_out(args.out, [path], overwrite=False)
+        beside = path.with_suffix(".csv")
+        calibrated = _fit(args, load(path, (beside, read_reference(str(beside))), finger=args.finger))
         if not args.no_upload:
             _upload(args, hand, args.finger, calibrated)
         outputs.say(args, calibrated.facts | {"not_covered": missing}, _text(calibrated.facts))
