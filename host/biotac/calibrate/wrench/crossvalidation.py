@@ -217,12 +217,7 @@ class _Trainer:
     """Trains on any choice of blocks; sums are computed once for each window, for all axes at all lags in use."""
 
     def __init__(
-        self,
-        run: Run,
-        blocks: Blocks,
-        trainings: Sequence[_Training],
-        others: Floats | None,
-        pool: ThreadPoolExecutor,
+        self, run: Run, blocks: Blocks, trainings: list[_Training], others: Floats | None, pool: ThreadPoolExecutor
     ) -> None:
         self._blocks, self._others = blocks, others
         self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.geometry import Floats
 from ...markdown import table
 from . import figures
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
@@ -24,6 +23,16 @@ def markdown(validation: Validation, picture: str) -> str:
     run = validation.run
     lags = ", ".join(f"{axis} {lag}" for axis, lag in zip(run.axes, validation.final.lag_rows, strict=True))
     cut, spans = _blocks(validation)
+    drifts = " and ".join(f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:])
+    still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
+    air = f"E_base is trained on with force 0, {facts['air_share']:.1%} of the run's weight"
+    if run.air is None:
+        air = "there is no E_base, so only the run itself shows what no contact is"
+    models = []
+    for name, errors in facts["models"].items():
+        cells = [f"{a:.3f} ({b:.3f})" for a, b in zip(errors, facts["models_drifted"][name], strict=True)]
+        models.append([name, *cells, TEXTS[name]])
+    shares = [[f"{value:+.3f}" for value in row] for row in facts["confusion"]]
     lines = [
         f"# Wrench calibration of {run.name}",
         "",
@@ -36,11 +45,9 @@ def markdown(validation: Validation, picture: str) -> str:
         *_axes(validation),
         "## Models",
         "",
-        "Held-out RMSE; in brackets, the worse of "
-        + " and ".join(f"{c:+.0f}" for c in SHIFTS_COUNTS[1:])
-        + " counts of untared drift.",
+        f"Held-out RMSE; in brackets, the worse of {drifts} counts of untared drift.",
         "",
-        *_models(validation),
+        *table(["model", *[f"{axis} [{_unit(axis)}]" for axis in run.axes], ""], models),
         "## Weak places",
         "",
         *_weak(validation, facts),
@@ -51,17 +58,14 @@ def markdown(validation: Validation, picture: str) -> str:
         "",
         *table(
             ["", *[f"true {name}" for name in run.axes]],
-            [
-                [f"predicted {name}", *[f"{value:+.3f}" for value in row]]
-                for name, row in zip(run.axes, figures.confusion(validation.predicted[0], run.truth), strict=True)
-            ],
+            [[f"predicted {name}", *row] for name, row in zip(run.axes, shares, strict=True)],
         ),
         "## Assumptions",
         "",
         f"* force and counts: counts lag by {facts['lag_rows']} rows (at most {MAX_LAG_ROWS} allowed), corrected per "
         f"axis: {lags}; an affine map reaches a held-out R2 of {facts['affine_r2']:.2f}",
         f"* the map is evaluated on counts averaged over {facts['window_rows']} frames",
-        _rest(validation, facts),
+        f"* without contact the map gives {still}, and {' and '.join(drifted)} at {drifts} counts of drift; {air}",
         *[f"* {note}" for note in facts["notes"]],
         *spans,
         "",
@@ -75,10 +79,18 @@ def draw(validation: Validation, figure: Any) -> None:
     """Draw prediction against truth for each force axis, and the models' errors, in a matplotlib figure."""
     figure.set_size_inches(16, 4.4)
     figure.suptitle(f"{validation.run.name}: {POOLED}, held out")
-    axes = figure.subplots(1, 4)
-    for axis in range(3):
-        _draw_axis(axes[axis], validation, axis)
-    _draw_models(axes[3], validation)
+    *panels, models = figure.subplots(1, 4)
+    forces = zip(panels, validation.run.axes, validation.run.truth.T, validation.predicted[0].T, strict=False)
+    for color, (axes, name, truth, guess) in zip(AXIS_COLORS, forces, strict=True):
+        step = max(1, len(truth) // MAX_DOTS)
+        axes.plot(truth[::step], guess[::step], ".", color=color, markersize=2, alpha=0.5)
+        ends = [float(truth.min()), float(truth.max())]
+        axes.plot(ends, ends, color="#444444", linewidth=1)
+        axes.set(xlabel=f"true {name} [N]", ylabel=f"predicted {name} [N]")
+        error = figures.rmse(guess[:, None], truth[:, None])[0]
+        axes.set_title(f"{name}: RMSE {error:.3f} N", fontsize=10)
+        axes.grid(alpha=0.3)
+    _draw_models(models, validation)
 
 
 def _blocks(validation: Validation) -> tuple[str, list[str]]:
@@ -90,15 +102,6 @@ def _blocks(validation: Validation) -> tuple[str, list[str]]:
     if not validation.run.rest.any():
         return cut, ["* the run never rests: blocks are cut anywhere, so a long contact may span two"]
     return cut, [f"* block edges at rest, so that no contact spans two blocks: {blocks.whole_contacts}"]
-
-
-def _rest(validation: Validation, facts: dict[str, Any]) -> str:
-    still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
-    at = " and ".join(f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:])
-    why = f"E_base is trained on with force 0, {facts['air_share']:.1%} of the run's weight"
-    if validation.run.air is None:
-        why = "there is no E_base, so only the run itself shows what no contact is"
-    return f"* without contact the map gives {still}, and {' and '.join(drifted)} at {at} counts of drift; {why}"
 
 
 def _unit(axis: str) -> str:
@@ -117,14 +120,6 @@ def _axes(validation: Validation) -> list[str]:
         each = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
         rows.append([name, *each, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
     return table(head, rows)
-
-
-def _models(validation: Validation) -> list[str]:
-    rows = []
-    for name, errors in validation.by_model.items():
-        drifted = errors[1:].max(axis=0)
-        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], TEXTS[name]])
-    return table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
 
 
 def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
@@ -154,20 +149,6 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
         error = f"{axis_errors[worst_block]:.3f} {_unit(name)}"
         lines.append(f"* {name}: worst block {worst_block + 1} of {BLOCKS}, RMSE {error}")
     return lines
-
-
-def _draw_axis(axes: Any, validation: Validation, axis: int) -> None:
-    truth: Floats = validation.run.truth[:, axis]
-    step = max(1, len(truth) // MAX_DOTS)
-    name = validation.run.axes[axis]
-    guess = validation.predicted[0][:, axis]
-    axes.plot(truth[::step], guess[::step], ".", color=AXIS_COLORS[axis], markersize=2, alpha=0.5)
-    ends = [float(truth.min()), float(truth.max())]
-    axes.plot(ends, ends, color="#444444", linewidth=1)
-    error = figures.rmse(guess[:, None], truth[:, None])[0]
-    axes.set(xlabel=f"true {name} [N]", ylabel=f"predicted {name} [N]")
-    axes.set_title(f"{name}: RMSE {error:.3f} N", fontsize=10)
-    axes.grid(alpha=0.3)
 
 
 def _draw_models(axes: Any, validation: Validation) -> None:
