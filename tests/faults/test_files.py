@@ -22,7 +22,7 @@ from record_all import record_all
 
 import biotac
 from biotac import documents
-from biotac.calibrate.population import population_map
+from biotac.calibrate import population as population_map
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.mcap_file import read_mcap
 from biotac.calibrate.reference.mounting import LIN, from_json, read_mounting

@@ -60,7 +60,7 @@ def in_force(settings: Mapping[wire.Setting, int]) -> bool:
 
 
 def shipped() -> str:
-    """The package's population map as JSON text (biotac.calibrate.population.map_file)."""
+    """The package's population map as JSON text (biotac.calibrate.population)."""
     return resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...errors import InputError
-from ..population.population_map import Population, Sums
+from ..population import Population, Sums
 
 # How much fingers differ in the two numbers, and the map's error in one press: from F1 and F2, each by the other's map.
 GAIN_SPREAD = 0.04

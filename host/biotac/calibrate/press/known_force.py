@@ -16,7 +16,7 @@ from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch, join
 from ...wire.frames import Q4_PER_COUNT, StructArray
-from ..population.population_map import Population, by_columns
+from ..population import Population, by_columns
 from .detector import Press, Procedure
 from .force_source import Reference
 from .guide import Face, guide

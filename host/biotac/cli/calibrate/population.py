@@ -10,7 +10,7 @@ import numpy as np
 
 import biotac
 
-from ...calibrate.population import population_map
+from ...calibrate import population
 from ...errors import InputError
 from ...map.columns import ELECTRODES
 from ...map.population import in_force
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Put the map into force, and print which fingers it is from and how far off it may be."""
-    trained = population_map.load(args.population)
+    trained = population.load(args.population)
     with biotac.open(args.port) as hand:
         values.check_answers(hand, args.finger)
         if args.population is None:

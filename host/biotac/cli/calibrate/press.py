@@ -11,7 +11,7 @@ from typing import Any
 
 import biotac
 
-from ...calibrate.population import population_map
+from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
 from ...calibrate.press.detector import MAX_N, Phase, Step
 from ...calibrate.press.force_source import Truth, load_csv
@@ -200,7 +200,7 @@ def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[we
 
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
     """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
-    trained = population_map.load(args.population)
+    trained = population.load(args.population)
     if args.weights:
         fit, how, forces = few_shot.weighed, "weights on tilted blocks", {"force_n": held.force_n.tolist()}
     else:

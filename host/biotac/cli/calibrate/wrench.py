@@ -11,7 +11,7 @@ from typing import Any
 
 import biotac
 
-from ...calibrate.population import population_map
+from ...calibrate import population
 from ...calibrate.reference.files import read_reference
 from ...calibrate.reference.mounting import read_mounting
 from ...calibrate.wrench import figures, report
@@ -124,7 +124,7 @@ def _fit(args: argparse.Namespace, loaded: Loaded) -> _Calibrated:
     try:
         run, others = loaded.run, None
         if args.population != "none":
-            trained = population_map.load(None if args.population is None else Path(args.population))
+            trained = population.load(None if args.population is None else Path(args.population))
             others, note = trained.others_than(loaded.files)
             run = replace(run, notes=(*run.notes, note))
         # data aligned by their own times leave no lag to search for

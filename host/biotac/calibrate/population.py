@@ -2,7 +2,8 @@
 
 It is linear in 323 columns: those of a wrench map that have no offset and are 0 where counts are at their tare, so that
 rest is 0 N on any finger. Coefficients have seven digits in the file: short, the same on every computer, and off by a
-thousandth of the map's error. biotac-lab trains such maps.
+thousandth of the map's error. A file holds coefficients and their provenance, never recordings. biotac-lab trains such
+maps; ``biotac.calibrate.press.few_shot`` improves one with five presses on a scale, or known weights.
 """
 
 from __future__ import annotations
@@ -17,14 +18,19 @@ from typing import Any
 
 import numpy as np
 
-from ...core.geometry import Floats
-from ...documents import parse_document, read_document, sealed
-from ...map import columns as map_columns
-from ...map.columns import ELECTRODES, Signals, split
-from ...map.fitted import WrenchMap
-from ...map.population import SHIPPED, Integers, board_map, likeness, shipped
-from ...version import __version__
-from ..wrench.models import CONDUCTANCE_QUADRATIC, GATED
+from ..core.geometry import Floats
+from ..documents import parse_document, read_document, sealed
+from ..map import columns as map_columns
+from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
+from ..map.fitted import WrenchMap
+from ..map.population import LEFT, SHIPPED, WEIGHT_BITS, Integers, board_map, bounded_q4, halves, likeness, shipped
+from ..version import __version__
+from .wrench.models import CONDUCTANCE_QUADRATIC, GATED
+
+__all__ = [
+    "AXES", "COLUMNS", "LEFT", "PARTS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "WEIGHT_BITS", "Population", "Sums", "Trained",
+    "bounded_q4", "columns", "dumps", "halves", "load", "provenance_of",
+]  # fmt: skip
 
 FORMAT = "biotac-population-map/1"
 _CURE = f"expected a {FORMAT}, as `biotac-lab population --out` writes it"
