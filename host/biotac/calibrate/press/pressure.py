@@ -221,33 +221,30 @@ def _numbers(fitted: Fit) -> Provenance:
 
 def facts(outcome: Outcome) -> list[dict[str, Any]]:
     """One object for each finger, in JSON types."""
-    out = []
-    for finger, fitted in outcome.fits.items():
-        digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
-        seen = outcome.verified[finger]
-        one = _numbers(fitted) | {
+    digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
+    return [
+        _numbers(fitted)
+        | {
             "serial": outcome.calibrations[finger].serial,
             "pressure_gain_nn": fitted.gain_nn,
             "notes": list(fitted.notes),
-            "verification": {name: round(getattr(seen, name), decimals) for name, decimals in digits.items()},
+            "verification": {key: round(getattr(outcome.verified[finger], key), n) for key, n in digits.items()},
         }
-        if finger in outcome.lag_rows:
-            one["lag_rows"] = outcome.lag_rows[finger]
-        out.append(one)
-    return out
+        | ({"lag_rows": outcome.lag_rows[finger]} if finger in outcome.lag_rows else {})
+        for finger, fitted in outcome.fits.items()
+    ]
 
 
 def lines(outcome: Outcome) -> list[str]:
     """The table of K and P0, with the verification press."""
-    head = f"{'finger':>6}  {'sensor':<16}  {'K N/count':>9}  {'P0 count':>8}  {'fit':>6}"
-    out = [head + f"  {'force N':>7}  {'board N':>7}  {'error':>6}  {'float64':>7}"]
+    out = ["finger  sensor            K N/count  P0 count     fit  force N  board N   error  float64"]
     for finger, fitted in outcome.fits.items():
-        serial = outcome.calibrations[finger].serial or "any"
-        line = f"{finger:>6}  {serial:<16}  {fitted.gain_n:>9.6f}  {fitted.rest.counts:>8.1f}"
-        line += f"  {fitted.relative_error:>6.2%}"
-        seen = outcome.verified[finger]
-        line += f"  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
-        out.append(line)
+        seen, serial = outcome.verified[finger], outcome.calibrations[finger].serial or "any"
+        out.append(
+            f"{finger:>6}  {serial:<16}  {fitted.gain_n:>9.6f}  {fitted.rest.counts:>8.1f}"
+            f"  {fitted.relative_error:>6.2%}  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}"
+            f"  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
+        )
     notes = [note for fitted in outcome.fits.values() for note in fitted.notes]
     notes += [
         f"finger {f}: {seen.board_error:.1%} off on the verification press (the paper's: {PAPER_ERROR:.2%}): was it at "

@@ -59,11 +59,6 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pa
     return path, procedure.coverage.missing()
 
 
-def open_board(args: argparse.Namespace) -> biotac.Hand:
-    """Open the board; a simulated one beside an emulated reference runs as fast as the host reads."""
-    return biotac.open(args.live, pace=0.0 if args.reference == [EMULATED] else 1.0)
-
-
 @contextlib.contextmanager
 def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[Reader, Mounting]]:
     if len(args.reference) != 1:

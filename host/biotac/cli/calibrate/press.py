@@ -43,24 +43,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
     against = parser.add_mutually_exclusive_group(required=True)
     against.add_argument(
-        "--scale",
-        metavar="PORT",
-        nargs="?",
-        const="",
+        "--scale", metavar="PORT", nargs="?", const="",
         help="fit z and the balance of the population map to presses straight down on a scale, whose readings are "
         "typed in, or read from a serial port (MT-SICS or A&D, ?baud=9600&parity=N&bits=8)",
-    )
+    )  # fmt: skip
     against.add_argument(
         "--weights", action="store_true", help="fit all axes of the population map to weights, level and tilted"
     )
     against.add_argument(
-        "--pressure",
-        metavar="FILE",
-        nargs="?",
-        const="",
+        "--pressure", metavar="FILE", nargs="?", const="",
         help="from pressure to force, one gain per finger: press a plate or scale whose readings are typed in; for a "
         "recording, a CSV with t_s in the board's time and force_n (or fx_n, fy_n, fz_n)",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--finger", metavar="NAME,NAME", type=values.fingers, default=(),
         help="names or chip selects; one, or for --pressure several, in order (all)",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -81,10 +81,8 @@ def run(args: argparse.Namespace) -> int:
     for path in args.files:
         reference = references.get(path)
         beside = None if reference is None else (Path(reference), read_reference(reference, mounting))
-        calibrated = _fit(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
-        if args.upload is not None:
-            _upload_to_port(args, calibrated)
-        outputs.say(args, calibrated.facts, _text(calibrated.facts))
+        facts = _calibrate(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
+        outputs.say(args, facts, _text(facts))
     return 0
 
 
@@ -93,7 +91,8 @@ def _live(args: argparse.Namespace) -> int:
         raise InputError("--live calibrates one finger: expected --finger NAME")
     if args.out is None:
         raise InputError("--live saves its recording: expected --out FOLDER")
-    with live.open_board(args) as hand:
+    # a simulated board beside an emulated reference runs as fast as the host reads
+    with biotac.open(args.live, pace=0.0 if args.reference == [live.EMULATED] else 1.0) as hand:
         values.check_answers(hand, args.finger)
         path, missing = live.record(args, hand, args.finger)
         for line in missing:
@@ -101,25 +100,14 @@ def _live(args: argparse.Namespace) -> int:
         if not args.force:
             _check_out(args.out, [path], overwrite=False)
         beside = path.with_suffix(".csv")
-        calibrated = _fit(args, load(path, (beside, read_reference(str(beside))), finger=args.finger))
-        if not args.no_upload:
-            _upload(args, hand, args.finger, calibrated)
-        outputs.say(args, calibrated.facts | {"not_covered": missing}, _text(calibrated.facts))
+        loaded = load(path, (beside, read_reference(str(beside))), finger=args.finger)
+        facts = _calibrate(args, loaded, None if args.no_upload else hand)
+        outputs.say(args, facts | {"not_covered": missing}, _text(facts))
     return 0
 
 
-@dataclass(frozen=True)
-class _Calibrated:
-    """A fitted run, where its map comes from, and all findings as JSON types."""
-
-    loaded: Loaded
-    validation: Validation
-    provenance: Provenance
-    facts: dict[str, Any]
-
-
-def _fit(args: argparse.Namespace, loaded: Loaded) -> _Calibrated:
-    """Fit, and write the files first: they are safe whatever happens on the board afterwards."""
+def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | None = None) -> dict[str, Any]:
+    """Fit, and write the files first: they are safe whatever happens on the board afterwards. All findings as JSON."""
     progress = Progress()
     try:
         run, others = loaded.run, None
@@ -133,34 +121,28 @@ def _fit(args: argparse.Namespace, loaded: Loaded) -> _Calibrated:
         validation = validate(run, align=align, windows=windows, others=others, show=progress.show)
     finally:
         progress.done()
-    provenance = loaded.provenance(int(time.time()))
-    facts = figures.summary(validation) | loaded.facts() | {key: provenance[key] for key in ("serial", "data_sha256")}
+    origin = loaded.provenance(int(time.time()))
+    facts = figures.summary(validation) | loaded.facts() | {key: origin[key] for key in ("serial", "data_sha256")}
     facts["fixed_point"] = summary(validation.wrench_map, run.counts, run.pdc)
     if args.out is not None:
-        written = _write(validation, provenance, loaded.files[0], args.out, overwrite=args.force)
+        written = _write(validation, origin, loaded.files[0], args.out, overwrite=args.force)
         facts["written"] = [str(path) for path in written]
-    return _Calibrated(loaded, validation, provenance, facts)
-
-
-def _upload_to_port(args: argparse.Namespace, calibrated: _Calibrated) -> None:
-    with biotac.open(args.upload) as hand:
-        finger, joined = args.finger, calibrated.loaded.joined
-        if finger is None:
-            finger = joined.finger if joined is not None else choose_finger(args.upload, hand.fingers, None)
-        serial = ascii_text(hand.sensor_info(finger).serial)
-        check_serial(calibrated.loaded.run.name, calibrated.provenance["serial"], serial, force=args.force)
-        _upload(args, hand, finger, calibrated)
-
-
-def _upload(args: argparse.Namespace, hand: biotac.Hand, finger: int, calibrated: _Calibrated) -> None:
-    run, origin = calibrated.loaded.run, calibrated.provenance
-    fitted = calibrated.validation.wrench_map
-    found = upload(
-        hand, finger, fitted, run.counts, run.pdc, serial=origin["serial"], made_s=origin["made_s"], force=args.force
-    )
-    if args.save:
-        hand.board.save_settings()
-    calibrated.facts["board"] = found | {"saved": args.save}
+    with contextlib.ExitStack() as stack:
+        finger = args.finger
+        if args.upload is not None and args.live is None:
+            hand = stack.enter_context(biotac.open(args.upload))
+            if finger is None:
+                joined = loaded.joined
+                finger = joined.finger if joined is not None else choose_finger(args.upload, hand.fingers, None)
+            serial = ascii_text(hand.sensor_info(finger).serial)
+            check_serial(run.name, origin["serial"], serial, force=args.force)
+        if hand is not None:
+            made_for = {"serial": origin["serial"], "made_s": origin["made_s"], "force": args.force}
+            found = upload(hand, finger, validation.wrench_map, run.counts, run.pdc, **made_for)
+            if args.save:
+                hand.board.save_settings()
+            facts["board"] = found | {"saved": args.save}
+    return facts
 
 
 def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
