@@ -17,7 +17,6 @@ from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, p
 from biotac.calibrate.wrench.run import MIN_ROWS, Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
 from biotac.cli.main import main
-from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.map import columns, file
 from biotac.map.columns import SIGNAL_COUNTS, Signals
@@ -138,23 +137,6 @@ def test_counts_are_averaged_before_anything_is_made_of_them() -> None:
     # beyond the ends are the ends
     np.testing.assert_allclose(mean[0], values[[0, 0, 0, 1, 2]].mean(axis=0))
     np.testing.assert_array_equal(moments.averaged(values, 1), values)
-
-
-@pytest.mark.parametrize("model", models.MODELS, ids=lambda model: model.name)
-def test_ridge_shrinks_toward_lins_geometry(model: models.Model, finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = load_run(finger)
-    monkeypatch.setattr(models, "LAMBDAS", (1e12, 1e12))
-    signals = Signals(run.counts - run.tare, run.tare)
-    sums = moments.strip_sums(signals, run.truth, run.drift)
-    found = models.pulled(sums, [model.family])[0][0]
-    # a small signal through the map: proportional to the electrodes' normals, per axis
-    small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare)
-    response = columns.with_one(columns.columns(small)) @ found
-    slope = response[1:] - response[0]
-    for axis in range(3):
-        normal = surface.ELECTRODE_NORMAL[:, axis]
-        likeness = slope[:, axis] @ normal / np.linalg.norm(slope[:, axis]) / np.linalg.norm(normal)
-        assert likeness > 0.9999, f"axis {axis}"
 
 
 def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
