@@ -25,7 +25,7 @@ from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
 from ..map.population import LEFT, SHIPPED, WEIGHT_BITS, Integers, board_map, bounded_q4, halves, likeness, shipped
 from ..version import __version__
-from .wrench.models import CONDUCTANCE_QUADRATIC, GATED
+from .wrench.models import CONDUCTANCE, GATED
 
 __all__ = [
     "AXES", "COLUMNS", "LEFT", "PARTS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "WEIGHT_BITS", "Population", "Sums", "Trained",
@@ -41,13 +41,13 @@ MODEL = "population"
 AXES = map_columns.AXES[:3]
 ROWS_AT_ONCE = 4096
 
-FAMILIES = (GATED, CONDUCTANCE_QUADRATIC)
+MODELS = (GATED, CONDUCTANCE)
 ALL_COLUMNS = map_columns.width(with_pdc=False)
-INDEX = [family.index(ALL_COLUMNS) for family in FAMILIES]
+INDEX = [model.index(ALL_COLUMNS) for model in MODELS]
 COLUMNS = sum(len(index) for index in INDEX)
 _STACKED = np.concatenate(INDEX)
 PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
-_BLOCKS = [block for family in FAMILIES for block in map_columns.blocks(with_pdc=False) if block in family.blocks]
+_BLOCKS = [block for model in MODELS for block in map_columns.blocks(with_pdc=False) if block in model.blocks]
 _BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in _BLOCKS]
 
 

@@ -13,13 +13,50 @@ import zlib
 from typing import NamedTuple
 
 from ..errors import InputError, PortError
-from . import flash_record
+from ..wire.native import ffi, lib
 from .calibration import Calibration
 from .chip import Chip
 
 SLOT_BYTES = 128
 SLOTS = 2
 CRC = GENERATION = struct.Struct("<I")
+
+
+RECORD_BYTES = 256
+
+_WHY = {
+    lib.BT_RECORD_DAMAGED: "holds no intact record: its CRC is wrong; store the calibration again",
+    lib.BT_RECORD_OF_SOMETHING: "holds a record other than a calibration; store the calibration again",
+    lib.BT_RECORD_OTHER_VERSION: "holds a calibration in a newer format; install a newer biotac-gateway",
+    lib.BT_RECORD_CLEARED: "holds a cleared calibration; store one again",
+    lib.BT_RECORD_OUT_OF_RANGE: "holds a calibration with a value out of range; store a valid one",
+}
+
+
+def pack(calibration: Calibration) -> bytes:
+    """The record, header and data, as in a page of the board's flash for finger 0; the board's own code packs it."""
+    record = ffi.new("bt_calibration *")
+    record.present = True
+    record.serial = calibration.wire_serial()
+    record.made_s = calibration.made_s
+    record.value = calibration.wire_values()
+    page = ffi.new("uint8_t[]", RECORD_BYTES)
+    return bytes(ffi.buffer(page, lib.bt_record_pack(record, page)))
+
+
+def unpack(data: bytes, where: str) -> Calibration:
+    """The calibration in ``data``, which may end in 0xFF bytes.
+
+    Raises InputError that begins with ``where`` and says why there is none that can be used.
+    """
+    record = ffi.new("bt_calibration *")
+    judgement = lib.bt_record_unpack(record, data, len(data))
+    if judgement != lib.BT_RECORD_GOOD:
+        raise InputError(f"{where} {_WHY[judgement]}")
+    try:
+        return Calibration.from_wire(list(record.serial), record.made_s, list(record.value))
+    except ValueError as error:
+        raise InputError(f"{where} holds an invalid calibration ({error}); store a valid one") from error
 
 
 class Kept(NamedTuple):
@@ -40,13 +77,13 @@ def load(chip: Chip) -> Calibration:
         raise InputError(
             f"{chip.name} holds no calibration: the CRCs of both copies are wrong; check its kind, or store it again"
         )
-    return flash_record.unpack(newest.record, chip.name)
+    return unpack(newest.record, chip.name)
 
 
 def store(chip: Chip, calibration: Calibration) -> bool:
     """Store the calibration; False if it was there already, and nothing is written to spare the chip."""
     newest = _newest([_read(chip, slot) for slot in range(SLOTS)])
-    body = flash_record.pack(calibration).ljust(SLOT_BYTES - CRC.size - GENERATION.size, b"\xff")
+    body = pack(calibration).ljust(SLOT_BYTES - CRC.size - GENERATION.size, b"\xff")
     if newest is not None and newest.record == body:
         return False
     slot = 0 if newest is None else 1 - newest.slot

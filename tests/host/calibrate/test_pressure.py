@@ -14,10 +14,9 @@ import pytest
 from biotac import InputError
 from biotac.calibrate.press import pressure
 from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
-from biotac.calibrate.press.force_source import MAX_LAG_ROWS, Series, check_alignment
+from biotac.calibrate.press.force_source import MAX_LAG_ROWS, ROW_DTYPE, Series, check_alignment
 from biotac.calibrate.press.guide import ask_forces
 from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
-from biotac.calibrate.press.rows import ROW_DTYPE
 from biotac.core.compiled import pressure_filtered_q4
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import Q4_PER_COUNT

@@ -154,7 +154,7 @@ def pulled_only(run: Run, model: models.Model, monkeypatch: pytest.MonkeyPatch, 
     """Coefficients at one lambda, on all rows."""
     monkeypatch.setattr(models, "LAMBDAS", (lam, lam))
     sums = moments.strip_sums(moments.smoothed(run, 1), run.truth, run.drift)
-    return models.pulled(sums, [model.family])[0][0]
+    return models.pulled(sums, [model])[0][0]
 
 
 @pytest.mark.parametrize("model", models.MODELS, ids=lambda model: model.name)

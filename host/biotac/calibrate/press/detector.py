@@ -21,7 +21,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...wire.frames import StructArray
-from .rows import ROW_DTYPE
+from .force_source import ROW_DTYPE
 
 HZ = 100
 WINDOW_ROWS = 40

@@ -9,8 +9,7 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...wire.batches import Batch
 from .detector import Press, Procedure, Step
-from .force_source import Reference
-from .rows import rows_of
+from .force_source import Reference, rows_of
 
 
 class Face(Protocol):

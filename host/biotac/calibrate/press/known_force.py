@@ -18,9 +18,8 @@ from ...wire.batches import Batch, join
 from ...wire.frames import Q4_PER_COUNT, StructArray
 from ..population import Population, by_columns
 from .detector import Press, Procedure
-from .force_source import Reference
+from .force_source import Reference, rows_of
 from .guide import Face, guide
-from .rows import rows_of
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0

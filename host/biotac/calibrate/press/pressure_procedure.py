@@ -19,10 +19,9 @@ from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, serial_text
 from .detector import Procedure
-from .force_source import Series, Truth, check_alignment
+from .force_source import Series, Truth, check_alignment, rows_of
 from .guide import Face, guide
 from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Fit, Outcome
-from .rows import rows_of
 
 AROUND_ROWS = 50  # before and after a touch, in which the plate's force is taken as this finger's
 

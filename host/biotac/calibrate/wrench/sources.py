@@ -18,9 +18,29 @@ from ...errors import InputError
 from ...recording.reader import Recording
 from ...version import __version__
 from ...wire.identity import ascii_text
+from ..reference.csv_file import read_csv
+from ..reference.mcap_file import read_mcap
+from ..reference.mounting import Mounting
 from ..reference.samples import Reference
 from .joined import Joined, board_of, choose_finger, join
 from .run import Run, load_run
+
+
+def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
+    """The reference in ``FILE.csv``, in ``FILE.mcap`` with one wrench topic, or in ``FILE.mcap:TOPIC``.
+
+    ``mounting`` replaces the one in the file. Raises InputError (RecordingError for the content).
+    """
+    name, colon, topic = text.rpartition(":")
+    if colon and name.lower().endswith(".mcap"):
+        return read_mcap(Path(name), mounting, topic)
+    path = Path(text)
+    suffix = path.suffix.lower()
+    if suffix == ".mcap":
+        return read_mcap(path, mounting)
+    if suffix in (".csv", ".tsv", ".txt"):
+        return read_csv(path, mounting)
+    raise InputError(f"{text}: unknown file type: expected .csv, .tsv, .txt, or .mcap with geometry_msgs WrenchStamped")
 
 
 def check_serial(where: str, made_for: str, serial: str, *, force: bool = False) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,30 +13,35 @@ from typing import Any
 import biotac
 
 from ...calibrate import population
-from ...calibrate.reference.files import read_reference
-from ...calibrate.reference.mounting import read_mounting
+from ...calibrate.reference.mounting import Mounting, read_mounting
+from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
+from ...calibrate.reference.samples import Reader
 from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
+from ...calibrate.wrench.guided import Procedure, walk
 from ...calibrate.wrench.joined import choose_finger
-from ...calibrate.wrench.sources import Loaded, check_serial, load
+from ...calibrate.wrench.sources import Loaded, check_serial, load, read_reference
 from ...calibrate.wrench.upload import upload
 from ...documents import Provenance, made_text
-from ...errors import InputError
+from ...errors import BiotacError, InputError
 from ...map.bound import summary, summary_text
 from ...map.file import dumps_fitted
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
+from ...sim.nano17 import Nano17
+from ...sim.nano17_reader import Nano17Reader
+from ...sim.source import Source
 from ...wire.identity import ascii_text
 from .. import outputs, values
 from ..progress import Progress
-from . import live
 
 NAME = "wrench"
 HELP = (
     "Counts to force: from a board's recordings with a force/torque sensor's file beside each, or from .npz with E, "
     "F (N), E_base and E_idle; M (N mm) and PDC if there."
 )
+EMULATED = "nano17"
 EXAMPLE = "biotac calibrate wrench thumb.mcap --reference thumb.csv --finger thumb --out calibrated/"
 
 
@@ -92,9 +98,9 @@ def _live(args: argparse.Namespace) -> int:
     if args.out is None:
         raise InputError("--live saves its recording: expected --out FOLDER")
     # a simulated board beside an emulated reference runs as fast as the host reads
-    with biotac.open(args.live, pace=0.0 if args.reference == [live.EMULATED] else 1.0) as hand:
+    with biotac.open(args.live, pace=0.0 if args.reference == [EMULATED] else 1.0) as hand:
         values.check_answers(hand, args.finger)
-        path, missing = live.record(args, hand, args.finger)
+        path, missing = _record(args, hand, args.finger)
         for line in missing:
             outputs.note(f"not covered: {line}")
         if not args.force:
@@ -152,6 +158,65 @@ def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
             f"{len(references)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
         )
     return dict(zip(recordings, references, strict=False))
+
+
+# ---- guided, on a board ------------------------------------------------------------------------
+
+
+def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Path, list[str]]:
+    """Guide through the procedure; return the recording, with the reference's .csv beside it, and what is missing.
+
+    Raises KeyboardInterrupt, with a message, if it was ended before there was anything to fit.
+    """
+    serial = ascii_text(hand.sensor_info(finger).serial)
+    check_serial(f"finger {finger}", serial, args.serial, force=args.force)
+    path = args.out / f"{serial or f'finger{finger}'}.mcap"
+    recorded = f"the recorded data is in {path} and {path.with_suffix('.csv')}"
+    progress = Progress()
+
+    def show(event: str) -> None:
+        progress.done()
+        outputs.note(event)
+
+    with _reader(args, hand, finger) as (reader, mounting):
+        outputs.make_folder(args.out)
+        procedure = Procedure(finger, mounting)
+        try:
+            walk(hand, reader, procedure, path, overwrite=args.force, show=show, progress=progress.show)
+        except BiotacError:
+            if path.exists():
+                outputs.note(recorded)
+            raise
+        finally:
+            progress.done()
+        lost = reader.stats
+    if lost.lost or lost.late or lost.bad:
+        outputs.note(f"reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad")
+    if procedure.zero is None:
+        raise KeyboardInterrupt(f"ended while {procedure.last_step.value.partition(':')[0]}; {recorded}")
+    return path, procedure.coverage.missing()
+
+
+@contextlib.contextmanager
+def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[Reader, Mounting]]:
+    if len(args.reference) != 1:
+        raise InputError(f"{len(args.reference)} --reference with --live: expected one, {PREFIX}HOST or {EMULATED}")
+    (text,) = args.reference
+    if text == EMULATED:
+        if not isinstance(hand.link.source, Source):
+            raise InputError(
+                f"{EMULATED} is emulated and works only with a simulated finger: expected --live sim:SCENARIO"
+            )
+        nano17 = Nano17() if args.mounting is None else Nano17(read_mounting(args.mounting))
+        yield Nano17Reader(hand.link.source, finger, nano17), nano17.mounting
+        return
+    if not text.startswith(PREFIX):
+        raise InputError(f"{text}: expected {PREFIX}HOST (a Net F/T box) or {EMULATED} (emulated)")
+    if args.mounting is None:
+        raise InputError(f"the mounting of {text} on the finger is unknown: expected --mounting FILE.toml")
+    mounting = read_mounting(args.mounting)
+    with contextlib.closing(NetFtReader(parse_address(text))) as reader:
+        yield reader, mounting
 
 
 # ---- files and text ----------------------------------------------------------------------------
