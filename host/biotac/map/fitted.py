@@ -55,13 +55,11 @@ class WrenchMap:
         scaled = self.coefficients * result_units(len(self.axes))
         found = columns.split(columns.blocks(with_pdc=self.with_pdc), scaled)
         found[Kind.OFFSET, Gate.ONE] = scaled[-1:]
-        for gate in Gate:
-            # e = min(e, 0) + max(e, 0): where both are present anyway, this saves a block
-            split = [(kind, gate) for kind in columns.SPLIT]
-            if (Kind.SIGNAL, gate) in found and all(part in found and np.any(found[part] != 0.0) for part in split):
-                signal = found.pop((Kind.SIGNAL, gate))
-                for part in split:
-                    found[part] = found[part] + signal
+        # e = min(e, 0) + max(e, 0): where both are present anyway, this saves a block
+        split = [(kind, Gate.ONE) for kind in columns.SPLIT]
+        if all(np.any(found[part] != 0.0) for part in split):
+            signal = found.pop((Kind.SIGNAL, Gate.ONE))
+            found |= {part: found[part] + signal for part in split}
         return found
 
     def on_board(self, *, serial: str = "", made_s: int = 0) -> BoardMap:

@@ -448,6 +448,6 @@ def test_calibrate_writes_report_picture_and_map(
 def test_calibrate_in_words_and_as_recorded(finger: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(finger), "--as-recorded"]) == 0
     said = capsys.readouterr().out
-    assert "counts lag the force by 3 rows, 0 corrected; mean of 1 rows" in said
+    assert "counts lag the force by 3 rows, [0, 0, 0] corrected; mean of 1 rows" in said
     for counts in SHIFTS_COUNTS[1:]:
         assert f"drifted {counts:+.0f} counts" in said

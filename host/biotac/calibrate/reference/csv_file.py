@@ -34,14 +34,12 @@ _WANTED = "t in s, forces in N, torques in N mm or N m"
 def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
     """The reference in ``path``; ``mounting`` replaces the file's own."""
     own, head, read = open_table(path)
-    chosen = mounting
-    if chosen is None and "mounting" in own:
-        chosen = from_json(own["mounting"], f"{path}: line '# mounting:'")
-    if chosen is None:
+    if mounting is None and "mounting" not in own:
         raise RecordingError(
             f"{path}: does not say how the sensor is mounted on the finger: expected --mounting FILE.toml, or "
             "--mounting lin if axes and origin are already Lin's"
         )
+    chosen = mounting or from_json(own["mounting"], f"{path}: line '# mounting:'")
     use, scale = columns(path, head)
     table = read(use)
     samples = Samples(table[:, 0], table[:, 1:] * scale)
@@ -135,10 +133,9 @@ class CsvWriter:
 
     def add(self, samples: Samples) -> None:
         """Append samples of six axes."""
-        if len(samples):
-            rows = np.column_stack([samples.t_s, samples.wrench])
-            np.savetxt(self._stream, rows, fmt=["%.6f", *["%.6g"] * 6], delimiter=",")
-            self._stream.flush()
+        rows = np.column_stack([samples.t_s, samples.wrench])
+        np.savetxt(self._stream, rows, fmt=["%.6f", *["%.6g"] * 6], delimiter=",")
+        self._stream.flush()
 
     def close(self) -> None:
         """Close the file. Safe to call twice."""

@@ -138,8 +138,7 @@ def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | Non
         if args.upload is not None and args.live is None:
             hand = stack.enter_context(biotac.open(args.upload))
             if finger is None:
-                joined = loaded.joined
-                finger = joined.finger if joined is not None else choose_finger(args.upload, hand.fingers, None)
+                finger = loaded.joined.finger if loaded.joined else choose_finger(args.upload, hand.fingers, None)
             serial = ascii_text(hand.sensor_info(finger).serial)
             check_serial(run.name, origin["serial"], serial, force=args.force)
         if hand is not None:
@@ -258,7 +257,6 @@ def _text(facts: dict[str, Any]) -> str:
         return "  ".join("    -" if value is None else f"{value:5.3f}" for value in values)
 
     up, down = (f"{counts:+.0f}" for counts in facts["drift_counts"])
-    torsion = f"  torsion:                RMSE {facts.get('torsion_rmse_nmm', 0):5.3f} N mm"
     lines = [
         f"{facts['file']}: {facts['rows']} rows, {facts['model']}",
         f"  held out, x y z:        RMSE {numbers(facts['rmse_n'])} N   R2 {numbers(facts['r2'][:3])}   "
@@ -266,7 +264,7 @@ def _text(facts: dict[str, Any]) -> str:
         f"  drifted {up} counts:    RMSE {numbers(facts['drift_rmse_n'][0])} N",
         f"  drifted {down} counts:    RMSE {numbers(facts['drift_rmse_n'][1])} N",
         *([f"  torque, x y z:          RMSE {numbers(facts['rmse_nmm'])} N mm"] if "rmse_nmm" in facts else []),
-        *([torsion] if "torsion_rmse_nmm" in facts else []),
+        *(f"  torsion:                RMSE {facts[key]:5.3f} N mm" for key in ("torsion_rmse_nmm",) if key in facts),
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
         f"  counts lag the force by {facts['lag_rows']} rows, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
