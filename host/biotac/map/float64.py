@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,30 @@ from ..core.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArray, tare_to_q4
+from ..wire.map_gen import Gate, Kind
 from .board_map import BoardMap
-from .columns import Signals, summed, tared
-from .quantise import unit
+from .columns import PRESSURE_COUNTS, SIGNAL_COUNTS, Signals, summed, tared
 
 _CHUNK_ROWS = 4096
+#: Real coefficients (columns, axes) of each block, in the results' units.
+Unrounded = Mapping[tuple[Kind, Gate], Floats]
+
+# The board's factor for 1 in columns.kinds().
+FACTOR = {
+    "one": 2.0**_map.ONE_Q,
+    "signal": 2.0**_map.SIGNAL_Q * SIGNAL_COUNTS,
+    "conductance": 2.0**_map.CONDUCTANCE_Q,
+    "pressure": 2.0**_map.PRESSURE_Q * PRESSURE_COUNTS,
+}
+
+
+def unit(kind: Kind, gate: Gate) -> float:
+    """The result, in its units times 2^exponent, of a coefficient of 1 where column and gate are 1."""
+    spec = _map.KINDS[kind]
+    factor = FACTOR[spec.of]
+    if spec.shape == "pairs":
+        factor *= FACTOR[spec.of] / 2.0**_map.ROW_CUT
+    return factor if gate == Gate.ONE else factor * 2.0 ** (_map.GATE_Q - _map.GATE_CUT)
 
 
 def result_units(axes: int) -> Floats:

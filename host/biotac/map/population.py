@@ -26,8 +26,8 @@ from ..wire.native import ffi
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
 from .columns import SIGNAL_COUNTS, split, summed, tared
+from .fitted import quantise
 from .float64 import derived_torque_x
-from .quantise import quantise
 
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]

@@ -57,9 +57,7 @@ AFFINE = Model("affine", _SIGNALS[:1], "every electrode to every axis")
 GATED = Model("gated", _GATED, "gains by sign that follow the contact")  # not on its own, but in others
 QUADRATIC = Model("quadratic", (*_SIGNALS, *_PRESSURE), "all products of two electrodes, PDC where recorded")
 CONDUCTANCE = Model(
-    "conductance-quadratic",
-    (*_CONDUCTANCES, *_PRESSURE),
-    "all products of two conductances, PDC where recorded",
+    "conductance-quadratic", (*_CONDUCTANCES, *_PRESSURE), "all products of two conductances, PDC where recorded"
 )
 JOINED = Model("joined", (*_GATED, *_CONDUCTANCES), "the same, plus gains by sign that follow the contact")
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)

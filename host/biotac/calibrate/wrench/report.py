@@ -23,6 +23,15 @@ def markdown(validation: Validation, picture: str) -> str:
     run = validation.run
     lags = ", ".join(f"{axis} {lag}" for axis, lag in zip(run.axes, validation.final.lag_rows, strict=True))
     cut, spans = _blocks(validation)
+    by_shift = [figures.rmse(predicted, run.truth) for predicted in validation.predicted]
+    explained, weights = figures.r2(validation.predicted[0], run.truth), facts["weights"].values()
+    axes = []
+    for k, (name, by_model) in enumerate(zip(run.axes, weights, strict=True)):
+        errors = [f"{error[k]:.3f} {_unit(name)}" for error in by_shift]
+        spread = f"{run.truth[:, k].std():.3f} {_unit(name)}"
+        chosen = ", ".join(f"{model} {weight:.2f}" for model, weight in by_model.items())
+        axes.append([name, *errors, f"{explained[k]:.3f}", spread, chosen])
+    at_drifts = [f"at {counts:+.0f} counts" for counts in SHIFTS_COUNTS[1:]]
     drifts = " and ".join(f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:])
     still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
     air = f"E_base is trained on with force 0, {facts['air_share']:.1%} of the run's weight"
@@ -42,7 +51,7 @@ def markdown(validation: Validation, picture: str) -> str:
         "",
         f"The map is the models' weighted mean; median angle {facts['median_angle_deg']:.2f} deg.",
         "",
-        *_axes(validation),
+        *table(["axis", "RMSE", *at_drifts, "R2", "standard deviation of the truth", "model weights"], axes),
         "## Models",
         "",
         f"Held-out RMSE; in brackets, the worse of {drifts} counts of untared drift.",
@@ -106,20 +115,6 @@ def _blocks(validation: Validation) -> tuple[str, list[str]]:
 
 def _unit(axis: str) -> str:
     return "N" if axis.startswith("F") else "N mm"
-
-
-def _axes(validation: Validation) -> list[str]:
-    truth = validation.run.truth
-    errors = [figures.rmse(predicted, truth) for predicted in validation.predicted]
-    explained = figures.r2(validation.predicted[0], truth)
-    drifts = [f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]]
-    head = ["axis", "RMSE", *drifts, "R2", "standard deviation of the truth", "model weights"]
-    rows = []
-    for k, (name, weights) in enumerate(zip(validation.run.axes, figures.weights(validation)[0], strict=True)):
-        chosen = ", ".join(f"{model} {weight:.2f}" for model, weight in weights.items())
-        each = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
-        rows.append([name, *each, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
-    return table(head, rows)
 
 
 def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
