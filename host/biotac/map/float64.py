@@ -40,8 +40,7 @@ def unit(kind: Kind, gate: Gate) -> float:
 
 def result_units(axes: int) -> Floats:
     """How many of the board's units make 1 N or 1 N mm, for each axis (axes,)."""
-    units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
-    return units[:axes]
+    return np.array(([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4)[:axes], dtype=np.float64)
 
 
 def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:

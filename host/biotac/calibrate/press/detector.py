@@ -96,13 +96,6 @@ def noise(values: Any) -> float:
     return float(np.diff(values).std()) if len(values) > 2 else 0.0
 
 
-def motion_limit(level: float, sigma: float) -> float:
-    """The largest ``motion`` of a window held at ``level`` counts above rest, with noise of ``sigma`` counts."""
-    # Filtered noise is correlated: with alpha = 0.5 a mean scatters sqrt(3) times more than for independent rows.
-    scatter = max(sigma, SIGMA_FLOOR) * np.sqrt(3.0 * 2.0 / (WINDOW_ROWS / 4))
-    return float(max(MOVING_SHARE * abs(level), NOISE_SIGMAS * scatter))
-
-
 class Presses:
     """Follows one finger through ``count`` presses. Feed it rows; they are its only clock.
 
@@ -209,10 +202,14 @@ class Presses:
         self._kept: list[Any] = []
 
     def _is_steady(self, pressure: float, level: float, sigma: float) -> bool:
+        """Whether the window is held at ``level`` counts above rest, with noise of ``sigma`` counts."""
         self._window.append(pressure)
         if len(self._window) < WINDOW_ROWS:
             return False
-        moved, limit = motion(list(self._window)), motion_limit(level, sigma)
+        # Filtered noise is correlated: with alpha = 0.5 a mean scatters sqrt(3) times more than for independent rows.
+        scatter = max(sigma, SIGMA_FLOOR) * np.sqrt(3.0 * 2.0 / (WINDOW_ROWS / 4))
+        limit = float(max(MOVING_SHARE * abs(level), NOISE_SIGMAS * scatter))
+        moved = motion(list(self._window))
         if moved < self._steadiest[0]:
             self._steadiest = (moved, limit)
         return moved <= limit

@@ -218,36 +218,31 @@ def walk(
     reference = CsvWriter(path.with_suffix(".csv"), procedure.mounting, reader.sensor, overwrite=overwrite)
     with closing(reference) as writer, closing(hand.record(path, overwrite=overwrite)):
         try:
-            _loop(hand, reader, procedure, writer, show, progress)
-            if procedure.step is not Step.DONE:
-                procedure.finish("the simulated source has ended")
+            first_us: int | None = None
+            for batch in hand.batches():
+                last_us = batch.last_t_us()
+                if last_us is not None:
+                    first_us = last_us if first_us is None else first_us
+                    samples = reader.read((last_us - first_us) / 1e6)
+                    # written before the procedure sees it, which may raise
+                    writer.add(samples)
+                    procedure.frames(batch.frames)
+                    procedure.samples(samples)
+                if procedure.wants_tare:
+                    try:
+                        hand.tare(procedure.finger)
+                        procedure.tared(accepted=True)
+                    except CommandRefusedError:
+                        procedure.tared(accepted=False)
+                for event in procedure.take_events():
+                    show(event)
+                progress(procedure.status())
+                if procedure.step is Step.DONE:
+                    break
+            procedure.finish("the simulated source has ended")
         except KeyboardInterrupt:
             procedure.finish("stopped by Ctrl-C")
     for event in procedure.take_events():
         show(event)
     # needed even if the board's source has ended: it sends nothing more, but still refuses as busy
     hand.stop()
-
-
-def _loop(hand: Hand, reader: Reader, procedure: Procedure, writer: CsvWriter, show: Show, progress: Show) -> None:
-    first_us: int | None = None
-    for batch in hand.batches():
-        last_us = batch.last_t_us()
-        if last_us is not None:
-            first_us = last_us if first_us is None else first_us
-            samples = reader.read((last_us - first_us) / 1e6)
-            # written before the procedure sees it, which may raise
-            writer.add(samples)
-            procedure.frames(batch.frames)
-            procedure.samples(samples)
-        if procedure.wants_tare:
-            try:
-                hand.tare(procedure.finger)
-                procedure.tared(accepted=True)
-            except CommandRefusedError:
-                procedure.tared(accepted=False)
-        for event in procedure.take_events():
-            show(event)
-        progress(procedure.status())
-        if procedure.step is Step.DONE:
-            return

@@ -82,7 +82,12 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--upload with {len(args.files)} files: expected one, the finger's")
     if args.out is not None:
         _check_out(args.out, args.files, overwrite=args.force)
-    references = _references(args.files, args.reference)
+    recordings = [path for path in args.files if path.suffix.lower() == ".mcap"]
+    if args.reference and len(args.reference) != len(recordings):
+        raise InputError(
+            f"{len(args.reference)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
+        )
+    references = dict(zip(recordings, args.reference, strict=False))
     mounting = None if args.mounting is None else read_mounting(args.mounting)
     for path in args.files:
         reference = references.get(path)
@@ -148,15 +153,6 @@ def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | Non
                 hand.board.save_settings()
             facts["board"] = found | {"saved": args.save}
     return facts
-
-
-def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
-    recordings = [path for path in files if path.suffix.lower() == ".mcap"]
-    if references and len(references) != len(recordings):
-        raise InputError(
-            f"{len(references)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
-        )
-    return dict(zip(recordings, references, strict=False))
 
 
 # ---- guided, on a board ------------------------------------------------------------------------
