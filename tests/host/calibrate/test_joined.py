@@ -145,7 +145,7 @@ def spoilt(reference: Reference, how: str) -> Reference:
         ("another run", r"not aligned: they agree best .* correlate with 0\.\d\d: expected at least 0\.4"),
         ("jumping clock", r"not aligned: the clocks drift by -?\d+ ppm over the run, and parts of it lie \d+ ms off"),
         ("newton metres", r"torque over force is 0\.\d+ mm about the fingertip's centre"),
-        ("wrong sign", r"in 4% of the rows above 1 N the line of force meets the finger's skin"),
+        ("wrong sign", r"in \d% of the rows above 1 N the line of force meets the finger's skin"),
         ("wrong offset", r"in \d+% of the rows above 1 N the line of force meets the finger's skin"),
         ("grams", r"units of F per RMS count .* gf or mN"),
         ("saturated", r"read exactly [\d.]+ N along [xyz], the extreme: .* saturated"),
