@@ -22,7 +22,7 @@ from record_all import record_all
 
 import biotac
 from biotac import documents
-from biotac.calibrate.population import population_map
+from biotac.calibrate import population as population_map
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.mcap_file import read_mcap
 from biotac.calibrate.reference.mounting import LIN, from_json, read_mounting
@@ -59,7 +59,6 @@ JSON: dict[str, tuple[Callable[[Path], Any], Any]] = {
     "calibration": (calibration_file.load, CALIBRATION | EDITED),
     "map": (map_file.load, MAP | EDITED),
     "fitted map": (map_file.load_fitted, FITTED | EDITED),
-    "provenance": (map_file.read_provenance, FITTED | EDITED),
     "settings": (read_settings, SETTINGS),
     "backup": (read_backup, KEPT | EDITED),
     "mounting": (lambda path: from_json(path.read_text(errors="replace"), "here"), MOUNTING),

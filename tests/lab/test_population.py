@@ -11,8 +11,8 @@ import pytest
 import wrench_run
 
 import biotac
-from biotac.calibrate.population import population_map
-from biotac.calibrate.population.population_map import Population, Trained
+from biotac.calibrate import population as population_map
+from biotac.calibrate.population import Population, Trained
 from biotac.calibrate.press.few_shot import Scale, pulled, scale_of
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core import geometry as surface

@@ -73,6 +73,6 @@ def own_map(finger: Finger) -> BoardMap:
     run = run_of(Path("loads"), {name: recorded[name] for name in ("E", "F", "E_base", "E_idle")})
     sums, air = strip_sums(smoothed(run, 1), run.truth, run.drift), air_sums(run, 1)
     assert air is not None
-    coefficients = models.pulled(sums.plus(air), [models.JOINED.family])[0][0]
+    coefficients = models.pulled(sums.plus(air), [models.JOINED])[0][0]
     lag_rows = (0,) * len(run.axes)
     return WrenchMap(models.JOINED.name, run.axes, run.tare, 1, lag_rows, coefficients).on_board()

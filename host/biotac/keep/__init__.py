@@ -2,8 +2,7 @@
 
 - ``calibration``: ``biotac.Calibration``, the values
 - ``calibration_file``: as JSON, readable and with provenance
-- ``flash_record``: as the bytes that a board keeps in its flash
-- ``eeprom``: a record in an EEPROM on the finger's harness, through ``chip``
+- ``eeprom``: as the record that a board keeps in its flash, and that in an EEPROM on the finger's harness, by ``chip``
 - ``harness``: which EEPROMs belong to a port's fingers
 """
 

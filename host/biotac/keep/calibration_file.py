@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..documents import Provenance, parse_document, read_document, sealed, write_new
+from ..documents import Provenance, parse_document, read_document, sealed
 from ..wire import messages_gen as wire
 from .calibration import Calibration
 
@@ -47,23 +47,12 @@ def from_dict(tree: Any) -> Calibration:
     weights = [w.name for w in wire.PocWeights]
     if tree["poc_weights"] not in weights:
         raise ValueError(f"poc_weights is {tree['poc_weights']!r}, expected one of {', '.join(weights)}")
-    x, y, z = _axes(tree, "force_gain_nn", "xyz")
-    torque_y, torque_z = _axes(tree, "torque_gain_nn", "yz")
-    return Calibration(
-        wire.PocWeights[tree["poc_weights"]],
-        (x, y, z),
-        (torque_y, torque_z),
-        tree["thermal_gain_milli"],
-        tree["serial"],
-        tree["made_s"],
-        tree["pressure_gain_nn"],
-    )
-
-
-def _axes(tree: dict[str, Any], key: str, axes: str) -> list[Any]:
-    if not isinstance(tree[key], dict) or sorted(tree[key]) != list(axes):
-        raise ValueError(f"{key} is {tree[key]!r}, expected an object with {', '.join(axes)}")
-    return [tree[key][axis] for axis in axes]
+    values = {key: value for key, value in tree.items() if key not in ("format", "provenance")}
+    for key, axes in (("force_gain_nn", "xyz"), ("torque_gain_nn", "yz")):
+        if not isinstance(tree[key], dict) or sorted(tree[key]) != list(axes):
+            raise ValueError(f"{key} is {tree[key]!r}, expected an object with {', '.join(axes)}")
+        values[key] = tuple(tree[key][axis] for axis in axes)
+    return Calibration(**values | {"poc_weights": wire.PocWeights[tree["poc_weights"]]})
 
 
 def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str:
@@ -79,10 +68,3 @@ def loads(text: str, where: str) -> Calibration:
 def load(path: Path) -> Calibration:
     """The calibration in a file. Raises InputError when it cannot be read or used."""
     return read_document(path, FORMAT, from_dict, _CURE)
-
-
-def save(
-    path: Path, calibration: Calibration, provenance: Provenance | None = None, *, overwrite: bool = False
-) -> None:
-    """Write a file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
-    write_new(path, dumps(calibration, provenance), overwrite=overwrite)

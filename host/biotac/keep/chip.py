@@ -64,10 +64,7 @@ def parse_place(text: str) -> tuple[str, str]:
 
 
 class Chip:
-    """One EEPROM; use it as a context manager.
-
-    Raises PortError when its bus cannot be opened, InputError for a kind below 256 bytes.
-    """
+    """One EEPROM; use it as a context manager."""
 
     def __init__(self, address: str, kind: str) -> None:
         self.name = f"EEPROM {address}"
@@ -86,8 +83,14 @@ class Chip:
         self._message: Any = smbus2.i2c_msg
         try:
             self._bus = smbus2.SMBus(bus)
+        except FileNotFoundError as error:
+            cure = "enable I2C (raspi-config, Interface Options), then see ls /dev/i2c-*"
+            raise PortError(f"no I2C bus {bus}; {cure}") from error
+        except PermissionError as error:
+            cure = "sudo usermod -aG i2c $USER, and log in again"
+            raise PortError(f"no permission to open /dev/i2c-{bus}; {cure}") from error
         except OSError as error:
-            raise PortError(_describe_open_error(bus, error)) from error
+            raise PortError(f"/dev/i2c-{bus} cannot be opened ({error}); see ls /dev/i2c-*") from error
 
     def __enter__(self) -> Chip:
         return self
@@ -138,11 +141,3 @@ class Chip:
             f"{self.name} did not acknowledge any of {QUESTIONS} polls after a page write; check its power and "
             "store again; the previous calibration is intact"
         )
-
-
-def _describe_open_error(bus: int, error: OSError) -> str:
-    if isinstance(error, FileNotFoundError):
-        return f"no I2C bus {bus}; enable I2C (raspi-config, Interface Options), then see ls /dev/i2c-*"
-    if isinstance(error, PermissionError):
-        return f"no permission to open /dev/i2c-{bus}; sudo usermod -aG i2c $USER, and log in again"
-    return f"/dev/i2c-{bus} cannot be opened ({error}); see ls /dev/i2c-*"

@@ -33,10 +33,7 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
 
 
 def load(port: str) -> tuple[str, dict[int, Calibration]]:
-    """The port without its option, and the calibration in each finger's EEPROM.
-
-    Raises PortError for an EEPROM that cannot be reached, InputError for one without a calibration.
-    """
+    """The port without its option, and the calibration in each finger's EEPROM."""
     bare, eeproms = parse(port)
     own = {}
     for finger, (address, kind) in eeproms.items():

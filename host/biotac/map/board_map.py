@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import ELECTRODES, Settings, board_settings, integers
+from ..core.compiled import ELECTRODES, Settings, board_settings, c_pointers, integers
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
@@ -119,19 +119,9 @@ class BoardMap:
         raw = integers("counts", counts, np.uint16, None, ELECTRODES)
         tare = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
         pdc = integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, len(raw))
-        force = np.empty((len(raw), 3), np.int32)
-        torque = np.empty((len(raw), 3), np.int32)
-        torsion = np.empty(len(raw), np.int32)
-        lib.bt_map_frames(
-            len(raw),
-            self.handle,
-            ffi.from_buffer("uint16_t[]", raw),
-            ffi.from_buffer("uint16_t[]", tare),
-            ffi.from_buffer("int32_t[]", pdc),
-            ffi.from_buffer("int32_t[]", force),
-            ffi.from_buffer("int32_t[]", torque),
-            ffi.from_buffer("int32_t[]", torsion),
-        )
+        n = len(raw)
+        force, torque, torsion = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
+        lib.bt_map_frames(n, self.handle, *c_pointers(raw, tare, pdc, force, torque, torsion))
         return force, torque, torsion
 
 
@@ -209,16 +199,8 @@ def on_board_q4(frames: StructArray, settings: Settings, board_map: BoardMap) ->
     n = len(frames)
     poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
     force_100un, torque_mnmm, torsion_mnmm = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
-    lib.bt_mapped_frames(
-        n,
-        *(ffi.from_buffer("uint16_t[]", array) for array in (raw, tare_q4, pdc, pdc_tare_q4)),
-        kernel,
-        ffi.from_buffer("int16_t[]", poc_um),
-        ffi.from_buffer("int32_t[]", force_100un),
-        ffi.from_buffer("int32_t[]", torque_mnmm),
-        ffi.from_buffer("int32_t[]", torsion_mnmm),
-        ffi.from_buffer("uint32_t[]", flags),
-    )
+    results = c_pointers(poc_um, force_100un, torque_mnmm, torsion_mnmm, flags)
+    lib.bt_mapped_frames(n, *c_pointers(raw, tare_q4, pdc, pdc_tare_q4), kernel, *results)
     return poc_um, force_100un, torque_mnmm, torsion_mnmm, flags
 
 

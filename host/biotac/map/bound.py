@@ -21,8 +21,7 @@ from ..wire.map_gen import Gate, Kind
 from .board_map import RING, BoardBlock, BoardMap
 from .columns import ELECTRODES, REACH_MM, Signals, centroid_mm, gates, kinds
 from .fitted import WrenchMap
-from .float64 import result_units, tared_chunks
-from .quantise import FACTOR, Unrounded, unit
+from .float64 import FACTOR, Unrounded, result_units, tared_chunks, unit
 
 _FIRST, _BEHIND = np.indices((ELECTRODES, len(RING) // ELECTRODES)).reshape(2, -1)
 _CONDUCTANCE_OFF = 0.52  # relative error in 1 / FACTOR["conductance"], in addition to half a unit

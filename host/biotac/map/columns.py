@@ -114,12 +114,14 @@ def with_one(values: Floats) -> Floats:
 def kinds(signals: Signals) -> dict[Kind, Floats]:
     """The columns (n, width) of each kind; PRESSURE only if the signals have it."""
     e = signals.e / SIGNAL_COUNTS
-    conductance = conductance_change(signals.e, signals.tare)
+    count, at_rest = (np.clip(c, _map.COUNT_MIN, _map.COUNT_MAX) for c in (signals.e + signals.tare, signals.tare))
+    # clipped, so that the square of a wet or shorted electrode stays bounded
+    conductance = np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
     result = {
         Kind.OFFSET: np.ones((len(e), 1)),
         Kind.SIGNAL: e,
         Kind.SIGNAL_PAIRS: _products(e),
-        Kind.CONDUCTANCE: conductance,
+        Kind.CONDUCTANCE: conductance,  # of each electrode, divided by that at rest, minus one
         Kind.CONDUCTANCE_PAIRS: _products(conductance),
         Kind.COMPRESSION: np.minimum(e, 0.0),
         Kind.BULGE: np.maximum(e, 0.0),
@@ -134,14 +136,6 @@ def gates(e: Floats) -> dict[Gate, Floats]:
     centre = centroid_mm(e)
     x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
     return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
-
-
-def conductance_change(e: Floats, tare: Floats) -> Floats:
-    """The conductance of each electrode (n, 19) divided by that at rest, minus one."""
-    count = np.clip(e + tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    # clipped, so that the square of a wet or shorted electrode stays bounded
-    return np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
 
 
 def centroid_mm(e: Floats) -> Floats:

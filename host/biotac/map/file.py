@@ -9,7 +9,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from ..documents import Provenance, made_text, parse_document, read_document, sealed, write_new
+from ..documents import Provenance, made_text, parse_document, read_document, sealed
 from ..errors import InputError
 from .board_map import from_blob, made_s_of, serial_of
 from .fitted import WrenchMap
@@ -63,19 +63,9 @@ def load_fitted(path: Path) -> WrenchMap:
     return read_document(path, FORMAT, lambda content: WrenchMap.from_dict(content["fit"]), _CURE)
 
 
-def read_provenance(path: Path) -> Provenance:
-    """The provenance in a file. Raises InputError when it cannot be read."""
-    return read_document(path, FORMAT, lambda content: dict(content["provenance"]), _CURE)
-
-
 def dumps(blob: bytes, provenance: Provenance | None = None) -> str:
     """The text of a file with a board's map."""
     return json.dumps(sealed(to_dict(blob, provenance)), indent=2) + "\n"
-
-
-def save(path: Path, blob: bytes, provenance: Provenance | None = None, *, overwrite: bool = False) -> None:
-    """Write a board's map. Raises InputError when the file exists and may not be overwritten, or cannot be written."""
-    write_new(path, dumps(blob, provenance), overwrite=overwrite)
 
 
 def dumps_fitted(fitted: WrenchMap, *, serial: str = "", made_s: int = 0, provenance: Provenance | None = None) -> str:

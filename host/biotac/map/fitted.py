@@ -1,4 +1,4 @@
-"""A wrench map as it was fitted, in float64."""
+"""A wrench map as it was fitted, in float64, and from its coefficients to a board's 16 bits."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import numpy as np
 
 from ..core.geometry import Floats
 from ..errors import InputError
+from ..wire import map_gen as _map
 from ..wire.map_gen import Gate, Kind
 from . import columns
-from .board_map import BoardMap
-from .columns import ELECTRODES, Signals, with_one
-from .float64 import result_units
-from .quantise import Unrounded, quantise
+from .board_map import BoardBlock, BoardMap, is_accepted
+from .columns import AXES, ELECTRODES, Signals, with_one
+from .float64 import Unrounded, result_units, unit
+
+_COEFFICIENT_MAX = 2**15 - 1
 
 
 @dataclass(frozen=True)
@@ -55,13 +57,11 @@ class WrenchMap:
         scaled = self.coefficients * result_units(len(self.axes))
         found = columns.split(columns.blocks(with_pdc=self.with_pdc), scaled)
         found[Kind.OFFSET, Gate.ONE] = scaled[-1:]
-        for gate in Gate:
-            # e = min(e, 0) + max(e, 0): where both are present anyway, this saves a block
-            split = [(kind, gate) for kind in columns.SPLIT]
-            if (Kind.SIGNAL, gate) in found and all(part in found and np.any(found[part] != 0.0) for part in split):
-                signal = found.pop((Kind.SIGNAL, gate))
-                for part in split:
-                    found[part] = found[part] + signal
+        # e = min(e, 0) + max(e, 0): where both are present anyway, this saves a block
+        split = [(kind, Gate.ONE) for kind in columns.SPLIT]
+        if all(np.any(found[part] != 0.0) for part in split):
+            signal = found.pop((Kind.SIGNAL, Gate.ONE))
+            found |= {part: found[part] + signal for part in split}
         return found
 
     def on_board(self, *, serial: str = "", made_s: int = 0) -> BoardMap:
@@ -105,3 +105,46 @@ class WrenchMap:
 
 def _block_names(*, with_pdc: bool) -> list[list[str]]:
     return [[kind.name, gate.name] for kind, gate in columns.blocks(with_pdc=with_pdc)]
+
+
+def quantise(blocks: Unrounded, serial: str = "", made_s: int = 0) -> BoardMap:
+    """The board's map of the ``blocks`` that are not all 0, with the largest exponents at which no sum can overflow.
+
+    Whether one can is decided by firmware/core/map/open.c, which is asked.
+    """
+    kept = tuple(_block(kind, gate, values) for (kind, gate), values in blocks.items() if np.any(values != 0.0))
+    if not kept:
+        raise InputError("every coefficient of the map is 0: expected a fitted map; calibrate again")
+    axes = kept[0].coefficients.shape[1]
+    size = _map.HEADER_BYTES + sum(_map.BLOCK_BYTES + 2 * axes * _map.KINDS[block.kind].halves for block in kept)
+    if size > _map.MAX_BYTES:
+        raise InputError(
+            f"the map takes {size} bytes: expected at most {_map.MAX_BYTES}, which fit a board; choose a smaller model"
+        )
+    return BoardMap(axes, kept, serial, made_s)
+
+
+def _block(kind: Kind, gate: Gate, values: Floats) -> BoardBlock:
+    exponents, coefficients = [], []
+    for axis in range(values.shape[1]):
+        real = values[:, axis] / unit(kind, gate)
+        for exponent in range(_map.EXPONENT_MAX, 0, -1):
+            scaled = np.rint(real * 2.0**exponent)
+            if np.abs(scaled).max() <= _COEFFICIENT_MAX and _fits(kind, gate, scaled.astype(np.int64), exponent):
+                break
+        else:
+            raise InputError(
+                f"coefficients of {kind.name} x {gate.name} for {AXES[axis]} add up to "
+                f"{float(np.abs(scaled).sum()):.3g} units: too large for a board's 16-bit values or 32-bit sums; fit "
+                "with more rows or a larger lambda"
+            )
+        exponents.append(exponent)
+        coefficients.append(scaled.astype(np.int64))
+    return BoardBlock(kind, gate, tuple(exponents), np.column_stack(coefficients))
+
+
+def _fits(kind: Kind, gate: Gate, column: Floats, exponent: int) -> bool:
+    """Whether a board accepts a map with this axis of a block alone; the other axes are 0."""
+    alone = np.zeros((len(column), _map.AXES_FORCE), np.int64)
+    alone[:, 0] = column
+    return is_accepted(BoardMap(_map.AXES_FORCE, (BoardBlock(kind, gate, (exponent, 1, 1), alone),)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,17 +12,35 @@ from ..core.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArray, tare_to_q4
-from .board_map import BoardBlock, BoardMap
-from .columns import Signals, summed, tared
-from .quantise import unit
+from ..wire.map_gen import Gate, Kind
+from .board_map import BoardMap
+from .columns import PRESSURE_COUNTS, SIGNAL_COUNTS, Signals, summed, tared
 
 _CHUNK_ROWS = 4096
+#: Real coefficients (columns, axes) of each block, in the results' units.
+Unrounded = Mapping[tuple[Kind, Gate], Floats]
+
+# The board's factor for 1 in columns.kinds().
+FACTOR = {
+    "one": 2.0**_map.ONE_Q,
+    "signal": 2.0**_map.SIGNAL_Q * SIGNAL_COUNTS,
+    "conductance": 2.0**_map.CONDUCTANCE_Q,
+    "pressure": 2.0**_map.PRESSURE_Q * PRESSURE_COUNTS,
+}
+
+
+def unit(kind: Kind, gate: Gate) -> float:
+    """The result, in its units times 2^exponent, of a coefficient of 1 where column and gate are 1."""
+    spec = _map.KINDS[kind]
+    factor = FACTOR[spec.of]
+    if spec.shape == "pairs":
+        factor *= FACTOR[spec.of] / 2.0**_map.ROW_CUT
+    return factor if gate == Gate.ONE else factor * 2.0 ** (_map.GATE_Q - _map.GATE_CUT)
 
 
 def result_units(axes: int) -> Floats:
     """How many of the board's units make 1 N or 1 N mm, for each axis (axes,)."""
-    units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
-    return units[:axes]
+    return np.array(([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4)[:axes], dtype=np.float64)
 
 
 def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
@@ -69,7 +87,10 @@ def exact(
     board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Floats:
     """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results()."""
-    blocks = [(block.kind, block.gate, unrounded(block)) for block in board_map.blocks]
+    blocks = [
+        (block.kind, block.gate, block.coefficients * (unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)))
+        for block in board_map.blocks
+    ]
     parts = [summed(blocks, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
     result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(board_map.axes)
@@ -86,9 +107,3 @@ def tared_chunks(
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
         yield Signals(every.e[rows], every.tare[rows], pressure[rows])
-
-
-def unrounded(block: BoardBlock) -> Floats:
-    """A block's coefficients (columns, axes) as real numbers, in the results' units per 1 of a column."""
-    scale = unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)
-    return np.asarray(block.coefficients * scale, dtype=np.float64)

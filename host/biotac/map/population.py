@@ -25,9 +25,9 @@ from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
-from .columns import SIGNAL_COUNTS, Signals, split, summed, tared
+from .columns import SIGNAL_COUNTS, split, summed, tared
+from .fitted import quantise
 from .float64 import derived_torque_x
-from .quantise import quantise
 
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]
@@ -60,7 +60,7 @@ def in_force(settings: Mapping[wire.Setting, int]) -> bool:
 
 
 def shipped() -> str:
-    """The package's population map as JSON text (biotac.calibrate.population.map_file)."""
+    """The package's population map as JSON text (biotac.calibrate.population)."""
     return resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8")
 
 
@@ -76,11 +76,6 @@ def blocks() -> list[Block]:
 def board_map(each: list[Block]) -> BoardMap:
     """The blocks as a board's map. Raises InputError when they do not fit the board's formats."""
     return quantise({(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in each})
-
-
-def alone(signals: Signals) -> Floats:
-    """The map's force (n, 3) in N, whatever its share."""
-    return summed(blocks(), signals)
 
 
 def bounded_q4(e: Floats) -> Integers:
@@ -157,7 +152,7 @@ def replace_force(
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
         signals = tared(counts[rows], tare_q4[rows])
-        force_n[rows] = likeness(signals.e, pattern_weights()).mixed(alone(signals))
+        force_n[rows] = likeness(signals.e, pattern_weights()).mixed(summed(blocks(), signals))
     torque_nmm[:, 0] = derived_torque_x(poc_mm, force_n)
 
 

@@ -15,7 +15,7 @@ from biotac.calibrate.wrench.sources import load
 from biotac.cli.main import main
 from biotac.errors import PortError
 from biotac.map.board_map import from_blob
-from biotac.map.file import load_fitted, read_provenance
+from biotac.map.file import load_fitted
 
 pytestmark = pytest.mark.nightly  # a minute and a half of procedure and fits
 
@@ -39,7 +39,7 @@ def fit_again(calibrated: Path, *words: str) -> list[str]:
 def test_it_leaves_recording_reference_report_picture_and_map(calibrated: Path) -> None:
     names = sorted(path.name for path in calibrated.iterdir())
     assert names == [f"{SERIAL}.{end}" for end in ("csv", "mcap", "md", "png", "wrench.json")]
-    its = read_provenance(calibrated / f"{SERIAL}.wrench.json")
+    its = json.loads((calibrated / f"{SERIAL}.wrench.json").read_text())["provenance"]
     assert (its["serial"], its["files"]) == (SERIAL, [f"{SERIAL}.mcap", f"{SERIAL}.csv"])
     assert its["software"].startswith("biotac-gateway ")
     assert its["alignment"]["clear"] > 5.0
@@ -61,7 +61,7 @@ def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
     assert facts["serial"] == SERIAL
     # better than Lin's scales on every force, or the procedure recorded the wrong things
     assert min(facts["better_than_lin"][:3]) > 1.0
-    again = read_provenance(calibrated / f"{SERIAL}.wrench.json")
+    again = json.loads((calibrated / f"{SERIAL}.wrench.json").read_text())["provenance"]
     assert facts["data_sha256"] == again["data_sha256"]
 
 

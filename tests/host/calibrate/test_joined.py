@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
-from biotac.calibrate.wrench.sources import check_serial
+from biotac.calibrate.wrench.sources import Loaded, check_serial
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.recording.reader import Recording
@@ -143,7 +145,7 @@ def spoilt(reference: Reference, how: str) -> Reference:
         ("another run", r"not aligned: they agree best .* correlate with 0\.\d\d: expected at least 0\.4"),
         ("jumping clock", r"not aligned: the clocks drift by -?\d+ ppm over the run, and parts of it lie \d+ ms off"),
         ("newton metres", r"torque over force is 0\.\d+ mm about the fingertip's centre"),
-        ("wrong sign", r"in 4% of the rows above 1 N the line of force meets the finger's skin"),
+        ("wrong sign", r"in \d% of the rows above 1 N the line of force meets the finger's skin"),
         ("wrong offset", r"in \d+% of the rows above 1 N the line of force meets the finger's skin"),
         ("grams", r"units of F per RMS count .* gf or mN"),
         ("saturated", r"read exactly [\d.]+ N along [xyz], the extreme: .* saturated"),
@@ -206,14 +208,13 @@ def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:
 
 
 def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
-    from biotac.calibrate.wrench.sources import provenance_of
-
     a, b = tmp_path / "a", tmp_path / "b"
     a.write_bytes(b"counts")
     b.write_bytes(b"force")
-    its = provenance_of("BTA", [a, b], "plate", made_s=86_400)
+    loaded = Loaded(SimpleNamespace(serial="BTA"), (a, b))  # type: ignore[arg-type]
+    its = loaded.provenance(86_400)
     # sha256sum of "countsforce"
-    assert its["data_sha256"] == __import__("hashlib").sha256(b"countsforce").hexdigest()
+    assert its["data_sha256"] == hashlib.sha256(b"countsforce").hexdigest()
     assert (its["serial"], its["made_s"], its["files"]) == ("BTA", 86_400, ["a", "b"])
     b.write_bytes(b"forcf")
-    assert provenance_of("BTA", [a, b], "plate", made_s=0)["data_sha256"] != its["data_sha256"]
+    assert loaded.provenance(0)["data_sha256"] != its["data_sha256"]

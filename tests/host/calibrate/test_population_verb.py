@@ -11,7 +11,7 @@ import pytest
 
 import biotac
 from biotac import ForceModel, FrameFlags, Setting
-from biotac.calibrate.population import population_map
+from biotac.calibrate import population as population_map
 from biotac.cli.main import main
 from biotac.map.board_map import from_blob
 from biotac.sim.loading import load_source

@@ -14,10 +14,9 @@ import pytest
 from biotac import InputError
 from biotac.calibrate.press import pressure
 from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
-from biotac.calibrate.press.force_source import MAX_LAG_ROWS, Series, check_alignment, lag_rows
+from biotac.calibrate.press.force_source import MAX_LAG_ROWS, ROW_DTYPE, Series, check_alignment
 from biotac.calibrate.press.guide import ask_forces
 from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
-from biotac.calibrate.press.rows import ROW_DTYPE
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import Q4_PER_COUNT
 from biotac.wire.native import ffi, lib
@@ -357,7 +356,6 @@ def test_a_series_is_straight_between_and_unknown_outside() -> None:
 def test_the_lag_is_found(lag: int) -> None:
     force = np.array(presses(2, 3.5, 5))
     above = np.roll(force, lag) / K
-    assert lag_rows(above, force)[0] == lag
     assert check_alignment("it", above, force) == lag
 
 
@@ -376,12 +374,8 @@ def test_the_table_has_k_and_p0_and_the_errors() -> None:
     its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
     from biotac import Calibration
 
-    outcome = pressure.Outcome(
-        {0: its},
-        {0: Calibration(serial="BTX")},
-        {0: {}},
-        {0: verify(its, with_board_force(held(3.0, 303), its.gain_nn))},
-    )
+    verified = verify(its, with_board_force(held(3.0, 303), its.gain_nn))
+    outcome = pressure.Outcome({0: its}, {0: Calibration(serial="BTX")}, verified={0: verified})
     head, line = pressure.lines(outcome)
     assert head.split() == ["finger", "sensor", "K", "N/count", "P0", "count", "fit", "force", "N", "board", "N",
                             "error", "float64"]  # fmt: skip

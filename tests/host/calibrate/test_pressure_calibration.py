@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import biotac
 from biotac.calibrate.press.detector import Step
 from biotac.calibrate.press.force_source import load_csv
 from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
-from biotac.calibrate.press.pressure_procedure import Plan, calibrate
+from biotac.calibrate.press.pressure_procedure import calibrate
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.recording.reader import Recording
@@ -112,7 +113,7 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) 
     """As a real one: stopped and set, with what each finger has of its own left as it was."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
-        outcome = calibrate(hand, Plan((0,)), Silent(), made_s=77)
+        outcome = calibrate(hand, Silent(), fingers=(0,), made_s=77)
         assert hand.board.calibration(0) == outcome.calibrations[0]
     its = outcome.calibrations[0]
     assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
@@ -130,7 +131,7 @@ def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) ->
     """As on a real port: nothing behind it that knows a truth."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.link.source = None
-        outcome = calibrate(hand, Plan((0,)), Scale(), made_s=1, save=True)
+        outcome = calibrate(hand, Scale(), fingers=(0,), made_s=1, save=True)
     assert outcome.verified[0].board_error <= 0.059
     assert outcome.fits[0].press_forces_n == CALIBRATION_FORCES_N
     assert outcome.not_saved is None
@@ -160,7 +161,7 @@ def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
         biotac.open("sim:fingers.toml?fingers=2") as hand,
         pytest.raises(biotac.InputError, match=r"no sensor on finger 3 \(0, 1 are there\)"),
     ):
-        calibrate(hand, Plan((0, 3)), Silent(), made_s=0)
+        calibrate(hand, Silent(), fingers=(0, 3), made_s=0)
 
 
 def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
@@ -168,7 +169,7 @@ def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
         biotac.open("sim:fingers.toml?fingers=1&seconds=9") as hand,
         pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"),
     ):
-        calibrate(hand, Plan((0,)), Silent(), made_s=0)
+        calibrate(hand, Silent(), fingers=(0,), made_s=0)
 
 
 # ---- recordings ----------------------------------------------------------------------------------
@@ -221,47 +222,37 @@ def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
     assert len(table) == 3 and "BTSIM00000000011" in table[1]
 
 
-def changed_csv(pressed: Path, tmp_path: Path, change: str) -> Path:
-    with (pressed / "plate.csv").open(newline="") as f:
-        head, *rows = list(csv.reader(f))
-    values = np.array(rows, np.float64)
-    if change == "mN":
-        values[:, 1:] *= 1000
-    elif change == "grams":
-        values[:, 1:] *= 20
-    elif change == "late":
-        values[:, 0] += 0.6
-    elif change == "elsewhere":
-        values[:, 0] += 1e4
-    elif change == "nan":
-        values[100, 2] = np.nan
-    elif change == "noise":
-        values[:, 1:] = np.random.default_rng(1).normal(0, 1, values[:, 1:].shape)
-    elif change == "short":
-        values = values[:900]
-    out = tmp_path / f"{change}.csv"
-    with out.open("w", newline="") as f:
-        csv.writer(f).writerows([["t_ms", *head[1:]] if change == "columns" else head, *values.tolist()])
-    return out
+def noisy(values: np.ndarray) -> np.ndarray:
+    force = np.random.default_rng(1).normal(0, 1, values[:, 1:].shape)
+    return np.column_stack([values[:, 0], force])
+
+
+def without_one(values: np.ndarray) -> np.ndarray:
+    values[100, 2] = np.nan
+    return values
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("mN", "forces up to 5000, expected newtons, at most 200"),
-        ("grams", "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
-        ("late", "they agree best with pressure -59 rows after the force"),
-        ("elsewhere", "covers none of"),
-        ("nan", "1 of 3110 rows with NaN"),
-        ("noise", "correlation 0."),
-        ("short", "has no reference: it gave no force in "),
-        ("columns", "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
+        (lambda v: v * [1, 1000, 1000, 1000], "forces up to 5000, expected newtons, at most 200"),
+        (lambda v: v * [1, 20, 20, 20], "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
+        (lambda v: np.add(v, [0.6, 0, 0, 0]), "they agree best with pressure -59 rows after the force"),
+        (lambda v: np.add(v, [1e4, 0, 0, 0]), "covers none of"),
+        (without_one, "1 of 3110 rows with NaN"),
+        (noisy, "correlation 0."),
+        (lambda v: v[:900], "has no reference: it gave no force in "),
+        (None, "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
     ],
 )
 def test_a_reference_that_is_none_is_refused_with_its_number(
-    pressed: Path, tmp_path: Path, capsys, change: str, words: str
+    pressed: Path, tmp_path: Path, capsys, change: Callable[[np.ndarray], np.ndarray] | None, words: str
 ) -> None:
-    place = changed_csv(pressed, tmp_path, change)
+    with (pressed / "plate.csv").open(newline="") as f:
+        head, *rows = list(csv.reader(f))
+    place, values = tmp_path / "changed.csv", np.array(rows, np.float64)
+    with place.open("w", newline="") as out:
+        csv.writer(out).writerows([head, *change(values).tolist()] if change else [["t_ms", *head[1:]], *rows])
     assert run(pressed, str(place), "--out", str(tmp_path / "out")) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

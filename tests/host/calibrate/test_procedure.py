@@ -13,7 +13,7 @@ from biotac.calibrate.reference.mounting import LIN
 from biotac.calibrate.reference.rdt import HOLD_RECORDS
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
-from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Files, Procedure, Step, walk
+from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording.reader import Recording
@@ -222,27 +222,27 @@ class Interrupting(Nano17Reader):
 
 def walked(
     folder: Path, scenario: str, at_s: float | None = None, error: type[BaseException] = KeyboardInterrupt
-) -> tuple[Procedure, list[str], Files, Interrupting]:
-    places = Files(folder / "walk.mcap", folder / "walk.csv")
+) -> tuple[Procedure, list[str], Path, Interrupting]:
+    path = folder / "walk.mcap"
     words: list[str] = []
     with biotac.open(f"sim:{scenario}") as hand:
         assert hand.link.source is not None
         reader = Interrupting(hand.link.source, 0)
         reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
         procedure = Procedure(0, reader.nano17.mounting)
-        walk(hand, reader, procedure, places, show=words.append)
+        walk(hand, reader, procedure, path, show=words.append)
         assert not hand.streaming
         hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
-    return procedure, words, places, reader
+    return procedure, words, path, reader
 
 
 @pytest.fixture(scope="module")
-def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Files]:
+def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Path]:
     return walked(tmp_path_factory.mktemp("walk"), "calibrate.toml")[:3]
 
 
-def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Files]) -> None:
-    procedure, words, places = everywhere
+def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path]) -> None:
+    procedure, words, path = everywhere
     assert procedure.step is Step.DONE
     assert procedure.coverage.complete and procedure.coverage.missing() == []
     assert words[0] == "warming up: leave the finger alone"
@@ -252,16 +252,16 @@ def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], File
     assert procedure.zero is not None
     np.testing.assert_allclose(procedure.zero[:3], Nano17().zero[:3], atol=0.01)
     np.testing.assert_allclose(procedure.zero[3:], Nano17().zero[3:], atol=0.05)
-    recording = Recording(places.recording)
+    recording = Recording(path)
     assert not recording.problems
     # it ended by itself, before the script did
     assert (recording.end_us - recording.begin_us) / 1e6 < 0.9 * len(load_source("calibrate.toml").samples) / 100.0
 
 
-def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedure, list[str], Files]) -> None:
-    _, _, places = everywhere
-    reference = read_csv(places.reference)
-    loaded = load(places.recording, (places.reference, reference), serial="BTSIM00000000006")
+def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedure, list[str], Path]) -> None:
+    path, beside = everywhere[2], everywhere[2].with_suffix(".csv")
+    reference = beside, read_csv(beside)
+    loaded = load(path, reference, serial="BTSIM00000000006")
     assert loaded.joined is not None and loaded.joined.on_skin_share > 0.99
     assert loaded.run.axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
     origin = loaded.provenance(1_700_000_000)
@@ -270,10 +270,10 @@ def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedur
     assert origin["mounting"]["offset_mm"] == [-5.0, 1.5, 10.0]
     assert origin["alignment"]["peak"] > 0.9
     with pytest.raises(InputError, match="is of sensor BTSIM00000000006, but this is BT0000000000000A"):
-        load(places.recording, (places.reference, reference), serial="BT0000000000000A")
-    assert load(places.recording, (places.reference, reference), serial="BT0000000000000A", force=True).run.serial
+        load(path, reference, serial="BT0000000000000A")
+    assert load(path, reference, serial="BT0000000000000A", force=True).run.serial
     with pytest.raises(InputError, match="which has no force: add --reference"):
-        load(places.recording)
+        load(path)
 
 
 def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
@@ -290,13 +290,13 @@ def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("at_s", [20.0, 150.0])
 def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> None:
-    procedure, words, places, reader = walked(tmp_path, "calibrate.toml", at_s)
+    procedure, words, path, reader = walked(tmp_path, "calibrate.toml", at_s)
     assert procedure.step is Step.DONE and words[-1] == "stopped by Ctrl-C"
     assert (procedure.zero is None) == (at_s < 100.0)
-    recording = Recording(places.recording)
+    recording = Recording(path)
     assert not recording.problems
     assert (recording.end_us - recording.begin_us) / 1e6 >= at_s  # to the last byte that came
-    reference = read_csv(places.reference) if at_s > 100.0 else None
+    reference = read_csv(path.with_suffix(".csv")) if at_s > 100.0 else None
     if reference is not None:
         # but for the records held back for those that might have been overtaken
         held_back_s = HOLD_RECORDS / reader.nano17.scale.rate_hz

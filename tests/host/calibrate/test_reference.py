@@ -11,11 +11,11 @@ import pytest
 from mcap.writer import Writer
 
 from biotac.calibrate.reference.csv_file import CsvWriter
-from biotac.calibrate.reference.files import read_reference
 from biotac.calibrate.reference.mounting import LIN, Mounting, read_mounting
 from biotac.calibrate.reference.net_ft import parse_address, read_configuration
 from biotac.calibrate.reference.rdt import HOLD_RECORDS, RdtDecoder, Scale, request
 from biotac.calibrate.reference.samples import Samples
+from biotac.calibrate.wrench.sources import read_reference
 from biotac.errors import DeviceLostError, InputError, RecordingError
 from biotac.sim.loading import load_source
 from biotac.sim.nano17 import MOUNTING, RESOLUTION, Nano17

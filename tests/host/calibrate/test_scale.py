@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.calibrate.population import population_map
-from biotac.calibrate.population.population_map import Population
+from biotac.calibrate import population as population_map
+from biotac.calibrate.population import Population
 from biotac.calibrate.press.few_shot import scaled
 from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import population_map
+from biotac.calibrate import population as population_map
 from biotac.calibrate.press import few_shot, weights
 from biotac.calibrate.press.known_force import Held, found
 from biotac.calibrate.wrench.run import load_run

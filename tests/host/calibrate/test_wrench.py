@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, p
 from biotac.calibrate.wrench.run import MIN_ROWS, Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
 from biotac.cli.main import main
-from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.map import columns, file
 from biotac.map.columns import SIGNAL_COUNTS, Signals
@@ -139,23 +139,6 @@ def test_counts_are_averaged_before_anything_is_made_of_them() -> None:
     np.testing.assert_array_equal(moments.averaged(values, 1), values)
 
 
-@pytest.mark.parametrize("model", models.MODELS, ids=lambda model: model.name)
-def test_ridge_shrinks_toward_lins_geometry(model: models.Model, finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = load_run(finger)
-    monkeypatch.setattr(models, "LAMBDAS", (1e12, 1e12))
-    signals = Signals(run.counts - run.tare, run.tare)
-    sums = moments.strip_sums(signals, run.truth, run.drift)
-    found = models.pulled(sums, [model.family])[0][0]
-    # a small signal through the map: proportional to the electrodes' normals, per axis
-    small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare)
-    response = columns.with_one(columns.columns(small)) @ found
-    slope = response[1:] - response[0]
-    for axis in range(3):
-        normal = surface.ELECTRODE_NORMAL[:, axis]
-        likeness = slope[:, axis] @ normal / np.linalg.norm(slope[:, axis]) / np.linalg.norm(normal)
-        assert likeness > 0.9999, f"axis {axis}"
-
-
 def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is known of others is the force of a whole map, offset and all; torque stays Lin's."""
     run = load_run(finger)
@@ -166,7 +149,7 @@ def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch
         signals = Signals((run.counts - run.tare)[rows], run.tare, pdc)
         truth = np.column_stack([run.truth[rows], np.ones((500, 3))])
         sums = moments.strip_sums(signals, truth, run.drift)
-        (found,) = models.pulled_to_others(sums, [models.JOINED.family], others)
+        (found,) = models.pulled_to_others(sums, [models.JOINED], others)
         assert found[0, : len(others) - 1, :3] == pytest.approx(others[:-1], abs=1e-6)
         assert found[0, len(others) - 1 : -1, :3] == pytest.approx(0.0, abs=1e-6)  # of PDC others know nothing
         assert found[0, :-1, 3:] == pytest.approx(models.lin(sums)[:-1, 3:], abs=1e-6)
@@ -345,80 +328,60 @@ def test_figures_of_known_errors() -> None:
 # ---- refusals ----------------------------------------------------------------------------------
 
 
-def _spoil(arrays: dict[str, Any], how: str) -> None:
-    force, counts = arrays["F"], arrays["E"]
-    if how == "short":
-        arrays |= {"E": counts[:1234], "F": force[:1234]}
-    elif how == "no force":
-        del arrays["F"]
-    elif how == "nan":
-        force[[17, 90], 1] = np.nan
-    elif how == "no rest":
-        del arrays["E_base"]
-    elif how == "base touched":
-        arrays["E_base"] = counts[:2000]
-    elif how == "grams":
-        force *= 101.97
-    elif how == "millinewton":
-        force *= 1000.0
-    elif how == "kilonewton":
-        force /= 1000.0
-    elif how == "railed":
-        counts[:200, 16] = 0
-    elif how == "stuck":
-        counts[:, 6] = 1800 + np.arange(len(counts)) % 2
-    elif how == "clipped":
-        np.clip(force, None, 1.0, out=force)
-    elif how == "other file":
-        arrays["F"] = wrench_run.fields(len(force), seed=9, rests=False)["F"]
-    elif how == "zero":
-        force[:] = 0.0
-    elif how == "nan counts":
-        arrays["E"] = counts.astype(np.float32)
-        arrays["E"][40, 3] = np.nan
-    elif how == "other finger's base":
-        its = wrench_run.fields(len(force))
-        arrays |= its | {"E_base": wrench_run.fields(len(force), seed=9)["E_base"]}
-    elif how == "strange serial":
-        arrays["serial"] = np.array([1, 2])
-    elif how == "torque rows differ":
-        arrays["M"] = force[:-1]
-    elif how == "fractions of counts":
-        arrays["E"] = counts + 0.5
-    elif how == "rows differ":
-        arrays["F"] = force[:-1]
+def scaled(factor: float) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    return lambda a: {"F": a["F"] * factor}
+
+
+def put(name: str, rows: Any, value: Any, dtype: Any = None) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    """Other values in some rows, or rows and columns, of a field."""
+
+    def change(arrays: dict[str, Any]) -> dict[str, Any]:
+        array = arrays[name].astype(dtype or arrays[name].dtype)
+        array[rows] = value
+        return {name: array}
+
+    return change
 
 
 @pytest.mark.parametrize(
-    ("how", "words"),
+    ("change", "words"),
     [
-        ("short", rf"1234 rows: expected at least {MIN_ROWS}"),
-        ("no force", r"holds E, E_base, E_idle: expected E .* and F"),
-        ("nan", r"F is not finite in 2 of 4000 rows, first in row 17"),
-        ("no rest", r"never at rest: 0 rows below 0.1 N, the lowest force is 1\.\d\d N"),
-        ("base touched", r"E_base is not at rest: E\d+ varies by \d{3,4} counts"),
-        ("grams", r"units of F per RMS count .* gf or mN"),
-        ("millinewton", r"units of F per RMS count .* gf or mN"),
-        ("kilonewton", r"units of F per RMS count .* kN or kgf"),
-        ("railed", r"E17 is saturated .* 5\.0% of the rows"),
-        ("stuck", r"E7 varies by 1 count\(s\) in 4000 rows: expected more than 2.* stuck"),
-        ("clipped", r"read exactly 1 N along [xyz], the extreme: .* saturated"),
-        ("other file", r"not aligned: .* lag of -?\d+ rows, .* held-out R2 of -?\d\.\d\d:"),
-        ("zero", r"F is 0 in every row"),
-        ("nan counts", r"field E row 40 holds nan: expected whole counts"),
-        ("fractions of counts", r"field E row 0 holds \d+\.5: expected whole counts"),
-        ("other finger's base", r"E at rest and E_base do not match: .* differ by \d\d+ RMS \(E\d+ by"),
-        ("strange serial", r"field serial is int64: expected one string"),
-        ("torque rows differ", r"field M is float32 \(3999, 3\): expected \(4000, 3\) in N mm"),
-        ("rows differ", r"field F is float32 \(3999, 3\): expected \(4000, 3\)"),
+        (lambda a: {"E": a["E"][:1234], "F": a["F"][:1234]}, rf"1234 rows: expected at least {MIN_ROWS}"),
+        (lambda a: {"F": None}, r"holds E, E_base, E_idle: expected E .* and F"),
+        (put("F", ([17, 90], 1), np.nan), r"F is not finite in 2 of 4000 rows, first in row 17"),
+        (lambda a: {"E_base": None}, r"never at rest: 0 rows below 0.1 N, the lowest force is 1\.\d\d N"),
+        (lambda a: {"E_base": a["E"][:2000]}, r"E_base is not at rest: E\d+ varies by \d{3,4} counts"),
+        (scaled(101.97), r"units of F per RMS count .* gf or mN"),
+        (scaled(1000.0), r"units of F per RMS count .* gf or mN"),
+        (scaled(0.001), r"units of F per RMS count .* kN or kgf"),
+        (put("E", (slice(200), 16), 0), r"E17 is saturated .* 5\.0% of the rows"),
+        (
+            put("E", (slice(None), 6), 1800 + np.arange(4000) % 2),
+            r"E7 varies by 1 count\(s\) in 4000 rows: expected more than 2.* stuck",
+        ),
+        (lambda a: {"F": np.clip(a["F"], None, 1.0)}, r"read exactly 1 N along [xyz], the extreme: .* saturated"),
+        (
+            lambda a: {"F": wrench_run.fields(4000, seed=9, rests=False)["F"]},
+            r"not aligned: .* lag of -?\d+ rows, .* held-out R2 of -?\d\.\d\d:",
+        ),
+        (scaled(0.0), r"F is 0 in every row"),
+        (put("E", (40, 3), np.nan, np.float32), r"field E row 40 holds nan: expected whole counts"),
+        (lambda a: {"E": a["E"] + 0.5}, r"field E row 0 holds \d+\.5: expected whole counts"),
+        (
+            lambda a: wrench_run.fields(4000) | {"E_base": wrench_run.fields(4000, seed=9)["E_base"]},
+            r"E at rest and E_base do not match: .* differ by \d\d+ RMS \(E\d+ by",
+        ),
+        (lambda a: {"serial": np.array([1, 2])}, r"field serial is int64: expected one string"),
+        (lambda a: {"M": a["F"][:-1]}, r"field M is float32 \(3999, 3\): expected \(4000, 3\) in N mm"),
+        (lambda a: {"F": a["F"][:-1]}, r"field F is float32 \(3999, 3\): expected \(4000, 3\)"),
     ],
 )
 def test_a_bad_recording_is_refused_with_the_number_that_shows_it(
-    how: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: Callable[[dict[str, Any]], dict[str, Any]], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arrays = wrench_run.fields(4000, rests=False)
-    _spoil(arrays, how)
-    path = wrench_run.save(tmp_path / "bad.npz", arrays)
+    arrays |= change(arrays)
+    path = wrench_run.save(tmp_path / "bad.npz", {name: array for name, array in arrays.items() if array is not None})
     with pytest.raises(RecordingError, match=words):
         validate(load_run(path))
     assert main(["calibrate", "wrench", str(path)]) == 2
@@ -485,6 +448,6 @@ def test_calibrate_writes_report_picture_and_map(
 def test_calibrate_in_words_and_as_recorded(finger: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(finger), "--as-recorded"]) == 0
     said = capsys.readouterr().out
-    assert "counts lag the force by 3 rows, 0 corrected; mean of 1 rows" in said
+    assert "counts lag the force by 3 rows, [0, 0, 0] corrected; mean of 1 rows" in said
     for counts in SHIFTS_COUNTS[1:]:
         assert f"drifted {counts:+.0f} counts" in said

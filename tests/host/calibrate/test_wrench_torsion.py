@@ -154,13 +154,11 @@ def pulled_only(run: Run, model: models.Model, monkeypatch: pytest.MonkeyPatch, 
     """Coefficients at one lambda, on all rows."""
     monkeypatch.setattr(models, "LAMBDAS", (lam, lam))
     sums = moments.strip_sums(moments.smoothed(run, 1), run.truth, run.drift)
-    return models.pulled(sums, [model.family])[0][0]
+    return models.pulled(sums, [model])[0][0]
 
 
 @pytest.mark.parametrize("model", models.MODELS, ids=lambda model: model.name)
-def test_ridge_shrinks_toward_lins_geometry_on_all_axes(
-    model: models.Model, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ridge_shrinks_toward_lins_geometry(model: models.Model, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     found = pulled_only(run, model, monkeypatch, 1e12)
     small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
     response = columns.with_one(columns.columns(small)) @ found
@@ -169,8 +167,8 @@ def test_ridge_shrinks_toward_lins_geometry_on_all_axes(
     # about the middle of the pad, where the outward normal is -z
     turn = -np.cross(surface.ELECTRODE_MM - surface.ELECTRODE_MM.mean(axis=0), surface.ELECTRODE_NORMAL)[:, 2]
     for axis, lin in enumerate([*surface.ELECTRODE_NORMAL.T, *arms.T, turn]):
-        likeness = abs(slope[:, axis] @ lin) / np.linalg.norm(slope[:, axis]) / np.linalg.norm(lin)
-        assert likeness > 0.999, f"axis {axis}"
+        likeness = slope[:, axis] @ lin / np.linalg.norm(slope[:, axis]) / np.linalg.norm(lin)
+        assert (likeness if axis < 3 else abs(likeness)) > 0.9999, f"axis {axis}"
     # pressure says nothing until a run says so
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
     said = columns.with_one(columns.columns(pressed)) @ found

@@ -306,7 +306,7 @@ def test_a_recording_of_before_there_were_any_and_a_damaged_one(tmp_path: Path, 
 def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "thumb.json"
     blob = make_map(7, serial="BT7")
-    map_file.save(path, blob, {"rmse_n": 0.2})
+    path.write_text(map_file.dumps(blob, {"rmse_n": 0.2}))
     assert map_file.load(path) == blob
     tree = json.loads(path.read_text())
     assert (tree["serial"], tree["made_s"], tree["provenance"]) == ("BT7", 7, {"rmse_n": 0.2})
@@ -344,7 +344,7 @@ def port() -> Iterator[str]:
 def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) -> None:
     mine, back = tmp_path / "mine.json", tmp_path / "back.json"
     blob = make_map(1_763_731_310)
-    map_file.save(mine, blob)
+    mine.write_text(map_file.dumps(blob))
     assert main(["calibration", "put", port, str(mine), "--finger", "1", "--save"]) == 0
     said = capsys.readouterr().out
     assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in said
@@ -363,7 +363,7 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
 
 def test_the_verb_forces_another_sensors_map(port: str, tmp_path: Path, capsys) -> None:
     other = tmp_path / "other.json"
-    map_file.save(other, make_map(1, serial="BTOTHER"))
+    other.write_text(map_file.dumps(make_map(1, serial="BTOTHER")))
     assert main(["calibration", "put", port, str(other), "--finger", "0"]) == 7
     assert "OTHER_SENSOR" in capsys.readouterr().err
     assert main(["calibration", "put", port, str(other), "--finger", "0", "--force"]) == 0
@@ -377,7 +377,7 @@ def test_the_verb_shows_a_recordings_maps(recorded: Path, capsys) -> None:
 
 def test_info_tells_of_a_map_in_force(port: str, tmp_path: Path, capsys) -> None:
     mine = tmp_path / "mine.json"
-    map_file.save(mine, make_map(1_763_731_310))
+    mine.write_text(map_file.dumps(make_map(1_763_731_310)))
     assert main(["calibration", "put", port, str(mine), "--finger", "1"]) == 0
     assert main(["info", port]) == 0
     assert "wrench map made 2025-11-21" in capsys.readouterr().out

@@ -17,8 +17,9 @@ from maps import make_map
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
 from biotac.cli.main import main
+from biotac.documents import write_new
 from biotac.keep import calibration_file as file
-from biotac.keep import flash_record
+from biotac.keep import eeprom
 from biotac.map import file as map_file
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.facts import Facts
@@ -87,13 +88,11 @@ def test_numpy_integers_are_whole_numbers() -> None:
 
 def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> None:
     path = tmp_path / "thumb.json"
-    file.save(path, ODD, {"by": "hand"})
+    path.write_text(file.dumps(ODD, {"by": "hand"}))
     assert file.load(path) == ODD
     tree = json.loads(path.read_text())
     assert (tree["poc_weights"], tree["force_gain_nn"]) == ("ABS_N2", {"x": 1, "y": -2, "z": 3})
     assert tree["provenance"] == {"by": "hand"}
-    with pytest.raises(biotac.InputError, match="already exists; choose another name"):
-        file.save(path, ODD, {})
 
 
 @pytest.mark.parametrize(
@@ -142,8 +141,9 @@ def test_what_is_no_file_at_all(text: str) -> None:
 def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     with pytest.raises(biotac.InputError, match="cannot be read"):
         file.load(tmp_path / "none.json")
-    with pytest.raises(biotac.InputError, match="cannot be written"):
-        file.save(tmp_path / "no" / "such.json", ODD, {})
+    for path, words in ((tmp_path, "already exists; choose another"), (tmp_path / "no" / "such", "cannot be written")):
+        with pytest.raises(biotac.InputError, match=words):
+            write_new(path, "")
     (tmp_path / "latin.json").write_bytes(b'{"by": "M\xfcller"}')
     with pytest.raises(biotac.InputError, match=r"is not usable: .* decode"):
         file.load(tmp_path / "latin.json")
@@ -154,11 +154,9 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
 
 def test_a_record_is_that_of_the_specification() -> None:
     data = SERIAL.encode() + struct.pack("<I8i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600, 9_500_000)
-    header = struct.pack("<IHHI", 0x52544F42, 2, 1, 52)
-    crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
-    assert flash_record.pack(ODD) == header + struct.pack("<I", crc) + data
-    assert flash_record.unpack(flash_record.pack(ODD), "it") == ODD
-    assert flash_record.unpack(flash_record.pack(ODD).ljust(256, b"\xff"), "it") == ODD
+    assert eeprom.pack(ODD) == sealed(2, 1, data)
+    assert eeprom.unpack(eeprom.pack(ODD), "it") == ODD
+    assert eeprom.unpack(eeprom.pack(ODD).ljust(256, b"\xff"), "it") == ODD
 
 
 def sealed(record_id: int, version: int, data: bytes) -> bytes:
@@ -167,15 +165,15 @@ def sealed(record_id: int, version: int, data: bytes) -> bytes:
     return header + struct.pack("<I", crc) + data
 
 
-GOOD = flash_record.pack(ODD)[16:]
+GOOD = eeprom.pack(ODD)[16:]
 
 
 @pytest.mark.parametrize(
     ("data", "words"),
     [
         (b"", "no intact record"),
-        (flash_record.pack(ODD)[:-3], "no intact record: its CRC is wrong"),
-        (flash_record.pack(ODD) + b"\0", "no intact record"),
+        (eeprom.pack(ODD)[:-3], "no intact record: its CRC is wrong"),
+        (eeprom.pack(ODD) + b"\0", "no intact record"),
         (sealed(1, 1, GOOD), "a record other than a calibration"),
         (sealed(7, 1, GOOD), "a record other than a calibration"),
         (sealed(2, 2, GOOD), "a newer format"),
@@ -187,15 +185,15 @@ GOOD = flash_record.pack(ODD)[16:]
 )
 def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
     with pytest.raises(biotac.InputError, match=words):
-        flash_record.unpack(data, "it")
+        eeprom.unpack(data, "it")
 
 
 @pytest.mark.parametrize("at", range(68))
 def test_no_byte_of_a_record_may_change(at: int) -> None:
-    data = bytearray(flash_record.pack(ODD))
+    data = bytearray(eeprom.pack(ODD))
     data[at] ^= 0x20
     with pytest.raises(biotac.InputError):
-        flash_record.unpack(bytes(data), "it")
+        eeprom.unpack(bytes(data), "it")
 
 
 # ---- a board with flash --------------------------------------------------------------------------
@@ -209,7 +207,7 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
         hand.board.set_calibration(1, replace(ODD, serial=""))
         hand.board.save_settings()
         hand.board.clear_calibration(1)  # not saved
-    assert flash_record.pack(mine) in flash.read_bytes()
+    assert eeprom.pack(mine) in flash.read_bytes()
     with boot(flash) as hand:
         assert hand.board.calibrations() == {0: mine, 1: replace(ODD, serial="")}
         hand.board.clear_calibration(1)
@@ -285,7 +283,7 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     path, back = tmp_path / "thumb.json", tmp_path / "back.json"
     with biotac.open(port) as hand:
         mine = replace(ODD, serial=serial_of(hand, 1))
-    file.save(path, mine, {})
+    path.write_text(file.dumps(mine))
     verb = ["calibration"]
     assert main([*verb, "get", port, "--finger", "1", str(back)]) == 2
     assert "finger 1 on" in capsys.readouterr().err
@@ -318,8 +316,8 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
 def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path) -> None:
     """Files say what they are; what a board holds of both kinds is named."""
     own, wrench_map, back = tmp_path / "own.json", tmp_path / "map.json", tmp_path / "back.json"
-    file.save(own, replace(ODD, serial=""))
-    map_file.save(wrench_map, make_map(1))
+    own.write_text(file.dumps(replace(ODD, serial="")))
+    wrench_map.write_text(map_file.dumps(make_map(1)))
     verb = "calibration"
     for path in (own, wrench_map):
         assert main([verb, "put", port, str(path), "--finger", "0"]) == 0
@@ -344,7 +342,7 @@ def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path
 
 def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
     path = tmp_path / "thumb.json"
-    file.save(path, ODD, {})
+    path.write_text(file.dumps(ODD))
     assert main(["calibration", "show", str(path)]) == 0
     assert f"{path}: for sensor {SERIAL}, made 2025-11-21 13:21 UTC" in capsys.readouterr().out
     assert main(["calibration", "show", "--json", str(path)]) == 0

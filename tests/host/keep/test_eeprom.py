@@ -254,7 +254,7 @@ def test_the_command_line_puts_shows_and_gets(monkeypatch, capsys, tmp_path: Pat
     wired(monkeypatch, "24c02")
     where = "i2c:1:0x50:24c02"
     path, back = tmp_path / "in.json", tmp_path / "out.json"
-    file.save(path, NEW, {})
+    path.write_text(file.dumps(NEW))
     verb = ["calibration"]
     assert main([*verb, "get", where, "-"]) == 2
     assert "is blank" in capsys.readouterr().err

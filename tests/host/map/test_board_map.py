@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,6 @@ from biotac.wire.frames import tare_to_q4
 from biotac.wire.map_gen import Gate, Kind
 from biotac.wire.sensor_gen import ELECTRODE_UM
 
-SHARED = Path(__file__).parents[3] / ".." / "shared" / "data" / "syntouchcontact" / "F1.npz"
 FORCE_MN, TORQUE_NMM = 10.0, 0.1  # RMS: as the issue asks for, and the same at the finger's 10 mm
 TARE = np.array([2955.0 + 31 * k for k in range(19)])
 
@@ -327,10 +327,8 @@ def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Pa
 
 
 @pytest.mark.parametrize("lam", [1e-5, 1e-2])
-def test_on_a_real_finger_every_row_is_right(lam: float) -> None:
-    if not SHARED.exists():
-        pytest.skip(f"{SHARED.name} is not at ../shared/data: real recordings are not part of the project")
-    run = load_run(SHARED)
+def test_on_a_real_finger_every_row_is_right(lam: float, shared_data: Path) -> None:
+    run = load_run(shared_data / "syntouchcontact" / "F1.npz")
     facts = bound.summary(fit(run, lam), run.counts, run.pdc)
     assert facts["rows"] == len(run.counts) and facts["outside"] == 0
     assert facts["force_mn_max"] <= facts["force_mn_bound"] and facts["force_mn_rms"] <= FORCE_MN
@@ -356,6 +354,12 @@ def mapped_frames(its: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
     return frames_and_tares(rounds, default_settings())[0]
 
 
+def checked(frames: np.ndarray, maps: Mapping[int, bytes | BoardMap]) -> CrossCheck:
+    outcome = CrossCheck()
+    outcome.add(frames, default_settings(), maps=maps)
+    return outcome
+
+
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> None:
     its = random_map(11, axes).on_board()
@@ -373,8 +377,7 @@ def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> Non
     np.testing.assert_array_equal(frames["torsion_mnmm"] != wire.INVALID_I32, mapped & (axes == 7))
     np.testing.assert_array_equal(frames["torque_mnmm"][mapped, 1:], published[mapped, 1:])
     np.testing.assert_array_equal(frames["poc_um"], plain["poc_um"])
-    outcome = CrossCheck()
-    outcome.add(frames, default_settings(), maps={3: its.blob})
+    outcome = checked(frames, {3: its.blob})
     assert outcome.violations == 0 and outcome.mapped == mapped.sum() and outcome.frames == len(frames)
     assert 0.0 < outcome.force_mn_max <= outcome.mapped_force_mn_bound
     assert outcome.as_dict()["force_mn_bound"] == outcome.mapped_force_mn_bound
@@ -385,14 +388,10 @@ def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
     frames = mapped_frames(its)
     wrong = frames.copy()
     wrong["force_100un"][100, 1] += 4000  # 0.4 N
-    outcome = CrossCheck()
-    outcome.add(wrong, default_settings(), maps={3: its})
+    outcome = checked(wrong, {3: its})
     assert outcome.violations >= 1 and "finger 3 frame" in outcome.findings[0] and "force y" in outcome.findings[0]
-    other = CrossCheck()
-    other.add(frames, default_settings(), maps={3: random_map(13).on_board()})
-    assert other.violations > 200
-    none = CrossCheck()
-    none.add(frames, default_settings(), maps={2: its})
+    assert checked(frames, {3: random_map(13).on_board()}).violations > 200
+    none = checked(frames, {2: its})
     assert none.violations == (frames["flags"] & wire.FrameFlags.MAPPED).astype(bool).sum()
     assert "map is unknown" in none.findings[0]
 
@@ -406,13 +405,11 @@ def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:
     ):
         wrong = frames.copy()
         wrong["torsion_mnmm"][100] = value
-        outcome = CrossCheck()
-        outcome.add(wrong, default_settings(), maps={3: its})
+        outcome = checked(wrong, {3: its})
         assert outcome.violations == 1 and seen in outcome.findings[0]
     plain = mapped_frames(None)
     plain["torsion_mnmm"][100] = 0
-    outcome = CrossCheck()
-    outcome.add(plain, default_settings())
+    outcome = checked(plain, {})
     assert outcome.violations == 1 and "torsion is valid on one side only" in outcome.findings[0]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import biotac
-from biotac.calibrate.population import population_map
+from biotac.calibrate import population as population_map
 from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.map import population

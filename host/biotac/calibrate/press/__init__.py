@@ -1,6 +1,6 @@
 """Calibration by presses of known force, on a scale, by weights or beside a force sensor.
 
-- ``rows``: the part of a frame that presses are found in; ``force_source``: the force that a file or a scenario knows
+- ``force_source``: the part of a frame that presses are found in, and the force that a file or a scenario knows
 - ``detector``: finds rest and held presses; ``guide``: guides through them on a board
 - ``pressure``: K of a finger's pressure (Navarro et al. 2015); ``pressure_procedure``: on a board and from a recording
 - ``known_force``: the population map fitted to presses by ``few_shot``; ``weights``: forces of masses on tilted blocks
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from .detector import Press, Procedure
 from .few_shot import Scale, pulled, scale_of
-from .force_source import Truth
+from .force_source import Truth, rows_of
 from .guide import Unattended, guide
 from .pressure import (
     CALIBRATION_FORCES_N,
@@ -24,7 +24,6 @@ from .pressure import (
     with_board_force,
 )
 from .pressure_procedure import put, with_gain
-from .rows import rows_of
 
 __all__ = [
     "CALIBRATION_FORCES_N", "PAPER_ERROR", "VERIFICATION_FORCES_N", "Fit", "Press", "Procedure", "Scale", "Truth",

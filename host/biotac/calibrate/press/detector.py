@@ -21,7 +21,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...wire.frames import StructArray
-from .rows import ROW_DTYPE
+from .force_source import ROW_DTYPE
 
 HZ = 100
 WINDOW_ROWS = 40
@@ -94,13 +94,6 @@ def noise(values: Any) -> float:
     For noise through the filter with alpha = 0.5 it equals that of the values themselves.
     """
     return float(np.diff(values).std()) if len(values) > 2 else 0.0
-
-
-def motion_limit(level: float, sigma: float) -> float:
-    """The largest ``motion`` of a window held at ``level`` counts above rest, with noise of ``sigma`` counts."""
-    # Filtered noise is correlated: with alpha = 0.5 a mean scatters sqrt(3) times more than for independent rows.
-    scatter = max(sigma, SIGMA_FLOOR) * np.sqrt(3.0 * 2.0 / (WINDOW_ROWS / 4))
-    return float(max(MOVING_SHARE * abs(level), NOISE_SIGMAS * scatter))
 
 
 class Presses:
@@ -209,10 +202,14 @@ class Presses:
         self._kept: list[Any] = []
 
     def _is_steady(self, pressure: float, level: float, sigma: float) -> bool:
+        """Whether the window is held at ``level`` counts above rest, with noise of ``sigma`` counts."""
         self._window.append(pressure)
         if len(self._window) < WINDOW_ROWS:
             return False
-        moved, limit = motion(list(self._window)), motion_limit(level, sigma)
+        # Filtered noise is correlated: with alpha = 0.5 a mean scatters sqrt(3) times more than for independent rows.
+        scatter = max(sigma, SIGMA_FLOOR) * np.sqrt(3.0 * 2.0 / (WINDOW_ROWS / 4))
+        limit = float(max(MOVING_SHARE * abs(level), NOISE_SIGMAS * scatter))
+        moved = motion(list(self._window))
         if moved < self._steadiest[0]:
             self._steadiest = (moved, limit)
         return moved <= limit
@@ -224,22 +221,19 @@ class Presses:
         self._kept.append(float(row["pressure"]))
         self._most_kept = max(self._most_kept, len(self._kept))
         sigma = noise(self._kept[-REST_ROWS:])
-        if not self._is_steady(self._kept[-1], 0.0, sigma) or len(self._kept) < REST_ROWS:
-            return
-        still = self._kept[-REST_ROWS:]
-        self.rest = Rest(float(np.mean(still)), sigma, len(still))
-        self._enter(Phase.PRESS)
+        if self._is_steady(self._kept[-1], 0.0, sigma) and len(self._kept) >= REST_ROWS:
+            self.rest = Rest(float(np.mean(self._kept[-REST_ROWS:])), sigma, REST_ROWS)
+            self._enter(Phase.PRESS)
 
     def _pressing(self, row: Any, above: float) -> None:
         assert self.rest is not None
         if above < PRESS_COUNTS:
             self._begin_again()
             return
-        if not self._is_steady(float(row["pressure"]), above, self.rest.sigma):
-            self._kept = []
-            return
-        if self._needs_force and np.isnan(row["force_n"]):
-            self._forceless += 1
+        steady = self._is_steady(float(row["pressure"]), above, self.rest.sigma)
+        forceless = self._needs_force and np.isnan(row["force_n"])
+        self._forceless += bool(steady and forceless)
+        if not steady or forceless:
             self._kept = []
             return
         self._kept.append(row)
@@ -280,7 +274,7 @@ class Procedure:
                 raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
         self.needs_force = needs_force
         self._turns = [
-            (Presses(finger, len(forces_n), needs_force=needs_force), tuple(float(force) for force in forces_n))
+            (Presses(finger, len(forces_n), needs_force=needs_force), tuple(map(float, forces_n)))
             for forces_n in series_n
             for finger in fingers
         ]

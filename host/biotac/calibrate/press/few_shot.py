@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...errors import InputError
-from ..population.population_map import Population, Sums
+from ..population import Population, Sums
 
 # How much fingers differ in the two numbers, and the map's error in one press: from F1 and F2, each by the other's map.
 GAIN_SPREAD = 0.04
@@ -23,10 +23,7 @@ PULL = 1000.0  # weight of the population map against the finger's own data, in 
 
 @dataclass(frozen=True)
 class Scale:
-    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x.
-
-    The defaults change nothing.
-    """
+    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x."""
 
     gain: float = 1.0
     balance: float = 0.0

@@ -1,4 +1,4 @@
-"""The force to calibrate to: a magnitude in N for every frame (Eq 2), from a scenario or from a file.
+"""The rows that presses are found in, and the force to calibrate to: a magnitude in N for every frame (Eq 2).
 
 There is no driver for a force plate here; anything that gives newtons at device times can be a ``Reference``.
 """
@@ -14,12 +14,16 @@ from numpy.typing import NDArray
 from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...link.base import Played
+from ...recording.pressure_check import usable
+from ...wire import messages_gen as wire
+from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 from ...wire.slots import FRAME_HZ
 from ..reference.csv_file import columns, open_table
 
 LAG_ROWS = 100
 MAX_LAG_ROWS = 20  # 0.2 s: more is not a transport delay but another clock; a contact held for 0.5 s allows this much
 MIN_CORRELATION = 0.9
+_COLUMNS = (("t_s", "force_n"), ("t_s", "fx_n", "fy_n", "fz_n"))
 MAX_FORCE_N = 200.0  # more than a finger withstands; values in millinewtons and grams exceed it
 
 
@@ -28,6 +32,31 @@ class Reference(Protocol):
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
         """Magnitude (n,) in N at device times (n,), NaN where it is not known."""
+
+
+#: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.
+#: ``board_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``touched`` means
+#: contact or a fault, ``railed`` a PDC at an end of its range.
+ROW_DTYPE = np.dtype(
+    [
+        *(("finger", "u1"), ("t_us", "<i8")),
+        *((name, "<f8") for name in ("pressure", "rest", "board_n", "force_n")),
+        *(("touched", "?"), ("railed", "?")),
+    ]
+)
+
+
+def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: Reference | None = None) -> StructArray:
+    """Rows (n,) from FRAME messages (n,) and their unwrapped times (n,), with the reference's force."""
+    out = np.empty(len(messages), ROW_DTYPE)
+    out["finger"], out["t_us"] = messages["finger"], t_us
+    out["pressure"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
+    out["rest"] = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
+    out["board_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
+    out["force_n"] = np.nan if reference is None else reference.at(messages["finger"], t_us)
+    out["touched"] = (messages["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.FAULT)) != 0
+    out["railed"] = ~usable(messages["pdc"]) & (messages["pdc"] != wire.INVALID_COUNT)
+    return out
 
 
 class Truth:
@@ -86,30 +115,25 @@ class Series:
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
         """See Reference.at; the force is the same for all fingers, as they share one plate."""
-        return np.asarray(np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan), np.float64)
-
-
-def lag_rows(above_rest: Floats, force_n: Floats) -> tuple[int, float]:
-    """The number of rows by which pressure lags the force, and the correlation there.
-
-    Both inputs are (n,); rows with NaN are left out.
-    """
-    best = (0, -1.0)
-    for lag in range(-LAG_ROWS, LAG_ROWS + 1):
-        a = above_rest[max(lag, 0) : len(above_rest) + min(lag, 0)]
-        b = force_n[max(-lag, 0) : len(force_n) + min(-lag, 0)]
-        both = np.isfinite(a) & np.isfinite(b)
-        if both.sum() < 2 or a[both].std() == 0 or b[both].std() == 0:
-            continue
-        correlation = float(np.corrcoef(a[both], b[both])[0, 1])
-        if correlation > best[1]:
-            best = (lag, correlation)
-    return best
+        force_n: Floats = np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan)
+        return force_n
 
 
 def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
-    """The number of rows by which one finger's pressure lags the force. Raises InputError when they do not match."""
-    lag, correlation = lag_rows(above_rest, force_n)
+    """The number of rows by which one finger's pressure lags the force, both (n,); rows with NaN are left out.
+
+    Raises InputError when they do not match.
+    """
+    lag, correlation = 0, -1.0
+    for rows in range(-LAG_ROWS, LAG_ROWS + 1):
+        a = above_rest[max(rows, 0) : len(above_rest) + min(rows, 0)]
+        b = force_n[max(-rows, 0) : len(force_n) + min(-rows, 0)]
+        both = np.isfinite(a) & np.isfinite(b)
+        if both.sum() < 2 or a[both].std() == 0 or b[both].std() == 0:
+            continue
+        found = float(np.corrcoef(a[both], b[both])[0, 1])
+        if found > correlation:
+            lag, correlation = rows, found
     if correlation < MIN_CORRELATION or abs(lag) > MAX_LAG_ROWS:
         raise InputError(
             f"{where}: force and pressure are not aligned: they agree best with pressure {lag} rows after the force, "
@@ -126,17 +150,13 @@ def load_csv(path: Path) -> Series:
     are ignored. Raises InputError that says what is wrong with the file.
     """
     _, head, read = open_table(path)
-    for axes in (["force_n"], ["fx_n", "fy_n", "fz_n"]):
-        if {"t_s", *axes} <= set(head):
-            indices = [head.index(name) for name in ("t_s", *axes)]
-            break
-    else:
-        try:
-            indices, _ = columns(path, head, torque=False)
-        except RecordingError as error:
-            raise InputError(
-                f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and "
-                f"fz_n, in seconds and newtons, or a wrench ({error})"
-            ) from None
+    names = next((names for names in _COLUMNS if set(names) <= set(head)), None)
+    try:
+        indices = columns(path, head, torque=False)[0] if names is None else [head.index(name) for name in names]
+    except RecordingError as error:
+        raise InputError(
+            f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and "
+            f"fz_n, in seconds and newtons, or a wrench ({error})"
+        ) from None
     values = read(indices)
     return Series(str(path), values[:, 0], np.linalg.norm(values[:, 1:], axis=-1))

@@ -9,8 +9,7 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...wire.batches import Batch
 from .detector import Press, Procedure, Step
-from .force_source import Reference
-from .rows import rows_of
+from .force_source import Reference, rows_of
 
 
 class Face(Protocol):
@@ -26,8 +25,7 @@ class Face(Protocol):
 class Unattended:
     """A Face for scenarios, which press by themselves."""
 
-    def show(self, step: Step | None) -> None:
-        pass
+    def show(self, step: Step | None) -> None: ...
 
     def force_n(self, step: Step) -> float:
         raise InputError(f"finger {step.finger}, press {step.press} has no force; expected a reference")

@@ -16,17 +16,15 @@ from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch, join
 from ...wire.frames import Q4_PER_COUNT, StructArray
-from ..population.population_map import Population, by_columns
+from ..population import Population, by_columns
 from .detector import Press, Procedure
-from .force_source import Reference
+from .force_source import Reference, rows_of
 from .guide import Face, guide
-from .rows import rows_of
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
-STRAIGHT = (0.0, 0.0, 1.0)
-ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # light and firm in turn; starts again after the last
-
+STRAIGHT_DOWN = (0.0, 0.0, 1.0)
+ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # on a scale: light and firm in turn; starts again after the last
 
 #: From a map, and columns (k, 323) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
 Fit = Callable[[Population, Floats, Floats], Population]
@@ -92,12 +90,6 @@ def found(population: Population, held: Held, fit: Fit) -> Found:
     return Found(own, before, after)
 
 
-def asked_n(presses: int) -> tuple[float, ...]:
-    """The forces in N to ask for on a scale. Raises InputError for fewer than LEAST_PRESSES."""
-    _check_enough(presses)
-    return tuple(ASKED_N[k % len(ASKED_N)] for k in range(presses))
-
-
 def guided(
     hand: Hand,
     finger: int,
@@ -139,12 +131,7 @@ def _check_enough(presses: int) -> None:
         raise InputError(f"{presses} presses of known force: expected {LEAST_PRESSES} or more; five work better")
 
 
-def _held(
-    frames: StructArray,
-    t_us: Any,
-    presses: Sequence[Press],
-    toward: Sequence[Sequence[float]] | None,
-) -> Held:
+def _held(frames: StructArray, t_us: Any, presses: Sequence[Press], toward: Sequence[Sequence[float]] | None) -> Held:
     counts, numbers, tares = [], [], []
     for k, press in enumerate(presses):
         held = frames[np.isin(t_us, press.rows["t_us"])]
@@ -159,6 +146,6 @@ def _held(
     tare = tares[0].mean(axis=0)
     # counts above each press's own tare: the board takes a new one between presses
     level = [one - at + tare for one, at in zip(counts, tares, strict=True)]
-    directions = np.array([STRAIGHT] * len(presses) if toward is None else toward)
+    directions = np.array([STRAIGHT_DOWN] * len(presses) if toward is None else toward)
     sizes_n = np.array([press.force_n for press in presses])
     return Held(np.concatenate(level), tare, np.concatenate(numbers), sizes_n[:, None] * directions)

@@ -49,7 +49,7 @@ class Fit:
     press_forces_n: tuple[float, ...]
     press_gains_n: tuple[float, ...]
     relative_error: float
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @property
     def gain_nn(self) -> int:
@@ -101,9 +101,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
             f"{where}: K of single presses is {min(gains):.4g} to {max(gains):.4g} N/count, a spread of {spread:.0%}, "
             f"expected at most {SPREAD_MAX:.0%}; is the reference for this finger, and were all presses at one place?"
         )
-    notes = []
-    if spread > SPREAD_NOTED:
-        notes.append(f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place")
+    note = f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place"
     return Fit(
         finger=finger,
         gain_n=gain_n,
@@ -113,7 +111,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
         press_forces_n=tuple(float(press.rows["force_n"].mean()) for press in presses),
         press_gains_n=tuple(gains),
         relative_error=relative_error(above * gain_n, force),
-        notes=tuple(notes),
+        notes=(note,) if spread > SPREAD_NOTED else (),
     )
 
 
@@ -149,11 +147,9 @@ def with_board_force(press: Press, gain_nn: int) -> Press:
     return press.with_column("board_n", to_units(pressure_force_100un(filtered_q4, rest_q4, gain_nn), FORCE_LSB_PER_N))
 
 
-def gain_of(above_rest: Any, force_n: Any) -> float:
+def gain_of(above_rest: Floats, force_n: Floats) -> float:
     """Eq 6: K in N per count, the pseudo-inverse of the column P - P0 (n,) times F (n,) in N."""
-    column = np.asarray(above_rest, np.float64).reshape(-1, 1)
-    (solved,) = np.linalg.pinv(column) @ np.asarray(force_n, np.float64)
-    return float(solved)
+    return float((np.linalg.pinv(above_rest[:, None]) @ force_n)[0])
 
 
 def relative_error(seen_n: Floats, force_n: Floats) -> float:
@@ -193,10 +189,10 @@ class Outcome:
     not save the calibrations, None if it did or was not asked to.
     """
 
-    fits: dict[int, Fit]
-    calibrations: dict[int, Calibration]
-    provenance: dict[int, Provenance]
-    verified: dict[int, Verification]
+    fits: dict[int, Fit] = field(default_factory=dict)
+    calibrations: dict[int, Calibration] = field(default_factory=dict)
+    provenance: dict[int, Provenance] = field(default_factory=dict)
+    verified: dict[int, Verification] = field(default_factory=dict)
     lag_rows: dict[int, int] = field(default_factory=dict)
     not_saved: CommandRefusedError | None = None
 
@@ -205,14 +201,9 @@ class Outcome:
         fitted = fit(rest, presses[:-1])
         self.fits[fitted.finger] = fitted
         self.verified[fitted.finger] = verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
-        self.provenance[fitted.finger] = provenance(fitted, **source)
+        made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
+        self.provenance[fitted.finger] = {**made, **source, **_numbers(fitted)}
         return fitted
-
-
-def provenance(fitted: Fit, **source: str) -> Provenance:
-    """How K was made, for a calibration's file: its ``source`` and the numbers of the fit."""
-    made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
-    return {**made, **source, **_numbers(fitted)}
 
 
 def _numbers(fitted: Fit) -> Provenance:
@@ -230,33 +221,30 @@ def _numbers(fitted: Fit) -> Provenance:
 
 def facts(outcome: Outcome) -> list[dict[str, Any]]:
     """One object for each finger, in JSON types."""
-    out = []
-    for finger, fitted in outcome.fits.items():
-        digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
-        seen = outcome.verified[finger]
-        one = _numbers(fitted) | {
+    digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
+    return [
+        _numbers(fitted)
+        | {
             "serial": outcome.calibrations[finger].serial,
             "pressure_gain_nn": fitted.gain_nn,
             "notes": list(fitted.notes),
-            "verification": {name: round(getattr(seen, name), decimals) for name, decimals in digits.items()},
+            "verification": {key: round(getattr(outcome.verified[finger], key), n) for key, n in digits.items()},
         }
-        if finger in outcome.lag_rows:
-            one["lag_rows"] = outcome.lag_rows[finger]
-        out.append(one)
-    return out
+        | ({"lag_rows": outcome.lag_rows[finger]} if finger in outcome.lag_rows else {})
+        for finger, fitted in outcome.fits.items()
+    ]
 
 
 def lines(outcome: Outcome) -> list[str]:
     """The table of K and P0, with the verification press."""
-    head = f"{'finger':>6}  {'sensor':<16}  {'K N/count':>9}  {'P0 count':>8}  {'fit':>6}"
-    out = [head + f"  {'force N':>7}  {'board N':>7}  {'error':>6}  {'float64':>7}"]
+    out = ["finger  sensor            K N/count  P0 count     fit  force N  board N   error  float64"]
     for finger, fitted in outcome.fits.items():
-        serial = outcome.calibrations[finger].serial or "any"
-        line = f"{finger:>6}  {serial:<16}  {fitted.gain_n:>9.6f}  {fitted.rest.counts:>8.1f}"
-        line += f"  {fitted.relative_error:>6.2%}"
-        seen = outcome.verified[finger]
-        line += f"  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
-        out.append(line)
+        seen, serial = outcome.verified[finger], outcome.calibrations[finger].serial or "any"
+        out.append(
+            f"{finger:>6}  {serial:<16}  {fitted.gain_n:>9.6f}  {fitted.rest.counts:>8.1f}"
+            f"  {fitted.relative_error:>6.2%}  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}"
+            f"  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
+        )
     notes = [note for fitted in outcome.fits.values() for note in fitted.notes]
     notes += [
         f"finger {f}: {seen.board_error:.1%} off on the verification press (the paper's: {PAPER_ERROR:.2%}): was it at "

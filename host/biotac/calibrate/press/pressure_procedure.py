@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,51 +17,44 @@ from ...hand.hand import Hand
 from ...keep import Calibration
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
-from ...wire.frames import StructArray
 from ...wire.identity import ascii_text, serial_text
 from .detector import Procedure
-from .force_source import Series, Truth, check_alignment
+from .force_source import Series, Truth, check_alignment, rows_of
 from .guide import Face, guide
-from .pressure import (
-    CALIBRATION_FORCES_N,
-    MIN_PRESSES,
-    VERIFICATION_FORCES_N,
-    Fit,
-    Outcome,
-)
-from .rows import rows_of
+from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Fit, Outcome
 
 AROUND_ROWS = 50  # before and after a touch, in which the plate's force is taken as this finger's
 
 
-@dataclass(frozen=True)
-class Plan:
-    """The fingers (none: all with a sensor) and the forces in N to ask for."""
+def calibrate(
+    hand: Hand,
+    face: Face,
+    *,
+    fingers: Sequence[int] = (),
+    forces_n: Sequence[float] = CALIBRATION_FORCES_N,
+    verification_n: Sequence[float] = VERIFICATION_FORCES_N,
+    made_s: int,
+    save: bool = False,
+) -> Outcome:
+    """K of each of ``fingers`` (none: all) on a board, which presses with about ``forces_n``, then ``verification_n``.
 
-    fingers: tuple[int, ...] = ()
-    forces_n: tuple[float, ...] = CALIBRATION_FORCES_N
-    verification_n: tuple[float, ...] = VERIFICATION_FORCES_N
-
-
-# ---- on a board --------------------------------------------------------------------------------
-
-
-def calibrate(hand: Hand, plan: Plan, face: Face, *, made_s: int, save: bool = False) -> Outcome:
-    """Run ``plan`` on a board; the force is its scenario's, or what ``face`` gives.
-
-    ``save`` keeps the result over reboots; see Outcome.not_saved if the board refuses. Raises InputError for presses
-    that cannot be used, for a finger without a sensor, and for a sensor that was changed meanwhile; the board then
-    keeps nothing beyond the next reboot.
+    The force is the board's scenario's, or what ``face`` gives. ``save`` keeps the result over reboots; see
+    Outcome.not_saved if the board refuses. Raises InputError for presses that cannot be used, for a finger without a
+    sensor, and for a sensor that was changed meanwhile; the board then keeps nothing beyond the next reboot.
     """
-    if len(plan.forces_n) < MIN_PRESSES:
-        raise InputError(f"{len(plan.forces_n)} presses are planned, expected {MIN_PRESSES} or more; name more forces")
-    fingers = _fingers(hand, plan)
+    if len(forces_n) < MIN_PRESSES:
+        raise InputError(f"{len(forces_n)} presses are planned, expected {MIN_PRESSES} or more; name more forces")
+    absent = sorted(set(fingers) - set(hand.fingers))
+    if absent or not hand.fingers:
+        there = f"{', '.join(map(str, hand.fingers))} are" if hand.fingers else "none is"
+        raise InputError(f"no sensor on finger {absent[0] if absent else '0 to 4'} ({there} there); check its cable")
+    fingers = fingers or hand.fingers
     serials = {finger: _serial(hand, finger) for finger in fingers}
     reference = None if hand.link.source is None else Truth(hand.link.source)
-    procedure = Procedure(fingers, plan.forces_n, plan.verification_n, needs_force=reference is not None)
+    procedure = Procedure(fingers, forces_n, verification_n, needs_force=reference is not None)
     held = guide(hand, procedure, reference, face)
     hand.stop()
-    outcome = Outcome({}, {}, {}, {})
+    outcome = Outcome()
     for finger, presses in held.items():
         now = _serial(hand, finger)
         if now != serials[finger]:
@@ -80,17 +73,6 @@ def calibrate(hand: Hand, plan: Plan, face: Face, *, made_s: int, save: bool = F
         except CommandRefusedError as error:
             outcome.not_saved = error  # the presses are not lost for this
     return outcome
-
-
-def _fingers(hand: Hand, plan: Plan) -> Sequence[int]:
-    absent = sorted(set(plan.fingers) - set(hand.fingers))
-    if absent or not hand.fingers:
-        there = ", ".join(map(str, hand.fingers)) or "none"
-        which = absent[0] if absent else "0 to 4"
-        raise InputError(
-            f"no sensor on finger {which} ({there} {'is' if not hand.fingers else 'are'} there); check its cable"
-        )
-    return plan.fingers or tuple(hand.fingers)
 
 
 def _serial(hand: Hand, finger: int) -> str:
@@ -119,9 +101,6 @@ def put(hand: Hand, finger: int, calibration: Calibration) -> None:
         )
 
 
-# ---- from a recording --------------------------------------------------------------------------
-
-
 def calibrate_recording(
     recording: Recording,
     reference: Series | None,
@@ -145,7 +124,13 @@ def calibrate_recording(
         raise InputError(
             f"{len(asked)} forces given, expected {MIN_PRESSES + 1} or more: one per press, the last for verification"
         )
-    rows = _rows(recording, reference)
+    t_us = recording.frames["t_us"]
+    rows = rows_of(recording.wire, t_us, reference)
+    if reference is not None and len(rows) and np.isnan(rows["force_n"]).all():
+        raise InputError(
+            f"{reference.name} covers none of {len(rows)} frames, which span {t_us.min() / 1e6:.2f} to "
+            f"{t_us.max() / 1e6:.2f} s of the board's time; expected t_s within it (t_us / 1e6)"
+        )
     there = np.unique(rows["finger"]).tolist()
     absent = sorted(set(fingers) - set(there))
     if absent or not there:
@@ -159,11 +144,15 @@ def calibrate_recording(
         "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
         "reference": reference.name if reference is not None else "typed",
     }
-    outcome = Outcome({}, {}, {}, {})
+    outcome = Outcome()
     for finger in fingers or there:
         own_rows = rows[rows["finger"] == finger]
         if reference is not None:
-            outcome.lag_rows[finger] = _lag(recording, own_rows, finger)
+            # All fingers share one plate: its force is this finger's only around its own touches.
+            near = np.convolve(own_rows["touched"], np.ones(2 * AROUND_ROWS + 1), "same") > 0
+            above = np.where(near, own_rows["pressure"] - own_rows["rest"], np.nan)
+            where = f"{recording.path}, finger {finger}"
+            outcome.lag_rows[finger] = check_alignment(where, above, own_rows["force_n"])
         # A procedure for each finger: a recording may have them in any order.
         procedure = Procedure([finger], asked, needs_force=reference is not None)
         presses = procedure.find(own_rows)[finger]
@@ -175,22 +164,3 @@ def calibrate_recording(
             own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s
         )
     return outcome
-
-
-def _rows(recording: Recording, reference: Series | None) -> StructArray:
-    t_us = recording.frames["t_us"]
-    rows = rows_of(recording.wire, t_us, reference)
-    if reference is not None and len(rows) and np.isnan(rows["force_n"]).all():
-        first_s, last_s = t_us.min() / 1e6, t_us.max() / 1e6
-        raise InputError(
-            f"{reference.name} covers none of {len(rows)} frames, which span {first_s:.2f} to {last_s:.2f} s of "
-            "the board's time; expected t_s within it (t_us / 1e6)"
-        )
-    return rows
-
-
-def _lag(recording: Recording, rows: StructArray, finger: int) -> int:
-    # All fingers share one plate: its force is this finger's only around its own touches.
-    near = np.convolve(rows["touched"], np.ones(2 * AROUND_ROWS + 1), "same") > 0
-    above = np.where(near, rows["pressure"] - rows["rest"], np.nan)
-    return check_alignment(f"{recording.path}, finger {finger}", above, rows["force_n"])

@@ -43,10 +43,8 @@ class Load:
         return x * along, y * along, math.cos(math.radians(self.tilt_deg))
 
     def __str__(self) -> str:
-        block = (
-            "the block level" if self.down == LEVEL else f"the block tilted by {self.tilt_deg:g} deg, {self.down} down"
-        )
-        return f"{self.mass_g:g} g on the pad, {block}"
+        tilt = LEVEL if self.down == LEVEL else f"tilted by {self.tilt_deg:g} deg, {self.down} down"
+        return f"{self.mass_g:g} g on the pad, the block {tilt}"
 
 
 def plan(masses_g: Sequence[float], tilts_deg: Sequence[float]) -> tuple[Load, ...]:

@@ -85,7 +85,8 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
         )
     width_s = _width(correlation, best)
     overlap_s = float(overlap[best] * STEP_S)
-    clear = float((_fisher(peak) - _fisher(runner_up)) * np.sqrt(overlap_s / max(width_s, STEP_S)))
+    fisher = np.arctanh(np.minimum([peak, runner_up], 0.9999))
+    clear = float((fisher[0] - fisher[1]) * np.sqrt(overlap_s / max(width_s, STEP_S)))
     if clear < MIN_CLEAR:
         raise RecordingError(
             f"{not_aligned}: their best agreement ({peak:.2f}) is not clear: another shift has {runner_up:.2f}, "
@@ -99,30 +100,9 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
             "did a clock jump?"
         )
     return Alignment(
-        offset_s=float(offset),
-        drift_ppm=drift_ppm,
-        middle_s=middle_s,
-        peak=peak,
-        runner_up=runner_up,
-        clear=clear,
-        width_s=width_s,
-        scatter_s=scatter,
-        pieces=pieces,
+        float(offset), drift_ppm, middle_s, peak, runner_up, clear, width_s, scatter_s=scatter, pieces=pieces,
         overlap_s=overlap_s,
-    )
-
-
-def on_grid(t_s: Floats, values: Floats, edges_s: Floats) -> Floats:
-    """Means (k, columns) of ``values`` (n, columns) between k + 1 ``edges_s``; NaN where there is no sample.
-
-    Means rather than the nearest sample: the noise of a sensor ten times as fast as the grid would be aliased.
-    """
-    cell = np.searchsorted(edges_s, t_s, side="right") - 1
-    good = np.isfinite(values).all(axis=1) & (cell >= 0) & (cell < len(edges_s) - 1)
-    count = np.bincount(cell[good], minlength=len(edges_s) - 1)
-    with np.errstate(invalid="ignore"):
-        columns = [np.bincount(cell[good], weights=v, minlength=len(edges_s) - 1) / count for v in values[good].T]
-    return np.column_stack(columns)
+    )  # fmt: skip
 
 
 def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:
@@ -130,11 +110,16 @@ def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:
     start = float(t_s[0])
     # cells are centred on their times: a board's one sample per cell keeps its time, and means are centred
     edges = start + STEP_S * (np.arange(int((t_s[-1] - start) / STEP_S) + 2, dtype=np.float64) - 0.5)
-    cells = on_grid(t_s, np.column_stack([load, t_s]), edges)
-    known = np.isfinite(cells[:, 0])
-    at = edges[:-1] + STEP_S / 2.0
-    # uses the mean time of each cell's samples: depending on their phase they lie to one side of its middle
-    even: Floats = np.interp(at, cells[known, 1], cells[known, 0]) if known.any() else np.zeros(len(cells))
+    cells = len(edges) - 1
+    cell = np.searchsorted(edges, t_s, side="right") - 1
+    good = np.isfinite(load) & np.isfinite(t_s) & (cell >= 0) & (cell < cells)
+    count = np.bincount(cell[good], minlength=cells)
+    known = count > 0
+    # means rather than the nearest sample: the noise of a sensor ten times as fast as the grid would be aliased; at
+    # the mean time of each cell's samples: depending on their phase they lie to one side of its middle
+    sums = (np.bincount(cell[good], weights=values[good], minlength=cells) for values in (t_s, load))
+    mean_s, mean_load = (values[known] / count[known] for values in sums)
+    even: Floats = np.interp(edges[:-1] + STEP_S / 2.0, mean_s, mean_load) if known.any() else np.zeros(cells)
     smooth = np.convolve(np.pad(even, 2, mode="edge"), np.full(5, 0.2), mode="valid")
     change: Floats = np.gradient(smooth)
     # without a limit a single knock would decide alone
@@ -169,10 +154,6 @@ def _peak(correlation: Floats, best: int) -> tuple[float, float]:
     return float(at - 0.25 * (before - after) * shift), float(shift)
 
 
-def _fisher(correlation: float) -> float:
-    return float(np.arctanh(min(correlation, 0.9999)))
-
-
 def _width(correlation: Floats, best: int) -> float:
     """Width in s at half the peak's height."""
     below = correlation < 0.5 * correlation[best]
@@ -193,12 +174,10 @@ def _drift(
         piece = a[begin : begin + size]
         if float((piece**2).mean()) < busy:
             continue
+        others = [b[begin + lag + k : begin + lag + k + size] for k in range(-reach, reach + 1)]
+        size_of_piece = np.linalg.norm(piece)
         found = np.array(
-            [
-                piece @ other / max(float(np.linalg.norm(piece) * np.linalg.norm(other)), 1e-300)
-                for k in range(-reach, reach + 1)
-                for other in [b[begin + lag + k : begin + lag + k + size]]
-            ]
+            [piece @ other / max(float(size_of_piece * np.linalg.norm(other)), 1e-300) for other in others]
         )
         best = int(np.argmax(found))
         height, shift = _peak(found, best)

@@ -32,19 +32,14 @@ _WANTED = "t in s, forces in N, torques in N mm or N m"
 
 
 def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
-    """The reference in ``path``; ``mounting`` replaces the file's own.
-
-    Raises RecordingError for what cannot be read or is not plausible, InputError for a wrong mounting in the file.
-    """
+    """The reference in ``path``; ``mounting`` replaces the file's own."""
     own, head, read = open_table(path)
-    chosen = mounting
-    if chosen is None and "mounting" in own:
-        chosen = from_json(own["mounting"], f"{path}: line '# mounting:'")
-    if chosen is None:
+    if mounting is None and "mounting" not in own:
         raise RecordingError(
             f"{path}: does not say how the sensor is mounted on the finger: expected --mounting FILE.toml, or "
             "--mounting lin if axes and origin are already Lin's"
         )
+    chosen = mounting or from_json(own["mounting"], f"{path}: line '# mounting:'")
     use, scale = columns(path, head)
     table = read(use)
     samples = Samples(table[:, 0], table[:, 1:] * scale)
@@ -63,8 +58,16 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
     except (OSError, UnicodeDecodeError) as error:
         seen = error.strerror if isinstance(error, OSError) else "it is not text"
         raise RecordingError(f"{path}: cannot be read ({seen}): expected a CSV file of a force/torque sensor") from None
-    own, head, body = _split(text)
-    if head is None:
+    own, head, body = {}, "", ""
+    for match in re.finditer(r"[^\n]*\n?", text):
+        line = match[0].strip()
+        if line and not line.startswith("#"):
+            head, body = line, text[match.end() :]
+            break
+        key, colon, value = line.lstrip("# ").partition(":")
+        if colon:
+            own[key.strip()] = value.strip()
+    if not head:
         raise RecordingError(f"{path}: no header line: expected one that names every column")
     separator = max(",;\t", key=head.count)
 
@@ -79,20 +82,6 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
             ) from None
 
     return own, [name.strip().strip('"') for name in head.split(separator)], read
-
-
-def _split(text: str) -> tuple[dict[str, str], str | None, str]:
-    """The values of '# key: value' lines, the header line, and the text after it."""
-    own: dict[str, str] = {}
-    for match in re.finditer(r"[^\n]*\n?", text):
-        line = match[0].strip()
-        if line.startswith("#"):
-            key, colon, value = line.lstrip("# ").partition(":")
-            if colon:
-                own[key.strip()] = value.strip()
-        elif line:
-            return own, line, text[match.end() :]
-    return own, None, ""
 
 
 def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[int], Floats]:
@@ -128,10 +117,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
 
 
 class CsvWriter:
-    """Writes a reference; every ``add`` is flushed to the operating system, so that killing the process loses nothing.
-
-    Raises InputError when ``path`` exists and may not be overwritten, or cannot be written.
-    """
+    """Writes a reference; every ``add`` is flushed to the operating system, so that a kill loses nothing."""
 
     def __init__(self, path: Path, mounting: Mounting, sensor: str, *, overwrite: bool = False) -> None:
         self.path = path
@@ -147,10 +133,9 @@ class CsvWriter:
 
     def add(self, samples: Samples) -> None:
         """Append samples of six axes."""
-        if len(samples):
-            rows = np.column_stack([samples.t_s, samples.wrench])
-            np.savetxt(self._stream, rows, fmt=["%.6f", *["%.6g"] * 6], delimiter=",")
-            self._stream.flush()
+        rows = np.column_stack([samples.t_s, samples.wrench])
+        np.savetxt(self._stream, rows, fmt=["%.6f", *["%.6g"] * 6], delimiter=",")
+        self._stream.flush()
 
     def close(self) -> None:
         """Close the file. Safe to call twice."""

@@ -25,11 +25,7 @@ Row = tuple[float, list[float]]
 
 
 def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -> Reference:
-    """The wrench of ``topic``, or of the only wrench topic.
-
-    Raises RecordingError for a file without exactly one or without ``mounting``, InputError where CDR needs an extra
-    that is not installed.
-    """
+    """The wrench of ``topic``, or of the only wrench topic."""
     if mounting is None:
         raise RecordingError(
             f"{path}: a WrenchStamped does not say how the sensor is mounted on the finger: expected --mounting "

@@ -54,20 +54,15 @@ def parse_address(text: str) -> Address:
         numbers = {key: float(value) for key, value in options.items()}
     except ValueError:
         raise InputError(f"{text}: an option is not a number: expected {_FORM}") from None
-    scale = None
     given = [key for key in ("cpf", "cpt", "rate") if key in numbers]
     if given and len(given) < 3:
         raise InputError(f"{text}: only {' and '.join(given)} given: expected cpf, cpt and rate, or none of them")
-    if given:
-        scale = Scale(numbers["cpf"], numbers["cpt"] / rdt.NMM_PER_NM, numbers["rate"])
+    scale = Scale(numbers["cpf"], numbers["cpt"] / rdt.NMM_PER_NM, numbers["rate"]) if given else None
     return Address(match[1], int(match[2] or rdt.PORT), int(numbers.get("http", 80)), scale)
 
 
 def read_configuration(xml: bytes, where: str) -> tuple[Scale, str]:
-    """Scale and calibration number from the box's netftapi2.xml.
-
-    Raises InputError for units that it cannot convert, RDT switched off, or XML that is not such a box's.
-    """
+    """Scale and calibration number from the box's netftapi2.xml."""
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
@@ -108,8 +103,7 @@ class NetFtReader:
 
     def __init__(self, address: Address, *, steady_s: Callable[[], float] = time.monotonic) -> None:
         where = f"{address.host}:{address.port}"
-        number = ""
-        scale = address.scale
+        number, scale = "", address.scale
         if scale is None:
             url = f"http://{address.host}:{address.http_port}/netftapi2.xml"
             try:

@@ -102,12 +102,10 @@ class Reader(Protocol):
     """A force/torque sensor that is read live."""
 
     @property
-    def sensor(self) -> str:
-        """Its name and number as far as known, for people and for provenance."""
+    def sensor(self) -> str: ...  # its name and number as far as known, for people and for provenance
 
     @property
-    def stats(self) -> ReaderStats:
-        """Counts so far."""
+    def stats(self) -> ReaderStats: ...
 
     def read(self, board_s: float) -> Samples:
         """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor is gone.

@@ -35,10 +35,7 @@ _BEYOND = re.compile(r"S[IR]*\s+[-+]|OL,.*")
 
 
 class Scale:
-    """The scale at ``port``, opened with its options (``?baud=`` etc.).
-
-    Raises InputError for wrong options, PortError when the port cannot be opened.
-    """
+    """The scale at ``port``, opened with its options (``?baud=`` etc.)."""
 
     def __init__(self, port: str, patience_s: float = PATIENCE_S) -> None:
         device, _, query = port.partition("?")
@@ -65,10 +62,7 @@ class Scale:
         self._serial.close()
 
     def force_n(self) -> float:
-        """The force in N that the scale shows, once it has settled.
-
-        Raises InputError when it does not settle, is silent, or shows no usable weight; PortError when it is gone.
-        """
+        """The force in N that the scale shows, once it has settled."""
         seen: list[str] = []
         try:
             self._serial.read(self._serial.in_waiting)  # discards lines from before the press

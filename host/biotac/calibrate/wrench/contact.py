@@ -152,19 +152,14 @@ def torsion_truth(
     torsion[firm] = found.torsion_nmm
     missed = firm.copy()
     missed[firm] = found.missed | ~found.on_skin
-    torsion[missed] = _on_mesh(force_n[missed], moment_nmm[missed])
+    # there, at the mesh point that fits best, unless even that is off by more than MAX_OFF_MM
+    force, point = force_n[missed], locate_on_mesh(force_n[missed], moment_nmm[missed])
+    normal, about = surface.normals_at(point), moment_nmm[missed] - np.cross(point, force)
+    off_mm = np.linalg.norm(np.cross(normal, about), axis=1) / np.linalg.norm(force, axis=1)
+    torsion[missed] = np.where(off_mm <= MAX_OFF_MM, (about * normal).sum(axis=1), np.nan)
     nowhere = ~np.isfinite(torsion)
     note = f"torsion: from F and M of point contacts; the line of action misses the finger in {missed.sum()} rows"
     if nowhere.sum() > MAX_NOWHERE_SHARE * rows:
         return np.zeros((rows, 0)), (f"{note}, in {nowhere.sum()} of which no contact fits: torsion is left out",)
     torsion[nowhere] = 0.0
     return torsion[:, None], (note,)
-
-
-def _on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
-    """Torsion (n,) at the mesh point that fits best; NaN where even that is off by more than MAX_OFF_MM."""
-    point = locate_on_mesh(force_n, moment_nmm)
-    normal = surface.normals_at(point)
-    about = moment_nmm - np.cross(point, force_n)
-    off_mm = np.linalg.norm(np.cross(normal, about), axis=1) / np.linalg.norm(force_n, axis=1)
-    return np.where(off_mm <= MAX_OFF_MM, (about * normal).sum(axis=1), np.nan)

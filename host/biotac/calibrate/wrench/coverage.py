@@ -79,8 +79,7 @@ class Coverage:
     def missing(self) -> list[str]:
         """A line for each region that lacks something, the one with the fewest cells first."""
         lines: list[tuple[int, str]] = []
-        for region, name in enumerate(REGIONS):
-            have = int(self.cells[region])
+        for region, (name, have) in enumerate(zip(REGIONS, self.cells.tolist(), strict=True)):
             parts = [f"{have} of {CELLS_PER_REGION} cells"] if have < ENOUGH_CELLS else []
             if have:  # for an untouched region, the line above is enough
                 pressed = (self.forces_s[region] >= SEEN_S).sum(axis=0).tolist()

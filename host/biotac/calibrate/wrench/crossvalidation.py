@@ -120,48 +120,37 @@ def validate(
     # Thousands of small systems: OpenBLAS's threads wait for each other, and much longer on a busy computer.
     threads = min(THREADS, os.cpu_count() or 1)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
-        return _validate(run, align, windows, others, show, pool)
-
-
-def _validate(
-    run: Run,
-    align: bool,
-    windows: tuple[int, ...],
-    others: Floats | None,
-    show: Show | None,
-    pool: ThreadPoolExecutor,
-) -> Validation:
-    blocks = Blocks(run.rest, run.contact)
-    axes = run.truth.shape[1]
-    lags = Lags(run, blocks)
-    lag_rows, affine_r2 = lags.check()
-    every = list(range(BLOCKS))
-    timing = _Timing(run, blocks, windows)
-    trainings = []
-    for block in [*every, None]:
-        strips = blocks.own(every) if block is None else blocks.kept_from([block])
-        kept = [other for other in every if other != block]
-        late = lags.of_axes(strips) if align else (0,) * axes
-        trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
-    trainer = _Trainer(run, blocks, trainings, others, pool)
-    predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
-    errors: dict[str, Floats] = {}
-    less = np.zeros((len(LESS), axes))
-    fits: list[Fit] = []
-    for block, fit in enumerate(pool.map(trainer.train, trainings)):
-        fits.append(fit)
-        if block == BLOCKS:
-            break
-        if show is not None:
-            show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
-        rows = blocks.rows(block)
-        # all at once: computing the columns costs more than the products
-        by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
-        predicted[:, rows] = by_each[:, :, list(fit.by_model).index(POOLED)]
-        error = ((by_each - run.truth[rows][:, None]) ** 2).sum(axis=1)
-        for k, name in enumerate(fit.by_model):
-            errors[name] = errors.get(name, 0.0) + error[:, k]
-        less += error[0, len(fit.by_model) :]
+        blocks = Blocks(run.rest, run.contact)
+        axes = run.truth.shape[1]
+        lags = Lags(run, blocks)
+        lag_rows, affine_r2 = lags.check()
+        every = list(range(BLOCKS))
+        timing = _Timing(run, blocks, windows)
+        trainings = []
+        for block in [*every, None]:
+            strips = blocks.own(every) if block is None else blocks.kept_from([block])
+            kept = [other for other in every if other != block]
+            late = lags.of_axes(strips) if align else (0,) * axes
+            trainings.append(_Training(kept, strips, late, timing.window(late, kept, strips)))
+        trainer = _Trainer(run, blocks, trainings, others, pool)
+        predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
+        errors: dict[str, Floats] = {}
+        less = np.zeros((len(LESS), axes))
+        fits: list[Fit] = []
+        for block, fit in enumerate(pool.map(trainer.train, trainings)):
+            fits.append(fit)
+            if block == BLOCKS:
+                break
+            if show is not None:
+                show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
+            rows = blocks.rows(block)
+            # all at once: computing the columns costs more than the products
+            by_each = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
+            predicted[:, rows] = by_each[:, :, list(fit.by_model).index(POOLED)]
+            error = ((by_each - run.truth[rows][:, None]) ** 2).sum(axis=1)
+            for k, name in enumerate(fit.by_model):
+                errors[name] = errors.get(name, 0.0) + error[:, k]
+            less += error[0, len(fit.by_model) :]
     n = len(run.truth)
     by_model, less = {name: np.sqrt(total / n) for name, total in errors.items()}, np.sqrt(less / n)
     return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
@@ -185,11 +174,8 @@ def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> F
 
 def _folds(blocks: Blocks, numbers: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
     """For each inner fold, the strips to train on and those to test on."""
-    result = []
-    for fold in range(INNER_FOLDS):
-        out = numbers[fold::INNER_FOLDS]
-        result.append((strips & blocks.kept_from(out), strips & blocks.own(out)))
-    return result
+    outs = [numbers[fold::INNER_FOLDS] for fold in range(INNER_FOLDS)]
+    return [(strips & blocks.kept_from(out), strips & blocks.own(out)) for out in outs]
 
 
 class _Timing:
@@ -231,12 +217,7 @@ class _Trainer:
     """Trains on any choice of blocks; sums are computed once for each window, for all axes at all lags in use."""
 
     def __init__(
-        self,
-        run: Run,
-        blocks: Blocks,
-        trainings: Sequence[_Training],
-        others: Floats | None,
-        pool: ThreadPoolExecutor,
+        self, run: Run, blocks: Blocks, trainings: list[_Training], others: Floats | None, pool: ThreadPoolExecutor
     ) -> None:
         self._blocks, self._others = blocks, others
         self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})
@@ -284,9 +265,9 @@ class _Trainer:
 
     def _pulled(self, sums: Sums, chosen: Sequence[Model]) -> list[Floats]:
         """Coefficients of the ``chosen`` models pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
-        found = models.pulled(sums, [model.family for model in chosen])
+        found = models.pulled(sums, chosen)
         if self._others is not None:
-            found += models.pulled_to_others(sums, [model.family for model in POOL], self._others)
+            found += models.pulled_to_others(sums, POOL, self._others)
         return found
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:

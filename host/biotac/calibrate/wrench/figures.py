@@ -103,17 +103,12 @@ def next_minute(validation: Validation) -> dict[str, Any]:
     return max(result, key=lambda region: region["gain_n"])
 
 
-def weights(validation: Validation) -> list[dict[str, float]]:
-    """For each axis, each model's weight in the pool, a mean over the folds; pulled to others or not."""
+def weights(validation: Validation) -> tuple[list[dict[str, float]], list[float]]:
+    """For each axis, means over the folds: each model's weight in the pool, and the part pulled to other fingers."""
     mean = np.mean([fit.weights for fit in validation.folds], axis=0)
-    of_models = mean.reshape(len(mean), -1, len(POOL), len(LAMBDAS)).sum(axis=(1, 3))
-    return [{model.name: float(one) for model, one in zip(POOL, shares, strict=True)} for shares in of_models]
-
-
-def pulled_share(validation: Validation) -> list[float]:
-    """For each axis, the weight of the members pulled to other fingers, a mean over the folds; 0 if there are none."""
-    mean = np.mean([fit.weights for fit in validation.folds], axis=0)
-    return [float(one) for one in mean[:, len(POOL) * len(LAMBDAS) :].sum(axis=1)]
+    by_model = mean.reshape(len(mean), -1, len(POOL), len(LAMBDAS)).sum(axis=(1, 3))
+    named = [{model.name: float(one) for model, one in zip(POOL, shares, strict=True)} for shares in by_model]
+    return named, mean[:, len(POOL) * len(LAMBDAS) :].sum(axis=1).tolist()
 
 
 def summary(validation: Validation) -> dict[str, Any]:
@@ -121,6 +116,7 @@ def summary(validation: Validation) -> dict[str, Any]:
     run, truth, predicted = validation.run, validation.run.truth, validation.predicted
     lin = validation.by_model[LIN][0]
     errors = [rmse(p, truth) for p in predicted]
+    by_model, pulled = weights(validation)
     result: dict[str, Any] = {
         "file": run.name,
         "rows": len(truth),
@@ -138,8 +134,8 @@ def summary(validation: Validation) -> dict[str, Any]:
         "lag_corrected_rows": list(validation.final.lag_rows),
         "window_rows": validation.final.window_rows,
         "affine_r2": validation.affine_r2,
-        "weights": dict(zip(run.axes, weights(validation), strict=True)),
-        "pulled_to_others": dict(zip(run.axes, pulled_share(validation), strict=True)),
+        "weights": dict(zip(run.axes, by_model, strict=True)),
+        "pulled_to_others": dict(zip(run.axes, pulled, strict=True)),
         "models": {name: _list(each[0]) for name, each in validation.by_model.items()},
         "models_drifted": {name: _list(each[1:].max(axis=0)) for name, each in validation.by_model.items()},
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],

@@ -66,7 +66,7 @@ class Procedure:
 
     def __post_init__(self) -> None:
         self._means: deque[tuple[float, float]] = deque()  # time in s, mean over the electrodes
-        self._half: list[tuple[float, Floats]] = []
+        self._half: list[tuple[float, float]] = []
         self._begin_s: float | None = None
         self._untouched = 0
         self._asked = False
@@ -90,11 +90,18 @@ class Procedure:
                 "the reference has no torque: expected six axes, to locate contacts; use a six-axis sensor"
             )
         if self.step in (Step.WARM_UP, Step.TARE):
-            self._keep(samples)
+            self._recent.append(samples)
+            while len(self._recent) > 1 and samples.t_s[-1] - self._recent[1].t_s[0] > TARE_SAMPLES_S:
+                self._recent.popleft()
         elif self.step is Step.LOADS and self.zero is not None:
             step_s = float(np.median(np.diff(samples.t_s))) if len(samples) > 1 else 0.0
             self.coverage.add(self.mounting.to_finger(samples.wrench - self.zero), step_s)
-            self._report_progress()
+            text = self.status()
+            if self.coverage.complete:
+                self._go(Step.DONE, f"covered: {self.coverage.summary()}")
+            elif text != self._last_status:
+                self._last_status = text
+                self.events.append(text)
 
     def tared(self, *, accepted: bool) -> None:
         """Take the board's answer; if it refused, it is asked again after TARE_FRAMES untouched frames."""
@@ -115,8 +122,7 @@ class Procedure:
             return f"{Step.WARM_UP.value}: {self.drift_counts_per_min:+.0f} counts/min"
         if self.step is Step.LOADS:
             return f"{self.coverage.summary()}; missing: {next(iter(self.coverage.missing()), 'nothing')}"
-        text: str = self.step.value
-        return text
+        return str(self.step.value)
 
     def take_events(self) -> list[str]:
         """The events since the last call."""
@@ -155,11 +161,11 @@ class Procedure:
             # the board reports a touch for a finger that drifts fast enough, too: either way, keep waiting
             self._half.clear()
             return
-        self._half.append((at_s, row["counts"].astype(np.float64)))
+        self._half.append((at_s, float(row["counts"].mean())))
         if len(self._half) < MEAN_FRAMES:
             return
-        mean_s = float(np.mean([t for t, _ in self._half]))
-        self._means.append((mean_s, float(np.mean([counts.mean() for _, counts in self._half]))))
+        mean_s, mean_counts = (float(np.mean(values)) for values in zip(*self._half, strict=True))
+        self._means.append((mean_s, mean_counts))
         self._half.clear()
         while mean_s - self._means[0][0] > DRIFT_OVER_S:
             self._means.popleft()
@@ -171,38 +177,19 @@ class Procedure:
         if long_enough and enough and abs(self.drift_counts_per_min) <= self.max_drift_counts_per_min:
             self._go(Step.TARE, f"warm: {self.drift_counts_per_min:+.1f} counts/min over the last minute")
 
-    def _keep(self, samples: Samples) -> None:
-        self._recent.append(samples)
-        newest_s = float(samples.t_s[-1])
-        while len(self._recent) > 1 and newest_s - float(self._recent[1].t_s[0]) > TARE_SAMPLES_S:
-            self._recent.popleft()
-
     def _zero_reference(self) -> None:
-        if not self._recent:
-            return
-        wrench = np.concatenate([samples.wrench for samples in self._recent])
+        wrench = np.concatenate([np.empty((0, 6)), *(samples.wrench for samples in self._recent)])
         wrench = wrench[np.isfinite(wrench).all(axis=1)]
         if not len(wrench):
             return
-        low, high = np.percentile(wrench[:, :3], (10, 90), axis=0)
-        if float((high - low).max()) > MAX_ZERO_SPREAD_N:
+        spread_n = float(np.ptp(np.percentile(wrench[:, :3], (10, 90), axis=0), axis=0).max())
+        if spread_n > MAX_ZERO_SPREAD_N:
             self._tared_frames = 0
-            self.events.append(f"the reference moves by {float((high - low).max()):.2f} N: let go of everything")
+            self.events.append(f"the reference moves by {spread_n:.2f} N: let go of everything")
             return
         self.zero = np.median(wrench, axis=0)
         self._recent.clear()
         self._go(Step.LOADS, Step.LOADS.value)
-
-    # ---- loads ---------------------------------------------------------------------------------
-
-    def _report_progress(self) -> None:
-        if self.coverage.complete:
-            self._go(Step.DONE, f"covered: {self.coverage.summary()}")
-            return
-        text = self.status()
-        if text != self._last_status:
-            self._last_status = text
-            self.events.append(text)
 
     def _go(self, step: Step, event: str) -> None:
         self.last_step, self.step = self.step, step
@@ -212,63 +199,50 @@ class Procedure:
 Show = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Files:
-    """Paths for the board's recording (.mcap) and the reference (.csv)."""
-
-    recording: Path
-    reference: Path
-
-
 def walk(
     hand: Hand,
     reader: Reader,
     procedure: Procedure,
-    files: Files,
+    path: Path,
     *,
     overwrite: bool = False,
     show: Show = lambda event: None,
     progress: Show = lambda text: None,
 ) -> None:
-    """Run and record the procedure until it is done, the board's source ends, or a KeyboardInterrupt, which ends it.
+    """Run the procedure until it is done, the board's source ends, or a KeyboardInterrupt, which ends it.
 
-    The board does not stream afterwards. Raises InputError when a file exists or cannot be written, when the finger
-    keeps drifting or the reference has no torque, and DeviceLostError when the board or the reference is lost; what was
-    recorded until then is kept.
+    The board is recorded to ``path``, the reference to a .csv beside it. The board does not stream afterwards. Raises
+    InputError when a file exists or cannot be written, when the finger keeps drifting or the reference has no torque,
+    and DeviceLostError when the board or the reference is lost; what was recorded until then is kept.
     """
-    reference = CsvWriter(files.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
-    with closing(reference) as writer, closing(hand.record(files.recording, overwrite=overwrite)):
+    reference = CsvWriter(path.with_suffix(".csv"), procedure.mounting, reader.sensor, overwrite=overwrite)
+    with closing(reference) as writer, closing(hand.record(path, overwrite=overwrite)):
         try:
-            _loop(hand, reader, procedure, writer, show, progress)
-            if procedure.step is not Step.DONE:
-                procedure.finish("the simulated source has ended")
+            first_us: int | None = None
+            for batch in hand.batches():
+                last_us = batch.last_t_us()
+                if last_us is not None:
+                    first_us = last_us if first_us is None else first_us
+                    samples = reader.read((last_us - first_us) / 1e6)
+                    # written before the procedure sees it, which may raise
+                    writer.add(samples)
+                    procedure.frames(batch.frames)
+                    procedure.samples(samples)
+                if procedure.wants_tare:
+                    try:
+                        hand.tare(procedure.finger)
+                        procedure.tared(accepted=True)
+                    except CommandRefusedError:
+                        procedure.tared(accepted=False)
+                for event in procedure.take_events():
+                    show(event)
+                progress(procedure.status())
+                if procedure.step is Step.DONE:
+                    break
+            procedure.finish("the simulated source has ended")
         except KeyboardInterrupt:
             procedure.finish("stopped by Ctrl-C")
     for event in procedure.take_events():
         show(event)
     # needed even if the board's source has ended: it sends nothing more, but still refuses as busy
     hand.stop()
-
-
-def _loop(hand: Hand, reader: Reader, procedure: Procedure, writer: CsvWriter, show: Show, progress: Show) -> None:
-    first_us: int | None = None
-    for batch in hand.batches():
-        last_us = batch.last_t_us()
-        if last_us is not None:
-            first_us = last_us if first_us is None else first_us
-            samples = reader.read((last_us - first_us) / 1e6)
-            # written before the procedure sees it, which may raise
-            writer.add(samples)
-            procedure.frames(batch.frames)
-            procedure.samples(samples)
-        if procedure.wants_tare:
-            try:
-                hand.tare(procedure.finger)
-                procedure.tared(accepted=True)
-            except CommandRefusedError:
-                procedure.tared(accepted=False)
-        for event in procedure.take_events():
-            show(event)
-        progress(procedure.status())
-        if procedure.step is Step.DONE:
-            return

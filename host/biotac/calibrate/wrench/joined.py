@@ -106,41 +106,38 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
     check_rows(f"{where}, where counts and force are both known", int(there.sum()))
     truth = reference.mounting.to_finger(rows[there] - zero)
     check_clipping(where, "force", reference.mounting.sign * (rows[there] - zero)[:, :3])
-    return _run(where, board, there, truth, reference, alignment, zero)
-
-
-def _run(
-    where: str, board: Board, there: Mask, truth: Floats, reference: Reference, alignment: Alignment, zero: Floats
-) -> Joined:
-    known = board.only(there)
-    counts, e = known.counts, known.e
+    covered = board.only(there)
+    counts, e = covered.counts, covered.e
     check_electrodes(where, counts)
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
     check_units(where, e, truth[:, :3])
     on_skin = float("nan")
-    on_skin_note: list[str] = []
-    about_torsion: tuple[str, ...] = ()
+    about_torque: list[str] = []
     if truth.shape[1] == 6:
         on_skin = _on_skin(where, truth)
-        on_skin_note = [f"{on_skin:.1%} of the rows above {FIRM_N:g} N have their line of action on the skin"]
+        about_torque = [f"{on_skin:.1%} of the rows above {FIRM_N:g} N have their line of action on the skin"]
         about_normal, about_torsion = contact.torsion_truth(where, None, truth[:, :3], truth[:, 3:])
+        about_torque += about_torsion
         truth = np.column_stack([truth, about_normal])
-    resting = counts[known.quiet]
+    resting = counts[covered.quiet]
     whole = len(resting) // IDLE_MEAN_ROWS * IDLE_MEAN_ROWS
     drift, drift_note = drift_of("rest", resting[:whole].reshape(-1, IDLE_MEAN_ROWS, counts.shape[1]).mean(axis=1))
+    zero_text = ", ".join(f"{v:+.3f}" for v in zero[:3]) + " N"
+    if len(zero) > 3:
+        zero_text += "; " + ", ".join(f"{v:+.2f}" for v in zero[3:]) + " N mm"
     notes = (
         f"tare: the board's own, which moved by up to {moved:.0f} counts",
         f"reference: {reference.name}" + (f", {reference.sensor}" if reference.sensor else ""),
-        f"reference's zero: {_zero_text(zero)}, from {int(board.quiet.sum())} rows in which the board saw no contact",
+        f"reference's zero: {zero_text}, from {int(board.quiet.sum())} rows in which the board saw no contact",
         f"clocks: offset {alignment.offset_s:+.4f} s, {alignment.drift_ppm:+.0f} ppm; "
         f"correlation {alignment.peak:.2f}, next best {alignment.runner_up:.2f}, "
         f"{alignment.width_s * 1e3:.0f} ms wide at half height; "
         f"{alignment.pieces} pieces scatter by {alignment.scatter_s * 1e3:.1f} ms",
         f"{int((~there).sum())} of {len(there)} frames left out, as the reference does not cover them",
-        *on_skin_note,
+        *about_torque[:1],
         drift_note,
-        *about_torsion,
+        *about_torque[1:],
     )
     run = Run(
         name=where,
@@ -148,7 +145,7 @@ def _run(
         counts=e + tare,
         tare=tare,
         truth=truth,
-        pdc=known.pdc if np.isfinite(known.pdc).all() else None,
+        pdc=covered.pdc if np.isfinite(covered.pdc).all() else None,
         drift=drift,
         rest=np.linalg.norm(truth[:, :3], axis=1) < REST_N,
         notes=notes,
@@ -226,10 +223,7 @@ def _zero(where: str, board: Board, rows: Floats) -> Floats:
 
 
 def _on_skin(where: str, truth: Floats) -> float:
-    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere.
-
-    Raises RecordingError when the share is too low, or torque and force do not fit each other.
-    """
+    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere."""
     firm = truth[np.linalg.norm(truth[:, :3], axis=1) > FIRM_N]
     if not len(firm):
         raise RecordingError(f"{where}: no force above {FIRM_N:g} N: expected firm presses; press harder")
@@ -249,11 +243,6 @@ def _on_skin(where: str, truth: Floats) -> float:
             "the torque's unit"
         )
     return share
-
-
-def _zero_text(zero: Floats) -> str:
-    text = ", ".join(f"{v:+.3f}" for v in zero[:3]) + " N"
-    return text if len(zero) == 3 else text + "; " + ", ".join(f"{v:+.2f}" for v in zero[3:]) + " N mm"
 
 
 def choose_finger(where: str, fingers: list[int], finger: int | None) -> int:

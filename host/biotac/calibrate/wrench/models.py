@@ -34,13 +34,15 @@ CHANCE = 0.5
 
 
 @dataclass(frozen=True)
-class Family:
-    """The blocks of columns that a model uses, in the order of BLOCKS; PRESSURE only where it was recorded."""
+class Model:
+    """A ridge regression on blocks of columns, in the order of BLOCKS; PRESSURE only where it was recorded."""
 
+    name: str
     blocks: tuple[tuple[Kind, Gate], ...]
+    text: str
 
     def index(self, columns: int) -> npt.NDArray[np.intp]:
-        """Indices of the family's columns; ``columns`` is the number of all columns of a run, with or without PDC."""
+        """Indices of the model's columns; ``columns`` is the number of all columns of a run, with or without PDC."""
         every = np.repeat(np.arange(len(BLOCKS)), [_map.KINDS[kind].columns for kind, _ in BLOCKS])
         own = [k for k, block in enumerate(BLOCKS) if block in self.blocks]
         return np.flatnonzero(np.isin(every, own)[:columns])
@@ -48,32 +50,16 @@ class Family:
 
 _PRESSURE = tuple((Kind.PRESSURE, gate) for gate in STRAIGHT)
 _CONDUCTANCES = ((Kind.CONDUCTANCE, Gate.ONE), (Kind.CONDUCTANCE_PAIRS, Gate.ONE))
-LINEAR = Family(((Kind.SIGNAL, Gate.ONE),))
-GATED = Family(tuple((kind, gate) for gate in STRAIGHT for kind in (*SPLIT, Kind.PRESSURE)))
-CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCES, *_PRESSURE))
+_GATED = tuple((kind, gate) for gate in STRAIGHT for kind in (*SPLIT, Kind.PRESSURE))
+_SIGNALS = ((Kind.SIGNAL, Gate.ONE), (Kind.SIGNAL_PAIRS, Gate.ONE))
 
-
-@dataclass(frozen=True)
-class Model:
-    """A ridge regression on the columns of a family."""
-
-    name: str
-    family: Family
-    text: str
-
-
-AFFINE = Model("affine", LINEAR, "every electrode to every axis")
-QUADRATIC = Model(
-    "quadratic",
-    Family(((Kind.SIGNAL, Gate.ONE), (Kind.SIGNAL_PAIRS, Gate.ONE), *_PRESSURE)),
-    "all products of two electrodes, PDC where recorded",
-)
+AFFINE = Model("affine", _SIGNALS[:1], "every electrode to every axis")
+GATED = Model("gated", _GATED, "gains by sign that follow the contact")  # not on its own, but in others
+QUADRATIC = Model("quadratic", (*_SIGNALS, *_PRESSURE), "all products of two electrodes, PDC where recorded")
 CONDUCTANCE = Model(
-    "conductance-quadratic", CONDUCTANCE_QUADRATIC, "all products of two conductances, PDC where recorded"
+    "conductance-quadratic", (*_CONDUCTANCES, *_PRESSURE), "all products of two conductances, PDC where recorded"
 )
-JOINED = Model(
-    "joined", Family((*GATED.blocks, *_CONDUCTANCES)), "the same, plus gains by sign that follow the contact"
-)
+JOINED = Model("joined", (*_GATED, *_CONDUCTANCES), "the same, plus gains by sign that follow the contact")
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
 LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
@@ -103,7 +89,7 @@ def lin_directions(axes: int) -> Floats:
 def lin(sums: Sums, *, offset: bool = True) -> Floats:
     """Lin's scales, least squares per axis, as coefficients (p + 1, axes) of all columns."""
     axes = sums.cross.shape[1]
-    index = LINEAR.index(len(sums.gram) - 1)
+    index = AFFINE.index(len(sums.gram) - 1)
     small = sums.part(index)
     result = np.zeros(sums.cross.shape)
     for axis, direction in enumerate(lin_directions(axes).T):
@@ -120,48 +106,44 @@ def lin(sums: Sums, *, offset: bool = True) -> Floats:
 
 def solve(sums: Sums, lam: float) -> Floats:
     """Ridge coefficients (q, axes) with ``lam``, shrunk towards zero except for the offset, which is last."""
-    mean, gram, cross, scale = _levelled(sums)
+    rows = sums.rows
+    # columns are centred, as the offset is free, and scaled to variance 1
+    mean = sums.gram[-1, :-1] / rows
+    gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
+    cross = sums.cross[:-1] / rows - mean[:, None] * (sums.cross[-1] / rows)
+    variance = np.diag(gram)
+    scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
+    gram = gram * scale[:, None] * scale
     gram.flat[:: len(gram) + 1] += lam
-    found = np.linalg.solve(gram, cross) * scale[:, None]
-    return np.concatenate([found, (sums.cross[-1] / sums.rows - mean @ found)[None]])
+    found = np.linalg.solve(gram, cross * scale[:, None]) * scale[:, None]
+    return np.concatenate([found, (sums.cross[-1] / rows - mean @ found)[None]])
 
 
-def pulled(sums: Sums, families: Sequence[Family]) -> list[Floats]:
-    """For each family, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales."""
-    return _pulled_to(lin(sums), sums, families, LAMBDAS)
+def pulled(sums: Sums, chosen: Sequence[Model]) -> list[Floats]:
+    """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales."""
+    return _pulled_to(lin(sums), sums, chosen, LAMBDAS)
 
 
-def pulled_to_others(sums: Sums, families: Sequence[Family], others: Floats) -> list[Floats]:
+def pulled_to_others(sums: Sums, chosen: Sequence[Model], others: Floats) -> list[Floats]:
     """As pulled(), with OTHERS_LAMBDAS and the force pulled to ``others`` (q + 1, 3), which have no columns of PDC."""
     known = lin(sums)
     known[:, : others.shape[1]] = 0.0
     known[: len(others) - 1, : others.shape[1]] = others[:-1]
     known[-1, : others.shape[1]] = others[-1]
-    return _pulled_to(known, sums, families, OTHERS_LAMBDAS)
+    return _pulled_to(known, sums, chosen, OTHERS_LAMBDAS)
 
 
-def _pulled_to(known: Floats, sums: Sums, families: Sequence[Family], lambdas: Sequence[float]) -> list[Floats]:
+def _pulled_to(known: Floats, sums: Sums, chosen: Sequence[Model], lambdas: Sequence[float]) -> list[Floats]:
     left = sums.left_by(known)
     result = []
-    for family in families:
-        index = family.index(len(known) - 1)
+    for model in chosen:
+        index = model.index(len(known) - 1)
         own = left.part(index)
         found = np.repeat(known[None], len(lambdas), axis=0)
         for k, lam in enumerate(lambdas):
             found[k, np.append(index, -1)] += solve(own, lam)
         result.append(found)
     return result
-
-
-def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:
-    """Mean, gram, cross and scale of columns that are centred, as the offset is free, and scaled to variance 1."""
-    rows = sums.rows
-    mean = sums.gram[-1, :-1] / rows
-    gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
-    cross = sums.cross[:-1] / rows - mean[:, None] * (sums.cross[-1] / rows)
-    variance = np.diag(gram)
-    scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
-    return mean, gram * scale[:, None] * scale, cross * scale[:, None], scale
 
 
 def weights(error: Floats) -> Floats:

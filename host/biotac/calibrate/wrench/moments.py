@@ -121,7 +121,7 @@ def at(signals: Signals, rows: Rows) -> Signals:
 
 
 def linear_columns(signals: Signals) -> Floats:
-    """The columns of LINEAR alone: enough to choose lag and window, and thirty times cheaper."""
+    """The columns of AFFINE alone: enough to choose lag and window, and thirty times cheaper."""
     return signals.e / SIGNAL_COUNTS
 
 

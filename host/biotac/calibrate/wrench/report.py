@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.geometry import Floats
 from ...markdown import table
 from . import figures
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
@@ -22,23 +21,42 @@ def markdown(validation: Validation, picture: str) -> str:
     """The page; ``picture`` is the file name of its picture."""
     facts = figures.summary(validation)
     run = validation.run
+    lags = ", ".join(f"{axis} {lag}" for axis, lag in zip(run.axes, validation.final.lag_rows, strict=True))
+    cut, spans = _blocks(validation)
+    by_shift = [figures.rmse(predicted, run.truth) for predicted in validation.predicted]
+    explained, weights = figures.r2(validation.predicted[0], run.truth), facts["weights"].values()
+    axes = []
+    for k, (name, by_model) in enumerate(zip(run.axes, weights, strict=True)):
+        errors = [f"{error[k]:.3f} {_unit(name)}" for error in by_shift]
+        spread = f"{run.truth[:, k].std():.3f} {_unit(name)}"
+        chosen = ", ".join(f"{model} {weight:.2f}" for model, weight in by_model.items())
+        axes.append([name, *errors, f"{explained[k]:.3f}", spread, chosen])
+    at_drifts = [f"at {counts:+.0f} counts" for counts in SHIFTS_COUNTS[1:]]
+    drifts = " and ".join(f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:])
+    still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
+    air = f"E_base is trained on with force 0, {facts['air_share']:.1%} of the run's weight"
+    if run.air is None:
+        air = "there is no E_base, so only the run itself shows what no contact is"
+    models = []
+    for name, errors in facts["models"].items():
+        cells = [f"{a:.3f} ({b:.3f})" for a, b in zip(errors, facts["models_drifted"][name], strict=True)]
+        models.append([name, *cells, TEXTS[name]])
+    shares = [[f"{value:+.3f}" for value in row] for row in facts["confusion"]]
     lines = [
         f"# Wrench calibration of {run.name}",
         "",
-        f"{facts['rows']} rows, {_cut(validation)}; lags, smoothing and the models' weights are chosen within the "
+        f"{facts['rows']} rows, {cut}; lags, smoothing and the models' weights are chosen within the "
         f"other blocks ({INNER_FOLDS} folds of whole blocks). "
         "Frame: x to the tip, y to E11's side, z dorsal; force on the finger.",
         "",
         f"The map is the models' weighted mean; median angle {facts['median_angle_deg']:.2f} deg.",
         "",
-        *_axes(validation),
+        *table(["axis", "RMSE", *at_drifts, "R2", "standard deviation of the truth", "model weights"], axes),
         "## Models",
         "",
-        "Held-out RMSE; in brackets, the worse of "
-        + " and ".join(f"{c:+.0f}" for c in SHIFTS_COUNTS[1:])
-        + " counts of untared drift.",
+        f"Held-out RMSE; in brackets, the worse of {drifts} counts of untared drift.",
         "",
-        *_models(validation),
+        *table(["model", *[f"{axis} [{_unit(axis)}]" for axis in run.axes], ""], models),
         "## Weak places",
         "",
         *_weak(validation, facts),
@@ -47,15 +65,18 @@ def markdown(validation: Validation, picture: str) -> str:
         "",
         "How much of each true axis appears on each predicted one; 1 on the diagonal and 0 elsewhere is perfect.",
         "",
-        *_confusion(validation),
+        *table(
+            ["", *[f"true {name}" for name in run.axes]],
+            [[f"predicted {name}", *row] for name, row in zip(run.axes, shares, strict=True)],
+        ),
         "## Assumptions",
         "",
         f"* force and counts: counts lag by {facts['lag_rows']} rows (at most {MAX_LAG_ROWS} allowed), corrected per "
-        f"axis: {_lags(validation)}; an affine map reaches a held-out R2 of {facts['affine_r2']:.2f}",
+        f"axis: {lags}; an affine map reaches a held-out R2 of {facts['affine_r2']:.2f}",
         f"* the map is evaluated on counts averaged over {facts['window_rows']} frames",
-        *_rest(validation, facts),
+        f"* without contact the map gives {still}, and {' and '.join(drifted)} at {drifts} counts of drift; {air}",
         *[f"* {note}" for note in facts["notes"]],
-        *_contacts(validation),
+        *spans,
         "",
         f"![prediction against truth, held out]({picture})",
         "",
@@ -67,71 +88,43 @@ def draw(validation: Validation, figure: Any) -> None:
     """Draw prediction against truth for each force axis, and the models' errors, in a matplotlib figure."""
     figure.set_size_inches(16, 4.4)
     figure.suptitle(f"{validation.run.name}: {POOLED}, held out")
-    axes = figure.subplots(1, 4)
-    for axis in range(3):
-        _draw_axis(axes[axis], validation, axis)
-    _draw_models(axes[3], validation)
+    *panels, models = figure.subplots(1, 4)
+    forces = zip(panels, validation.run.axes, validation.run.truth.T, validation.predicted[0].T, strict=False)
+    for color, (axes, name, truth, guess) in zip(AXIS_COLORS, forces, strict=True):
+        step = max(1, len(truth) // MAX_DOTS)
+        axes.plot(truth[::step], guess[::step], ".", color=color, markersize=2, alpha=0.5)
+        ends = [float(truth.min()), float(truth.max())]
+        axes.plot(ends, ends, color="#444444", linewidth=1)
+        axes.set(xlabel=f"true {name} [N]", ylabel=f"predicted {name} [N]")
+        error = figures.rmse(guess[:, None], truth[:, None])[0]
+        axes.set_title(f"{name}: RMSE {error:.3f} N", fontsize=10)
+        axes.grid(alpha=0.3)
+    _draw_models(models, validation)
 
 
-def _cut(validation: Validation) -> str:
-    if validation.blocks.by_contact:
-        return f"{validation.blocks.contacts} contacts split into {BLOCKS} blocks, each held out once"
-    return f"{BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} guard rows on both sides"
-
-
-def _contacts(validation: Validation) -> list[str]:
-    if validation.blocks.by_contact:
-        return []
+def _blocks(validation: Validation) -> tuple[str, list[str]]:
+    """How the run is cut into blocks, and what that says of contacts that span two."""
+    blocks = validation.blocks
+    if blocks.by_contact:
+        return f"{blocks.contacts} contacts split into {BLOCKS} blocks, each held out once", []
+    cut = f"{BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} guard rows on both sides"
     if not validation.run.rest.any():
-        return ["* the run never rests: blocks are cut anywhere, so a long contact may span two"]
-    whole = validation.blocks.whole_contacts
-    return [f"* block edges at rest, so that no contact spans two blocks: {whole}"]
-
-
-def _rest(validation: Validation, facts: dict[str, Any]) -> list[str]:
-    still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
-    line = f"* without contact the map gives {still}, and {' and '.join(drifted)} at " + " and ".join(
-        f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:]
-    )
-    if validation.run.air is None:
-        return [line + " counts of drift; there is no E_base, so only the run itself shows what no contact is"]
-    return [line + f" counts of drift; E_base is trained on with force 0, {facts['air_share']:.1%} of the run's weight"]
-
-
-def _lags(validation: Validation) -> str:
-    return ", ".join(f"{axis} {lag}" for axis, lag in zip(validation.run.axes, validation.final.lag_rows, strict=True))
+        return cut, ["* the run never rests: blocks are cut anywhere, so a long contact may span two"]
+    return cut, [f"* block edges at rest, so that no contact spans two blocks: {blocks.whole_contacts}"]
 
 
 def _unit(axis: str) -> str:
     return "N" if axis.startswith("F") else "N mm"
 
 
-def _axes(validation: Validation) -> list[str]:
-    truth = validation.run.truth
-    errors = [figures.rmse(predicted, truth) for predicted in validation.predicted]
-    explained = figures.r2(validation.predicted[0], truth)
-    drifts = [f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]]
-    head = ["axis", "RMSE", *drifts, "R2", "standard deviation of the truth", "model weights"]
-    rows = []
-    for k, (name, weights) in enumerate(zip(validation.run.axes, figures.weights(validation), strict=True)):
-        chosen = ", ".join(f"{model} {weight:.2f}" for model, weight in weights.items())
-        figures_here = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
-        rows.append([name, *figures_here, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
-    return table(head, rows)
-
-
-def _models(validation: Validation) -> list[str]:
-    rows = []
-    for name, errors in validation.by_model.items():
-        drifted = errors[1:].max(axis=0)
-        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], TEXTS[name]])
-    return table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
-
-
 def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
     found = figures.regions(validation)
     worst, best = found[0], found[-1]
     gain = ", ".join(f"{axis} {g:.1f}" for axis, g in zip(validation.run.axes, facts["better_than_lin"], strict=True))
+    curve = "; ".join(
+        f"{one['minutes']:.1f} min " + "/".join(f"{error:.3f}" for error in one["rmse"][:3]) for one in facts["minutes"]
+    )
+    x, y = facts["next_minute"]["x_mm"], facts["next_minute"]["y_mm"]
     r2 = facts["r2"]
     axis = min(range(len(r2)), key=lambda k: np.inf if r2[k] is None else r2[k])
     lines = [
@@ -140,7 +133,9 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
         f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS error "
         f"{worst['rmse_n']:.3f} N; best region {best['rmse_n']:.3f} N",
         f"* factor by which it is better than Lin's three scales: {gain}",
-        *_more(facts),
+        f"* error along x/y/z in N by minutes of training data (100 rows per second): {curve}",
+        f"* another minute helps most where the compression is centred at x {x[0]:.1f} to {x[1]:.1f} mm, "
+        f"y {y[0]:.1f} to {y[1]:.1f} mm: it would cut the error by about {facts['next_minute']['gain_n']:.2f} N",
     ]
     blocks = [validation.blocks.rows(k) for k in range(BLOCKS)]
     errors = np.array([figures.rmse(validation.predicted[0][r], validation.run.truth[r]) for r in blocks])
@@ -149,39 +144,6 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
         error = f"{axis_errors[worst_block]:.3f} {_unit(name)}"
         lines.append(f"* {name}: worst block {worst_block + 1} of {BLOCKS}, RMSE {error}")
     return lines
-
-
-def _more(facts: dict[str, Any]) -> list[str]:
-    curve = "; ".join(
-        f"{one['minutes']:.1f} min " + "/".join(f"{error:.3f}" for error in one["rmse"][:3]) for one in facts["minutes"]
-    )
-    (x, y), gain = (facts["next_minute"][name] for name in ("x_mm", "y_mm")), facts["next_minute"]["gain_n"]
-    return [
-        f"* error along x/y/z in N by minutes of training data (100 rows per second): {curve}",
-        f"* another minute helps most where the compression is centred at x {x[0]:.1f} to {x[1]:.1f} mm, "
-        f"y {y[0]:.1f} to {y[1]:.1f} mm: it would cut the error by about {gain:.2f} N",
-    ]
-
-
-def _confusion(validation: Validation) -> list[str]:
-    matrix = figures.confusion(validation.predicted[0], validation.run.truth)
-    names = validation.run.axes
-    rows = [[f"predicted {name}", *[f"{value:+.3f}" for value in row]] for name, row in zip(names, matrix, strict=True)]
-    return table(["", *[f"true {name}" for name in names]], rows)
-
-
-def _draw_axis(axes: Any, validation: Validation, axis: int) -> None:
-    truth: Floats = validation.run.truth[:, axis]
-    step = max(1, len(truth) // MAX_DOTS)
-    name = validation.run.axes[axis]
-    guess = validation.predicted[0][:, axis]
-    axes.plot(truth[::step], guess[::step], ".", color=AXIS_COLORS[axis], markersize=2, alpha=0.5)
-    ends = [float(truth.min()), float(truth.max())]
-    axes.plot(ends, ends, color="#444444", linewidth=1)
-    error = figures.rmse(guess[:, None], truth[:, None])[0]
-    axes.set(xlabel=f"true {name} [N]", ylabel=f"predicted {name} [N]")
-    axes.set_title(f"{name}: RMSE {error:.3f} N", fontsize=10)
-    axes.grid(alpha=0.3)
 
 
 def _draw_models(axes: Any, validation: Validation) -> None:

@@ -108,10 +108,11 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
         truth = np.column_stack([force, moment, about_normal])
     check_electrodes(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
-    tare, notes = _tare(path, fields, counts, force, rest)
+    base = _counts(path, "E_base", fields) if "E_base" in fields else None
+    tare, note_of_tare = _tare(path, base, counts, force, rest)
     check_units(path, counts - tare, force)
     # only after the check of units: in others a press may look like a rest
-    if "E_base" in fields and rest.sum() >= MIN_REST_ROWS:
+    if base is not None and rest.sum() >= MIN_REST_ROWS:
         _check_same_finger(path, tare, np.median(counts[rest], axis=0))
     pdc = None
     if "PDC" in fields:
@@ -121,6 +122,9 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
     drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes assumed to drift alike"
     if "E_idle" in fields:
         drift, note = drift_of("E_idle", _counts(path, "E_idle", fields))
+    serial = fields.get("serial", np.array(""))
+    if serial.dtype.kind != "U" or serial.size != 1:
+        raise RecordingError(f"{path}: field serial is {serial.dtype}: expected one string; save it as str")
     return Run(
         path.name,
         counts,
@@ -129,9 +133,9 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
         pdc,
         drift,
         rest,
-        (*notes, note, *about_torsion),
-        serial=_serial(path, fields),
-        air=_counts(path, "E_base", fields) if "E_base" in fields else None,
+        (note_of_tare, note, *about_torsion),
+        serial=str(serial.reshape(())),
+        air=base,
         contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
     )
 
@@ -162,14 +166,6 @@ def check_rows(where: object, rows: int) -> None:
             f"{where}: {rows} rows: expected at least {MIN_ROWS}, for {BLOCKS} blocks of twice the guard of "
             f"{GUARD_ROWS} rows; record longer"
         )
-
-
-def _serial(path: Path, fields: dict[str, npt.NDArray[Any]]) -> str:
-    if "serial" not in fields:
-        return ""
-    if fields["serial"].dtype.kind != "U" or fields["serial"].size != 1:
-        raise RecordingError(f"{path}: field serial is {fields['serial'].dtype}: expected one string; save it as str")
-    return str(fields["serial"].reshape(()))
 
 
 def check_clipping(path: object, name: str, force: Floats) -> None:
@@ -203,11 +199,10 @@ def check_electrodes(path: object, counts: Floats) -> None:
 
 
 def _tare(
-    path: Path, fields: dict[str, npt.NDArray[Any]], counts: Floats, force: Floats, rest: npt.NDArray[np.bool_]
-) -> tuple[Floats, tuple[str, ...]]:
-    """Counts at rest, from E_base or from the run's own rows without force."""
-    if "E_base" in fields:
-        base = _counts(path, "E_base", fields)
+    path: Path, base: Floats | None, counts: Floats, force: Floats, rest: npt.NDArray[np.bool_]
+) -> tuple[Floats, str]:
+    """Counts at rest, from E_base or from the run's own rows without force, and a note."""
+    if base is not None:
         low, median, high = np.percentile(base, (10, 50, 90), axis=0)
         worst = int(np.argmax(high - low))
         if high[worst] - low[worst] > MAX_REST_SWING_COUNTS:
@@ -216,7 +211,7 @@ def _tare(
                 f"{high[worst] - low[worst]:.0f} counts: expected at most {MAX_REST_SWING_COUNTS:.0f}; record it in air"
             )
         # the median, because a brief touch in the recording must not change it
-        return median, (f"tare: median of {len(base)} rows of E_base",)
+        return median, f"tare: median of {len(base)} rows of E_base"
     if rest.sum() < MIN_REST_ROWS:
         raise RecordingError(
             f"{path}: never at rest: {rest.sum()} rows below {REST_N} N, the lowest force is "
@@ -224,7 +219,7 @@ def _tare(
             f"without contact; let go in between, or add E_base"
         )
     resting: Floats = np.median(counts[rest], axis=0)
-    return resting, (f"tare: median of {rest.sum()} rows below {REST_N} N",)
+    return resting, f"tare: median of {rest.sum()} rows below {REST_N} N"
 
 
 def check_units(path: object, signal: Floats, force: Floats) -> None:
@@ -266,8 +261,6 @@ def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
     mean = float(first.mean())
     # loadings of both signs mean a touch or a broken electrode, and dividing by their mean would inflate them
     if share < MIN_DRIFT_SHARE or mean < 0.5 * float(np.abs(first).mean()):
-        return (
-            common,
-            f"drift: {name} ({share:.0%} in its first component) shows no common drift; electrodes assumed alike",
-        )
+        note = f"drift: {name} ({share:.0%} in its first component) shows no common drift; electrodes assumed alike"
+        return common, note
     return first / mean, f"drift: first component of {name}, {share:.1%} of its variance"

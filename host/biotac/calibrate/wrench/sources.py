@@ -7,7 +7,6 @@ give the same hash, and a single changed count gives another.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,30 +18,29 @@ from ...errors import InputError
 from ...recording.reader import Recording
 from ...version import __version__
 from ...wire.identity import ascii_text
+from ..reference.csv_file import read_csv
+from ..reference.mcap_file import read_mcap
+from ..reference.mounting import Mounting
 from ..reference.samples import Reference
 from .joined import Joined, board_of, choose_finger, join
 from .run import Run, load_run
 
 
-def provenance_of(
-    serial: str, files: Sequence[Path], reference: str, *, made_s: int, **more: dict[str, Any]
-) -> Provenance:
-    """The provenance of a map made from ``files``, which it reads, at ``made_s`` in seconds since 1970 UTC.
+def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
+    """The reference in ``FILE.csv``, in ``FILE.mcap`` with one wrench topic, or in ``FILE.mcap:TOPIC``.
 
-    ``serial`` is the sensor's, "" if unknown.
+    ``mounting`` replaces the one in the file. Raises InputError (RecordingError for the content).
     """
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.read_bytes())
-    return {
-        "serial": serial,
-        "made_s": made_s,
-        "software": f"biotac-gateway {__version__}",
-        "files": [path.name for path in files],
-        "data_sha256": digest.hexdigest(),
-        "reference": reference,
-        **more,
-    }
+    name, colon, topic = text.rpartition(":")
+    if colon and name.lower().endswith(".mcap"):
+        return read_mcap(Path(name), mounting, topic)
+    path = Path(text)
+    suffix = path.suffix.lower()
+    if suffix == ".mcap":
+        return read_mcap(path, mounting)
+    if suffix in (".csv", ".tsv", ".txt"):
+        return read_csv(path, mounting)
+    raise InputError(f"{text}: unknown file type: expected .csv, .tsv, .txt, or .mcap with geometry_msgs WrenchStamped")
 
 
 def check_serial(where: str, made_for: str, serial: str, *, force: bool = False) -> None:
@@ -66,15 +64,23 @@ class Loaded:
     joined: Joined | None = None
 
     def provenance(self, made_s: int) -> Provenance:
-        """The provenance of a map made from this run."""
-        joined = self.joined
-        if joined is None:
-            return provenance_of(self.run.serial, self.files, "in the same file", made_s=made_s)
-        reference = f"{joined.reference.name} {joined.reference.sensor}".strip()
-        mounting, alignment = joined.reference.mounting.facts(), asdict(joined.alignment)
-        return provenance_of(
-            self.run.serial, self.files, reference, made_s=made_s, mounting=mounting, alignment=alignment
-        )
+        """The provenance of a map made from this run, whose files it reads, at ``made_s`` in seconds since 1970 UTC."""
+        digest = hashlib.sha256()
+        for path in self.files:
+            digest.update(path.read_bytes())
+        made = {
+            "serial": self.run.serial,
+            "made_s": made_s,
+            "software": f"biotac-gateway {__version__}",
+            "files": [path.name for path in self.files],
+            "data_sha256": digest.hexdigest(),
+            "reference": "in the same file",
+        }
+        if self.joined is None:
+            return made
+        reference = self.joined.reference
+        made["reference"] = f"{reference.name} {reference.sensor}".strip()
+        return made | {"mounting": reference.mounting.facts(), "alignment": asdict(self.joined.alignment)}
 
     def facts(self) -> dict[str, Any]:
         """Results of joining, as JSON types; empty for an .npz."""
@@ -93,10 +99,7 @@ def load(
     serial: str = "",
     force: bool = False,
 ) -> Loaded:
-    """A checked run from ``path``. ``serial`` is the sensor it is for; a run of another is refused unless forced.
-
-    Raises InputError, RecordingError for the content of files.
-    """
+    """A checked run from ``path``. ``serial`` is the sensor it is for; a run of another is refused unless forced."""
     if path.suffix.lower() != ".mcap":
         if reference is not None:
             raise InputError(f"{path} contains its force: expected no --reference; that is for .mcap recordings")

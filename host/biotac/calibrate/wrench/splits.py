@@ -46,8 +46,7 @@ class Blocks:
 
     def __init__(self, rest: npt.NDArray[np.bool_], contact: npt.NDArray[np.int64] | None = None) -> None:
         self.by_contact = contact is not None
-        self.contacts = 0
-        self.whole_contacts = 0
+        self.contacts = self.whole_contacts = 0
         if contact is not None:
             names, number = np.unique(contact, return_inverse=True)
             self.contacts = len(names)
@@ -63,7 +62,8 @@ class Blocks:
         even = np.linspace(0, rows, BLOCKS + 1).round().astype(np.int64)
         # half of what a block has beyond its guards: a block that shrinks at both edges still holds its guards
         room = max((rows // BLOCKS - 2 * GUARD_ROWS) // 2, 0)
-        middles = _rest_middles(rest)
+        change = np.flatnonzero(np.diff(np.concatenate([[False], rest, [False]]).astype(np.int8)))
+        middles = (change[::2] + change[1::2]) // 2
         edges = even.copy()
         for k in range(1, BLOCKS):
             near = middles[np.abs(middles - even[k]) <= room]
@@ -92,8 +92,3 @@ class Blocks:
         for block in blocks:
             mask[max(3 * block - 1, 0) : 3 * block + 4] = False
         return mask
-
-
-def _rest_middles(rest: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    change = np.flatnonzero(np.diff(np.concatenate([[False], rest, [False]]).astype(np.int8)))
-    return (change[::2] + change[1::2]) // 2

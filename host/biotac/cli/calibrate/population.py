@@ -10,7 +10,7 @@ import numpy as np
 
 import biotac
 
-from ...calibrate.population import population_map
+from ...calibrate import population
 from ...errors import InputError
 from ...map.columns import ELECTRODES
 from ...map.population import in_force
@@ -35,11 +35,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Put the map into force, and print which fingers it is from and how far off it may be."""
-    trained = population_map.load(args.population)
+    trained = population.load(args.population)
     with biotac.open(args.port) as hand:
         values.check_answers(hand, args.finger)
         if args.population is None:
-            _use_firmwares(hand, args.finger)
+            if hand.board.get_map(args.finger) is not None:
+                hand.board.clear_map(args.finger)
+            hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
+            if not in_force(hand.board.finger_settings().get(args.finger, hand.board.settings())):
+                raise InputError(
+                    f"finger {args.finger} has force gains of its own, which go before the map: expected the default "
+                    "ones; `biotac calibration clear` removes a finger's, and the board's are the settings "
+                    "force_gain_x_nn to _z_nn"
+                )
         else:
             # the board takes counts above its own tare: any will do here
             fitted = trained.population.wrench_map(np.zeros(ELECTRODES))
@@ -51,14 +59,3 @@ def run(args: argparse.Namespace) -> int:
     text = f"finger {args.finger}: map of {trained.fingers}, in force, {values.how_long(args)}"
     say(args, facts, f"{text}\n  one sigma along x, y, z: {sigma} N")
     return 0
-
-
-def _use_firmwares(hand: biotac.Hand, finger: int) -> None:
-    if hand.board.get_map(finger) is not None:
-        hand.board.clear_map(finger)
-    hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
-    if not in_force(hand.board.finger_settings().get(finger, hand.board.settings())):
-        raise InputError(
-            f"finger {finger} has force gains of its own, which go before the map: expected the default ones; "
-            "`biotac calibration clear` removes a finger's, and the board's are the settings force_gain_x_nn to _z_nn"
-        )

@@ -6,19 +6,18 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import biotac
 
-from ...calibrate.population import population_map
+from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
 from ...calibrate.press.detector import MAX_N, Phase, Step
 from ...calibrate.press.force_source import Truth, load_csv
 from ...calibrate.reference.scale import UNITS_N, Scale
 from ...calibrate.wrench.upload import upload
+from ...documents import write_new
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import calibration_file
@@ -37,8 +36,6 @@ HELP = (
     "weights, or one gain from pressure to force. Guided on a board, or from a recording of that."
 )
 EXAMPLE = "biotac calibrate press sim:fingers.toml --scale --finger index --presses 3"
-CURE = "tare, and load the pad flat, firmly and steadily, or upload it anyway with --force"
-LET_GO = "let go of finger {finger}, and do not touch it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,24 +43,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
     against = parser.add_mutually_exclusive_group(required=True)
     against.add_argument(
-        "--scale",
-        metavar="PORT",
-        nargs="?",
-        const="",
+        "--scale", metavar="PORT", nargs="?", const="",
         help="fit z and the balance of the population map to presses straight down on a scale, whose readings are "
         "typed in, or read from a serial port (MT-SICS or A&D, ?baud=9600&parity=N&bits=8)",
-    )
+    )  # fmt: skip
     against.add_argument(
         "--weights", action="store_true", help="fit all axes of the population map to weights, level and tilted"
     )
     against.add_argument(
-        "--pressure",
-        metavar="FILE",
-        nargs="?",
-        const="",
+        "--pressure", metavar="FILE", nargs="?", const="",
         help="from pressure to force, one gain per finger: press a plate or scale whose readings are typed in; for a "
         "recording, a CSV with t_s in the board's time and force_n (or fx_n, fy_n, fz_n)",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--finger", metavar="NAME,NAME", type=values.fingers, default=(),
         help="names or chip selects; one, or for --pressure several, in order (all)",
@@ -107,16 +98,16 @@ def run(args: argparse.Namespace) -> int:
     if len(args.finger) != 1:
         raise InputError(f"{len(args.finger)} fingers named: expected --finger NAME, the one that is pressed")
     outputs.check_file(args.out, overwrite=args.force)
-    loads = _on_scale(args) if args.scale is not None else _weights(args)
     (finger,) = args.finger
+    loads = weights.plan(args.masses, args.tilts) if args.weights else ()
     if recorded:
         recording = load(Path(args.where))
         serial = next((ascii_text(s.serial) for s in recording.sensors if s.finger == finger), "")
-        return _fit_map(args, loads, loads.recorded(recording), serial, None)
+        return _fit_map(args, _recorded(args, recording, loads), serial, None)
     with biotac.open(args.where) as hand:
         values.check_answers(hand, finger)
-        held = loads.guided(hand)
-        return _fit_map(args, loads, held, ascii_text(hand.sensor_info(finger).serial), hand)
+        held = _guided(args, hand, loads)
+        return _fit_map(args, held, ascii_text(hand.sensor_info(finger).serial), hand)
 
 
 class _Guide:
@@ -130,8 +121,10 @@ class _Guide:
             text = "done"
         elif step.phase is Phase.PRESS:
             text = f"{step.press} of {step.presses}: {self._press(step)}"
+        elif step.phase is Phase.REST:
+            text = f"let go of finger {step.finger}, and do not touch it"
         else:
-            text = (LET_GO if step.phase is Phase.REST else f"held: {self._held}").format(finger=step.finger)
+            text = f"held: {self._held.format(finger=step.finger)}"
         print(text, file=sys.stderr)
 
     def force_n(self, step: Step) -> float:
@@ -164,79 +157,58 @@ def _check_terminal(hand: Hand, where: str) -> None:
 # ---- a map, by a scale or by weights -----------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Loads:
-    """How the finger is loaded, and what is fitted to that; ``how`` says where the force is from."""
-
-    guided: Callable[[Hand], known_force.Held]
-    recorded: Callable[[Recording], known_force.Held]
-    fit: known_force.Fit
-    how: str
-    facts: Callable[[known_force.Held, population_map.Trained], dict[str, Any]]
-
-
-def _on_scale(args: argparse.Namespace) -> _Loads:
-    (finger,), newtons = args.finger, UNITS_N[args.unit]
+def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load]) -> known_force.Held:
+    """Presses on a board: by ``loads``, or without any on a scale."""
+    (finger,) = args.finger
+    if loads:
+        face = _Guide(
+            lambda step: f"{loads[step.press - 1]}; do not touch it",
+            lambda step: loads[step.press - 1].size_n,
+            "take the weight off",
+        )
+        sizes_n, toward = [load.size_n for load in loads], [load.toward for load in loads]
+        return known_force.guided(hand, finger, sizes_n, face, toward=toward)
 
     def press(step: Step) -> str:
         return (
-            f"push the pad straight down on the scale with about {step.force_n / newtons:.0f} {args.unit}, in a new "
-            "place each time; hold still until told"
+            f"push the pad straight down on the scale with about {step.force_n / UNITS_N[args.unit]:.0f} {args.unit}, "
+            "in a new place each time; hold still until told"
         )
 
-    def guided(hand: Hand) -> known_force.Held:
-        source = hand.link.source
-        forces_n = known_force.asked_n(args.presses)
-        with ExitStack() as stack:
-            if args.scale:
-                scale = stack.enter_context(Scale(args.scale))
-                face = _Guide(press, lambda step: scale.force_n(), "let go")
-                return known_force.guided(hand, finger, forces_n, face)
-            _check_terminal(hand, args.where)
-            face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go")
-            reference = None if source is None else Truth(source)
-            return known_force.guided(hand, finger, forces_n, face, reference=reference)
-
-    def recorded(recording: Recording) -> known_force.Held:
-        if args.readings is None:
-            raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
-        return known_force.recorded(recording, finger, [value * newtons for value in args.readings])
-
-    def facts(held: known_force.Held, trained: population_map.Trained) -> dict[str, Any]:
-        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n[:, 2])
-        return {"shown_n": held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
-
-    return _Loads(guided, recorded, few_shot.scaled, "presses on a scale", facts)
+    asked_n = [known_force.ASKED_N[k % len(known_force.ASKED_N)] for k in range(args.presses)]
+    if args.scale:
+        with Scale(args.scale) as scale:
+            return known_force.guided(hand, finger, asked_n, _Guide(press, lambda step: scale.force_n(), "let go"))
+    _check_terminal(hand, args.where)
+    face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go")
+    reference = None if hand.link.source is None else Truth(hand.link.source)
+    return known_force.guided(hand, finger, asked_n, face, reference=reference)
 
 
-def _weights(args: argparse.Namespace) -> _Loads:
-    (finger,), loads = args.finger, weights.plan(args.masses, args.tilts)
-    sizes_n, toward = [load.size_n for load in loads], [load.toward for load in loads]
-
-    def press(step: Step) -> str:
-        return f"{loads[step.press - 1]}; do not touch it"
-
-    face = _Guide(press, lambda step: sizes_n[step.press - 1], "take the weight off")
-    return _Loads(
-        lambda hand: known_force.guided(hand, finger, sizes_n, face, toward=toward),
-        lambda recording: known_force.recorded(recording, finger, sizes_n, toward),
-        few_shot.weighed,
-        "weights on tilted blocks",
-        lambda held, trained: {"force_n": held.force_n.tolist()},
-    )
+def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[weights.Load]) -> known_force.Held:
+    if not loads and args.readings is None:
+        raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
+    forces_n = [load.size_n for load in loads] or [value * UNITS_N[args.unit] for value in args.readings]
+    return known_force.recorded(recording, args.finger[0], forces_n, [load.toward for load in loads] or None)
 
 
-def _fit_map(args: argparse.Namespace, loads: _Loads, held: known_force.Held, serial: str, hand: Hand | None) -> int:
+def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
     """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
-    trained = population_map.load(args.population)
-    found = known_force.found(trained.population, held, loads.fit)
+    trained = population.load(args.population)
+    if args.weights:
+        fit, how, forces = few_shot.weighed, "weights on tilted blocks", {"force_n": held.force_n.tolist()}
+    else:
+        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n[:, 2])
+        fit, how = few_shot.scaled, "presses on a scale"
+        forces = {"shown_n": held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
+    found = known_force.found(trained.population, held, fit)
     own = found.own.wrench_map(held.tare)
     (finger,), made_s = args.finger, int(time.time())
     facts: dict[str, Any] = {
         "finger": finger,
         "serial": serial,
         "presses": len(held.force_n),
-        **loads.facts(held, trained),
+        **forces,
         "before_n": found.before_n.tolist(),
         "held_out_n": found.held_out_n.tolist(),
         "why_not": found.why_not(trained.sigma_scale5_n),
@@ -244,9 +216,10 @@ def _fit_map(args: argparse.Namespace, loads: _Loads, held: known_force.Held, se
         "fixed_point": summary(own, held.counts),
     }
     if args.out is not None:
-        how = f"{len(held.force_n)} {loads.how}; population map from {trained.fingers}"
+        reference = f"{len(held.force_n)} {how}; population map from {trained.fingers}"
         software = trained.provenance.get("software", "")
-        origin = {"serial": serial, "made_s": made_s, "software": software, "files": [args.where], "reference": how}
+        origin = {"serial": serial, "made_s": made_s, "software": software, "files": [args.where]}
+        origin["reference"] = reference
         text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=origin)
         with whole(args.out, overwrite=args.force) as path:
             path.write_text(text, encoding="utf-8")
@@ -257,7 +230,7 @@ def _fit_map(args: argparse.Namespace, loads: _Loads, held: known_force.Held, se
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
         if args.save:
             hand.board.save_settings()
-    outputs.say(args, facts, "\n".join(_map_lines(facts, loads.how)))
+    outputs.say(args, facts, "\n".join(_map_lines(facts, how)))
     return int(facts["refused"])
 
 
@@ -265,13 +238,14 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
     def numbers(axes: Sequence[float]) -> str:
         return "  ".join(f"{value:5.2f}" for value in axes)
 
+    cure = "tare, and load the pad flat, firmly and steadily, or upload it anyway with --force"
     gain = f": z gain {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N" if "gain" in facts else ""
     return [
         f"finger {facts['finger']}, {facts['presses']} {how}{gain}",
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N",
         f"  each press held out:          {numbers(facts['held_out_n'])} N",
         f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
-        *([f"  not worth using: {facts['why_not']}; {CURE}"] if facts["why_not"] else []),
+        *([f"  not worth using: {facts['why_not']}; {cure}"] if facts["why_not"] else []),
         *([f"  written: {facts['written']}"] if "written" in facts else []),
         "  on the board; without --save, only until it restarts" if "board" in facts else "  no board was changed",
     ]
@@ -281,24 +255,28 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
 
 
 def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
-    stem = f"{Path(args.where).stem}-" if recorded else ""
+    stem, made_s = f"{Path(args.where).stem}-" if recorded else "", int(time.time())
     if args.out is not None:
         every = [args.out / f"{stem}finger{finger}.json" for finger in args.finger or range(MAX_SENSORS)]
         outputs.check(args.out, every, overwrite=args.force)
     if recorded:
-        outcome = _from_recording(args)
+        reference = load_csv(Path(args.pressure)) if args.pressure else None
+        readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
+        outcome = pressure_procedure.calibrate_recording(
+            load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=made_s
+        )
     elif args.pressure:
         raise InputError(
             "--pressure FILE needs a recording; on a board, type in what a scale shows: drop FILE, or record the "
             "presses together with the plate"
         )
     else:
-        outcome = _on_board(args)
+        outcome = _on_board(args, made_s)
     written = []
     for finger, calibration in outcome.calibrations.items() if args.out is not None else ():
         outputs.make_folder(args.out)
         path = args.out / f"{stem}finger{finger}.json"
-        calibration_file.save(path, calibration, outcome.provenance[finger], overwrite=args.force)
+        write_new(path, calibration_file.dumps(calibration, outcome.provenance[finger]), overwrite=args.force)
         written.append(str(path))
     lines = [*pressure.lines(outcome), *(f"  written: {path}" for path in written)]
     if not recorded and (not args.save or outcome.not_saved is not None):
@@ -309,24 +287,19 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
     return 0
 
 
-def _from_recording(args: argparse.Namespace) -> pressure.Outcome:
-    reference = load_csv(Path(args.pressure)) if args.pressure else None
-    readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
-    return pressure_procedure.calibrate_recording(
-        load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=int(time.time())
+def _on_board(args: argparse.Namespace, made_s: int) -> pressure.Outcome:
+    face = _Guide(
+        lambda step: f"press finger {step.finger} with about {step.force_n:g} N, and hold still",
+        lambda step: _typed_n(step, args.unit),
+        "let go of finger {finger}",
     )
-
-
-def _on_board(args: argparse.Namespace) -> pressure.Outcome:
-    def press(step: Step) -> str:
-        return f"press finger {step.finger} with about {step.force_n:g} N, and hold still"
-
-    face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go of finger {finger}")
     forces_n = args.forces or pressure.CALIBRATION_FORCES_N
-    plan = pressure_procedure.Plan(args.finger, forces_n, (args.verify,))
     with biotac.open(args.where) as hand:
         _check_terminal(hand, args.where)
-        return pressure_procedure.calibrate(hand, plan, face, made_s=int(time.time()), save=args.save)
+        return pressure_procedure.calibrate(
+            hand, face, fingers=args.finger, forces_n=forces_n, verification_n=(args.verify,), made_s=made_s,
+            save=args.save,
+        )  # fmt: skip
 
 
 def _force(text: str) -> float:

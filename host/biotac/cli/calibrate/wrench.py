@@ -5,37 +5,42 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import biotac
 
-from ...calibrate.population import population_map
-from ...calibrate.reference.files import read_reference
-from ...calibrate.reference.mounting import read_mounting
+from ...calibrate import population
+from ...calibrate.reference.mounting import Mounting, read_mounting
+from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
+from ...calibrate.reference.samples import Reader
 from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
+from ...calibrate.wrench.guided import Procedure, walk
 from ...calibrate.wrench.joined import choose_finger
-from ...calibrate.wrench.sources import Loaded, check_serial, load
+from ...calibrate.wrench.sources import Loaded, check_serial, load, read_reference
 from ...calibrate.wrench.upload import upload
 from ...documents import Provenance, made_text
-from ...errors import InputError
+from ...errors import BiotacError, InputError
 from ...map.bound import summary, summary_text
 from ...map.file import dumps_fitted
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
+from ...sim.nano17 import Nano17, Nano17Reader
+from ...sim.source import Source
 from ...wire.identity import ascii_text
 from .. import outputs, values
 from ..progress import Progress
-from . import live
 
 NAME = "wrench"
 HELP = (
     "Counts to force: from a board's recordings with a force/torque sensor's file beside each, or from .npz with E, "
     "F (N), E_base and E_idle; M (N mm) and PDC if there."
 )
+EMULATED = "nano17"
 EXAMPLE = "biotac calibrate wrench thumb.mcap --reference thumb.csv --finger thumb --out calibrated/"
 
 
@@ -50,12 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
     values.add_finger(parser, required=False, text="of a recording with several: name or chip select")
-    parser.add_argument(
-        "--population",
-        metavar="FILE",
-        default=None,
-        help="regularize towards this map of other fingers, or none (default: the package's)",
-    )
+    text = "regularize towards this map of other fingers, or none (default: the package's)"
+    parser.add_argument("--population", metavar="FILE", help=text)
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data from any other sensor")
     parser.add_argument("--force", action="store_true", help="overwrite existing files; accept another sensor's data")
     guided = parser.add_argument_group("guided, on a board")
@@ -80,15 +81,18 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--upload with {len(args.files)} files: expected one, the finger's")
     if args.out is not None:
         _check_out(args.out, args.files, overwrite=args.force)
-    references = _references(args.files, args.reference)
+    recordings = [path for path in args.files if path.suffix.lower() == ".mcap"]
+    if args.reference and len(args.reference) != len(recordings):
+        raise InputError(
+            f"{len(args.reference)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
+        )
+    references = dict(zip(recordings, args.reference, strict=False))
     mounting = None if args.mounting is None else read_mounting(args.mounting)
     for path in args.files:
         reference = references.get(path)
         beside = None if reference is None else (Path(reference), read_reference(reference, mounting))
-        calibrated = _fit(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
-        if args.upload is not None:
-            _upload_to_port(args, calibrated)
-        outputs.say(args, calibrated.facts, _text(calibrated.facts))
+        facts = _calibrate(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
+        outputs.say(args, facts, _text(facts))
     return 0
 
 
@@ -97,38 +101,28 @@ def _live(args: argparse.Namespace) -> int:
         raise InputError("--live calibrates one finger: expected --finger NAME")
     if args.out is None:
         raise InputError("--live saves its recording: expected --out FOLDER")
-    with live.open_board(args) as hand:
+    # a simulated board beside an emulated reference runs as fast as the host reads
+    with biotac.open(args.live, pace=0.0 if args.reference == [EMULATED] else 1.0) as hand:
         values.check_answers(hand, args.finger)
-        files, missing = live.record(args, hand, args.finger)
+        path, missing = _record(args, hand, args.finger)
         for line in missing:
             outputs.note(f"not covered: {line}")
         if not args.force:
-            _check_out(args.out, [files.recording], overwrite=False)
-        reference = files.reference, read_reference(str(files.reference))
-        calibrated = _fit(args, load(files.recording, reference, finger=args.finger))
-        if not args.no_upload:
-            _upload(args, hand, args.finger, calibrated)
-        outputs.say(args, calibrated.facts | {"not_covered": missing}, _text(calibrated.facts))
+            _check_out(args.out, [path], overwrite=False)
+        beside = path.with_suffix(".csv")
+        loaded = load(path, (beside, read_reference(str(beside))), finger=args.finger)
+        facts = _calibrate(args, loaded, None if args.no_upload else hand)
+        outputs.say(args, facts | {"not_covered": missing}, _text(facts))
     return 0
 
 
-@dataclass(frozen=True)
-class _Calibrated:
-    """A fitted run, where its map comes from, and all findings as JSON types."""
-
-    loaded: Loaded
-    validation: Validation
-    provenance: Provenance
-    facts: dict[str, Any]
-
-
-def _fit(args: argparse.Namespace, loaded: Loaded) -> _Calibrated:
-    """Fit, and write the files first: they are safe whatever happens on the board afterwards."""
+def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | None = None) -> dict[str, Any]:
+    """Fit, and write the files first: they are safe whatever happens on the board afterwards. All findings as JSON."""
     progress = Progress()
     try:
         run, others = loaded.run, None
         if args.population != "none":
-            trained = population_map.load(None if args.population is None else Path(args.population))
+            trained = population.load(None if args.population is None else Path(args.population))
             others, note = trained.others_than(loaded.files)
             run = replace(run, notes=(*run.notes, note))
         # data aligned by their own times leave no lag to search for
@@ -137,43 +131,86 @@ def _fit(args: argparse.Namespace, loaded: Loaded) -> _Calibrated:
         validation = validate(run, align=align, windows=windows, others=others, show=progress.show)
     finally:
         progress.done()
-    provenance = loaded.provenance(int(time.time()))
-    facts = figures.summary(validation) | loaded.facts() | {key: provenance[key] for key in ("serial", "data_sha256")}
+    origin = loaded.provenance(int(time.time()))
+    facts = figures.summary(validation) | loaded.facts() | {key: origin[key] for key in ("serial", "data_sha256")}
     facts["fixed_point"] = summary(validation.wrench_map, run.counts, run.pdc)
     if args.out is not None:
-        written = _write(validation, provenance, loaded.files[0], args.out, overwrite=args.force)
+        written = _write(validation, origin, loaded.files[0], args.out, overwrite=args.force)
         facts["written"] = [str(path) for path in written]
-    return _Calibrated(loaded, validation, provenance, facts)
+    with contextlib.ExitStack() as stack:
+        finger = args.finger
+        if args.upload is not None and args.live is None:
+            hand = stack.enter_context(biotac.open(args.upload))
+            if finger is None:
+                finger = loaded.joined.finger if loaded.joined else choose_finger(args.upload, hand.fingers, None)
+            serial = ascii_text(hand.sensor_info(finger).serial)
+            check_serial(run.name, origin["serial"], serial, force=args.force)
+        if hand is not None:
+            made_for = {"serial": origin["serial"], "made_s": origin["made_s"], "force": args.force}
+            found = upload(hand, finger, validation.wrench_map, run.counts, run.pdc, **made_for)
+            if args.save:
+                hand.board.save_settings()
+            facts["board"] = found | {"saved": args.save}
+    return facts
 
 
-def _upload_to_port(args: argparse.Namespace, calibrated: _Calibrated) -> None:
-    with biotac.open(args.upload) as hand:
-        finger, joined = args.finger, calibrated.loaded.joined
-        if finger is None:
-            finger = joined.finger if joined is not None else choose_finger(args.upload, hand.fingers, None)
-        serial = ascii_text(hand.sensor_info(finger).serial)
-        check_serial(calibrated.loaded.run.name, calibrated.provenance["serial"], serial, force=args.force)
-        _upload(args, hand, finger, calibrated)
+# ---- guided, on a board ------------------------------------------------------------------------
 
 
-def _upload(args: argparse.Namespace, hand: biotac.Hand, finger: int, calibrated: _Calibrated) -> None:
-    run, origin = calibrated.loaded.run, calibrated.provenance
-    fitted = calibrated.validation.wrench_map
-    found = upload(
-        hand, finger, fitted, run.counts, run.pdc, serial=origin["serial"], made_s=origin["made_s"], force=args.force
-    )
-    if args.save:
-        hand.board.save_settings()
-    calibrated.facts["board"] = found | {"saved": args.save}
+def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Path, list[str]]:
+    """Guide through the procedure; return the recording, with the reference's .csv beside it, and what is missing.
+
+    Raises KeyboardInterrupt, with a message, if it was ended before there was anything to fit.
+    """
+    serial = ascii_text(hand.sensor_info(finger).serial)
+    check_serial(f"finger {finger}", serial, args.serial, force=args.force)
+    path = args.out / f"{serial or f'finger{finger}'}.mcap"
+    recorded = f"the recorded data is in {path} and {path.with_suffix('.csv')}"
+    progress = Progress()
+
+    def show(event: str) -> None:
+        progress.done()
+        outputs.note(event)
+
+    with _reader(args, hand, finger) as (reader, mounting):
+        outputs.make_folder(args.out)
+        procedure = Procedure(finger, mounting)
+        try:
+            walk(hand, reader, procedure, path, overwrite=args.force, show=show, progress=progress.show)
+        except BiotacError:
+            if path.exists():
+                outputs.note(recorded)
+            raise
+        finally:
+            progress.done()
+        lost = reader.stats
+    if lost.lost or lost.late or lost.bad:
+        outputs.note(f"reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad")
+    if procedure.zero is None:
+        raise KeyboardInterrupt(f"ended while {procedure.last_step.value.partition(':')[0]}; {recorded}")
+    return path, procedure.coverage.missing()
 
 
-def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
-    recordings = [path for path in files if path.suffix.lower() == ".mcap"]
-    if references and len(references) != len(recordings):
-        raise InputError(
-            f"{len(references)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
-        )
-    return dict(zip(recordings, references, strict=False))
+@contextlib.contextmanager
+def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[Reader, Mounting]]:
+    if len(args.reference) != 1:
+        raise InputError(f"{len(args.reference)} --reference with --live: expected one, {PREFIX}HOST or {EMULATED}")
+    (text,) = args.reference
+    if text == EMULATED:
+        if not isinstance(hand.link.source, Source):
+            raise InputError(
+                f"{EMULATED} is emulated and works only with a simulated finger: expected --live sim:SCENARIO"
+            )
+        nano17 = Nano17() if args.mounting is None else Nano17(read_mounting(args.mounting))
+        yield Nano17Reader(hand.link.source, finger, nano17), nano17.mounting
+        return
+    if not text.startswith(PREFIX):
+        raise InputError(f"{text}: expected {PREFIX}HOST (a Net F/T box) or {EMULATED} (emulated)")
+    if args.mounting is None:
+        raise InputError(f"the mounting of {text} on the finger is unknown: expected --mounting FILE.toml")
+    mounting = read_mounting(args.mounting)
+    with contextlib.closing(NetFtReader(parse_address(text))) as reader:
+        yield reader, mounting
 
 
 # ---- files and text ----------------------------------------------------------------------------
@@ -195,7 +232,14 @@ def _write(
     written = _outputs(folder, path)
     with contextlib.ExitStack() as stack:
         page, picture, map_file = (stack.enter_context(whole(out, overwrite=overwrite)) for out in written)
-        page.write_text(report.markdown(validation, written[1].name) + _origin(origin), encoding="utf-8")
+        made_from = [
+            f"* sensor: {origin['serial'] or 'not stated in the recording'}",
+            f"* software: {origin['software']}, {made_text(origin['made_s'])}",
+            f"* data: {', '.join(origin['files'])}, SHA-256 {origin['data_sha256']}",
+            f"* reference: {origin['reference']}",
+        ]
+        text = report.markdown(validation, written[1].name)
+        page.write_text("\n".join([text, "## Provenance", "", *made_from, ""]), encoding="utf-8")
         with drawn(picture) as figure:
             report.draw(validation, figure)
         text = dumps_fitted(validation.wrench_map, serial=origin["serial"], made_s=origin["made_s"], provenance=origin)
@@ -203,22 +247,11 @@ def _write(
     return written
 
 
-def _origin(origin: Provenance) -> str:
-    rows = [
-        ("sensor", origin["serial"] or "not stated in the recording"),
-        ("software", f"{origin['software']}, {made_text(origin['made_s'])}"),
-        ("data", f"{', '.join(origin['files'])}, SHA-256 {origin['data_sha256']}"),
-        ("reference", origin["reference"]),
-    ]
-    return "\n".join(["", "## Provenance", "", *[f"* {name}: {what}" for name, what in rows], ""])
-
-
 def _text(facts: dict[str, Any]) -> str:
     def numbers(values: list[float | None]) -> str:
         return "  ".join("    -" if value is None else f"{value:5.3f}" for value in values)
 
     up, down = (f"{counts:+.0f}" for counts in facts["drift_counts"])
-    torsion = f"  torsion:                RMSE {facts.get('torsion_rmse_nmm', 0):5.3f} N mm"
     lines = [
         f"{facts['file']}: {facts['rows']} rows, {facts['model']}",
         f"  held out, x y z:        RMSE {numbers(facts['rmse_n'])} N   R2 {numbers(facts['r2'][:3])}   "
@@ -226,7 +259,7 @@ def _text(facts: dict[str, Any]) -> str:
         f"  drifted {up} counts:    RMSE {numbers(facts['drift_rmse_n'][0])} N",
         f"  drifted {down} counts:    RMSE {numbers(facts['drift_rmse_n'][1])} N",
         *([f"  torque, x y z:          RMSE {numbers(facts['rmse_nmm'])} N mm"] if "rmse_nmm" in facts else []),
-        *([torsion] if "torsion_rmse_nmm" in facts else []),
+        *(f"  torsion:                RMSE {facts[key]:5.3f} N mm" for key in ("torsion_rmse_nmm",) if key in facts),
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
         f"  counts lag the force by {facts['lag_rows']} rows, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",

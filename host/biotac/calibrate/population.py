@@ -2,7 +2,8 @@
 
 It is linear in 323 columns: those of a wrench map that have no offset and are 0 where counts are at their tare, so that
 rest is 0 N on any finger. Coefficients have seven digits in the file: short, the same on every computer, and off by a
-thousandth of the map's error. biotac-lab trains such maps.
+thousandth of the map's error. A file holds coefficients and their provenance, never recordings. biotac-lab trains such
+maps; ``biotac.calibrate.press.few_shot`` improves one with five presses on a scale, or known weights.
 """
 
 from __future__ import annotations
@@ -16,16 +17,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ...core.geometry import Floats
-from ...documents import parse_document, read_document, sealed
-from ...map import columns as map_columns
-from ...map.columns import ELECTRODES, Signals, split
-from ...map.fitted import WrenchMap
-from ...map.population import SHIPPED, Integers, board_map, likeness, shipped
-from ...version import __version__
-from ..wrench.models import CONDUCTANCE_QUADRATIC, GATED
+from ..core.geometry import Floats
+from ..documents import parse_document, read_document, sealed
+from ..map import columns as map_columns
+from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
+from ..map.fitted import WrenchMap
+from ..map.population import LEFT, SHIPPED, WEIGHT_BITS, Integers, board_map, bounded_q4, halves, likeness, shipped
+from ..version import __version__
+from .wrench.models import CONDUCTANCE, GATED
+
+__all__ = [
+    "AXES", "COLUMNS", "LEFT", "PARTS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "WEIGHT_BITS", "Population", "Sums", "Trained",
+    "bounded_q4", "columns", "dumps", "halves", "load", "provenance_of",
+]  # fmt: skip
 
 FORMAT = "biotac-population-map/1"
 _CURE = f"expected a {FORMAT}, as `biotac-lab population --out` writes it"
@@ -36,14 +41,13 @@ MODEL = "population"
 AXES = map_columns.AXES[:3]
 ROWS_AT_ONCE = 4096
 
-FAMILIES = (GATED, CONDUCTANCE_QUADRATIC)
+MODELS = (GATED, CONDUCTANCE)
 ALL_COLUMNS = map_columns.width(with_pdc=False)
-INDEX: tuple[npt.NDArray[np.intp], ...] = tuple(family.index(ALL_COLUMNS) for family in FAMILIES)
+INDEX = [model.index(ALL_COLUMNS) for model in MODELS]
 COLUMNS = sum(len(index) for index in INDEX)
 _STACKED = np.concatenate(INDEX)
 PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
-_OWN = map_columns.blocks(with_pdc=False)
-_BLOCKS = [block for family in FAMILIES for block in _OWN if block in family.blocks]
+_BLOCKS = [block for model in MODELS for block in map_columns.blocks(with_pdc=False) if block in model.blocks]
 _BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in _BLOCKS]
 
 
@@ -120,13 +124,11 @@ class Trained:
 
         They are None if the map was trained on one of the files.
         """
+        note = f"regularized towards the population map of {self.fingers}"
         if self.made_of(files):
-            return None, (
-                f"not regularized towards the population map of {self.fingers}, which was made from this recording"
-            )
+            return None, f"not {note}, which was made from this recording"
         # any tare will do: the columns mean the same with every tare
-        coefficients = self.population.wrench_map(np.zeros(ELECTRODES)).coefficients
-        return coefficients, f"regularized towards the population map of {self.fingers}"
+        return self.population.wrench_map(np.zeros(ELECTRODES)).coefficients, note
 
 
 def provenance_of(files: Sequence[Path], source: str, *, symmetric: bool) -> dict[str, Any]:
@@ -158,13 +160,10 @@ def dumps(trained: Trained) -> str:
             "coefficients_n_and_variance": [_short(row) for row in rows],
         }
     )
-    lines = []
-    for key, value in document.items():
-        text = json.dumps(value)
-        if key == "coefficients_n_and_variance":
-            text = "[\n" + ",\n".join(f"  {json.dumps(row)}" for row in value) + "\n ]"
-        lines.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    last = "coefficients_n_and_variance"
+    texts = {key: json.dumps(value) for key, value in document.items()}
+    texts[last] = "[\n" + ",\n".join(f"  {json.dumps(row)}" for row in document[last]) + "\n ]"
+    return "{\n" + ",\n".join(f' "{key}": {text}' for key, text in texts.items()) + "\n}\n"
 
 
 def load(path: Path | None) -> Trained:
