@@ -35,6 +35,8 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     if seconds is not None and not (math.isfinite(seconds) and 0.01 <= seconds <= MAX_SECONDS):
         raise InputError(f"seconds is {seconds!r}: expected 0.01 to {MAX_SECONDS:.0f} s")
     place = Path(path)
+    if place.exists() and not place.is_file():  # a pipe would be waited for, for ever
+        raise InputError(f"{place}: not a file: expected a scenario or a recording; check the path")
     lower = place.name.lower()
     if lower.endswith(".toml"):
         return play(parse_scenario(_scenario_bytes(place), file=place.name), fingers=fingers, seconds=seconds)

@@ -53,6 +53,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     names["cut.mcap"].write_bytes(names["rec.mcap"].read_bytes()[:100])
     names["text.mcap"].write_text("no recording\n")
     names["dir"].mkdir()
+    names["pipe.npz"] = folder / "pipe.npz"
+    os.mkfifo(names["pipe.npz"])
     names["done"] = folder / "done"
     names["done"].mkdir()
     (names["done"] / "shear.md").write_text("precious")
@@ -90,6 +92,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected 1 to 5", "demo press.toml --fingers 9 --out +out"),
     (2, "check the path", "demo +no.npz --out +out"),
     (2, "nowhere.btd", "demo nowhere.btd --out +out"),
+    (2, "not a file", "demo @pipe.npz --out +out"),
     (2, "data.csv", "demo data.csv --out +out"),
     (2, "choose another --out", "demo press.toml --seconds 1 --out @list.json"),
     (2, "add one", "demo @bad.toml --out +out"),
