@@ -15,7 +15,7 @@ _Static_assert(BT_DECODED_FRAME == 0 && BT_DECODED_PAC == 1 && BT_DECODED_IDLE =
 #define ROUND_US   (1000000 * BT_SLOTS / BT_SLOT_HZ)
 #define WRAP_US    (INT64_C(1) << 32)
 #define LATEST_US  (INT64_C(1) << 62) // lies about uptime must not add up to an overflow
-#define UNHEARD_US 60000000 // a board sends at least a STATUS a second; numbers wrap after 655 s
+#define UNHEARD_US 60000000           // a board sends at least a STATUS a second; numbers wrap after 655 s
 
 static const uint32_t row_bytes[BT_INTAKE_ROW_KINDS] = {BT_FRAME_BYTES, BT_PAC_BYTES, BT_IDLE_BYTES};
 
