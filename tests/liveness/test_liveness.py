@@ -325,6 +325,7 @@ def test_a_hold_that_lapsed_in_a_pause_is_told_and_not_renewed(board: BoardBehin
         hand.on_gap(gaps.append)
         board.wait_for(lambda: bool(hand["index"].flags & biotac.FrameFlags.HELD))
         link, write = hand.link, hand.link.write
+        link.patience = 6.0  # a question that is not heard is asked again after 2 s
         link.write = lambda data: None  # type: ignore[method-assign]  # the board hears nothing, as if this stood still
         time.sleep(2.5)
         link.write = write  # type: ignore[method-assign]

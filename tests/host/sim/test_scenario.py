@@ -290,7 +290,7 @@ def test_an_unknown_suffix_is_refused() -> None:
 def test_a_folder_is_refused(tmp_path: Path) -> None:
     for name in ("a.toml", "a.npz"):
         (tmp_path / name).mkdir()
-        with pytest.raises(InputError, match="Is a directory"):
+        with pytest.raises(InputError, match="not a file"):
             load_source(tmp_path / name)
 
 
