@@ -176,6 +176,25 @@ def npz(**fields: np.ndarray) -> bytes:
     return file.getvalue()
 
 
+def test_a_flipped_bit_in_an_npz_drops_no_channel(tmp_path: Path) -> None:
+    """Every bit of the archive's structure: a field whose name is another one would just be missing."""
+    path = tmp_path / "finger.npz"
+    draw = np.random.default_rng(5)
+    data = npz(E=draw.integers(2000, 3000, (20, 19)), PDC=draw.integers(2000, 3000, 20), TDC=np.arange(900, 920))
+    path.write_bytes(data)
+    good = load_source(path).samples
+    told = 0
+    for bit in range(8 * data.index(b"PK\x01\x02"), 8 * len(data)):  # the directory, at the end
+        spoilt = bytearray(data)
+        spoilt[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(spoilt)
+        try:
+            np.testing.assert_array_equal(load_source(path).samples, good)
+        except BiotacError:
+            told += 1
+    assert told
+
+
 def binaries() -> Iterator[tuple[str, str, Callable[[Path], Any], bytes]]:
     """Name, suffix, reader and a good file."""
     rows = "\n".join(f"{k / 100},{k % 7},0.5,1,0,0,0" for k in range(300))
