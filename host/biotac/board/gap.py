@@ -17,6 +17,8 @@ from ..wire.slots import FRAME_HZ
 GAP = "gap"  # its name in a recording's metadata
 # More than this between two rows of a finger is told.
 JUMP_US = 250_000
+# Of a longer batch, as of a board whose time does not pass, each finger's own latest row counts, not the batch's.
+LONG_US = 50_000
 # After a loss, this many batches may wait until every held finger has said whether it is still held.
 BATCHES_HELD_BACK = 8
 
@@ -137,8 +139,11 @@ class Gaps:
             batch.fingers = sum(1 << finger for finger in fingers)
         elif any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers):
             gap = self._jump(_rows(batch), {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
+        is_long = last_us - (batch.first_t_us() or last_us) > LONG_US
         for finger in fingers:
             seen_us[finger] = last_us
+        if is_long:
+            seen_us |= {finger: rows[-1][0] for finger, rows in _rows(batch).items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
         if gap is not None:
             self.count += 1
