@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -45,8 +46,7 @@ def check(lake: str, item: tuple[str, dict[str, str]]) -> Checked:
         elif hashlib.sha256(data).hexdigest() != sha256:
             checked.wrong.append(f"{file} differs from what was exported; export it again with --force")
         elif topic in (RECORDINGS, "frames"):
-            # Without threads: one that still held a Python file when the program ended aborted it, twice in 160 runs.
-            tables[topic] = pq.read_table(pa.BufferReader(data), use_threads=False, pre_buffer=False)
+            tables[topic] = pq.read_table(io.BytesIO(data))
     if not any(path.startswith(f"{RECORDINGS}/") for path in sums):
         checked.wrong.append(f"{recording} has no file in {RECORDINGS}; export it again with --force")
     if len(tables) == 2:
