@@ -3,7 +3,7 @@
 #include "keep/storage.h"
 #include "port.h"
 #include "properties.h"
-#include "talk/host.h"
+#include "talk/host_link.h"
 #include "talk/rounds.h"
 #include "talk/sensors.h"
 #include "word.h"

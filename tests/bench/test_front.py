@@ -16,8 +16,8 @@ from kernel_errors import MILLI, NAMES, QUANTITIES
 
 ROOT = Path(__file__).resolve().parents[2]
 # The double is its own rounding; a float is off by 26 half units of 2^-23 of a sum, which the projection magnifies by
-# up to 4.6; gold rounds to nm; the shipped kernel's bound is in firmware/reference/kernel_bounds.h.
-POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "gold int64": 0.002, "shipped": 1.5}
+# up to 4.6; exact rounds to nm; the shipped kernel's bound is in firmware/reference/kernel_bounds.h.
+POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "exact int64": 0.002, "shipped": 1.5}
 
 
 @pytest.mark.parametrize("weights", PocWeights)

@@ -2,7 +2,7 @@
 #ifndef BIOTAC_TEST_FAKE_BOARD_H
 #define BIOTAC_TEST_FAKE_BOARD_H
 
-#include "talk/host.h"
+#include "talk/host_link.h"
 #include "talk/rounds.h"
 #include "talk/sensors.h"
 

@@ -4,7 +4,7 @@
 
 #include "support.h"
 
-#include "talk/host.h"
+#include "talk/host_link.h"
 #include "talk/rounds.h"
 
 #define MAX_RECEIVED 4096

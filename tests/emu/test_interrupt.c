@@ -9,7 +9,7 @@
 #include "map/store.h"
 #include "only_board.h"
 #include "spi_word_by_word.h"
-#include "talk/host.h"
+#include "talk/host_link.h"
 #include "wire/framing.h"
 #include "wire/messages_gen.h"
 

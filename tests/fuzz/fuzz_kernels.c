@@ -3,7 +3,7 @@
 // endian, signed). Whatever is missing at the end is 0. Bounds: firmware/reference/kernel_bounds.h.
 #include "input.h"
 
-#include "gold.h"
+#include "exact.h"
 #include "kernel_bounds.h"
 #include "lin2013.h"
 #include "solve/solve.h"
@@ -107,25 +107,25 @@ static void shipped_bounds(const load *of, bounds *out)
 
 // ---- exact int64 sums --------------------------------------------------------------------------------
 
-static void gold(const frame_input *in, answer *out)
+static void exact(const frame_input *in, answer *out)
 {
     int32_t poc_nm[3] = {0, 0, 0};
     int64_t force_un[3], torque_mnmm[2];
-    out->has_poc = gold_poc(in->e_q4, in->weights, poc_nm);
-    gold_force_un(in->e_q4, in->force_nn, force_un);
-    gold_torque_yz_mnmm(in->e_q4, in->torque_nn, torque_mnmm);
+    out->has_poc = exact_poc(in->e_q4, in->weights, poc_nm);
+    exact_force_un(in->e_q4, in->force_nn, force_un);
+    exact_torque_yz_mnmm(in->e_q4, in->torque_nn, torque_mnmm);
     for (int d = 0; d < 3; d++) {
         out->poc_um[d] = poc_nm[d] * 1e-3;
         out->force_mn[d] = (double)force_un[d] * 1e-3;
     }
-    out->torque_mnmm[0] = (double)gold_torque_x_mnmm(poc_nm, force_un);
+    out->torque_mnmm[0] = (double)exact_torque_x_mnmm(poc_nm, force_un);
     out->torque_mnmm[1] = (double)torque_mnmm[0];
     out->torque_mnmm[2] = (double)torque_mnmm[1];
 }
 
-// Half of the last digit of each, as gold.h states them; the lever's two inputs are off by as much. The
+// Half of the last digit of each, as exact.h states them; the lever's two inputs are off by as much. The
 // terms of 1e-6 are what the double itself may be off.
-static void gold_bounds(const load *of, bounds *out)
+static void exact_bounds(const load *of, bounds *out)
 {
     out->poc_um = 1e-3;
     out->force_mn = 0.5e-3 + 1e-6;
@@ -139,7 +139,7 @@ static void gold_bounds(const load *of, bounds *out)
 
 static const variant variants[] = {
     {"shipped", shipped, shipped_bounds},
-    {"gold", gold, gold_bounds},
+    {"exact", exact, exact_bounds},
 };
 
 static void check(const variant *v, const answer *got, const lin2013_result *want, const bounds *allowed)

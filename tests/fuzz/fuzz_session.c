@@ -10,7 +10,7 @@
 #include "input.h"
 
 #include "fake_board.h"
-#include "talk/host.h"
+#include "talk/host_link.h"
 #include "talk/rounds.h"
 #include "wire/crc32.h"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import biotac
-from biotac.recording.file import RecordingFile
 from biotac.recording.layout import CHECKSUM
+from biotac.recording.mcap_file import RecordingFile
 
 
 def copies(recording: biotac.Recording, folder: Path, count: int, apart_s: float) -> list[Path]:

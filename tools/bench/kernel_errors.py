@@ -23,7 +23,7 @@ from biotac.wire.messages_gen import PocWeights
 Signals = NDArray[np.int32]  # (n, 19), 1/16 count, compression negative
 Floats = NDArray[np.float64]
 
-NAMES = ("shipped", "double", "float", "gold int64", "quick")  # as kernels.c has them
+NAMES = ("shipped", "double", "float", "exact int64", "quick")  # as kernels.c has them
 QUANTITIES = {"PoC": "um", "force": "mN", "torque y, z": "N*um", "torque x": "N*um"}  # N*um is the wire's mN*mm
 E_MAX_Q4 = 16 * sensor.FULL_SCALE_COUNT
 UM = np.array(sensor.ELECTRODE_UM, dtype=np.int64)

@@ -15,11 +15,11 @@ def messages(contract: Contract) -> str:
         f"Wire version {wire['major']}.{wire['minor']}, schema hash `0x{contract.hash:08X}`. "
         "Framing, CRC and handshake are in [SPEC.md](SPEC.md).",
         "",
-        "| id | message | direction | payload | on the wire | answered by |",
+        "| id | message | direction, and streams that carry it | payload | on the wire | answered by |",
         "|---|---|---|---|---|---|",
     ]
     for m in contract.messages:
-        direction = "host to board" if m.id & 0x80 else "board to host"
+        direction = "host to board" if m.id & 0x80 else ", ".join(["board to host", *(f"`{s}`" for s in m.streams)])
         whole = m.payload_bytes + 1 + 4 + 1 + 1  # id, CRC, COBS code byte, delimiter
         reply = f"`{m.reply}`" if m.reply else ""
         out.append(f"| 0x{m.id:02X} | `{m.name}` | {direction} | {m.payload_bytes} B | {whole} B | {reply} |")

@@ -145,6 +145,12 @@ def wire(contract: Contract) -> str:
     class_of = {message.name: class_name(message) for message in contract.messages}
     out += ["# What each command is answered by.", "ANSWERS: dict[type[Any], type[Any]] = {"]
     out += [f"    {class_name(m)}: {class_of[m.reply]}," for m in contract.messages if m.reply] + ["}", ""]
+    out += ["# The streams that carry a message; not of answers.", "STREAMS_OF: dict[type[Any], StreamFlags] = {"]
+    for m in contract.messages:
+        if m.streams:
+            out.append(f"    {class_name(m)}: {' | '.join(f'StreamFlags.{stream}' for stream in m.streams)},")
+    out += ["}", "", "# What each round of a touched finger consists of, as far as it is streamed."]
+    out += [f"EVERY_ROUND = ({', '.join(class_name(m) for m in contract.messages if m.every_round)})", ""]
     return "\n".join(out).rstrip() + "\n"
 
 

@@ -57,7 +57,8 @@ class Message:
     id: int
     doc: str
     fields: tuple[Field, ...]
-    stream: bool = False
+    streams: tuple[str, ...] = ()  # which of them carry it
+    every_round: bool = False  # sent in each round of a touched finger
     reply: str | None = None
 
     @property
@@ -97,7 +98,8 @@ def load(folder: Path) -> Contract:
 
 def parse_message(name: str, raw: dict[str, Any]) -> Message:
     fields = tuple(Field(**{k: tuple(v) if k == "range" else v for k, v in entry.items()}) for entry in raw["fields"])
-    return Message(name, raw["id"], raw["doc"], fields, raw.get("stream", False), raw.get("reply"))
+    streams = tuple(raw.get("streams", ()))
+    return Message(name, raw["id"], raw["doc"], fields, streams, raw.get("every_round", False), raw.get("reply"))
 
 
 def command_byte(index: int) -> int:
@@ -159,8 +161,11 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
             check_command(message)
         if message.reply is not None and message.reply not in names:
             raise ValueError(f"link.toml: {message.name} is answered by unknown message {message.reply}")
-        if message.stream and [f.name for f in message.fields[:2]] != ["seq", "t_us"]:
-            raise ValueError(f"link.toml: stream message {message.name} must start with seq, t_us")
+        # Both ways round, for a replay plays only what names its stream.
+        if bool(message.streams) != ([f.name for f in message.fields[:2]] == ["seq", "t_us"]):
+            raise ValueError(f"link.toml: {message.name} must start with seq, t_us if it has streams, and only then")
+        if not set(message.streams) <= set(entries(link["flags"]["stream"])):
+            raise ValueError(f"link.toml: {message.name} is in a stream that [flags.stream] does not have")
 
 
 def check_command(message: Message) -> None:

@@ -1,6 +1,6 @@
 // One session with the host: fingers, settings, calibrations, maps, streams and link statistics. It knows no
-// transport: bytes leave through one function that takes a whole frame or nothing, and arrive through host.h.
-// Times are device time in us, wrapping at 2^32.
+// transport: bytes leave through one function that takes a whole frame or nothing, and arrive through
+// host_link.h. Times are device time in us, wrapping at 2^32.
 #ifndef BIOTAC_SESSION_H
 #define BIOTAC_SESSION_H
 

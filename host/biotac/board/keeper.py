@@ -7,6 +7,8 @@ waits for its reader is not asked.
 
 from __future__ import annotations
 
+import functools
+import operator
 import secrets
 import time
 
@@ -21,7 +23,7 @@ LOOK_S = KEEPALIVE_S / 3
 RETRY_S = 0.25
 # This many looks without rows from a finger that is there, and the stream has stopped.
 LOOKS_WITHOUT_ROWS = 3
-ROWS = wire.StreamFlags.FRAMES | wire.StreamFlags.PAC | wire.StreamFlags.BANDS
+ROWS = functools.reduce(operator.or_, (wire.STREAMS_OF[message] for message in wire.EVERY_ROUND))
 # Of a board that is not asked, times its link's patience.
 SILENCE_S = 3.0
 

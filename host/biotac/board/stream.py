@@ -29,7 +29,7 @@ QUANTITIES = {
     "events": QuantityFlags.EVENTS,
 }
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
-STREAMS = {"pac": StreamFlags.PAC, "bands": StreamFlags.BANDS}
+STREAMS = {str(flag.name).lower(): flag for flag in StreamFlags if flag not in (StreamFlags.FRAMES, StreamFlags.STATUS)}
 NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS, "status")
 # Messages that a board sends only to those who want them, by the name of what carries them.
 CARRIED_BY = {Touch: "touch", Event: "events", Bands: "bands"}

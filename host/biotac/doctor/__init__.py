@@ -6,7 +6,7 @@ finding's code is listed in ``catalogue`` and, for people, in host/docs/referenc
 
 from __future__ import annotations
 
-from . import connection, leads, sensors, signals, timing
+from . import channels, connection, leads, sensors, timing
 from .catalogue import CATALOGUE, Finding
 from .facts import BoardFacts, Facts, PairFacts, SystemFacts
 
@@ -16,7 +16,7 @@ def judge(facts: Facts) -> list[Finding]:
     board = facts.board
     if board is None:
         return list(connection.check(facts))
-    of_board = *sensors.check(board, facts.expected_fingers), *timing.check(board, facts.pair), *signals.check(board)
+    of_board = *sensors.check(board, facts.expected_fingers), *timing.check(board, facts.pair), *channels.check(board)
     return [*connection.check(facts), *leads.check(facts), *of_board]
 
 

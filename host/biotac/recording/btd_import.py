@@ -16,7 +16,7 @@ from ..wire.framing import encode
 from ..wire.identity import NO_IMAGE
 from .btd_file import read_btd
 from .facts import Facts
-from .file import RecordingFile
+from .mcap_file import RecordingFile
 from .rounds import Rounds, frames_and_tares
 
 NO_BOARD = 0

@@ -24,7 +24,7 @@ from ..wire.frames import StructArray
 from ..wire.framing import encode
 from ..wire.native import lib
 from .facts import in_force
-from .file import RecordingFile
+from .mcap_file import RecordingFile
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares, with_silence
 

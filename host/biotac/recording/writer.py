@@ -16,7 +16,7 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
 from . import layout
 from .facts import Facts
-from .file import RecordingFile
+from .mcap_file import RecordingFile
 
 # Less than the one second that may be lost: data keeps arriving between the decision to write and the end of the write.
 FLUSH_S = 0.9

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x6BE768D5
+SCHEMA_HASH = 0xCAAC3432
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -2375,3 +2375,19 @@ ANSWERS: dict[type[Any], type[Any]] = {
     EmuPlay: EmuStatus,
     EmuKeep: EmuStatus,
 }
+
+# The streams that carry a message; not of answers.
+STREAMS_OF: dict[type[Any], StreamFlags] = {
+    Frame: StreamFlags.FRAMES,
+    Pac: StreamFlags.PAC,
+    Tare: StreamFlags.FRAMES,
+    Status: StreamFlags.STATUS,
+    SensorStatus: StreamFlags.STATUS,
+    Idle: StreamFlags.FRAMES,
+    Touch: StreamFlags.FRAMES,
+    Event: StreamFlags.FRAMES | StreamFlags.PAC,
+    Bands: StreamFlags.BANDS,
+}
+
+# What each round of a touched finger consists of, as far as it is streamed.
+EVERY_ROUND = (Frame, Pac, Bands)

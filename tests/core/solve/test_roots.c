@@ -1,8 +1,8 @@
-// The gold kernel's integer square root against bisection, and around every kind of square; the core's
+// The exact kernel's integer square root against bisection, and around every kind of square; the core's
 // reciprocal of one against double.
 #include "support.h"
 
-#include "gold.h"
+#include "exact.h"
 #include "solve/rsqrt.h"
 #include "wire/sensor_gen.h"
 
@@ -26,10 +26,10 @@ static uint32_t bisected(uint64_t n)
 
 static void check_around(uint64_t k)
 {
-    assert_int_equal(gold_isqrt64(k * k), k);
-    assert_int_equal(gold_isqrt64(k * k + 1), k == 0 ? 1 : k);
+    assert_int_equal(exact_isqrt64(k * k), k);
+    assert_int_equal(exact_isqrt64(k * k + 1), k == 0 ? 1 : k);
     if (k > 0) {
-        assert_int_equal(gold_isqrt64(k * k - 1), k - 1);
+        assert_int_equal(exact_isqrt64(k * k - 1), k - 1);
     }
 }
 
@@ -78,10 +78,10 @@ static void the_top_of_the_range_is_exact(void **state)
         check_around(k);
     }
     for (uint64_t n = UINT64_MAX; n > UINT64_MAX - 3000; n--) {
-        assert_int_equal(gold_isqrt64(n), UINT32_MAX);
+        assert_int_equal(exact_isqrt64(n), UINT32_MAX);
     }
-    assert_int_equal(gold_isqrt64((uint64_t)1 << 63), 3037000499u);
-    assert_int_equal(gold_isqrt64(((uint64_t)1 << 63) - 1), 3037000499u);
+    assert_int_equal(exact_isqrt64((uint64_t)1 << 63), 3037000499u);
+    assert_int_equal(exact_isqrt64(((uint64_t)1 << 63) - 1), 3037000499u);
 }
 
 static void any_number_agrees_with_bisection(void **state)
@@ -89,11 +89,11 @@ static void any_number_agrees_with_bisection(void **state)
     (void)state;
     uint64_t seed = 4;
     for (uint64_t n = 0; n < 5000; n++) {
-        assert_int_equal(gold_isqrt64(n), bisected(n));
+        assert_int_equal(exact_isqrt64(n), bisected(n));
     }
     for (int k = 0; k < 200000; k++) {
         uint64_t n = random_u64(&seed) >> (k % 64);
-        assert_int_equal(gold_isqrt64(n), bisected(n));
+        assert_int_equal(exact_isqrt64(n), bisected(n));
     }
 }
 

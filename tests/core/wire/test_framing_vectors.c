@@ -1,7 +1,7 @@
 // Frames, COBS and CRC against protocol/vectors/, which other libraries made.
 #include "support.h"
 
-#include "talk/host.h"
+#include "talk/host_link.h"
 #include "talk/rounds.h"
 #include "wire/crc32.h"
 #include "wire/framing.h"

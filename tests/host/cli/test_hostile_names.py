@@ -14,7 +14,7 @@ from record_all import record_all
 import biotac
 from biotac.cli.main import main
 from biotac.recording import layout
-from biotac.recording.file import RecordingFile
+from biotac.recording.mcap_file import RecordingFile
 
 NOT_UTF8 = os.fsdecode(b"\xff\xfe")
 ESCAPES = "\x1b[31m\nred"

@@ -24,7 +24,7 @@ from biotac.cli.main import main
 from biotac.core.bands import pac_bands
 from biotac.export import BANDS_COLUMNS, COLUMNS, FORMATS, PAC_COLUMNS
 from biotac.export.columns import GAP, STAMP
-from biotac.recording.file import RecordingFile
+from biotac.recording.mcap_file import RecordingFile
 from biotac.wire.batches import StreamDecoder
 from biotac.wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
 

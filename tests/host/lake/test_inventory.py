@@ -13,8 +13,8 @@ from record_all import record_all
 
 import biotac
 from biotac.cli.main import main
-from biotac.recording.file import RecordingFile
 from biotac.recording.layout import CHECKSUM
+from biotac.recording.mcap_file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 

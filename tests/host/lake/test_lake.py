@@ -32,7 +32,7 @@ from biotac.errors import InputError
 from biotac.export.messages import message_tables
 from biotac.lake import folder as lake_folder
 from biotac.lake import ids
-from biotac.recording.file import RecordingFile
+from biotac.recording.mcap_file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import frames_from_wire, frames_to_wire
 from biotac.wire.framing import encode

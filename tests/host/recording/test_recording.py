@@ -21,7 +21,7 @@ from biotac.board.gap import Gap
 from biotac.cli.main import main
 from biotac.recording import layout, writer
 from biotac.recording.facts import Facts
-from biotac.recording.file import RecordingFile
+from biotac.recording.mcap_file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode

@@ -16,7 +16,7 @@ from record_all import record_all
 import biotac
 from biotac.cli.main import main
 from biotac.link.ports import open_link
-from biotac.recording.file import RecordingFile
+from biotac.recording.mcap_file import RecordingFile
 from biotac.recording.replay.link import open_replay
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder

@@ -78,7 +78,7 @@ def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
 
 def test_a_damaged_second_is_kept_as_it_came(recorded: Path, tmp_path: Path) -> None:
     """To the byte, whatever was on the line; and its rows come with the others."""
-    from biotac.recording.file import RecordingFile
+    from biotac.recording.mcap_file import RecordingFile
 
     whole = biotac.Recording(recorded)
     blocks = list(whole.blocks)

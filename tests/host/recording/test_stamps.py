@@ -11,7 +11,7 @@ from record_all import record_all
 from ros_topics import of_topic
 
 import biotac
-from biotac.recording.file import RecordingFile
+from biotac.recording.mcap_file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode

@@ -1,6 +1,6 @@
 #include "kernels.h"
 
-#include "gold.h"
+#include "exact.h"
 #include "keep/settings.h"
 
 #include <math.h>
@@ -25,16 +25,16 @@ static bool kernel_double(const int32_t e_q4[BT_ELECTRODES], const kernel_settin
     return !isnan(out->real64.poc_mm[0]);
 }
 
-static bool kernel_gold(const int32_t e_q4[BT_ELECTRODES], const kernel_settings *settings, uint32_t wanted,
-                        kernel_output *out)
+static bool kernel_exact(const int32_t e_q4[BT_ELECTRODES], const kernel_settings *settings, uint32_t wanted,
+                         kernel_output *out)
 {
     (void)wanted;
-    gold_force_un(e_q4, settings->force_nn, out->gold.force_un);
-    gold_torque_yz_mnmm(e_q4, settings->torque_nn, out->gold.torque_mnmm + 1);
-    if (!gold_poc(e_q4, settings->shipped.poc_weights, out->gold.poc_nm)) {
+    exact_force_un(e_q4, settings->force_nn, out->exact.force_un);
+    exact_torque_yz_mnmm(e_q4, settings->torque_nn, out->exact.torque_mnmm + 1);
+    if (!exact_poc(e_q4, settings->shipped.poc_weights, out->exact.poc_nm)) {
         return false;
     }
-    out->gold.torque_mnmm[0] = gold_torque_x_mnmm(out->gold.poc_nm, out->gold.force_un);
+    out->exact.torque_mnmm[0] = exact_torque_x_mnmm(out->exact.poc_nm, out->exact.force_un);
     return true;
 }
 
@@ -49,7 +49,7 @@ static bool kernel_gold(const int32_t e_q4[BT_ELECTRODES], const kernel_settings
         }                                                                                                    \
     }
 READ(real64, poc_mm, *1000, force_n, *1000, torque_nmm, *1000)
-READ(gold, poc_nm, / 1000, force_un, / 1000, torque_mnmm, )
+READ(exact, poc_nm, / 1000, force_un, / 1000, torque_mnmm, )
 READ(f32, poc_mm, *1000, force_n, *1000, torque_nmm, *1000)
 READ(integer, poc_um, , force_100un, / 10, torque_mnmm, )
 
@@ -57,7 +57,7 @@ const kernel kernels[KERNELS] = {
     [KERNEL_SHIPPED] = {"shipped", kernel_shipped, read_integer},
     {"double", kernel_double, read_real64},
     {"float", kernel_float, read_f32},
-    {"gold int64", kernel_gold, read_gold},
+    {"exact int64", kernel_exact, read_exact},
     {"quick", kernel_quick, read_integer},
 };
 

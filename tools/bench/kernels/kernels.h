@@ -32,7 +32,7 @@ typedef union {
         int32_t poc_nm[3];
         int64_t force_un[3];
         int64_t torque_mnmm[3];
-    } gold;
+    } exact;
     struct {
         float poc_mm[3];
         float force_n[3];

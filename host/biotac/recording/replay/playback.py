@@ -21,21 +21,10 @@ from ...wire.framing import encode
 from ..block import Packet
 from ..reader import Recording
 
-_STREAM_OF = {
-    wire.Frame.ID: wire.StreamFlags.FRAMES,
-    wire.Idle.ID: wire.StreamFlags.FRAMES,
-    wire.Tare.ID: wire.StreamFlags.FRAMES,
-    wire.Touch.ID: wire.StreamFlags.FRAMES,
-    wire.Event.ID: wire.StreamFlags.FRAMES | wire.StreamFlags.PAC,
-    wire.Pac.ID: wire.StreamFlags.PAC,
-    wire.Bands.ID: wire.StreamFlags.BANDS,
-    wire.Status.ID: wire.StreamFlags.STATUS,
-    wire.SensorStatus.ID: wire.StreamFlags.STATUS,
-}
+_STREAMS_OF = {message.ID: streams for message, streams in wire.STREAMS_OF.items()}
 _TIME = struct.Struct("<I")
 _OFFSETS: Any = {message_id: dtype.fields for message_id, dtype in DTYPES.items()}  # of a field: [id][name][1]
 _TIME_AT = _OFFSETS[wire.Frame.ID]["t_us"][1]  # in all stream messages
-_REQ_ID_AT = _OFFSETS[wire.Status.ID]["req_id"][1]  # in SENSOR_STATUS, too
 # Only these arrive in order of their times: a PAC can begin later than the FRAME that it precedes.
 _CLOCKS = (wire.Frame.ID, wire.Idle.ID)
 
@@ -111,19 +100,18 @@ class Playback:
             reply = wire.Reply.unpack(payload[: wire.Reply.STRUCT.size])
             again = reply.command == wire.Start.ID and reply.error == wire.Error.OK
             return encode(wire.Reply.ID, dataclasses.replace(reply, req_id=0).pack()) if again else None
-        stream = _STREAM_OF.get(message_id)
-        if stream is None or not self._asked.streams & stream:
+        if not self._asked.streams & _STREAMS_OF.get(message_id, 0):
             return None
-        if stream == wire.StreamFlags.STATUS and payload[_REQ_ID_AT]:
+        fields = _OFFSETS[message_id]
+        if "req_id" in fields and payload[fields["req_id"][1]]:
             return None  # it answered a request at the time
         if message_id == wire.Status.ID:
             self._status = wire.Status.unpack(payload[: wire.Status.STRUCT.size])
-            return packet.data
         if message_id == wire.SensorStatus.ID:
             status = wire.SensorStatus.unpack(payload[: wire.SensorStatus.STRUCT.size])
             self._sensor_status[status.finger] = status
-        at = _OFFSETS[message_id]["finger"][1]
-        return packet.data if self._asked.fingers >> payload[at] & 1 else None
+        is_wanted = "finger" not in fields or self._asked.fingers >> payload[fields["finger"][1]] & 1
+        return packet.data if is_wanted else None
 
     # ---- what it answers -----------------------------------------------------------------------
 

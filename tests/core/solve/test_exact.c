@@ -3,7 +3,7 @@
 // rounded to uN; the torque's sum is rounded to 1/16 count*um before its gain, then to mN*mm.
 #include "support.h"
 
-#include "gold.h"
+#include "exact.h"
 #include "lin2013.h"
 
 #include <math.h>
@@ -26,8 +26,8 @@ static void check(const int32_t e_q4[BT_ELECTRODES], int weights, const int32_t 
         settings.torque_gain[d % 2] = torque_nn[d % 2] * 1e-9;
     }
     lin2013(e, &settings, &want);
-    gold_force_un(e_q4, force_nn, force_un);
-    gold_torque_yz_mnmm(e_q4, torque_nn, torque_mnmm);
+    exact_force_un(e_q4, force_nn, force_un);
+    exact_torque_yz_mnmm(e_q4, torque_nn, torque_mnmm);
     for (int d = 0; d < 3; d++) {
         assert_true(fabs((double)force_un[d] - want.force_n[d] * 1e6) <= 0.5 + 1e-3);
     }
@@ -35,7 +35,7 @@ static void check(const int32_t e_q4[BT_ELECTRODES], int weights, const int32_t 
         double rounded_sum = 0.5 / 16 * fabs(settings.torque_gain[d]);
         assert_true(fabs((double)torque_mnmm[d] - want.torque_nmm[d + 1] * 1e3) <= 0.5 + rounded_sum + 1e-6);
     }
-    if (!gold_poc(e_q4, weights, poc_nm)) {
+    if (!exact_poc(e_q4, weights, poc_nm)) {
         assert_true(isnan(want.poc_mm[0]));
         return;
     }
@@ -43,11 +43,11 @@ static void check(const int32_t e_q4[BT_ELECTRODES], int weights, const int32_t 
         assert_true(fabs(poc_nm[d] - want.poc_mm[d] * 1e6) <= 0.6);
     }
     double size = fabs(want.force_n[1]) + fabs(want.force_n[2]);
-    double error = fabs((double)gold_torque_x_mnmm(poc_nm, force_un) - want.torque_nmm[0] * 1e3);
+    double error = fabs((double)exact_torque_x_mnmm(poc_nm, force_un) - want.torque_nmm[0] * 1e3);
     assert_true(error <= 0.5 + 2 * 5.08 * 0.5e-3 + 0.6e-3 * size + 1e-6);
 }
 
-static void gold_is_the_reference_to_its_rounding(void **state)
+static void exact_is_the_reference_to_its_rounding(void **state)
 {
     (void)state;
     uint64_t seed = 21;
@@ -69,7 +69,7 @@ static void gold_is_the_reference_to_its_rounding(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gold_is_the_reference_to_its_rounding),
+        cmocka_unit_test(exact_is_the_reference_to_its_rounding),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

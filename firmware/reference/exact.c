@@ -1,4 +1,4 @@
-#include "gold.h"
+#include "exact.h"
 
 #include "fixed_point.h"
 
@@ -9,7 +9,7 @@ _Static_assert(BT_SUM_SQUARES_MAX_Q8 <= INT64_MAX, "the weight sum must fit int6
 // 0/0 (SPEC.md, Degenerate input).
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
 
-uint32_t gold_isqrt64(uint64_t n)
+uint32_t exact_isqrt64(uint64_t n)
 {
     uint64_t root = 0;
     for (uint64_t bit = (uint64_t)1 << 62; bit != 0; bit >>= 2) {
@@ -59,13 +59,13 @@ static void scale_to_radius(const int64_t v[3], int first, int32_t out_nm[3])
         scaled[d] = v[d] < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
         squares += magnitude * magnitude;
     }
-    int64_t length = (int64_t)gold_isqrt64(squares);
+    int64_t length = (int64_t)exact_isqrt64(squares);
     for (int d = first; d < 3; d++) {
         out_nm[d] = (int32_t)bt_div_round(scaled[d] * (BT_CORE_RADIUS_UM * 1000), length);
     }
 }
 
-bool gold_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3])
+bool exact_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3])
 {
     int64_t sum = 0;               // W of Eq 1
     int64_t moment[3] = {0, 0, 0}; // N of Eq 1, um
@@ -101,7 +101,7 @@ _Static_assert(BT_SUM_ARM_MAX_Q4_NM / 1000 < INT64_MAX / BT_SETTING_FORCE_GAIN_X
                "a scaled torque sum must fit int64");
 _Static_assert(FORCE_MAX_UN <= INT64_MAX / 2 / POC_MAX_NM, "the lever product must fit int64");
 
-void gold_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3])
+void exact_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3])
 {
     for (int d = 0; d < 3; d++) {
         int32_t sum = 0;
@@ -112,7 +112,7 @@ void gold_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], 
     }
 }
 
-void gold_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[2], int64_t torque_mnmm[2])
+void exact_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[2], int64_t torque_mnmm[2])
 {
     for (int d = 0; d < 2; d++) {
         int64_t sum_nm = 0;
@@ -125,7 +125,7 @@ void gold_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_n
     }
 }
 
-int64_t gold_torque_x_mnmm(const int32_t poc_nm[3], const int64_t force_un[3])
+int64_t exact_torque_x_mnmm(const int32_t poc_nm[3], const int64_t force_un[3])
 {
     return bt_div_round(poc_nm[1] * force_un[2] - poc_nm[2] * force_un[1], LEVER_DIVISOR);
 }

@@ -1,7 +1,7 @@
 // What the board sees of the host: its bytes, its silence and its disconnection. Times are device time in us,
 // wrapping at 2^32.
-#ifndef BIOTAC_HOST_H
-#define BIOTAC_HOST_H
+#ifndef BIOTAC_HOST_LINK_H
+#define BIOTAC_HOST_LINK_H
 
 #include "talk/session.h"
 

@@ -1,4 +1,4 @@
-#include "talk/host.h"
+#include "talk/host_link.h"
 
 #include "talk/commands.h"
 #include "talk/status.h"
