@@ -176,14 +176,25 @@ uint8_t bt_tare_now(bt_tare *tare)
     return BT_ERROR_OK;
 }
 
+static void set(bt_tare *tare, const bt_baseline *base, uint8_t reason)
+{
+    bt_adopt_in_place(tare, base, reason);
+    tare->last.known = false; // never undone: who sets it knows better
+}
+
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base)
 {
     if (tare->state == BT_TARE_STATE_FAULT) {
         return BT_ERROR_RAILED;
     }
-    bt_adopt_in_place(tare, base, BT_TARE_REASON_HOST_SET);
-    tare->last.known = false; // never undone: the host knows better
+    set(tare, base, BT_TARE_REASON_HOST_SET);
     return BT_ERROR_OK;
+}
+
+void bt_tare_restore(bt_tare *tare, const bt_baseline *base, bool held)
+{
+    set(tare, base, BT_TARE_REASON_RESTORED);
+    tare->held = held;
 }
 
 void bt_tare_hold(bt_tare *tare)

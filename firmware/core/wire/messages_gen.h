@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0xCAAC3432u
+#define BT_SCHEMA_HASH 0x94D13E9Fu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -61,6 +61,7 @@ enum bt_tare_reason {
     BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is unchanged, and kept
     BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is unchanged until the signals are still
     BT_TARE_REASON_HOLD_LAPSED = 12, // HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
+    BT_TARE_REASON_RESTORED = 13, // the tare from before a reset of the board, with HELD as it was
 };
 
 // Weight of an electrode's signal e in the point of contact (Lin Eq 1).
@@ -148,7 +149,9 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
 #define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map, or along the skin's normals where the touch is unlike its training
 #define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
-#define BT_FRAME_FLAGS 0x7FFFFFFu // all there are
+#define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
+#define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
+#define BT_FRAME_FLAGS 0x1FFFFFFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally

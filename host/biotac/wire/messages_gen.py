@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0xCAAC3432
+SCHEMA_HASH = 0x94D13E9F
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -70,6 +70,7 @@ class TareReason(IntEnum):
     HOST_HOLD = 10  # HOLD command: the tare is unchanged, and kept
     HOST_RELEASE = 11  # RELEASE command: the tare is unchanged until the signals are still
     HOLD_LAPSED = 12  # HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
+    RESTORED = 13  # the tare from before a reset of the board, with HELD as it was
 
 
 class PocWeights(IntEnum):
@@ -166,6 +167,8 @@ class FrameFlags(IntFlag):
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
     POPULATION = 1 << 25  # force comes from the population map, or along the skin's normals where the touch is unlike its training
     OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
+    TARE_UNSURE = 1 << 27  # the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
+    PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
 
 
 class FaultFlags(IntFlag):
@@ -245,6 +248,7 @@ TARE_REASON_DOC: dict[int, str] = {
     10: "HOLD command: the tare is unchanged, and kept",
     11: "RELEASE command: the tare is unchanged until the signals are still",
     12: "HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged",
+    13: "the tare from before a reset of the board, with HELD as it was",
 }
 
 
@@ -333,6 +337,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
     33554432: "force comes from the population map, or along the skin's normals where the touch is unlike its training",
     67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma",
+    134217728: "the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then",
+    268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
 }
 
 

@@ -87,6 +87,26 @@ static void a_stored_tare_before_the_first_word_makes_no_contact(void **state)
     }
 }
 
+static void a_restored_tare_carries_a_grip_over_a_reset(void **state)
+{
+    (void)state;
+    for (int held = 0; held < 2; held++) {
+        emulated_finger finger;
+        finger_init(&finger);
+        bt_baseline base = {.pdc_q16 = PDC_REST << 16};
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            base.electrode_q16[i] = (uint32_t)lround(rest_count(&finger, i)) << 16;
+        }
+        bt_tare_restore(&finger.tare, &base, held);
+        finger.load = 300;
+        finger.pdc_load = 200;
+        assert_true(run_until(&finger, BT_TARE_STATE_CONTACT, 20) <= 5);
+        run_seconds(&finger, 60);
+        assert_true(finger.tare.state == BT_TARE_STATE_CONTACT && finger.tare.held == held);
+        assert_true(fabs(share_kept(&finger, 300) - 1) < 0.02);
+    }
+}
+
 static void one_missing_pressure_word_does_not_forget_the_pressure_at_rest(void **state)
 {
     (void)state;
@@ -291,6 +311,7 @@ int main(void)
         cmocka_unit_test(a_missing_word_does_not_look_like_motion),
         cmocka_unit_test(an_electrode_that_was_never_read_makes_no_contact_when_it_comes),
         cmocka_unit_test(a_stored_tare_before_the_first_word_makes_no_contact),
+        cmocka_unit_test(a_restored_tare_carries_a_grip_over_a_reset),
         cmocka_unit_test(one_missing_pressure_word_does_not_forget_the_pressure_at_rest),
         cmocka_unit_test(three_frames_over_the_threshold_make_a_contact_and_two_do_not),
         cmocka_unit_test(pressure_alone_makes_a_contact),
