@@ -250,10 +250,8 @@ void shifter_start(void (*exchanged)(void))
     PADS_BANK0_GPIO(PIN_MISO) = PADS_DRIVE_4MA | PADS_SCHMITT | PADS_IE | PADS_PDE;
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_PIO0;
 
-    use_interrupt(PIO0_IRQ_0, heard);
-    use_interrupt(PIO0_IRQ_1, exchanged);
-    NVIC_IPR2 = 1u << 6; // interrupt 8 behind 7 and the timer's, before the USB's
     PIO0_IRQ0_INTE = PIO_INT_RX(SHIFTER);
-    NVIC_ISER = 1u << PIO0_IRQ_0 | 1u << PIO0_IRQ_1;
+    use_interrupt(PIO0_IRQ_0, 0, heard);
+    use_interrupt(PIO0_IRQ_1, 1, exchanged); // behind it and the timer's, before the USB's
     PIO0_CTRL = 1u << SHIFTER | 1u << WATCHER;
 }

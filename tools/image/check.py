@@ -1,19 +1,21 @@
 #!/usr/bin/env python3
 """What a board image takes, and what must not be in it. Runs after each link; exit 1 says what is wrong.
 
-    check.py IMAGE.elf [--objdump PROGRAM]
+    check.py IMAGE.elf --port NAME --limits BOARD/limits.json [--objdump PROGRAM]
 
-Prints flash, RAM and the deepest stack. Refuses an image over its budget, with a heap, printf or floating point in it,
-with a stack that may outgrow its room, with code run from flash after boot, or with an unbounded wait in the port. None
-of it depends on what the compiler inlined.
+Prints flash, RAM and the deepest stack. Refuses an image over its board's limits, with a heap, printf or floating point
+in it, with a stack that may outgrow its room, with an unbounded wait in the port, or, where the board runs from RAM,
+with code run from flash after boot. None of it depends on what the compiler inlined.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -22,19 +24,16 @@ from image import stack, waits
 from image.symbols import FLOAT_SYMBOL, LIBRARY_SYMBOL
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PORT = ROOT / "firmware" / "port" / "rp2040"
-FLASH_BUDGET = 68 * 1024  # of 1820 KiB: boot has to copy it
-RAM_BUDGET = 200 * 1024  # of 256 KiB: the image, five maps of 20 KiB, 16 KiB of data and the stack
-SRAM = 0x20000000
-RAM_PARTS = (("program", ".text"), ("data", ".data"), ("bss", ".bss"), ("stack", ".stack"))
+PORTS = ROOT / "firmware" / "port"
 
 ROM = "(boot ROM)"
-ROM_STACK_BYTES = 256  # an allowance: the ROM's use is not documented
+FLASH_SPAN = 16 << 20  # no flash here is larger
 EXCEPTION_BYTES = 32 + 4  # pushed by the core, with alignment
+SECTION = re.compile(r"^\s*\d+ (\.\S+)\s+([0-9a-f]+)\s+([0-9a-f]+) .*\n\s+(.*)$", re.M)
 
 COMMANDS = (ROOT / "firmware" / "core" / "talk" / "commands.c").read_text(encoding="utf-8")
 
-# The functions that each call through a pointer in the source may reach.
+# The functions that each call through a pointer in the gateway's source may reach; limits.json has its board's own.
 POINTERS = {
     "session->write(": ("write_link",),
     "board->save_settings(": ("save_settings",),
@@ -46,19 +45,47 @@ POINTERS = {
     "flash->program(": ("program_page", "program_map_page"),
     "flash->read(": ("read_flash",),
     "commands[k].run(": tuple(re.findall(r"^    {BT_\w+_ID, .*, (\w+)},$", COMMANDS, re.MULTILINE)),
-    "rom.": (ROM,),
-    "boot2_copy": (ROM,),
-    "device->source(": ("bt_emu_stream_count",),
-    "lookup(": (ROM,),
-    "loader(": (ROM,),
 }
-# The worst case nests all that the image has; the last two are the sensor board's.
-INTERRUPTS = ("usb_interrupt", "uart_interrupt", "timer_interrupt", "exchanged", "heard")
 
 
-def section_sizes(elf: Path, objdump: str) -> dict[str, int]:
+@dataclass(frozen=True)
+class Limits:
+    """limits.json of a board's folder."""
+
+    flash_at: int
+    flash_bytes: int
+    ram_bytes: int
+    runs_from_ram: bool
+    interrupts: tuple[str, ...]  # the worst case nests all of them that the image has
+    rom_stack_bytes: int  # an allowance, where what the boot ROM uses is not documented
+    pointers: dict[str, tuple[str, ...]]
+
+
+def read_limits(path: Path) -> Limits:
+    told = json.loads(path.read_text(encoding="utf-8"))
+    return Limits(
+        int(told["flash"]["at"], 0), told["flash"]["bytes"], told["ram"]["bytes"], told.get("runs_from_ram", False),
+        tuple(told["interrupts"]), told.get("rom_stack_bytes", 0),
+        {call: tuple(names) for call, names in told.get("pointers", {}).items()},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Section:
+    bytes: int
+    stored: bool  # in flash
+    in_ram: bool
+
+
+def sections(elf: Path, objdump: str, limits: Limits) -> dict[str, Section]:
+    """Those that take memory. A part of RAM that is copied from flash takes both."""
     text = subprocess.run([objdump, "-h", str(elf)], capture_output=True, text=True, check=True).stdout
-    return {name: int(size, 16) for name, size in re.findall(r"^\s*\d+ (\.\S+)\s+([0-9a-f]+)", text, re.M)}
+    found = {}
+    for name, size, address, flags in SECTION.findall(text):
+        if "ALLOC" in flags:
+            in_flash = limits.flash_at <= int(address, 16) < limits.flash_at + FLASH_SPAN
+            found[name] = Section(int(size, 16), "LOAD" in flags, not in_flash)
+    return found
 
 
 def symbols(elf: Path, objdump: str) -> set[str]:
@@ -66,57 +93,58 @@ def symbols(elf: Path, objdump: str) -> set[str]:
     return {line.split()[-1] for line in text.splitlines() if re.match(r"^[0-9a-f]{8} ", line)}
 
 
-def interrupts(program: stack.Program) -> list[str]:
-    return [name for name in INTERRUPTS if name in program.functions]
-
-
-def stack_depth(program: stack.Program) -> tuple[int, str]:
+def stack_depth(program: stack.Program, interrupts: list[str]) -> tuple[int, str]:
     """Bytes with all interrupts on top of the main loop's deepest chain, and the chains in words."""
-    chains = [program.deepest(name) for name in ("main", *interrupts(program))]
+    chains = [program.deepest(name) for name in ("main", *interrupts)]
     depth = sum(bytes_ for bytes_, _ in chains) + EXCEPTION_BYTES * (len(chains) - 1)
     return depth, "; ".join(f"{' > '.join(chain)} {bytes_}" for bytes_, chain in chains)
 
 
-def misplaced(program: stack.Program) -> list[str]:
+def misplaced(program: stack.Program, limits: Limits, interrupts: list[str]) -> list[str]:
     """Functions that would run from the slow flash, or from SRAM before they are copied there."""
     early = program.reached("clocks_start") | {"image_reset"}
-    late = program.reached("main").union(*(program.reached(name) for name in interrupts(program))) - {ROM}
-    wrong = [f"{name} runs from flash" for name in late if program.functions[name].address < SRAM]
+    late = program.reached("main").union(*(program.reached(name) for name in interrupts)) - {ROM}
+    flash = range(limits.flash_at, limits.flash_at + FLASH_SPAN)
+    wrong = [f"{name} runs from flash" for name in late if program.functions[name].address in flash]
     return sorted(
-        wrong
-        + [f"{name} runs from SRAM before it is copied" for name in early if program.functions[name].address >= SRAM]
-    )
+        wrong + [f"{name} runs from RAM before it is copied" for name in early
+                 if program.functions[name].address not in flash]
+    )  # fmt: skip
 
 
-def check(elf: Path, objdump: str) -> list[str]:
+def check(elf: Path, objdump: str, limits: Limits, port: Path) -> list[str]:
     """Print the figures; return what is wrong."""
-    size = section_sizes(elf, objdump)
-    kept = (".boot2", ".vectors", ".binary_info", ".image_note", ".boot_code", ".data", ".text")
-    flash = sum(size.get(name, 0) for name in kept)
-    ram = sum(size.get(name, 0) for name in (".stack", ".text", ".data", ".bss"))
-    program = stack.load(elf, objdump, elf.parent, POINTERS)
-    program.functions[ROM] = stack.Function(0, ROM_STACK_BYTES)
-    depth, chains = stack_depth(program)
-    print(f"flash {flash} of {FLASH_BUDGET} bytes")
-    parts = ", ".join(f"{name} {size[section]}" for name, section in RAM_PARTS)
-    print(f"RAM   {ram} of {RAM_BUDGET} bytes: {parts}")
-    print(f"stack {depth} of {size['.stack']} bytes: {chains}")
-    wrong = [f"{flash} bytes of flash, over budget"] if flash > FLASH_BUDGET else []
-    wrong += [f"{ram} bytes of RAM, over budget"] if ram > RAM_BUDGET else []
-    wrong += [f"a stack of {depth} bytes, more than .stack has"] if depth > size[".stack"] else []
+    parts = sections(elf, objdump, limits)
+    flash = sum(part.bytes for part in parts.values() if part.stored)
+    ram = sum(part.bytes for part in parts.values() if part.in_ram)
+    program = stack.load(elf, objdump, elf.parent, POINTERS | limits.pointers)
+    program.functions[ROM] = stack.Function(0, limits.rom_stack_bytes)
+    interrupts = [name for name in limits.interrupts if name in program.functions]
+    depth, chains = stack_depth(program, interrupts)
+    room = parts[".stack"].bytes
+    print(f"flash {flash} of {limits.flash_bytes} bytes")
+    in_ram = ", ".join(f"{name[1:]} {part.bytes}" for name, part in parts.items() if part.in_ram and part.bytes)
+    print(f"RAM   {ram} of {limits.ram_bytes} bytes: {in_ram}")
+    print(f"stack {depth} of {room} bytes: {chains}")
+    wrong = [f"{flash} bytes of flash, over its limit"] if flash > limits.flash_bytes else []
+    wrong += [f"{ram} bytes of RAM, over its limit"] if ram > limits.ram_bytes else []
+    wrong += [f"a stack of {depth} bytes, more than .stack has"] if depth > room else []
     for name in sorted(symbols(elf, objdump)):
         if FLOAT_SYMBOL.match(name) or LIBRARY_SYMBOL.match(name):
             wrong.append(f"{name} must not be in the image")
-    return wrong + misplaced(program) + waits.unbounded(PORT)
+    wrong += misplaced(program, limits, interrupts) if limits.runs_from_ram else []
+    return wrong + waits.unbounded(PORTS / "cortex_m", port) + waits.unbounded(port)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("elf", type=Path)
+    parser.add_argument("--port", required=True, help="a folder of firmware/port")
+    parser.add_argument("--limits", required=True, type=Path)
     parser.add_argument("--objdump", default="arm-none-eabi-objdump")
     args = parser.parse_args()
     try:
-        wrong = check(args.elf, args.objdump)
+        wrong = check(args.elf, args.objdump, read_limits(args.limits), PORTS / args.port)
     except stack.Unknown as unknown:
         wrong = [str(unknown)]
     for what in wrong:

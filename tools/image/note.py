@@ -1,35 +1,47 @@
 #!/usr/bin/env python3
 """Complete what an image says of itself (firmware/app/image_note.h): its size and CRC-32, beside what it is for.
 
-    note.py IMAGE.bin
+    note.py IMAGE.bin [IMAGE.elf --objcopy PROGRAM]
 
+The .elf gets the same note, so that a debugger, or a tool that makes its own .uf2 from it, writes the same image.
 Refuses an image that `biotac flash` would refuse for its note, by the same code, but before anybody has it.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 CODE = Path(__file__).resolve().parents[2] / "host/biotac/flash/note.py"
 
 
 def main() -> int:
-    if len(sys.argv) != 2:
-        sys.exit((__doc__ or "").strip())
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("bin", type=Path)
+    parser.add_argument("elf", type=Path, nargs="?")
+    parser.add_argument("--objcopy", default="arm-none-eabi-objcopy")
+    args = parser.parse_args()
     spec = importlib.util.spec_from_file_location("biotac_image_note", CODE)
     assert spec is not None and spec.loader is not None
     code = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = code  # dataclasses look up their module here
     spec.loader.exec_module(code)
-    path = Path(sys.argv[1])
+    path = args.bin
     try:
         image = code.seal(path.read_bytes())
         note = code.find(image)
     except ValueError as error:
         sys.exit(f"note.py: {path}: {error}")
     path.write_bytes(image)
+    if args.elf is not None:
+        with tempfile.NamedTemporaryFile() as section:
+            section.write(code.bytes_of(image))
+            section.flush()
+            subprocess.run([args.objcopy, "--update-section", f".image_note={section.name}", str(args.elf)], check=True)
     wire = ".".join(map(str, note.wire))
     print(f"note  board {note.board}, firmware {note.version}, wire {wire}, CRC-32 {note.crc32:08x}")
     return 0

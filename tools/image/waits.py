@@ -1,8 +1,8 @@
 """Finds unbounded waits in a port's C source.
 
-Every loop on a register goes through the helpers of wait.h. Elsewhere any `while` is refused, whatever it waits for. So
-is a `for` whose condition reads a register or is missing; the only exception is the endless loop after a requested
-reset.
+Every loop on a register goes through the helpers of cortex_m.h and of the port's wait.h. Elsewhere any `while` is
+refused, whatever it waits for. So is a `for` whose condition reads a register or is missing; the only exception is the
+endless loop after a requested reset.
 """
 
 from __future__ import annotations
@@ -11,19 +11,21 @@ import re
 from pathlib import Path
 
 HELPERS = "wait.h"
-REGISTERS = "rp2040_regs.h"
+SHARED = "cortex_m.h"
+REGISTERS = "*_regs.h"
 AFTER_RESET = "system_reset"
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
 LOOP = re.compile(r"\b(while|for)\b\s*\(")
 DEFINED = re.compile(r"^#define (\w+)(?:\(\w+\))?\s+(?:REG32|\(\*)", re.M)
 
 
-def unbounded(port: Path) -> list[str]:
+def unbounded(port: Path, registers_of: Path | None = None) -> list[str]:
     """One line for each loop that is not allowed."""
-    registers = set(DEFINED.findall((port / REGISTERS).read_text(encoding="utf-8")))
+    headers = (registers_of or port).glob(REGISTERS)
+    registers = {name for path in headers for name in DEFINED.findall(path.read_text(encoding="utf-8"))}
     wrong = []
     for path in sorted(port.rglob("*.[ch]")):
-        if path.name != HELPERS:
+        if path.name not in (HELPERS, SHARED):
             text = COMMENT.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), path.read_text(encoding="utf-8"))
             wrong += [f"{path.relative_to(port)}:{line}: {why}" for line, why in loops(text, registers)]
     return wrong

@@ -2,6 +2,8 @@
 #ifndef BIOTAC_RP2040_DMA_H
 #define BIOTAC_RP2040_DMA_H
 
+#include "ring.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -27,14 +29,18 @@ bool dma_move(enum dma_channel channel, uint32_t options, volatile void *to, con
 // The same, by the core should the DMA not come to an end.
 void dma_copy(enum dma_channel channel, volatile uint8_t *to, const uint8_t *from, uint32_t bytes);
 
-// Into a ring of that size, a power of two, that counts the bytes ever put in; there is room for them.
-static inline void dma_copy_to_ring(enum dma_channel channel, uint8_t *ring, uint32_t size, uint32_t head,
-                                    const uint8_t *from, uint32_t bytes)
+// ring_put by the DMA.
+static inline bool dma_put(enum dma_channel channel, ring *to, const uint8_t *from, uint32_t bytes)
 {
-    const uint32_t at = head % size;
-    const uint32_t first = bytes < size - at ? bytes : size - at;
-    dma_copy(channel, ring + at, from, first);
-    dma_copy(channel, ring, from + first, bytes - first);
+    const uint32_t head = ring_get(&to->head);
+    const uint32_t first = ring_run(to, head, bytes);
+    if (bytes > ring_room(to)) {
+        return false;
+    }
+    dma_copy(channel, ring_at(to, head), from, first);
+    dma_copy(channel, to->bytes, from + first, bytes - first);
+    ring_set(&to->head, head + bytes);
+    return true;
 }
 
 #endif

@@ -11,7 +11,7 @@
 
 #include <string.h>
 
-// boards/pico/pico.ld keeps the image off both.
+// rp2040.ld keeps the image off both.
 #define FLASH_BYTES    (2u * 1024 * 1024)
 #define STORAGE_OFFSET (FLASH_BYTES - BT_STORAGE_BYTES) // where it was before there were maps
 #define MAPS_OFFSET    (STORAGE_OFFSET - BT_MAPS_BYTES)

@@ -103,7 +103,7 @@ void port_idle(bt_port *port)
     usb_watch();
     uart_watch();
     watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
-    timer_sleep();
+    sleep_until_woken();
 }
 
 bool port_reboot_bootloader(bt_port *port)

@@ -3,9 +3,9 @@
 #ifndef BIOTAC_RP2040_REGS_H
 #define BIOTAC_RP2040_REGS_H
 
-#include <stdint.h>
+#include "cortex_m.h"
 
-#define REG32(address) (*(volatile uint32_t *)(uintptr_t)(address))
+#include <stdint.h>
 
 // 2.1.2: each peripheral's registers (not SIO, nor the core's) again, where a write sets or clears bits.
 #define REG_SET(reg) (*(&(reg) + 0x2000 / 4))
@@ -18,15 +18,6 @@
 #define SIO_GPIO_OUT_SET REG32(0xD0000014u)
 #define SIO_GPIO_OUT_CLR REG32(0xD0000018u)
 #define SIO_GPIO_OE_SET  REG32(0xD0000024u)
-
-// ---- 2.4.8 core: NVIC, SCB
-#define NVIC_ISER REG32(0xE000E100u)
-#define NVIC_ICER REG32(0xE000E180u)
-#define NVIC_IPR1                                                                                            \
-    REG32(0xE000E404u) // priorities of interrupts 4..7, the two upper bits of each byte; 0 first
-#define NVIC_IPR2 REG32(0xE000E408u) // of interrupts 8..11
-#define NVIC_IPR5 REG32(0xE000E414u) // of interrupts 20..23
-#define VTOR      REG32(0xE000ED08u)
 
 // ---- 2.3.2 interrupts
 #define TIMER_IRQ_0 0

@@ -8,58 +8,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Code that runs from flash, before all other is copied to SRAM. noinline, or it would end up in its caller,
-// or what it calls in it.
-#define AT_BOOT __attribute__((section(".boot_code"), noinline))
-
-// ---- one interrupt held off, and no other: for who shares something with it
-static inline void interrupt_hold_off(uint32_t number)
-{
-    NVIC_ICER = 1u << number;
-    __asm volatile("dsb\n isb" ::: "memory");
-}
-
-static inline void interrupt_let_go(uint32_t number)
-{
-    __asm volatile("" ::: "memory");
-    NVIC_ISER = 1u << number;
-}
-
-// ---- all of them, for the few cycles in which two must see the same
-static inline uint32_t interrupts_disable(void)
-{
-    uint32_t primask;
-    __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
-    return primask;
-}
-
-static inline void interrupts_restore(uint32_t primask)
-{
-    __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
-}
-
-// ---- startup.c: who takes an interrupt, beside the timer's and the USB's
-void use_interrupt(uint32_t number, void (*handler)(void));
-
 // ---- image_note.c: of the image in flash; see port.h
 uint32_t image_crc32(void);
 
-// ---- system.c: clocks, watchdog, reset
-// CLK_SYS_HZ from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
-bool clocks_start(void);
+// ---- system.c
 void watchdog_start(void);
 void watchdog_feed(void);
-void system_reset(void) __attribute__((noreturn));
 
 // ---- timer.c
 void timer_start(void);
-void timer_interrupt(void);
-
-// Sleep until an interrupt calls timer_wake, or not at all when one has since the last call.
-void timer_sleep(void);
-
-// Something came that the main loop should look at; port_idle will not sleep over it. For interrupts.
-void timer_wake(void);
 
 // ---- what the image is for: a gateway's side of the sensors' bus (slot.c), or the sensors'
 void bus_start(void);
@@ -84,7 +41,6 @@ bool flash_unique_id(uint8_t id[FLASH_ID_BYTES]);
 // ---- usb/
 // serial: text that stays; what the host shows as the serial number.
 void usb_start(const char *serial);
-void usb_interrupt(void);
 
 // In the main loop, often: start over a controller that hears nothing any more.
 void usb_watch(void);

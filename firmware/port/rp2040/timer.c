@@ -1,17 +1,22 @@
-// Time, the sampler's alarm, and sleep.
+// Time and the sampler's alarm.
 #include "only_board.h"
 
 #include "system.h"
 #include "wait.h"
 
-#define NAPS 64 // interrupts until the main loop looks around all the same: a slot has two, and the bus some
-
-static volatile bool woken;
+static void timer_interrupt(void)
+{
+    REG_CLR(TIMER_INTF) = TIMER_ALARM0_BIT;
+    TIMER_INTR = TIMER_ALARM0_BIT; // writing 1 clears
+    if (bt_port_alarm()) {
+        wake();
+    }
+}
 
 void timer_start(void)
 {
     REG_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
-    NVIC_ISER = 1u << TIMER_IRQ_0;
+    use_interrupt(TIMER_IRQ_0, 0, timer_interrupt);
 }
 
 uint32_t port_now_us(bt_port *port)
@@ -38,29 +43,4 @@ void port_alarm_at(bt_port *port, uint32_t at_us)
         TIMER_ARMED = TIMER_ALARM0_BIT; // writing 1 disarms
         REG_SET(TIMER_INTF) = TIMER_ALARM0_BIT;
     }
-}
-
-void timer_wake(void)
-{
-    woken = true;
-}
-
-void timer_interrupt(void)
-{
-    REG_CLR(TIMER_INTF) = TIMER_ALARM0_BIT;
-    TIMER_INTR = TIMER_ALARM0_BIT; // writing 1 clears
-    if (bt_port_alarm()) {
-        timer_wake();
-    }
-}
-
-// Interrupts are held off, and still one of them ends WFI: none can slip in between looking and sleeping.
-void timer_sleep(void)
-{
-    __asm volatile("cpsid i" ::: "memory");
-    for (int k = 0; k < NAPS && !woken; k++) { // most interrupts are the bus's own
-        __asm volatile("dsb\n wfi\n cpsie i\n isb\n cpsid i" ::: "memory"); // its handler runs here
-    }
-    woken = false;
-    __asm volatile("cpsie i" ::: "memory");
 }

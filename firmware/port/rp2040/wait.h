@@ -1,5 +1,5 @@
-// The only waits of this port. A device that never becomes ready must not hang the board: every loop on a
-// register is here, with a bound, and tools/image/waits.py refuses one anywhere else.
+// The only waits of this port beside cortex_m.h's. A device that never becomes ready must not hang the board:
+// every loop on a register is in these two, with a bound, and tools/image/waits.py refuses one anywhere else.
 #ifndef BIOTAC_RP2040_WAIT_H
 #define BIOTAC_RP2040_WAIT_H
 
@@ -12,17 +12,6 @@
 #define WAIT_CLOCKS_TURNS 100000u // 50 ms at least: the crystal takes 1 ms, a PLL less
 #define WAIT_SPI_TURNS    1000u   // 48 us at least: a word takes 4 us
 
-// Until (*reg & mask) == value. False when it never was within so many turns.
-static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_t value, uint32_t turns)
-{
-    while ((*reg & mask) != value) {
-        if (turns-- == 0) {
-            return false;
-        }
-    }
-    return true;
-}
-
 // Into reset and out again: every register of these blocks is as after power-on. False when they do not come
 // back. Inline, because boot calls it before there is code in SRAM, and the USB's guard after.
 static inline bool take_out_of_reset(uint32_t blocks)
@@ -34,22 +23,15 @@ static inline bool take_out_of_reset(uint32_t blocks)
 
 // At least us microseconds, and hardly more at the image's clock; on a slower one it takes longer. For the
 // few that a wait on the timer, which ticks once in a us, would lengthen by up to two.
-#define WAIT_TURN_CYCLES  3u
-#define WAIT_TURNS_PER_US (CLK_SYS_HZ / 1000000u / WAIT_TURN_CYCLES + 1)
-static inline void wait_turns(uint32_t turns)
-{
-    __asm volatile("1: sub %0, #1\n bne 1b" : "+l"(turns) : : "cc");
-}
-
 static inline void wait_short_us(uint32_t us)
 {
-    wait_turns(us * WAIT_TURNS_PER_US);
+    wait_cycles(us * (CLK_SYS_HZ / 1000000u));
 }
 
 // The same in nanoseconds, of a constant.
 static inline void wait_short_ns(uint32_t ns)
 {
-    wait_turns(ns * WAIT_TURNS_PER_US / 1000 + 1);
+    wait_cycles((ns * (CLK_SYS_HZ / 1000000u) + 999) / 1000);
 }
 
 // Read data away while (*status & more), words at most.

@@ -60,6 +60,12 @@ def seal(image: bytes) -> bytes:
     return bytes(sized)
 
 
+def bytes_of(image: bytes) -> bytes:
+    """The note alone, as it is in the image. Raises ValueError unless there is exactly one."""
+    at = _place(image)
+    return image[at : at + FIELDS.size + PROOF.size]
+
+
 def _place(image: bytes) -> int:
     places = range(0, len(image) - FIELDS.size - PROOF.size + 1, ALIGNMENT)
     notes = [at for at in places if image.startswith(MAGIC, at)]

@@ -116,5 +116,5 @@ def test_settings_and_maps_are_where_the_firmware_has_them() -> None:
     assert (FLASH_BYTES, SETTINGS_BYTES, MAPS_BYTES) == (2 * 1024 * 1024, 2 * 4096, 11 * 20480)
     assert (
         f"LENGTH = 2M - 256 - {(SETTINGS_BYTES + MAPS_BYTES) // 1024}K"
-        in (ROOT / "firmware/boards/pico/pico.ld").read_text()
+        in (ROOT / "firmware/port/rp2040/rp2040.ld").read_text()
     )

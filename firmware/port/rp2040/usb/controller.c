@@ -40,7 +40,7 @@ static void buffers_done(void)
     }
 }
 
-void usb_interrupt(void)
+static void usb_interrupt(void)
 {
     uint32_t status = USB_INTS;
     // Buffers before SETUP: they belong to the request before it.
@@ -64,7 +64,7 @@ void usb_interrupt(void)
         USB_SIE_STATUS = USB_SIE_RESUME;
         usb_data_suspend(false);
     }
-    timer_wake();
+    wake();
 }
 
 void usb_start(const char *serial)
@@ -85,8 +85,7 @@ void usb_start(const char *serial)
         USB_EP_ENABLE | USB_EP_INT_PER_BUFFER | USB_EP_TYPE_BULK | USB_DATA_OUT_BUFFER;
     USB_SIE_CTRL = USB_SIE_EP0_INT_1BUF;
     USB_INTE = USB_INT_BUFF_STATUS | USB_INT_SETUP_REQ | USB_INT_BUS_RESET | USB_INT_SUSPEND | USB_INT_RESUME;
-    NVIC_IPR1 = 3u << 14; // interrupt 5 at the lowest priority: sampling goes first
-    NVIC_ISER = 1u << USBCTRL_IRQ;
+    use_interrupt(USBCTRL_IRQ, 3, usb_interrupt); // sampling goes first
     USB_MAIN_CTRL = USB_CONTROLLER_EN;
     REG_SET(USB_SIE_CTRL) = USB_SIE_PULLUP_EN; // now the host sees a device
 }
@@ -107,7 +106,7 @@ void usb_watch(void)
         frame = USB_SOF_RD;
         since_us = now_us;
     } else if (now_us - since_us >= HEARS_NOTHING_US) {
-        NVIC_ICER = 1u << USBCTRL_IRQ;
+        interrupt_hold_off(USBCTRL_IRQ);
         usb_control_bus_reset();
         (void)take_out_of_reset(RESETS_USBCTRL);
         off = true;

@@ -8,20 +8,10 @@
 #include "usb/buffers.h"
 #include "usb/descriptors.h"
 
-#include <stdatomic.h>
-
-#define TX_RING 4096 // 40 ms of five fingers' frames
-#define RX_RING 256  // some commands; when it is full the host is told to wait
-_Static_assert((TX_RING & (TX_RING - 1)) == 0 && (RX_RING & (RX_RING - 1)) == 0, "indices wrap");
+RING(tx, 4096); // 40 ms of five fingers' frames
+RING(rx, 256);  // some commands; when it is full the host is told to wait
 
 #define TOUCH_BITS_PER_S 1200
-
-static uint8_t tx[TX_RING];
-static _Atomic uint32_t tx_head; // main loop; counts bytes ever put in
-static _Atomic uint32_t tx_tail; // interrupt
-static uint8_t rx[RX_RING];
-static _Atomic uint32_t rx_head; // interrupt
-static _Atomic uint32_t rx_tail; // main loop
 
 static volatile bool configured;
 static volatile bool suspended;
@@ -34,17 +24,6 @@ static bool delimiter_due;
 static uint32_t in_toggle;
 static uint32_t out_toggle;
 static uint32_t line_rate;
-
-// Plain loads and stores: the Cortex-M0+ has no atomic read-modify-write, and one writer needs none.
-static uint32_t get(_Atomic uint32_t *index)
-{
-    return atomic_load_explicit(index, memory_order_acquire);
-}
-
-static void set(_Atomic uint32_t *index, uint32_t value)
-{
-    atomic_store_explicit(index, value, memory_order_release);
-}
 
 // ---- data, in the interrupt or with it held off ----------------------------------------------------------
 
@@ -64,24 +43,24 @@ static void send_next(void)
         return;
     }
     volatile uint8_t *out = usb_memory(USB_DATA_IN_BUFFER);
-    uint32_t tail = get(&tx_tail);
-    uint32_t waiting = get(&tx_head) - tail;
+    uint32_t tail = ring_get(&tx.tail);
+    uint32_t waiting = ring_filled(&tx);
     uint32_t bytes = 0;
     if (delimiter_due) {
         out[bytes++] = 0;
         delimiter_due = false;
     }
     uint32_t taken = min(waiting, USB_PACKET_BYTES - bytes);
-    uint32_t first = min(taken, TX_RING - tail % TX_RING); // the rest lies at the ring's start
-    dma_copy(DMA_OF_USB, out + bytes, tx + tail % TX_RING, first);
-    dma_copy(DMA_OF_USB, out + bytes + first, tx, taken - first);
+    uint32_t first = ring_run(&tx, tail, taken);
+    dma_copy(DMA_OF_USB, out + bytes, ring_at(&tx, tail), first);
+    dma_copy(DMA_OF_USB, out + bytes + first, tx.bytes, taken - first);
     bytes += taken;
     tail += taken;
     // A host waits for more after a full packet; when there is none, an empty one tells it so.
     if (bytes == 0 && !last_was_full) {
         return;
     }
-    set(&tx_tail, tail);
+    ring_set(&tx.tail, tail);
     last_was_full = bytes == USB_PACKET_BYTES;
     in_busy = true;
     usb_hand_over(&USB_BUFFER_IN(USB_EP_DATA), bytes | USB_BUFFER_FULL | in_toggle);
@@ -90,7 +69,7 @@ static void send_next(void)
 
 static void receive_next(void)
 {
-    if (out_armed || !configured || RX_RING - (get(&rx_head) - get(&rx_tail)) < USB_PACKET_BYTES) {
+    if (out_armed || !configured || ring_room(&rx) < USB_PACKET_BYTES) {
         return; // not armed: the controller makes the host wait
     }
     out_armed = true;
@@ -105,7 +84,7 @@ void usb_data_line_state(bool now_dtr)
     if (now_dtr != dtr) {
         // A new host must not get what the old one left; a packet that the old one no longer fetched may
         // still be with the controller, so a delimiter comes before the first frame.
-        set(&tx_tail, get(&tx_head));
+        ring_forget(&tx);
         delimiter_due = now_dtr;
     }
     dtr = now_dtr;
@@ -158,12 +137,10 @@ void usb_data_sent(void)
 void usb_data_received(void)
 {
     uint32_t bytes = USB_BUFFER_OUT(USB_EP_DATA) & USB_BUFFER_LENGTH;
-    uint32_t head = get(&rx_head);
-    bytes = bytes < USB_PACKET_BYTES ? bytes : USB_PACKET_BYTES;
-    for (uint32_t k = 0; k < bytes; k++) {
-        rx[head++ % RX_RING] = usb_memory(USB_DATA_OUT_BUFFER)[k];
+    for (uint32_t k = 0; k < min(bytes, USB_PACKET_BYTES); k++) {
+        uint8_t byte = usb_memory(USB_DATA_OUT_BUFFER)[k];
+        (void)ring_put(&rx, &byte, 1); // there is room, or it would not have been armed
     }
-    set(&rx_head, head);
     out_armed = false;
     receive_next();
 }
@@ -177,7 +154,7 @@ bool usb_data_waits(void)
 
 bool usb_all_sent(void)
 {
-    return !in_busy && get(&tx_head) == get(&tx_tail);
+    return !in_busy && ring_filled(&tx) == 0;
 }
 
 bool usb_touched(void)
@@ -192,12 +169,9 @@ bool usb_link_up(void)
 
 bool usb_link_write(const uint8_t *data, size_t bytes)
 {
-    uint32_t head = get(&tx_head);
-    if (!usb_link_up() || bytes > TX_RING - (head - get(&tx_tail))) {
+    if (!usb_link_up() || !dma_put(DMA_OF_FRAMES, &tx, data, (uint32_t)bytes)) {
         return false;
     }
-    dma_copy_to_ring(DMA_OF_FRAMES, tx, TX_RING, head, data, (uint32_t)bytes);
-    set(&tx_head, head + (uint32_t)bytes);
     // The interrupt either sees the new bytes, or has left in_busy false by now; likewise when reading.
     atomic_signal_fence(memory_order_seq_cst);
     if (!in_busy) {
@@ -210,13 +184,7 @@ bool usb_link_write(const uint8_t *data, size_t bytes)
 
 size_t usb_link_read(uint8_t *data, size_t bytes)
 {
-    uint32_t tail = get(&rx_tail);
-    uint32_t come = get(&rx_head) - tail;
-    size_t taken = come < bytes ? come : bytes;
-    for (size_t k = 0; k < taken; k++) {
-        data[k] = rx[tail++ % RX_RING];
-    }
-    set(&rx_tail, tail);
+    size_t taken = ring_take(&rx, data, bytes);
     atomic_signal_fence(memory_order_seq_cst);
     if (taken > 0 && !out_armed) {
         interrupt_hold_off(USBCTRL_IRQ);

@@ -1,0 +1,48 @@
+# How an image for a microcontroller is built. A board's CMakeLists.txt includes this before project(), and after it calls
+#   gateway_image(NAME PORT CPU LINKER [SOURCES...])   the gateway on that port
+#   board_image(NAME PORT CPU LINKER SOURCES...)       another program on it
+# PORT is a folder of firmware/port, CPU the compiler's options for the core, LINKER a script in the port's folder. Makes
+# NAME.elf and NAME.bin (what is stored from its first byte on), with whatever PORT/image.cmake adds, and holds it to
+# limits.json of the board's folder.
+if(NOT CMAKE_TOOLCHAIN_FILE)
+  set(CMAKE_TOOLCHAIN_FILE ${CMAKE_CURRENT_LIST_DIR}/arm-none-eabi.cmake)
+endif()
+set(CMAKE_C_STANDARD 11)
+set(CMAKE_C_EXTENSIONS OFF)
+set(boards ${CMAKE_CURRENT_LIST_DIR})
+set(fw ${boards}/..)
+set(tools ${fw}/../tools)
+
+find_package(Python3 3.10 REQUIRED COMPONENTS Interpreter)
+
+function(board_image name port_name cpu linker)
+  set(port ${fw}/port/${port_name})
+  separate_arguments(cpu)
+  # The same warnings as everywhere (the root's biotac_options), and what a small image wants.
+  set(warnings -Wall -Wextra -Wconversion -Wsign-conversion -Werror)
+  add_compile_options(${cpu} -g -ffunction-sections -fdata-sections
+    "$<$<COMPILE_LANGUAGE:C>:${warnings};-fstack-usage;-fno-common>")
+  if(EXISTS ${port}/image.cmake)
+    include(${port}/image.cmake)
+  endif()
+  add_executable(${name} ${ARGN} ${port_objects})
+  set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
+  target_include_directories(${name} PRIVATE
+    ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m ${port} ${CMAKE_CURRENT_LIST_DIR})
+  target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections
+    -Wl,--fatal-warnings -Wl,-Map=${name}.map -T ${port}/${linker})
+  include(${boards}/compile_options.cmake)
+  board_compile_options(${ARGN})
+  add_custom_command(TARGET ${name} POST_BUILD
+    COMMAND ${CMAKE_OBJCOPY} -O binary ${name}.elf ${name}.bin
+    COMMAND ${Python3_EXECUTABLE} ${tools}/image/note.py ${name}.bin ${name}.elf --objcopy ${CMAKE_OBJCOPY}
+    ${port_after}
+    COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${port_name}
+      --limits ${CMAKE_CURRENT_LIST_DIR}/limits.json --objdump ${CMAKE_OBJDUMP})
+endfunction()
+
+function(gateway_image name port_name cpu linker)
+  file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c
+    ${fw}/port/cortex_m/*.c ${fw}/port/${port_name}/*.c ${fw}/port/${port_name}/*/*.c)
+  board_image(${name} ${port_name} ${cpu} ${linker} ${sources} ${ARGN})
+endfunction()

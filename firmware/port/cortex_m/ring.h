@@ -1,0 +1,88 @@
+// Bytes on their way between an interrupt and the main loop: one writer, one reader. Plain loads and stores,
+// as a Cortex-M0+ has no atomic read-modify-write, and one writer needs none.
+#ifndef BIOTAC_RING_H
+#define BIOTAC_RING_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    uint8_t *bytes;
+    uint32_t size;         // a power of two
+    _Atomic uint32_t head; // bytes ever put in, modulo 2^32; the writer's
+    _Atomic uint32_t tail; // and taken out; the reader's
+} ring;
+
+#define RING(name, size_)                                                                                    \
+    _Static_assert(((size_) & ((size_) - 1)) == 0, "indices wrap");                                          \
+    static uint8_t name##_bytes[size_];                                                                      \
+    static ring name = {.bytes = name##_bytes, .size = (size_)}
+
+static inline uint32_t ring_get(_Atomic uint32_t *index)
+{
+    return atomic_load_explicit(index, memory_order_acquire);
+}
+
+static inline void ring_set(_Atomic uint32_t *index, uint32_t value)
+{
+    atomic_store_explicit(index, value, memory_order_release);
+}
+
+static inline uint32_t ring_filled(ring *r)
+{
+    return ring_get(&r->head) - ring_get(&r->tail);
+}
+
+static inline uint32_t ring_room(ring *r)
+{
+    return r->size - ring_filled(r);
+}
+
+static inline uint8_t *ring_at(ring *r, uint32_t index)
+{
+    return r->bytes + (index & (r->size - 1));
+}
+
+// How many of so many bytes from index on lie in one piece; the rest lies at the ring's start.
+static inline uint32_t ring_run(const ring *r, uint32_t index, uint32_t bytes)
+{
+    const uint32_t to_end = r->size - (index & (r->size - 1));
+    return bytes < to_end ? bytes : to_end;
+}
+
+// The writer's. Takes all bytes or none.
+static inline bool ring_put(ring *r, const uint8_t *data, size_t bytes)
+{
+    uint32_t head = ring_get(&r->head);
+    if (bytes > ring_room(r)) {
+        return false;
+    }
+    for (size_t k = 0; k < bytes; k++) {
+        *ring_at(r, head++) = data[k];
+    }
+    ring_set(&r->head, head);
+    return true;
+}
+
+// The reader's. Returns how many there were.
+static inline size_t ring_take(ring *r, uint8_t *data, size_t bytes)
+{
+    uint32_t tail = ring_get(&r->tail);
+    const uint32_t filled = ring_get(&r->head) - tail;
+    const size_t taken = filled < bytes ? filled : bytes;
+    for (size_t k = 0; k < taken; k++) {
+        data[k] = *ring_at(r, tail++);
+    }
+    ring_set(&r->tail, tail);
+    return taken;
+}
+
+// The reader's: as if all were taken.
+static inline void ring_forget(ring *r)
+{
+    ring_set(&r->tail, ring_get(&r->head));
+}
+
+#endif

@@ -1,0 +1,83 @@
+// Reset, the vector table, and what happens when the program goes wrong.
+#include "cortex_m.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define EXCEPTIONS 16 // the core's own; the first is the stack's top
+#ifdef __ARM_ARCH_6M__
+#define INTERRUPTS 32
+#else
+#define INTERRUPTS 112 // more than any chip has that this was tried on
+#endif
+#define VTOR REG32(0xE000ED08u)
+
+// The linker script's: what lies in RAM and is stored elsewhere, what begins as zeros, and the stack.
+extern uint32_t image_ram_from[], image_ram_start[], image_ram_end[], image_bss_start[], image_bss_end[];
+extern uint32_t image_stack_top[];
+
+int main(int argc, char **argv);
+void image_reset(void);
+
+// A board that hangs holds a hand still: start again.
+static void start_again(void)
+{
+    system_reset();
+}
+
+typedef void (*vector)(void);
+
+// Where the chip looks at first.
+__attribute__((section(".vectors"), used)) static const vector first_vectors[EXCEPTIONS] = {
+    (vector)image_stack_top, image_reset, [2 ... EXCEPTIONS - 1] = start_again};
+
+// The table that is used: it may be read while the flash may not. Aligned to its size, rounded up.
+static vector vectors[EXCEPTIONS + INTERRUPTS] __attribute__((aligned(INTERRUPTS > 48 ? 512 : 256)));
+
+static void use_vectors(void)
+{
+    memcpy(vectors, first_vectors, sizeof first_vectors);
+    for (int k = 0; k < INTERRUPTS; k++) {
+        vectors[EXCEPTIONS + k] = start_again;
+    }
+    VTOR = (uint32_t)(uintptr_t)vectors;
+}
+
+// The two upper bits of a byte are those that every core has.
+static uint32_t with_priority(uint32_t word, uint32_t byte, uint32_t priority)
+{
+    return (word & ~(0xFFu << 8 * byte)) | priority << (8 * byte + 6);
+}
+
+void use_interrupt(int number, uint32_t priority, void (*handler)(void))
+{
+    vectors[EXCEPTIONS + number] = handler;
+    if (number < 0) {
+        SCB_SHPR3 = with_priority(SCB_SHPR3, 3, priority);
+        return;
+    }
+    const uint32_t n = (uint32_t)number;
+    NVIC_IPR(n) = with_priority(NVIC_IPR(n), n % 4, priority);
+    interrupt_let_go(n);
+}
+
+// With what it calls it may run from flash and copy all other code. At the full clock, because on a slow one
+// a word of flash may take 40 us. Loops of its own and not memcpy, which may not be there yet; the volatile
+// keeps the compiler from putting the call back.
+AT_BOOT void image_reset(void)
+{
+    bool ticking = clocks_start();
+    const uint32_t *from = image_ram_from;
+    for (volatile uint32_t *to = image_ram_start; to < image_ram_end; to++) {
+        *to = *from++;
+    }
+    for (volatile uint32_t *to = image_bss_start; to < image_bss_end; to++) {
+        *to = 0;
+    }
+    if (!ticking) {
+        system_reset(); // without its crystal the board can neither keep time nor speak to a host
+    }
+    use_vectors();
+    (void)main(0, NULL);
+    start_again();
+}
