@@ -42,7 +42,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 
-// After a reset: the tare from before it, and whether the host held the finger then.
+// After a reset of the board: the tare from before it, and whether the host held the finger then.
 void bt_tare_restore(bt_tare *tare, const bt_baseline *base, bool held);
 
 // The host says that the finger holds something, or no longer does; or the host has been silent for too long.
