@@ -50,6 +50,7 @@ install_for_boards_and_pages() {
     need "arm-none-eabi-gcc -print-file-name=nano.specs | grep / " gcc-arm-none-eabi libnewlib-arm-none-eabi
     need "command -v qemu-system-arm" qemu-system-arm
     need "command -v chromium" chromium # the page of `biotac view`
+    need "command -v sigrok-cli" sigrok-cli # what the emulated Pico writes for a logic analyser
 }
 
 generated_files() {

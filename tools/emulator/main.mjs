@@ -1,7 +1,7 @@
 // An emulated Pico on a pty. `biotac sim --board pico` and biotac.open("emu:pico?source=...") start it.
 //
 //   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH --master FD
-//                 [--pace X] [--hold] [--serials A,B,...] [--uart-master FD]
+//                 [--pace X] [--hold] [--serials A,B,...] [--uart-master FD] [--do VERB]...
 //   node main.mjs --image BIN --sensor BIN --sensor-pty PATH --sensor-master FD --tape FILE --pty PATH --master FD
 //                 [--endless] ...
 //
@@ -14,8 +14,8 @@
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
-//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, suspend, resume, cut power, write uf2 FILE: now, or at a
-//                     time of the sensors' world
+//   [@SECONDS] VERB   one of rig.mjs, such as `unplug`: now, or at a time of the sensors' world. --do has it done before
+//                     the board boots
 //   counters          answers "counters JSON"
 //   arrivals          answers "counters [[t_us, finger, device us when its last byte was with the host], ...]", one a FRAME
 //   until SECONDS JSON  answers likewise once the counters are those of JSON, or "never JSON" with what they are when
@@ -47,6 +47,7 @@ const { values: options } = parseArgs({
     serials: { type: 'string', default: '' },
     endless: { type: 'boolean', default: false },
     hold: { type: 'boolean', default: false },
+    do: { type: 'string', multiple: true, default: [] },
   },
 })
 
@@ -84,6 +85,7 @@ function plugIn() {
 function power() {
   try {
     rig = new Rig({ image: read(options.image), sensors, hold: options.hold, port: pty, uartPort: uartPty, lossless: pace === 0 })
+    for (const verb of options.do) rig.act(verb)
   } catch (error) {
     die(options.image, error.message)
   }

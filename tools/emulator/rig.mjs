@@ -8,6 +8,7 @@ import { Board, BootRom } from './rom.mjs'
 import { SlotTiming } from './timing.mjs'
 import { Uart } from './uart.mjs'
 import { UsbHost } from './usb.mjs'
+import { Vcd } from './vcd.mjs'
 
 export class Rig {
   /** port, uartPort: a Pty or something like it; no uartPort: nothing on either UART's pins. hold: device time stands
@@ -27,6 +28,7 @@ export class Rig {
     this.loaders = 0 // how often the chip went to its UF2 loader
     this.loader = null // while it is there
     this.images = 0 // that the loader has taken whole
+    this.vcd = null // what a logic analyser records, once somebody wants to know
     this.machine = new Machine(image, (machine) => this.#attach(machine))
   }
 
@@ -50,8 +52,9 @@ export class Rig {
         this.powerFailed = false
         this.act('cut power')
       }
-      if (this.still) return
+      if (this.still) break
     }
+    this.vcd?.flush(this.still ? Infinity : this.machine.worldNanos)
   }
 
   release() {
@@ -90,6 +93,10 @@ export class Rig {
       'cut power after (\\d+) flash bytes': (bytes) => (this.board.cutAfter = Number(bytes)),
       'two setups (\\d+)': (nanos) => this.usb.hurry(Number(nanos)), // so far apart
       'slow the core ([0-9.]+) times': (times) => (this.machine.slowness = Number(times)),
+      'write vcd (.+)': (file) => {
+        this.vcd = new Vcd(file)
+        this.#analyse()
+      },
       // of the sensors' board
       'lead (\\w+) to (\\w+)': (name, end) => this.sensors.connect(name, end === 'nothing' ? null : end),
       'write uf2 (.+)': (file) => {
@@ -194,6 +201,11 @@ export class Rig {
     this.usb.setPlugged(this.plugged)
     this.usb.setOpen(this.port.up)
     this.uarts = this.uartPort === null ? [] : [0, 1].map((number) => new Uart(machine.mcu, number, this.uartPort))
+    this.#analyse()
     if (machine.inLoader) this.#enterLoader(machine)
+  }
+
+  #analyse() {
+    this.vcd?.watch(this.machine.mcu, () => this.machine.worldNanos, this.uarts)
   }
 }

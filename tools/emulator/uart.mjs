@@ -23,6 +23,7 @@ export class Uart {
     this.heard = []
     this.silent = false // after what was heard
     this.dma = false
+    this.onByte = () => {} // (line, byte) whose stop bit is over: TX or RX
     this.counters = { sent: 0, overruns: 0, unread: 0, fastest_bits_per_s: 0 }
     this.sender = mcu.clock.createAlarm(() => this.#sent())
     this.hearer = mcu.clock.createAlarm(() => this.#hear())
@@ -60,6 +61,7 @@ export class Uart {
     const bytes = this.port.take(1)
     this.hearing = false
     if (bytes?.length > 0) {
+      this.onByte('RX', bytes[0])
       if (this.heard.length < FIFO) this.heard.push(bytes[0])
       else this.counters.overruns++
       this.silent = false
@@ -73,6 +75,7 @@ export class Uart {
   #sent() {
     const byte = this.sending.shift()
     this.counters.sent++
+    if (this.wired) this.onByte('TX', byte)
     if (!this.wired || !this.port.hasRoom) this.counters.unread++ // a UART waits for nobody
     else this.port.put(Uint8Array.of(byte))
     if (this.sending.length > 0) this.sender.schedule(this.byteNanos)

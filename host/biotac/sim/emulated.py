@@ -13,7 +13,7 @@ import shutil
 import subprocess
 import sys
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,15 +40,25 @@ class Tools:
 class EmulatedBoard(SimBoard):
     """A running emulator; ``path`` is a pty that any serial program can open.
 
-    With ``uart``, a second pty, ``uart_path``, is connected to the pins of the board's UART.
+    With ``uart``, a second pty, ``uart_path``, is connected to the pins of the board's UART. ``verbs``, which rig.mjs
+    lists, are done before it boots.
     """
 
     _pass_fds: tuple[int, ...] = ()  # besides those of its own ptys
 
     def __init__(
-        self, board: str, source: Source, *, pace: float, hold: bool, image: str | None = None, uart: bool = False
+        self,
+        board: str,
+        source: Source,
+        *,
+        pace: float,
+        hold: bool,
+        image: str | None = None,
+        uart: bool = False,
+        verbs: Sequence[str] = (),
     ) -> None:
         self._tools = find_tools(board, image)
+        self._verbs = verbs
         self._has_uart = uart
         self.uart_path = ""
         super().__init__(source, pace=pace, hold=hold)
@@ -56,6 +66,7 @@ class EmulatedBoard(SimBoard):
     def _start(self, options: list[str]) -> Any:
         tools = self._tools
         command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors), *options]
+        command += [f"--do={verb}" for verb in self._verbs]
         with ExitStack() as ptys:
             master, path = ptys.enter_context(new_pty())
             command += ["--pty", path, "--master", str(master)]
@@ -68,11 +79,11 @@ class EmulatedBoard(SimBoard):
             return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=fds)
 
     def plan(self, seconds: float, verb: str) -> None:
-        """Make something happen to the board when its sensors' time reaches ``seconds``; see main.mjs for verbs."""
+        """Make something happen to the board when its sensors' time reaches ``seconds``; see rig.mjs for verbs."""
         self.say(f"@{seconds:.9f} {verb}")
 
     def do(self, verb: str) -> None:
-        """Make something happen to the board before it gets anything written to its link from now on; see main.mjs.
+        """Make something happen to the board before it gets anything written to its link from now on; see rig.mjs.
 
         Verbs and the link are separate pipes: without waiting for an answer, the link could overtake the verb.
         """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import PortError
@@ -23,17 +24,18 @@ class SimPort:
     fingers: int | None
     seconds: float | None
     image: str | None
+    verbs: tuple[str, ...]  # done to an emulated board before it boots
 
 
 FORMS = {
     "sim": "sim:SOURCE?pace=X&fingers=N&seconds=S",
-    "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S",
+    "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S&do=VERB;VERB",
 }
 EXAMPLES = {
     "sim": "sim:press.toml?pace=real&fingers=2&seconds=5",
     "emu": "emu:pico?source=press.toml&pace=real&fingers=2&seconds=5",
 }
-_OPTIONS = {"sim": {"pace", "fingers", "seconds"}, "emu": {"pace", "fingers", "seconds", "source", "image"}}
+_OPTIONS = {"sim": {"pace", "fingers", "seconds"}, "emu": {"pace", "fingers", "seconds", "source", "image", "do"}}
 
 
 def parse_sim(port: str, pace: float) -> SimPort:
@@ -51,6 +53,7 @@ def parse_sim(port: str, pace: float) -> SimPort:
             int(options["fingers"]) if "fingers" in options else None,
             float(options["seconds"]) if "seconds" in options else None,
             options.get("image"),
+            tuple(filter(None, options.get("do", "").split(";"))),
         )
     except ValueError as error:
         raise PortError(f"{port}: {error}; an example is {EXAMPLES[scheme]}") from error
@@ -60,10 +63,12 @@ def open_sim(port: str, pace: float) -> SimLink:
     """Open a sim: or emu: port. Raises PortError, or InputError for a source that cannot be played."""
     sim = parse_sim(port, pace)
     source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
-    return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image))
+    return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image, verbs=sim.verbs))
 
 
-def start_board(board: str, source: Source, *, pace: float, image: str | None = None) -> SimBoard:
+def start_board(
+    board: str, source: Source, *, pace: float, image: str | None = None, verbs: Sequence[str] = ()
+) -> SimBoard:
     """Start a simulated board, held until released: ``posix`` or an emulated one.
 
     Raises PortError naming what is missing and how to get it.
@@ -71,5 +76,5 @@ def start_board(board: str, source: Source, *, pace: float, image: str | None = 
     if board == "posix":
         return SimBoard(source, pace=pace, hold=True)
     if board == "two_picos":
-        return TwoPicos(source, pace=pace, hold=True, image=image)
-    return EmulatedBoard(board, source, pace=pace, hold=True, image=image)
+        return TwoPicos(source, pace=pace, hold=True, image=image, verbs=verbs)
+    return EmulatedBoard(board, source, pace=pace, hold=True, image=image, verbs=verbs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from typing import Any
 
@@ -24,12 +25,20 @@ class TwoPicos(EmulatedBoard):
     Without a source nothing is played, and both ports are for other programs, like those of two real boards.
     """
 
-    def __init__(self, source: Source | None, *, pace: float, hold: bool, image: str | None = None) -> None:
+    def __init__(
+        self,
+        source: Source | None,
+        *,
+        pace: float,
+        hold: bool,
+        image: str | None = None,
+        verbs: Sequence[str] = (),
+    ) -> None:
         self.sensor_path = ""
         self._alone = source is None
         self.sensor_board: SensorBoard | None = None
         self._sensors = ExitStack()
-        super().__init__("pico", source or NOTHING, pace=pace, hold=hold, image=image)
+        super().__init__("pico", source or NOTHING, pace=pace, hold=hold, image=image, verbs=verbs)
 
     def _start(self, options: list[str]) -> Any:
         image = self._tools.image.parent.parent / "sensor-board" / "biotac-sensor.bin"

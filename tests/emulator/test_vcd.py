@@ -1,0 +1,64 @@
+"""What the emulated Pico writes for a logic analyser: sigrok decodes the counts and the UART's bytes of its FRAMEs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tools/make"), str(ROOT / "tests/hil")]
+
+from rig import all_rigs, in_ci, prepare  # noqa: E402
+
+from biotac.wire.decoder import Decoder  # noqa: E402
+from bus_picture import BITS_PER_S, draw, read_vcd, record, slots_ns  # noqa: E402
+
+PRODUCT_MANUAL_SETTLE_NS = 50_000
+PINS_SETUP_NS, PINS_HOLD_NS = 1800, 230  # firmware/boards/pico/pins.h
+
+
+def sigrok(path: Path, *options: str) -> bytes:
+    command = ["sigrok-cli", "-i", str(path), "-I", "vcd:downsample=28", *options]  # 4 samples a half bit
+    return subprocess.run(command, check=True, capture_output=True).stdout
+
+
+def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> None:
+    why = prepare(all_rigs()["pico_emulated"])
+    if why is not None:
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+    path = tmp_path / "bus.vcd"
+    frames = record(path, fingers=2)
+    for finger in range(2):
+        spi = f"spi:clk=SCK:miso=MISO:mosi=MOSI:cs=SS{finger}:wordsize=16"
+        words = sigrok(path, "-P", spi, "-B", "spi=miso")
+        # A slot has the command, whose answer means nothing, then the read: 7 + 5 bits of count beside parity.
+        read = np.frombuffer(words[: len(words) // 4 * 4], ">u2").reshape(-1, 2)[:, 1]
+        counts = ((read >> 9) * 32 + (read >> 3 & 31)).astype(np.uint16)
+        told = frames[frames["finger"] == finger]
+        rounds = [np.uint16([row["pdc"], row["tac"], row["tdc"], *row["counts"]]) for row in told]
+        others = [counts[first::2] for first in (0, 1)]  # every second sample is PAC
+        seen = [one for one in rounds if any(one.tobytes() in some.tobytes() for some in others)]
+        assert len(seen) > 3
+    sent = sigrok(path, "-P", f"uart:rx=TX:baudrate={BITS_PER_S}", "-B", "uart=rx")
+    decoded = Decoder().feed(b"\0" + sent[sent.index(b"\0") :]).frames
+    came = [row.tobytes() for row in frames]
+    assert len(decoded) > 4 and sum(row.tobytes() in came for row in decoded) > 4
+
+    lines = read_vcd(path)
+    ss_ns, levels = lines["SS0"]
+    sck_ns, clock = lines["SCK"]
+    begin = slots_ns(lines)[2:-2]
+    for start in begin:
+        fell = ss_ns[(levels == 0) & (ss_ns > start)][0]
+        rose = ss_ns[(levels == 1) & (ss_ns > fell)][0]
+        ticks = sck_ns[(sck_ns > fell) & (sck_ns < rose)]
+        assert len(ticks) == 32
+        assert ticks[0] - fell >= PINS_SETUP_NS and rose - ticks[-1] >= PINS_HOLD_NS
+        command_over = sck_ns[(sck_ns > start) & (clock == 0)][15]
+        assert ticks[0] - command_over >= PRODUCT_MANUAL_SETTLE_NS
+    draw(lines, tmp_path / "bus.png")
+    assert (tmp_path / "bus.png").stat().st_size > 10_000
