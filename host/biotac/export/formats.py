@@ -26,6 +26,7 @@ FORMATS = {
     ".csv": Format("biotac.export.csv_text", "text, one line per finger and round; PAC and bands in separate files"),
     ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; the same files"),
     ".h5": Format("biotac.export.hdf5", "HDF5, one group per finger, one dataset per column"),
+    ".mat": Format("biotac.export.mat", "MATLAB and Octave, one struct per finger: finger0.frames.force_n"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
     ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..wire.frames import StructArray
 from . import layout
 from .block import FRAME, IDLE, KINDS, ROWS, Packet, Rest, TableReader, packets_of
+from .index import Index
 from .scan import Scan
 
 _NO_FINGER = np.empty(0, np.uint8)
@@ -38,7 +39,10 @@ class Block:
 
 
 class Blocks:
-    """Iterates over Blocks; ``metadata`` (None until seen) and ``scan.problems`` are complete afterwards."""
+    """Iterates over Blocks; ``metadata`` (None until seen) and ``scan.problems`` are complete afterwards.
+
+    With ``index``, only the blocks numbered ``only`` are read.
+    """
 
     def __init__(
         self,
@@ -47,13 +51,15 @@ class Blocks:
         fingers: Collection[int] | None = None,
         *,
         check: bool = True,
+        index: Index | None = None,
+        only: Iterable[int] = (),
     ) -> None:
         self.metadata: dict[str, str] | None = None
         self.damaged_metadata = 0
         self._wanted = wanted
         self._fingers = None if fingers is None else set(fingers)
         self._is_chosen = None if fingers is None else np.isin(np.arange(256), list(fingers))
-        self.scan = Scan(path, self._is_wanted, check=check)
+        self.scan = Scan(path, self._is_wanted, check=check, index=index, only=only)
         self._reader: TableReader | None = None
 
     def __iter__(self) -> Iterator[Block]:

@@ -102,6 +102,7 @@ class RecordingFile:
         """Note that the board was away before the bytes that are added next."""
         self._gaps.append(asdict(gap))
         self._plots.gap(gap)
+        self._writer.flush()  # type: ignore[no-untyped-call]  # the index finds a chunk by its first message
 
     def _put(self, tables: dict[int, bytes], rest: Rest, arrived_ns: int, all_here_ns: int | None) -> None:
         """Write a block, each part as a chunk of its own, so that a reader need not open the others."""

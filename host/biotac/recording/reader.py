@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -21,14 +21,17 @@ from ..wire import messages_gen as wire
 from ..wire.batches import StreamDecoder
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire, frames_from_wire
+from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import layout
 from .block import FRAME, IDLE, PAC, ROWS, Packet, as_sent
 from .blocks import Block, Blocks, lost_between
 from .facts import Facts
+from .index import Index
 from .layout import finger_of
+from .selection import fields_named, part_of
 from .stamps import Stamps, unwrapped_us
-from .tabular import to_pandas, to_xarray
+from .tabular import Selection
 
 
 class Recording:
@@ -49,49 +52,84 @@ class Recording:
     ``blocks`` are the wire bytes, about one block per second. ``arrived_ns`` is when each block began,
     ``all_here_ns`` when it was complete (None where unknown), both in ns on the host's clock (Unix).
 
-    Raises RecordingError when nothing can be read. ``show`` is called with the share of the work done, 0 to 1.
+    Of a complete file, opening reads the metadata, and ``select`` only what it returns; the first use of anything else
+    reads and checks all of it. With ``show``, which is called with the share of that work done (0 to 1), it is read at
+    once. Raises RecordingError when nothing can be read, or when the file has changed since it was opened.
     """
 
-    def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
+    problems: list[str]
+    cut_off: bool
+    damaged_chunks: int
+    wrong_checksums: int
+    arrived_ns: list[int]
+    all_here_ns: list[int | None]
+    messages: list[Any]
+    pac: StructArray
+    idle: StructArray
+    seq: NDArray[np.int64]
+    t_us: NDArray[np.int64]
+    counts: FramingCounts
+    pac_lost: int
+    disordered: int
+    frames_lost: int
+    gaps: list[Gap]
+    _blocks: list[Block]
+    _sent: StructArray
+    _gaps: list[list[Gap]]
+
+    def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] | None = None) -> None:
         self.path = Path(path)
+        self._index = None if show else Index.read(self.path)
+        if self._index is not None:
+            blocks = Blocks(self.path, {}, (), index=self._index)
+            list(blocks)
+            if blocks.metadata is not None and not blocks.scan.problems:
+                self._take_metadata(blocks.metadata)
+                return
+        self._read_all(show or (lambda share: None))
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in Recording.__annotations__ or "_sent" in vars(self):
+            raise AttributeError(f"a Recording has no {name!r}")
+        self._read_all(lambda share: None)
+        return vars(self)[name]
+
+    def _read_all(self, show: Callable[[float], None]) -> None:
+        if self._index is not None:
+            self._index.check(self.path)
         blocks = Blocks(self.path)
-        self._blocks: list[Block] = []
+        own: list[Block] = []
         for block in blocks:
-            self._blocks.append(block)
+            own.append(block)
             show(blocks.scan.share)
-        self.problems: list[str] = blocks.scan.problems
+        self.problems = blocks.scan.problems
         self.cut_off = blocks.scan.cut_off
         self.damaged_chunks = blocks.scan.damaged_chunks
         self.wrong_checksums = blocks.scan.wrong_checksums
         if blocks.metadata is None:
             raise RecordingError(self._without_metadata(blocks.damaged_metadata > 0))
-        try:
-            self._take_metadata(blocks.metadata)
-        except (KeyError, ValueError) as error:
-            raise RecordingError(
-                f"{self.path} has damaged metadata ({error}) and cannot be used; try another copy"
-            ) from error
-        self.arrived_ns: list[int] = [block.arrived_ns for block in self._blocks]
+        self._take_metadata(blocks.metadata)
+        self._blocks = own
+        self.arrived_ns = [block.arrived_ns for block in own]
         # Imported recordings store the first time for both.
-        self.all_here_ns: list[int | None] = [
-            block.all_here_ns if block.all_here_ns != block.arrived_ns else None for block in self._blocks
-        ]
+        self.all_here_ns = [block.all_here_ns if block.all_here_ns != block.arrived_ns else None for block in own]
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        self.messages: list[Any] = decoder.feed(b"".join(block.rest.packets for block in self._blocks)).messages
-        self._sent, self.pac, self.idle = (self._rows_of(kind) for kind in (FRAME, PAC, IDLE))
-        self.seq, self.t_us = self._sent["seq"].astype(np.int64), self._sent["t_us"]
-        rows = len(self._sent) + len(self.pac) + len(self.idle)
+        self.messages = decoder.feed(b"".join(block.rest.packets for block in own)).messages
+        sent, self.pac, self.idle = (self._rows_of(kind) for kind in (FRAME, PAC, IDLE))
+        self.seq, self.t_us = sent["seq"].astype(np.int64), sent["t_us"]
+        rows = len(sent) + len(self.pac) + len(self.idle)
         self.counts = replace(decoder.counts, good=decoder.counts.good + rows)
-        rests = [block.rest for block in self._blocks]
+        rests = [block.rest for block in own]
         self.pac_lost = sum(rest.lost_pac for rest in rests)
         self.disordered = sum(rest.disordered for rest in rests)
         self._gaps = [[gap for facts in rest.gaps if (gap := self._gap(facts)) is not None] for rest in rests]
         self.gaps = [gap for before_block in self._gaps for gap in before_block]
-        in_damaged = sum(block.missing for block in self._blocks) + lost_between(self._blocks)
+        in_damaged = sum(block.missing for block in own) + lost_between(own)
         self.frames_lost = sum(frames for rest in rests for _, _, frames in rest.lost) + in_damaged
         if self.cut_off and not len(self.seq):
             raise RecordingError(f"{self.path} was cut off before its first second was complete; record it again")
+        self._sent = sent
         self._describe_losses([loss for rest in rests for loss in rest.lost], in_damaged)
 
     def _rows_of(self, kind: int) -> StructArray:
@@ -136,13 +174,37 @@ class Recording:
         """The wire bytes as they came, about one second per block."""
         return [b"".join(packet.data for packet in block.packets()) for block in self._blocks]
 
+    def select(
+        self,
+        *,
+        fingers: Iterable[int | str] | None = None,
+        start_s: float = 0.0,
+        stop_s: float | None = None,
+        fields: Iterable[str] | None = None,
+    ) -> Selection:
+        """A part of the frames, for NumPy, pandas or xarray, to be resampled, or aligned with another sensor's signal.
+
+        ``fingers`` are chip selects or recorded names. ``start_s`` (inclusive) and ``stop_s`` (exclusive) are device
+        seconds since the first row. ``fields`` are columns of FRAME_DTYPE; ``finger``, ``seq`` and ``t_us`` come with
+        them. Raises InputError for an unknown field or finger. What is damaged or missing is left out; ``problems``
+        says so.
+        """
+        names = (
+            None if fields is None else {"finger", "seq", "t_us", *([fields] if isinstance(fields, str) else fields)}
+        )
+        chosen = fields_named(names)
+        rows, _, _ = part_of(self.path, self._index, chosen, fingers, start_s, stop_s)
+        by_number = {finger: name for name, finger in self.names.items()}
+        label = np.full(len(rows), "")
+        return Selection(rows, tuple(chosen), by_number, label, self.stamp_ns)
+
     def to_pandas(self) -> Any:
-        """The frames as a pandas DataFrame (tabular.py), in order of arrival. Needs the extra ``export``."""
-        return to_pandas(self.frames, self.stamp_ns(self.frames["t_us"]))
+        """All frames as a pandas DataFrame: see Selection. Needs the extra ``export``."""
+        return self.select().to_pandas()
 
     def to_xarray(self) -> Any:
-        """The frames as an xarray Dataset (tabular.py). Needs the extra ``export``."""
-        return to_xarray(self.frames, self.stamp_ns(self.frames["t_us"]))
+        """All frames as an xarray Dataset: see Selection. Needs the extra ``export``."""
+        return self.select().to_xarray()
 
     def stamp_ns(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:
         """Device times (n,) in us, converted to the host's clock: Unix ns (n,).
@@ -160,11 +222,19 @@ class Recording:
             stamps.arrived(t_us, at_ns)
         return stamps
 
+    @cached_property
+    def _heads(self) -> list[Block]:
+        """The blocks, until all has been read without their rows."""
+        if "_sent" in vars(self) or self._index is None:
+            return self._blocks
+        every = range(len(self._index.blocks))
+        return list(Blocks(self.path, {}, (), check=False, index=self._index, only=every))
+
     def _arrivals(self) -> Iterator[tuple[int, int]]:
         """Last device time of each block that has rows, and when it had arrived."""
-        for block, at_ns in zip(self._blocks, self.all_here_ns, strict=True):
-            if block.rest.last_us is not None and at_ns is not None:
-                yield block.rest.last_us, at_ns
+        for block in self._heads:
+            if block.rest.last_us is not None and block.all_here_ns != block.arrived_ns:
+                yield block.rest.last_us, block.all_here_ns
 
     def __getitem__(self, finger: int | str) -> StructArray:
         """The frames of one finger, by number or by its recorded name. Raises KeyError for an unknown name."""
@@ -203,14 +273,18 @@ class Recording:
 
     def _take_metadata(self, metadata: dict[str, str]) -> None:
         layout.check_version(self.path, metadata)
-        major = metadata["wire"].partition(".")[0]
-        if int(major) != wire.WIRE_MAJOR:
+        try:
+            if int(metadata["wire"].partition(".")[0]) != wire.WIRE_MAJOR:
+                raise RecordingError(
+                    f"{self.path} uses wire version {metadata['wire']}, this biotac-gateway reads {wire.WIRE_MAJOR}.x; "
+                    "install the version it was recorded with"
+                )
+            facts = Facts.read(metadata)
+        except (KeyError, ValueError) as error:
             raise RecordingError(
-                f"{self.path} uses wire version {metadata['wire']}, this biotac-gateway reads {wire.WIRE_MAJOR}.x; "
-                "install the version it was recorded with"
-            )
+                f"{self.path} has damaged metadata ({error}) and cannot be used; try another copy"
+            ) from error
         self.metadata = metadata
-        facts = Facts.read(metadata)
         self.info, self.sensors, self.names = facts.info, facts.sensors, facts.names
         self.calibrations, self.maps, self.settings = facts.calibrations, facts.maps, facts.settings
 
@@ -229,19 +303,19 @@ class Recording:
     @property
     def begin_us(self) -> int:
         """Device time of the first frame or heartbeat, us; 0 if there is none."""
-        times = [block.rest.first_us for block in self._blocks if block.rest.first_us is not None]
+        times = [block.rest.first_us for block in self._heads if block.rest.first_us is not None]
         return min(times, default=0)
 
     @property
     def end_us(self) -> int:
         """Device time of the last frame or heartbeat, us; 0 if there is none."""
-        times = [block.rest.last_us for block in self._blocks if block.rest.last_us is not None]
+        times = [block.rest.last_us for block in self._heads if block.rest.last_us is not None]
         return max(times, default=0)
 
     @property
     def begin_ns(self) -> int:
         """``begin_us`` on the host's clock (Unix), in ns; late by the delay of the link."""
-        return self.arrived_ns[0] if self.arrived_ns else 0
+        return self._heads[0].arrived_ns if self._heads else 0
 
     def _describe_losses(self, losses: list[tuple[int, int, int]], in_damaged: int) -> None:
         for finger, seq, lost in losses[:10]:

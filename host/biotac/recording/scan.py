@@ -25,6 +25,7 @@ from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
+from .index import Index
 
 # A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to, or less with fingers at rest. In
 # memory the data takes ten times its unpacked size.
@@ -68,11 +69,20 @@ class Scan:
 
     ``schemas`` holds the schemas read so far, by topic. Complete afterwards: ``problems`` in words, ``cut_off`` (the
     file ends without its index), ``damaged_chunks`` and ``wrong_checksums`` (over the file's records and its index).
-    Unwanted chunks, and those two checksums, are verified only with ``check``. Raises RecordingError if the file is
-    not an MCAP file, or unpacks to far more than a recording would.
+    Unwanted chunks, and those two checksums, are verified only with ``check``. With ``index``, only the metadata and
+    the chunks of the blocks ``only`` are read. Raises RecordingError if the file is not an MCAP file, unpacks to far
+    more than a recording would, or has changed since its index was read.
     """
 
-    def __init__(self, path: Path, wanted: Callable[[str], bool], *, check: bool = True) -> None:
+    def __init__(
+        self,
+        path: Path,
+        wanted: Callable[[str], bool],
+        *,
+        check: bool = True,
+        index: Index | None = None,
+        only: Iterable[int] = (),
+    ) -> None:
         self.path = path
         self.problems: list[str] = []
         self.cut_off = False
@@ -81,6 +91,7 @@ class Scan:
         self.schemas: dict[str, bytes] = {}
         self._wanted = cache(wanted)
         self._check = check
+        self._index, self._only = index, only
         self._topics: dict[int, str] = {}
         self._unwanted: set[int] = set()  # channels
         self._schema: dict[int, bytes] = {}
@@ -97,6 +108,9 @@ class Scan:
         except OSError as error:
             raise RecordingError(f"{self.path} cannot be read ({error.strerror}); check the path") from error
         with stream:
+            if self._index is not None:
+                yield from self._by_index(stream, self._index)
+                return
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
                 raise RecordingError(
                     f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); expected a file "
@@ -143,6 +157,17 @@ class Scan:
             self.problems.append(
                 f"{self.path.name} is damaged: it lacks its statistics or end record, so losses may go unnoticed"
             )
+
+    def _by_index(self, stream: BinaryIO, index: Index) -> Iterator[Metadata | tuple[str, Message]]:
+        index.check(self.path)
+        yield from self._take(index.records)
+        for at, length in index.metadata:
+            record = self._read(Opcode.METADATA, _content(stream, at + _HEAD_BYTES, length - _HEAD_BYTES))
+            yield from self._take([record] if record is not None else [])
+        for block in map(index.blocks.__getitem__, self._only):
+            for topic, (at, length) in block.items():
+                if self._wanted(topic):
+                    yield from self._open(stream, at + _HEAD_BYTES, length - _HEAD_BYTES, unwanted=False)
 
     def _prove(self, stream: BinaryIO, record: DataEnd | Footer, at: int, length: int) -> None:
         """Verify the checksum in ``record``; 0 means that the program that wrote it made none."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,7 @@ from ..wire.frames import StructArray
 from . import layout
 from .block import FRAME
 from .blocks import Blocks
+from .index import Index
 
 _BY_NAME = {field.name: field for field in FRAME_FIELDS}
 
@@ -37,13 +41,30 @@ def load(
     has the details.
     """
     path = Path(path)
-    chosen = _fields(fields)
+    chosen = fields_named(fields)
+    rows, blocks, gaps = part_of(path, Index.read(path), chosen, fingers, start_s, stop_s)
+    _check(blocks, path, gaps)
+    return rows
+
+
+def part_of(
+    path: Path,
+    index: Index | None,
+    chosen: list[Field],
+    fingers: Iterable[int | str] | None,
+    start_s: float = 0.0,
+    stop_s: float | None = None,
+) -> tuple[StructArray, Blocks, int]:
+    """The rows that ``load`` gives, what was read for them, and how many gaps that has."""
     numbers = None if fingers is None else _fingers(path, fingers)
     wanted = {FRAME: {"t_us", *(field.sent or field.name for field in chosen)}}
-    blocks = Blocks(path, wanted, numbers, check=False)
+    begin_us: int | None = None
+    only = range(0)
+    if index is not None:
+        begin_us, only = _within(path, index, start_s, stop_s)
+    blocks = Blocks(path, wanted, numbers, check=False, index=index, only=only)
     dtype = dtype_of(chosen)
     parts = [np.empty(0, dtype)]
-    begin_us: int | None = None
     gaps = 0
     for block in blocks:
         gaps += len(block.rest.gaps)
@@ -59,11 +80,32 @@ def load(
         for field in chosen:
             out[field.name] = values_of(field, rows[field.sent or field.name])
         parts.append(out)
-    _check(blocks, path, gaps)
-    return np.concatenate(parts)
+    return np.concatenate(parts), blocks, gaps
 
 
-def _fields(names: Iterable[str] | None) -> list[Field]:
+def _within(path: Path, index: Index, start_s: float, stop_s: float | None) -> tuple[int | None, range]:
+    """Device time of the first row, and the blocks that can have rows between these times: a few of them are read."""
+    count = len(index.blocks)
+
+    @cache
+    def first_us(block: int) -> float:
+        """Of this block, or else of the next that has rows."""
+        for found in Blocks(path, {}, (), check=False, index=index, only=range(block, count)):
+            if found.rest.first_us is not None:
+                return found.rest.first_us
+        return math.inf
+
+    if not count or math.isinf(first_us(0)):
+        return None, range(count)
+    begin_us = first_us(0)
+    # One block more: rows that came out of order may lie beyond their neighbours.
+    begin = bisect_right(range(count), begin_us + start_s * 1e6, key=first_us) - 2 if start_s > 0 else 0
+    end = count if stop_s is None else bisect_left(range(count), begin_us + stop_s * 1e6, key=first_us) + 1
+    return int(begin_us), range(max(0, begin), min(count, end))
+
+
+def fields_named(names: Iterable[str] | None) -> list[Field]:
+    """Fields in the order of rows, all for None. Raises InputError for an unknown one."""
     chosen = list(_BY_NAME) if names is None else [names] if isinstance(names, str) else list(names)
     unknown = [name for name in chosen if name not in _BY_NAME]
     if unknown:

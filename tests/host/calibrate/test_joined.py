@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibrate.reference.alignment import align
 from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
@@ -19,6 +18,7 @@ from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
 from biotac.calibrate.wrench.sources import Loaded, check_serial
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
+from biotac.recording.alignment import align
 from biotac.recording.reader import Recording
 from biotac.sim.nano17 import MOUNTING, Nano17
 from biotac.sim.source import Source

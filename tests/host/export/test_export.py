@@ -17,6 +17,7 @@ import pytest
 from record_all import record_all
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from scipy.io import loadmat
 
 import biotac
 from biotac.board.gap import Gap
@@ -214,6 +215,16 @@ def test_npz_says_what_its_columns_are(recorded, tmp_path) -> None:
                     assert same(arrays[f"finger{finger}/{kind[1:] or 'frames'}/{name}"], values), name
 
 
+def test_matlab_has_a_struct_a_finger(recorded, tmp_path) -> None:
+    assert export(recorded, tmp_path / "a.mat") == 0
+    file = loadmat(tmp_path / "a.mat", simplify_cells=True)
+    assert file["columns"]["frames"]["torque_nmm"]["unit"] == "N*mm" and file["finger1"]["frame_id"] == "biotac_finger1"
+    for finger in range(FINGERS):
+        for kind, _, wanted_of in KINDS:
+            table = file[f"finger{finger}"][kind[1:] or "frames"]
+            assert all(same(table[name], values) for name, values in wanted_of(recorded, finger).items())
+
+
 def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
     assert export(recorded, tmp_path / "a.ros2") == 0
     got: dict[str, list[tuple[int, Any]]] = {}
@@ -309,7 +320,7 @@ def test_a_folder_that_is_no_bag_is_never_replaced(recorded, tmp_path, capsys) -
         assert (folder / "precious").read_text() == "x"
 
 
-@pytest.mark.parametrize(("suffix", "module"), [(".parquet", "pyarrow"), (".h5", "h5py"), (".ros2", "rosbags")])
+@pytest.mark.parametrize(("suffix", "module"), [(".parquet", "pyarrow"), (".h5", "h5py"), (".mat", "scipy")])
 def test_a_missing_extra_is_named(recorded, tmp_path, suffix: str, module: str) -> None:
     program = (
         f"import sys; sys.modules[{module!r}] = None\n"

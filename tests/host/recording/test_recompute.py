@@ -92,6 +92,7 @@ def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, capsy
     words = ["export", "--recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
     assert main([*words, "--poc-weights", weights.name.lower(), *options]) == 0
     assert f"poc_weights = {weights.name} ({int(weights)})" in capsys.readouterr().out
+    expected.wire  # noqa: B018  (read before its file goes)
     (folder / "truth.mcap").unlink()
     new = biotac.Recording(folder / "new.mcap")
     assert np.array_equal(new.wire["poc_um"], expected.wire["poc_um"])

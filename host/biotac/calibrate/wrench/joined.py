@@ -14,10 +14,9 @@ import numpy.typing as npt
 from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...map.board_map import pdc_above_rest_q4
+from ...recording.alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
 from ...wire import messages_gen as wire
-from ...wire import sensor_gen as sensor
 from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units
-from ..reference.alignment import STEP_S, Alignment, align
 from ..reference.samples import Reference
 from . import contact
 from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_electrodes, check_rows, check_units, drift_of
@@ -25,15 +24,11 @@ from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_electrodes, c
 Mask = npt.NDArray[np.bool_]
 
 MAX_INCOMPLETE_SHARE = 0.05
-MAX_GAP_S = 0.05  # between two samples of the reference: in a longer gap the force is unknown
 SETTLE_ROWS = 30  # after a touch the skin creeps back, and a hand may still be near
 MAX_REST_FORCE_N = 0.5
 FIRM_N = 1.0
 MIN_ON_SKIN_SHARE = 0.7
 LEVER_MM = (0.1, 40.0)  # |M| / |F| about Lin's origin: contacts are within 17 mm of it, torsion adds some
-# Times after a frame's t_us at which its electrodes, on average, and its pressure are read.
-ELECTRODES_S = float(np.mean([sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES])) / sensor.SLOT_HZ
-PDC_S = sensor.SLOTS.index("PDC") / sensor.SLOT_HZ
 IDLE_MEAN_ROWS = 50  # drift is slow: means show it without the noise
 
 
@@ -100,7 +95,7 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
     zero = _common_value(wrench)
     for _ in range(2):  # twice, now with a better zero: |F| grows with the load only if the zero is right
         alignment = _align(where, board, reference.samples.t_s, wrench, zero)
-        rows = _means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
+        rows = means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
         zero = _zero(where, board, rows)
     there: Mask = np.isfinite(rows.sum(axis=1))
     check_rows(f"{where}, where counts and force are both known", int(there.sum()))
@@ -161,16 +156,7 @@ def _align(where: str, board: Board, t_s: Floats, wrench: Floats, zero: Floats) 
     if np.isfinite(board.pdc).all() and np.ptp(board.pdc) > 0.0:
         # where the channel works, the fluid's pressure follows the normal force more closely than the counts do
         tries.append((PDC_S, board.pdc))
-    found: list[Alignment] = []
-    refusals: list[RecordingError] = []
-    for after_s, board_load in tries:
-        try:
-            found.append(align(where, board.t_s + after_s, board_load, t_s, load))
-        except RecordingError as error:
-            refusals.append(error)
-    if not found:
-        raise refusals[0]
-    return max(found, key=lambda alignment: alignment.peak)
+    return align_best(where, [(board.t_s + after_s, board_load) for after_s, board_load in tries], t_s, load)
 
 
 def _common_value(wrench: Floats) -> Floats:
@@ -181,27 +167,6 @@ def _common_value(wrench: Floats) -> Floats:
         width = max(1, len(values) // 50)
         narrowest = int(np.argmin(values[width:] - values[:-width])) if len(values) > width else 0
         result[axis] = values[narrowest : narrowest + width].mean()
-    return result
-
-
-def _means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
-    """Means (k, columns) over a board's step around ``at_s`` (k,); linear interpolation where samples are sparser.
-
-    NaN beyond the ends and in gaps.
-    """
-    good = np.isfinite(values).all(axis=1)
-    t_s, values = t_s[good], values[good]
-    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
-    low, high = (np.searchsorted(t_s, at_s + side * STEP_S) for side in (-0.5, 0.5))
-    many = high - low
-    with np.errstate(invalid="ignore", divide="ignore"):
-        result: Floats = (sums[high] - sums[low]) / many[:, None] + values[0]
-    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
-    share = (at_s - t_s[after - 1]) / (t_s[after] - t_s[after - 1])
-    line = values[after - 1] + share[:, None] * (values[after] - values[after - 1])
-    result = np.where((many >= 2)[:, None], result, line)
-    gap = (t_s[after] - t_s[after - 1] > MAX_GAP_S) & (many == 0)
-    result[gap | (at_s < t_s[0]) | (at_s > t_s[-1])] = np.nan
     return result
 
 

@@ -13,11 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import RecordingError
+from ..errors import RecordingError
+from ..wire import sensor_gen as _sensor
 
 Floats = npt.NDArray[np.float64]
 
 STEP_S = 0.01  # a board's round
+# Times after a frame's t_us at which its electrodes, on average, and its pressure are read.
+ELECTRODES_S = float(np.mean([_sensor.SLOTS.index(name) for name in _sensor.ELECTRODE_NAMES])) / _sensor.SLOT_HZ
+PDC_S = _sensor.SLOTS.index("PDC") / _sensor.SLOT_HZ
+MAX_GAP_S = 0.05  # between two samples of the reference: in a longer gap its value is unknown
 MIN_OVERLAP_S = 10.0
 MIN_OVERLAP_SHARE = 0.3  # of the shorter stream
 MIN_PEAK = 0.4  # correlation; unrelated streams of two minutes have 0.2 to 0.3
@@ -51,6 +56,16 @@ class Alignment:
     scatter_s: float
     pieces: int
     overlap_s: float
+
+    @property
+    def sigma_s(self) -> float:
+        """One standard deviation of ``offset_s``: by the scatter of the pieces, or by the peak's height and width.
+
+        A peak of correlation r moves as one of overlap_s / width_s independent values does.
+        """
+        values = max(self.overlap_s / max(self.width_s, STEP_S), 1.0)
+        by_peak = self.width_s / 2.355 * float(np.sqrt(max(1.0 / self.peak**2 - 1.0, 0.0) / values))
+        return max(by_peak, self.scatter_s / float(np.sqrt(max(self.pieces, 1))))
 
     def to_reference_s(self, t_board_s: Floats) -> Floats:
         """The reference's times (n,) at the board's times (n,), both in s."""
@@ -103,6 +118,41 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
         float(offset), drift_ppm, middle_s, peak, runner_up, clear, width_s, scatter_s=scatter, pieces=pieces,
         overlap_s=overlap_s,
     )  # fmt: skip
+
+
+def align_best(where: str, board: list[tuple[Floats, Floats]], t_s: Floats, load: Floats) -> Alignment:
+    """``align`` by each of the board's (times, loads); the result with the highest peak. Raises as ``align`` does."""
+    found: list[Alignment] = []
+    refusals: list[RecordingError] = []
+    for board_s, board_load in board:
+        try:
+            found.append(align(where, board_s, board_load, t_s, load))
+        except RecordingError as error:
+            refusals.append(error)
+    if not found:
+        raise refusals[0]
+    return max(found, key=lambda alignment: alignment.peak)
+
+
+def means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
+    """Means (k, columns) over a board's step around ``at_s`` (k,); linear interpolation where samples are sparser.
+
+    NaN beyond the ends and in gaps.
+    """
+    good = np.isfinite(values).all(axis=1)
+    t_s, values = t_s[good], values[good]
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+    low, high = (np.searchsorted(t_s, at_s + side * STEP_S) for side in (-0.5, 0.5))
+    many = high - low
+    with np.errstate(invalid="ignore", divide="ignore"):
+        result: Floats = (sums[high] - sums[low]) / many[:, None] + values[0]
+    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
+    share = (at_s - t_s[after - 1]) / (t_s[after] - t_s[after - 1])
+    line = values[after - 1] + share[:, None] * (values[after] - values[after - 1])
+    result = np.where((many >= 2)[:, None], result, line)
+    gap = (t_s[after] - t_s[after - 1] > MAX_GAP_S) & (many == 0)
+    result[gap | (at_s < t_s[0]) | (at_s > t_s[-1])] = np.nan
+    return result
 
 
 def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:

@@ -1,0 +1,28 @@
+"""MATLAB: one struct per finger, ``finger0.frames.force_n``, and ``columns``, which describes them; also for Octave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from scipy.io import savemat
+
+from ..recording.reader import Recording
+from .columns import EXPORTED, Show, Table
+
+KINDS_APART = False
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """Write a file of version 5. Its texts, such as the label, are character matrices."""
+    fingers: dict[str, Any] = {}
+    for k, table in enumerate(made):
+        show(k / len(made))
+        fingers.setdefault(f"finger{table.finger}", {"frame_id": table.frame_id})[table.kind] = table.arrays
+    columns = {
+        kind: {c.name: {"unit": c.unit, "what": c.what, "parts": list(c.parts)} for c in fields}
+        for kind, fields in EXPORTED.items()
+    }
+    about = {"metadata": recording.metadata, "columns": columns}
+    with place.open("wb") as file:
+        savemat(file, fingers | about, do_compression=True, oned_as="column")
