@@ -106,10 +106,31 @@ static uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place
     return store(context, map_id(finger), BT_MAP_RECORD_VERSION, record, bytes);
 }
 
-static uint8_t reboot_bootloader(void *context)
+static uint8_t leave(void *context, bool into_bootloader)
 {
     const bt_gateway *gateway = context;
-    return port_reboot_bootloader(gateway->port) ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
+    return port_reboot(gateway->port, into_bootloader) ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
+}
+
+static void measure(void *context, bt_msg_board_facts *msg)
+{
+    const bt_gateway *gateway = context;
+    const port_facts facts = port_measure(gateway->port);
+    msg->t_us = facts.t_us;
+    msg->usb_frame = facts.usb_frame;
+    msg->usb_starts = facts.usb_starts;
+    msg->chip_id = facts.chip_id;
+    memcpy(msg->flash_id, facts.flash_id, sizeof msg->flash_id);
+    msg->erase_us = facts.erase_us;
+    msg->supply_mv = facts.supply_mv;
+    msg->die_centi_c = facts.die_centi_c;
+    msg->bus_khz = facts.bus_khz;
+}
+
+static void clock_bus(void *context, uint16_t khz)
+{
+    const bt_gateway *gateway = context;
+    port_spi_rate(gateway->port, khz);
 }
 
 // ------------------------------------------------------------------------------------------------------
@@ -157,7 +178,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         .save_settings = save_settings,
         .save_calibration = save_calibration,
         .save_map = save_map,
-        .reboot_bootloader = reboot_bootloader,
+        .reboot = leave,
+        .measure = measure,
+        .set_bus_rate = clock_bus,
         .maps = &gateway->map_flash,
         .now_us = now_us,
     };

@@ -7,7 +7,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x94D13E9Fu
+#define BT_SCHEMA_HASH 0x84AFE357u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -445,6 +445,22 @@ typedef struct {
     uint32_t energy_q4[6]; // [count^2 q4] energy of each band over the round, in 1/16 count^2, lowest band first; 0xFFFFFFFF: no good word
 } bt_msg_bands;
 
+// What a board measures of itself. Reply to GET_BOARD_FACTS.
+#define BT_BOARD_FACTS_ID 0x19
+#define BT_BOARD_FACTS_BYTES 28
+typedef struct {
+    uint8_t req_id; // [1] as in the command
+    uint32_t t_us; // [us] device time at which usb_frame and usb_starts were read
+    uint16_t usb_frame; // [1] number of USB's latest frame, one a ms by the host's clock; 0xFFFF: no USB
+    uint32_t usb_starts; // [1] starts of frame received since boot; wraps
+    uint32_t chip_id; // [1] the microcontroller's own id of its kind and revision; 0: unknown
+    uint8_t flash_id[3]; // [1] JEDEC id of the flash chip: maker, kind, log2 of its bytes; 0: unknown
+    uint32_t erase_us; // [us] longest erase of a flash sector since boot; 0: none
+    uint16_t supply_mv; // [mV] the board's supply, before its regulator; 0: not measured
+    int16_t die_centi_c; // [1/100 degree Celsius] temperature of the microcontroller; -32768: not measured
+    uint16_t bus_khz; // [kHz] clock rate of the sensors' bus
+} bt_msg_board_facts;
+
 // First command of a host. Allowed at any time.
 #define BT_HELLO_REQUEST_ID 0x80
 #define BT_HELLO_REQUEST_BYTES 5
@@ -552,12 +568,12 @@ typedef struct {
     int32_t value; // [the setting's] new value
 } bt_msg_set_setting;
 
-// Restart into the board's boot loader: the board replies, leaves USB and comes back as a drive. Allowed at any time.
+// Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed at any time.
 #define BT_REBOOT_BOOTLOADER_ID 0x8D
 #define BT_REBOOT_BOOTLOADER_BYTES 5
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint32_t magic; // [1] 0xB0071DE5; anything else is refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
+    uint32_t magic; // [1] 0xB0071DE5: into its boot loader; 0x2E57A27A: into its firmware again; anything else is refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
 } bt_msg_reboot_bootloader;
 
 // Store settings, calibrations and maps permanently. Refused while streaming, as slots are lost while flash is written. If power fails, the settings and each finger's calibration and map are each either old or new, never mixed.
@@ -673,6 +689,21 @@ typedef struct {
     uint32_t finger_faults[5]; // [flags frame] STATUS.finger_faults as it was read
 } bt_msg_clear_faults;
 
+// Ask for BOARD_FACTS.
+#define BT_GET_BOARD_FACTS_ID 0x9B
+#define BT_GET_BOARD_FACTS_BYTES 1
+typedef struct {
+    uint8_t req_id; // [1] 1 to 255
+} bt_msg_get_board_facts;
+
+// Clock the sensors' bus at the nearest rate the board has, not above this, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin. Values read meanwhile mean nothing. Refused while streaming.
+#define BT_SET_BUS_RATE_ID 0x9C
+#define BT_SET_BUS_RATE_BYTES 3
+typedef struct {
+    uint8_t req_id; // [1] 1 to 255
+    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, nor goes below the usual rate
+} bt_msg_set_bus_rate;
+
 // State of an emulated sensor board. Reply to every EMU command. Counters start at EMU_PLUG of finger 0.
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 39
@@ -767,6 +798,7 @@ static const uint8_t bt_client_layout[] = {
     BT_TOUCH_ID, 4, 0x41, 0x81, 0x02, 0x81,
     BT_EVENT_ID, 5, 0x41, 0x81, 0x04, 0x82, 0x41,
     BT_BANDS_ID, 4, 0x41, 0x81, 0x02, 0x86,
+    BT_BOARD_FACTS_ID, 7, 0x01, 0x81, 0x41, 0x82, 0x03, 0x81, 0x43,
     BT_HELLO_REQUEST_ID, 2, 0x01, 0x81,
     BT_START_ID, 2, 0x03, 0x41,
     BT_STOP_ID, 1, 0x01,
@@ -794,6 +826,8 @@ static const uint8_t bt_client_layout[] = {
     BT_HOLD_ID, 1, 0x02,
     BT_RELEASE_ID, 1, 0x02,
     BT_CLEAR_FAULTS_ID, 3, 0x01, 0x41, 0x85,
+    BT_GET_BOARD_FACTS_ID, 1, 0x01,
+    BT_SET_BUS_RATE_ID, 2, 0x01, 0x41,
     BT_EMU_STATUS_ID, 7, 0x02, 0x81, 0x41, 0x85, 0x41, 0x82, 0x01,
     BT_EMU_PLUG_ID, 1, 0x13,
     BT_EMU_TAPE_ID, 6, 0x03, 0x81, 0x3F, 0x3F, 0x3F, 0x1F,
@@ -820,6 +854,7 @@ _Static_assert(sizeof(bt_msg_idle) == 28, "numbers lie at multiples of their siz
 _Static_assert(sizeof(bt_msg_touch) == 16, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_event) == 24, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_bands) == 36, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_board_facts) == 36, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_hello_request) == 8, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_start) == 6, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_stop) == 1, "numbers lie at multiples of their size");
@@ -847,6 +882,8 @@ _Static_assert(sizeof(bt_msg_clear_map) == 2, "numbers lie at multiples of their
 _Static_assert(sizeof(bt_msg_hold) == 2, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_release) == 2, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_clear_faults) == 24, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_get_board_facts) == 1, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_set_bus_rate) == 4, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_emu_status) == 48, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_emu_plug) == 19, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_emu_tape) == 228, "numbers lie at multiples of their size");
@@ -874,6 +911,7 @@ _Static_assert(sizeof(bt_msg_emu_keep) == 12, "numbers lie at multiples of their
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
+#define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
@@ -901,6 +939,8 @@ _Static_assert(sizeof(bt_msg_emu_keep) == 12, "numbers lie at multiples of their
 #define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_CLEAR_FAULTS_FIELDS(X) X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
+#define BT_GET_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1)
+#define BT_SET_BUS_RATE_FIELDS(X) X(req_id, u8, 1) X(bus_khz, u16, 1)
 #define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1) X(rounds_moved, i32, 1) X(loop_slots, u32, 1) X(looping, u8, 1)
 #define BT_EMU_PLUG_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(serial, u8, 16)
 #define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
@@ -908,7 +948,7 @@ _Static_assert(sizeof(bt_msg_emu_keep) == 12, "numbers lie at multiples of their
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1)
 #define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif

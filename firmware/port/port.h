@@ -73,9 +73,30 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
 // The slots for maps as memory, which changes as they are erased and programmed. Aligned to 4 bytes.
 const uint8_t *port_flash_maps(bt_port *port);
 
-// Enter the bootloader as soon as what was written to the link is out, or after a short while. False if this
-// board has none.
-bool port_reboot_bootloader(bt_port *port);
+// Restart, into the bootloader or into the firmware again, as soon as what was written to the link is out, or
+// after a short while. False if this board cannot.
+bool port_reboot(bt_port *port, bool into_bootloader);
+
+// ---- what a board measures of itself, for whoever brings it up -------------------------------
+typedef struct {
+    uint32_t t_us;       // when the next two were read
+    uint16_t usb_frame;  // 0xFFFF: no USB
+    uint32_t usb_starts; // of frame, since boot
+    uint32_t chip_id;    // 0: unknown; likewise down to supply_mv
+    uint8_t flash_id[3];
+    uint32_t erase_us; // the longest of a sector so far
+    uint16_t supply_mv;
+    int16_t die_centi_c; // PORT_NOT_MEASURED: unknown
+    uint16_t bus_khz;
+} port_facts;
+#define PORT_NOT_MEASURED INT16_MIN
+#define PORT_NO_FACTS                                                                                        \
+    ((port_facts){.usb_frame = UINT16_MAX, .die_centi_c = PORT_NOT_MEASURED, .bus_khz = 4400})
+port_facts port_measure(bt_port *port);
+
+// From the next slot on, clock SPI at the fastest rate there is up to this one, but not below the usual; 0:
+// the usual one. Does nothing where the rate is fixed.
+void port_spi_rate(bt_port *port, uint32_t khz);
 
 // ---- identity -------------------------------------------------------------------------------
 #define PORT_SERIAL_BYTES 12

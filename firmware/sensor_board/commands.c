@@ -147,7 +147,7 @@ static void obey(uint8_t id, const uint8_t *payload)
     case BT_REBOOT_BOOTLOADER_ID:
         bt_msg_reboot_bootloader_unpack(&got.reboot, payload);
         error = got.reboot.magic != BT_BOOTLOADER_MAGIC ? BT_ERROR_OUT_OF_RANGE
-                : port_reboot_bootloader(ONLY_BOARD)    ? BT_ERROR_OK
+                : port_reboot(ONLY_BOARD, true)         ? BT_ERROR_OK
                                                         : BT_ERROR_NOT_HERE;
         reply(req_id, id, error);
         return;

@@ -171,10 +171,19 @@ void port_flash_read(bt_port *board, uint32_t offset, uint8_t *data, size_t byte
     memset(data, 0xFF, bytes);
 }
 
-bool port_reboot_bootloader(bt_port *board)
+bool port_reboot(bt_port *board, bool into_bootloader)
 {
     (void)board;
     return false;
+}
+
+port_facts port_measure(bt_port *board)
+{
+    return PORT_NO_FACTS;
+}
+
+void port_spi_rate(bt_port *board, uint32_t khz)
+{
 }
 
 // ---- identity ---------------------------------------------------------------------------------

@@ -170,10 +170,19 @@ const uint8_t *port_flash_maps(bt_port *port)
     return fake.kept + BT_STORAGE_BYTES;
 }
 
-bool port_reboot_bootloader(bt_port *port)
+bool port_reboot(bt_port *port, bool into_bootloader)
 {
     fake.reboots++;
     return fake.has_loader;
+}
+
+port_facts port_measure(bt_port *port)
+{
+    return PORT_NO_FACTS;
+}
+
+void port_spi_rate(bt_port *port, uint32_t khz)
+{
 }
 
 port_identity port_identify(bt_port *port)

@@ -45,6 +45,8 @@ COMMANDS = {
     wire.ClearMap: ((0,), wire.Reply),
     wire.SaveSettings: ((), wire.Reply),
     wire.ClearFaults: ((0, (0,) * 5), wire.Reply),
+    wire.GetBoardFacts: ((), wire.BoardFacts),
+    wire.SetBusRate: ((0,), wire.BoardFacts),
     wire.RebootBootloader: ((1,), wire.Reply),  # not the magic number: refused, and it stays
 }
 REFUSED = [

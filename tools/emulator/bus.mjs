@@ -23,13 +23,13 @@ const SETUP_REC = 1 << 17
 const SUSPENDED = 1 << 4
 const SOF_RD = 0x48
 const RESET_USBCTRL = 1 << 24
-const FRAME_NS = 1e6
 const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
 const BITS_PER_S = 12e6
 
 export class UsbBus {
-  constructor(mcu) {
+  constructor(mcu, board) {
     this.mcu = mcu
+    this.board = board
     this.usb = mcu.usbCtrl
     this.view = mcu.usbDPRAMView
     this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
@@ -204,6 +204,12 @@ export class UsbBus {
     }
     usb.readUint32 = (offset) =>
       // A device reads the host's frame number there.
-      offset === SOF_RD ? Math.floor((this.hungAt ?? this.mcu.clock.nanos) / FRAME_NS) & 0x7ff : read(offset)
+      offset === SOF_RD ? this.#frame() : read(offset)
+  }
+
+  /** The number of the latest frame whose start has come. */
+  #frame() {
+    const frame = Math.floor((this.hungAt ?? this.mcu.clock.nanos) / this.board.frameNanos)
+    return (frame % this.board.lostFrames === 1 ? frame - 1 : frame) & 0x7ff
   }
 }

@@ -39,6 +39,7 @@ const OUTOVER = 3 << 8
 const READ = 0x03
 const READ_STATUS_2 = 0x35
 const READ_UNIQUE_ID = 0x4b
+const READ_JEDEC_ID = 0x9f
 const READ_QUAD = 0xeb
 const UNIQUE_ID_DUMMIES = 4
 const QUAD_ENABLE = 2 // in status register 2
@@ -222,6 +223,7 @@ export class Flash {
     const command = this.sent[0] & 0xff
     if (command === READ_STATUS_2) return this.board.quad === null ? NOTHING : this.board.quad ? QUAD_ENABLE : 0
     if (command === READ_UNIQUE_ID && at >= UNIQUE_ID_DUMMIES) return this.board.uniqueId[at - UNIQUE_ID_DUMMIES] ?? NOTHING
+    if (command === READ_JEDEC_ID) return this.board.flashId[at] ?? NOTHING
     return NOTHING
   }
 }

@@ -78,7 +78,12 @@ export class Rig {
       'touch at 1200 baud': () => this.usb.touch(1200),
       'stretch a word': () => (this.sensors.stretched = true),
       'corrupt a handshake': () => (this.usb.corrupting = true),
-      'wear the flash out': () => (this.board.worn = true),
+      'wear the flash out': () => Object.assign(this.board, { eraseNanos: 400e6, programNanos: 3e6 }), // data sheet
+      'erase in (\\d+) ms': (ms) => (this.board.eraseNanos = Number(ms) * 1e6),
+      'flash chip (\\w{6})': (id) => (this.board.flashId = [...Buffer.from(id, 'hex')]),
+      'supply at (\\d+) mV': (mv) => (this.board.supplyMv = Number(mv)),
+      'clock ([0-9.]+) times as fast': (times) => (this.board.frameNanos = 1e6 * Number(times)),
+      'lose a start of frame in (\\d+)': (n) => (this.board.lostFrames = Number(n)),
       'flip a written bit': () => (this.machine.mcu.flash[this.board.writtenAt + 40] ^= 1),
       'switch off quad reads': () => (this.board.quad = false),
       'silence the flash': () => (this.board.quad = null),
@@ -97,7 +102,8 @@ export class Rig {
         this.vcd = new Vcd(file)
         this.#analyse()
       },
-      // of the sensors' board
+      'late bits above ([0-9.]+) MHz': (mhz) => (this.sensors.lateAboveHz = Number(mhz) * 1e6),
+      'finger (\\d) feels ([0-9.]+) of (\\w+)': (finger, share, channel) => this.sensors.weaken(Number(finger), channel, Number(share)),
       'lead (\\w+) to (\\w+)': (name, end) => this.sensors.connect(name, end === 'nothing' ? null : end),
       'write uf2 (.+)': (file) => {
         if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
@@ -186,7 +192,7 @@ export class Rig {
       this.timing.sampled(mosi, machine.time.nanos)
       if ((this.waiting && this.sensors.started) || this.sensors.over) machine.time.hold()
     }
-    this.usb = new UsbHost(machine.mcu, {
+    this.usb = new UsbHost(machine.mcu, this.board, {
       onData: (bytes) => {
         this.latency.received(bytes, machine.time.nanos)
         this.port.put(bytes)

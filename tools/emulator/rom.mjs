@@ -13,8 +13,6 @@ const BKPT = 0xbe00
 const BX_LR = 0x4770
 const WFI_FOREVER = [0xbf30, 0xe7fd] // wfi; b back to it
 const THUMB = 1
-const WORN_ERASE_NS = 400e6 // the most that the data sheet allows
-const WORN_PROGRAM_NS = 3e6
 const CYCLE_NS = 8
 
 const ROSC = 0x40060
@@ -26,7 +24,13 @@ export class Board {
     this.uniqueId = uniqueId
     this.random = randomInt(1, 2 ** 31) // no two programs boot alike
     this.cutAfter = null // bytes erased or programmed until power fails
-    this.worn = false // its flash takes the longest that it may
+    this.eraseNanos = ERASE_NS // of its flash, a sector
+    this.programNanos = PROGRAM_NS // a page
+    this.flashId = [0xef, 0x40, 0x15] // W25Q16JV
+    this.frameNanos = 1e6 // of the host's USB, by this board's clock
+    this.lostFrames = Infinity // one start of frame in so many does not come
+    this.supplyMv = 4750 // VBUS less a diode
+    this.celsius = 27
     this.quad = true // its flash has all four lines switched on; null: it does not even say
     this.writtenAt = null // where it was programmed last
     this.counters = { erases: 0, programs: 0, bytes: 0, misses: 0, wrong: [] }
@@ -65,6 +69,7 @@ export class BootRom {
     correctDma(mcu, time, (what) => this.#wrong(what))
     this.#install()
     this.#randomBit()
+    this.#measures()
   }
 
   #install() {
@@ -124,7 +129,7 @@ export class BootRom {
     const [at, bytes] = this.#r
     if (!this.#allowed(at, bytes, SECTOR, 'erase')) return
     this.board.counters.erases++
-    this.#spend(((this.board.worn ? WORN_ERASE_NS : ERASE_NS) * bytes) / SECTOR)
+    this.#spend((this.board.eraseNanos * bytes) / SECTOR)
     this.#change(at, bytes, () => 0xff)
   }
 
@@ -132,7 +137,7 @@ export class BootRom {
     const [at, from, bytes] = this.#r
     if (!this.#allowed(at, bytes, PAGE, 'program')) return
     this.board.counters.programs++
-    this.#spend(((this.board.worn ? WORN_PROGRAM_NS : PROGRAM_NS) * bytes) / PAGE)
+    this.#spend((this.board.programNanos * bytes) / PAGE)
     this.board.writtenAt = at
     this.#change(at, bytes, (k) => this.mcu.flash[at + k] & this.mcu.readUint8(from + k))
   }
@@ -146,6 +151,17 @@ export class BootRom {
   #randomBit() {
     const rosc = this.mcu.peripherals[ROSC]
     rosc.readUint32 = (offset) => (offset === ROSC_RANDOMBIT ? this.board.randomBit() : 0)
+  }
+
+  /** GPIO 29 has a third of the supply on a Pico; channel 4 is the chip's own temperature (4.9.5). */
+  #measures() {
+    const adc = this.mcu.adc
+    adc.onADCRead = (channel) => {
+      const millivolts = channel === 3 ? this.board.supplyMv / 3 : channel === 4 ? 706 - 1.721 * (this.board.celsius - 27) : 0
+      adc.channelValues[channel] = Math.round((millivolts * 4096) / 3300)
+      adc.currentChannel = channel
+      adc.sampleAlarm.schedule(adc.sampleTime * 1000)
+    }
   }
 
   /** The program is gone: its interrupts and its watchdog are off. What the loader then does: loader.mjs. */

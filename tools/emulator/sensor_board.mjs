@@ -173,11 +173,12 @@ export class SensorBoard {
       }
     })
     this.selectFell = null
-    this.rom = new BootRom(machine, new Board({ uniqueId: [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x5e] }), {
+    const board = new Board({ uniqueId: [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x5e] })
+    this.rom = new BootRom(machine, board, {
       onLoader: () => {},
       onCut: () => {},
     })
-    this.usb = new UsbHost(mcu, {
+    this.usb = new UsbHost(mcu, board, {
       onData: (bytes) => this.port.put(bytes),
       canTake: () => this.port.hasRoom,
       take: (n) => this.port.take(n),

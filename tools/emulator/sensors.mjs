@@ -1,5 +1,7 @@
 // The emulated BioTacs on the chip's SPI0: firmware/emu/ as WebAssembly, called in the middle of a transfer, so
 // that what a sensor answers follows from the exact emulated time of each edge.
+import fs from 'node:fs'
+
 import { GPIOPinState } from 'rp2040js'
 
 import { onReset } from './faults.mjs'
@@ -12,7 +14,14 @@ const SPI_FUNCTION = 1
 export const WIDTHS = [8, 16] // of a property's byte; of all else
 const STRETCH_NS = 150e3
 const FASTEST_HZ = 10e6 // data sheet
+const COMMANDS = new Map(
+  JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.channel.map(({ name, command }) => [name, command]),
+)
 const RESET_SPI0 = 1 << 16
+const SAMPLE_COMMAND = 0x80 // and above
+
+/** A byte with an odd number of ones, as all of a sample have. */
+const odd = (byte) => (byte.toString(2).split('1').length - 1) % 2 === 1
 
 /** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
 export class Sensors {
@@ -27,6 +36,10 @@ export class Sensors {
     if (wrong !== 0) throw new Error(this.#text(wrong))
     this.overlaps = 0 // transfers with more than one chip select low: commands to all, else contention
     this.misconfigured = 0
+    this.ends = CHIP_SELECTS.map((_, finger) => 1 << finger) // of the selects' leads: whom each selects
+    this.lateAboveHz = Infinity // MISO is a bit late at faster clocks
+    this.weak = new Map() // finger and channel: [share of what it should feel, its count at first]
+    this.command = 0 // that was sent last
     this.stretched = false // the next word takes longer than any driver waits
     this.selected = 0 // ns, when a chip select last fell
     this.shortestSetup = Infinity // ns from there to a word
@@ -58,11 +71,13 @@ export class Sensors {
   /** Solder them to a chip. nanos() is the time the sensors live in. */
   wire(mcu, nanos) {
     const spi = mcu.spi[0]
+    let low = 0
     let mask = 0
     CHIP_SELECTS.forEach((pin, finger) => {
       mcu.gpio[pin].addListener((state) => {
         // A pin that is not driven is pulled up at the sensor.
-        mask = state === GPIOPinState.Low ? mask | (1 << finger) : mask & ~(1 << finger)
+        low = state === GPIOPinState.Low ? low | (1 << finger) : low & ~(1 << finger)
+        mask = this.ends.reduce((all, end, lead) => (low & (1 << lead) ? all | end : all), 0)
         if (state === GPIOPinState.Low) this.selected = mcu.clock.nanos
         this.calls.select(mask, nanos())
       })
@@ -82,6 +97,9 @@ export class Sensors {
       this.stretched = false
       if (mask & (mask - 1)) this.overlaps++
       word = this.#answer(mcu, spi, mosi, nanos())
+      if (mosi >> 8 >= SAMPLE_COMMAND) this.command = mosi >> 8
+      else if (this.weak.size > 0) word = this.#weakened(word, Math.log2(mask))
+      if (spi.clockFrequency > this.lateAboveHz) word >>>= 1
       // As published a transfer takes no time at all.
       done.schedule(Math.max(1, Math.round(spi.dataBits * (mcu.clkSys / spi.clockFrequency))) * (1e9 / mcu.clkSys) + late)
     }
@@ -95,6 +113,28 @@ export class Sensors {
       return 0xffff
     }
     return spi.dataBits === 8 ? this.calls.transfer_byte(mosi, nanos) : this.calls.transfer(mosi, nanos)
+  }
+
+  /** Have a select's lead end at another finger, or nowhere (null), by the names SS0 to SS4. */
+  connect(name, end) {
+    const [lead, finger] = [name, end].map((one) => (one === null ? null : Number(/^SS([0-4])$/.exec(one)?.[1] ?? NaN)))
+    if (Number.isNaN(lead) || Number.isNaN(finger)) throw new Error(`no lead ${name} to ${end}: expected SS0 to SS4`)
+    this.ends[lead] = finger === null ? 0 : 1 << finger
+  }
+
+  /** A finger's channel moves by this share of what it should; 0: it is stuck. */
+  weaken(finger, channel, share) {
+    this.weak.set(`${finger} ${COMMANDS.get(channel)}`, [share, null])
+  }
+
+  #weakened(word, finger) {
+    const fault = this.weak.get(`${finger} ${this.command}`)
+    if (fault === undefined || !odd(word >> 8) || !odd(word & 0xff)) return word
+    const count = (word >> 9) * 32 + ((word >> 3) & 31)
+    fault[1] ??= count
+    const felt = Math.round(fault[1] + (count - fault[1]) * fault[0])
+    const [high, low] = [(felt >> 5) << 1, (felt & 31) << 3]
+    return ((odd(high) ? high : high | 1) << 8) | (odd(low) ? low : low | 1)
   }
 
   #bytes() {

@@ -33,8 +33,8 @@ const u16 = (value) => [value & 0xff, value >> 8]
 
 export class UsbHost {
   /** onData(bytes) gets what the device sends; canTake() says whether more may come. */
-  constructor(mcu, { onData, canTake, take }) {
-    this.bus = new UsbBus(mcu)
+  constructor(mcu, board, { onData, canTake, take }) {
+    this.bus = new UsbBus(mcu, board)
     this.usb = mcu.usbCtrl
     this.onData = onData
     this.canTake = canTake

@@ -79,6 +79,7 @@ def header(contract: Contract) -> str:
         "",
         *constants(contract),
         f"#define BT_BOOTLOADER_MAGIC 0x{wire['bootloader_magic']:08X}u // of REBOOT_BOOTLOADER",
+        f"#define BT_RESTART_MAGIC 0x{wire['restart_magic']:08X}u // likewise",
         f"#define BT_COMMAND_REQ_ID_AT {REQ_ID_AT} // in every command's payload",
         f"#define BT_COMMAND_FINGER_AT {FINGER_AT} // in that of every command to one finger",
         f"#define BT_USB_VENDOR 0x{contract.link['usb']['vendor']:04X}",

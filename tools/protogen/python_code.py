@@ -108,6 +108,7 @@ def wire(contract: Contract) -> str:
         f"MAX_FRAME_BYTES = {link['wire']['max_frame_bytes']}",
         f"INVALID_COUNT = 0x{link['wire']['invalid_count']:04X}",
         f"BOOTLOADER_MAGIC = 0x{link['wire']['bootloader_magic']:08X}",
+        f"RESTART_MAGIC = 0x{link['wire']['restart_magic']:08X}",
         *(f"USB_{name.upper()} = 0x{value:04X}" for name, value in link["usb"].items()),
         "INVALID_I16 = -(2**15)",
         "INVALID_I32 = -(2**31)",

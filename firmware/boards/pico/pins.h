@@ -34,6 +34,8 @@
 #define PINS_BOARD   "pico"
 // The Pico's own regulator, not on a board pin: high keeps it from its power-save mode, which ripples more.
 #define PIN_SMPS_PWM 23
+// A third of VSYS, at the ADC; on a Pico W it is the radio's clock, too.
+#define PIN_SUPPLY   29
 #endif
 
 #endif

@@ -59,6 +59,7 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     if (msg.streams == 0) {
         bt_session_stop(session);
     }
+    bt_session_end_trial(session);
     session->streams = msg.streams;
     session->fingers = msg.fingers;
     session->keepalive_ms = msg.keepalive_ms;
@@ -315,11 +316,37 @@ static uint8_t reboot(bt_session *session, const uint8_t *payload)
 {
     bt_msg_reboot_bootloader msg;
     bt_msg_reboot_bootloader_unpack(&msg, payload);
-    if (msg.magic != BT_BOOTLOADER_MAGIC) {
+    if (msg.magic != BT_BOOTLOADER_MAGIC && msg.magic != BT_RESTART_MAGIC) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE
-                                                    : session->board.reboot_bootloader(session->context);
+    return session->board.reboot == NULL
+               ? BT_ERROR_NOT_HERE
+               : session->board.reboot(session->context, msg.magic == BT_BOOTLOADER_MAGIC);
+}
+
+static uint8_t get_board_facts(bt_session *session, const uint8_t *payload)
+{
+    uint8_t out[BT_BOARD_FACTS_BYTES];
+    bt_msg_board_facts msg = {.req_id = payload[BT_COMMAND_REQ_ID_AT]};
+    if (session->board.measure == NULL) {
+        return BT_ERROR_NOT_HERE;
+    }
+    session->board.measure(session->context, &msg);
+    bt_msg_board_facts_pack(&msg, out);
+    bt_session_send(session, BT_BOARD_FACTS_ID, out);
+    return BT_ERROR_OK;
+}
+
+static uint8_t set_bus_rate(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_set_bus_rate msg;
+    bt_msg_set_bus_rate_unpack(&msg, payload);
+    if (session->board.set_bus_rate == NULL) {
+        return BT_ERROR_NOT_HERE;
+    }
+    session->bus_tried = true;
+    session->board.set_bus_rate(session->context, msg.bus_khz);
+    return get_board_facts(session, payload);
 }
 
 enum check {
@@ -361,6 +388,8 @@ static const struct {
     {BT_CLEAR_MAP_ID, FINGER | STOPPED | MAPS, bt_map_clear},
     {BT_SAVE_SETTINGS_ID, STOPPED, save},
     {BT_REBOOT_BOOTLOADER_ID, 0, reboot},
+    {BT_GET_BOARD_FACTS_ID, ANSWERS, get_board_facts},
+    {BT_SET_BUS_RATE_ID, ANSWERS | STOPPED, set_bus_rate},
 };
 
 static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *payload)

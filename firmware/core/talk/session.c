@@ -101,12 +101,21 @@ uint8_t bt_session_present(const bt_session *session)
     return mask;
 }
 
+void bt_session_end_trial(bt_session *session)
+{
+    if (session->bus_tried) {
+        session->bus_tried = false;
+        session->board.set_bus_rate(session->context, 0);
+    }
+}
+
 void bt_session_stop(bt_session *session)
 {
     session->streams = 0;
     session->keepalive_ms = 0;
     session->upload.open = false;
     session->other = session->refused = 0;
+    bt_session_end_trial(session);
     bt_session_use_settings(session);
 }
 

@@ -32,9 +32,11 @@ typedef struct {
     uint8_t (*save_settings)(void *context, const bt_settings *settings);
     uint8_t (*save_calibration)(void *context, uint8_t finger, const bt_calibration *calibration);
     uint8_t (*save_map)(void *context, uint8_t finger, const bt_map_place *place);
-    uint8_t (*reboot_bootloader)(void *context); // OK: it happens once the reply is out
-    const bt_map_flash *maps;                    // where wrench maps are kept; NULL: nowhere
-    uint32_t (*now_us)(void *context);           // device time; NULL: the board is never short of time
+    uint8_t (*reboot)(void *context, bool into_bootloader); // OK: it happens once the reply is out
+    void (*measure)(void *context, bt_msg_board_facts *facts);
+    void (*set_bus_rate)(void *context, uint16_t khz); // 0: the usual one
+    const bt_map_flash *maps;                          // where wrench maps are kept; NULL: nowhere
+    uint32_t (*now_us)(void *context);                 // device time; NULL: the board is never short of time
 } bt_board_actions;
 
 // Finger-rounds of FRAME streams in which something was skipped because nobody needed it; wrap at 2^32.
@@ -62,6 +64,7 @@ typedef struct {
     uint8_t unsure;  // may be another sensor than info says
     uint8_t other;   // is another one than at START
     uint8_t refused; // likewise, and calibration or map are not its own
+    bool bus_tried;  // at a rate of SET_BUS_RATE
     bt_settings settings;
     bt_calibration calibration[BT_MAX_FINGERS];
     uint8_t calibration_state[BT_MAX_FINGERS]; // enum bt_calibration_state; derived from the above
@@ -114,6 +117,9 @@ void bt_session_use_settings(bt_session *session);
 
 // End every stream. A change of sensor that had to wait for this takes effect.
 void bt_session_stop(bt_session *session);
+
+// The sensors' bus is at its usual rate again.
+void bt_session_end_trial(bt_session *session);
 
 // Finger f's sensor has told its serial number; other: it is not the one that was there before.
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);

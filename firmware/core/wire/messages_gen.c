@@ -832,6 +832,53 @@ void bt_msg_bands_unpack(bt_msg_bands *msg, const uint8_t in[BT_BANDS_BYTES])
     (void)at;
 }
 
+void bt_msg_board_facts_pack(const bt_msg_board_facts *msg, uint8_t out[BT_BOARD_FACTS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->t_us, 4);
+    at = put(at, (uint32_t)msg->usb_frame, 2);
+    at = put(at, (uint32_t)msg->usb_starts, 4);
+    at = put(at, (uint32_t)msg->chip_id, 4);
+    for (int k = 0; k < 3; k++) {
+        at = put(at, (uint32_t)msg->flash_id[k], 1);
+    }
+    at = put(at, (uint32_t)msg->erase_us, 4);
+    at = put(at, (uint32_t)msg->supply_mv, 2);
+    at = put(at, (uint32_t)msg->die_centi_c, 2);
+    at = put(at, (uint32_t)msg->bus_khz, 2);
+    (void)at;
+}
+
+void bt_msg_board_facts_unpack(bt_msg_board_facts *msg, const uint8_t in[BT_BOARD_FACTS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->t_us = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->usb_frame = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->usb_starts = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->chip_id = (uint32_t)value;
+    for (int k = 0; k < 3; k++) {
+        at = get(at, &value, 1);
+        msg->flash_id[k] = (uint8_t)value;
+    }
+    at = get(at, &value, 4);
+    msg->erase_us = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->supply_mv = (uint16_t)value;
+    at = get(at, &value, 2);
+    msg->die_centi_c = (int16_t)value;
+    at = get(at, &value, 2);
+    msg->bus_khz = (uint16_t)value;
+    (void)at;
+}
+
 void bt_msg_hello_request_pack(const bt_msg_hello_request *msg, uint8_t out[BT_HELLO_REQUEST_BYTES])
 {
     uint8_t *at = out;
@@ -1401,6 +1448,41 @@ void bt_msg_clear_faults_unpack(bt_msg_clear_faults *msg, const uint8_t in[BT_CL
     (void)at;
 }
 
+void bt_msg_get_board_facts_pack(const bt_msg_get_board_facts *msg, uint8_t out[BT_GET_BOARD_FACTS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    (void)at;
+}
+
+void bt_msg_get_board_facts_unpack(bt_msg_get_board_facts *msg, const uint8_t in[BT_GET_BOARD_FACTS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_set_bus_rate_pack(const bt_msg_set_bus_rate *msg, uint8_t out[BT_SET_BUS_RATE_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->bus_khz, 2);
+    (void)at;
+}
+
+void bt_msg_set_bus_rate_unpack(bt_msg_set_bus_rate *msg, const uint8_t in[BT_SET_BUS_RATE_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->bus_khz = (uint16_t)value;
+    (void)at;
+}
+
 void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES])
 {
     uint8_t *at = out;
@@ -1633,6 +1715,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_EVENT_BYTES;
     case BT_BANDS_ID:
         return BT_BANDS_BYTES;
+    case BT_BOARD_FACTS_ID:
+        return BT_BOARD_FACTS_BYTES;
     case BT_HELLO_REQUEST_ID:
         return BT_HELLO_REQUEST_BYTES;
     case BT_START_ID:
@@ -1687,6 +1771,10 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_RELEASE_BYTES;
     case BT_CLEAR_FAULTS_ID:
         return BT_CLEAR_FAULTS_BYTES;
+    case BT_GET_BOARD_FACTS_ID:
+        return BT_GET_BOARD_FACTS_BYTES;
+    case BT_SET_BUS_RATE_ID:
+        return BT_SET_BUS_RATE_BYTES;
     case BT_EMU_STATUS_ID:
         return BT_EMU_STATUS_BYTES;
     case BT_EMU_PLUG_ID:

@@ -258,9 +258,18 @@ void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
 {
 }
 
-bool port_reboot_bootloader(bt_port *port)
+bool port_reboot(bt_port *port, bool into_bootloader)
 {
     return false; // a process has no loader
+}
+
+port_facts port_measure(bt_port *port)
+{
+    return PORT_NO_FACTS;
+}
+
+void port_spi_rate(bt_port *port, uint32_t khz)
+{
 }
 
 // ---- identity ---------------------------------------------------------------------------------

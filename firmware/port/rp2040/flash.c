@@ -19,6 +19,8 @@
 #define BOOT2_WORDS  64
 #define SECTOR_ERASE 0x20 // the flash's command for BT_FLASH_SECTOR_BYTES
 
+#define JEDEC_ID_COMMAND 0x9F // then three bytes
+
 // Read unique ID: the command, four dummy bytes, then the eight of the number.
 #define UNIQUE_ID_COMMAND 0x4B
 #define UNIQUE_ID_AT      5
@@ -40,6 +42,8 @@ static struct {
 // boot2 in SRAM: it makes the flash readable again.
 static uint32_t boot2_copy[BOOT2_WORDS];
 static bool usable;
+uint8_t flash_jedec_id[3];
+uint32_t flash_erase_us;
 
 void flash_start(void)
 {
@@ -80,9 +84,12 @@ bool port_flash_erase(bt_port *port, uint32_t sector_offset)
         return false;
     }
     watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
+    uint32_t since_us = port_now_us(port);
     uint32_t primask = leave_xip();
     rom.erase(on_chip(sector_offset), BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
     back_to_xip(primask);
+    uint32_t took_us = port_now_us(port) - since_us;
+    flash_erase_us = took_us > flash_erase_us ? took_us : flash_erase_us;
     return true;
 }
 
@@ -134,10 +141,13 @@ static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
     return come == bytes;
 }
 
-bool flash_unique_id(uint8_t id[FLASH_ID_BYTES])
+bool flash_identify(uint8_t id[FLASH_ID_BYTES])
 {
     uint8_t answer[UNIQUE_ID_AT + FLASH_ID_BYTES];
     uint8_t all = 0xFF, any = 0;
+    if (usable && exchange(JEDEC_ID_COMMAND, answer, 1 + sizeof flash_jedec_id)) {
+        memcpy(flash_jedec_id, answer + 1, sizeof flash_jedec_id);
+    }
     if (!usable || !exchange(UNIQUE_ID_COMMAND, answer, sizeof answer)) {
         return false;
     }

@@ -23,7 +23,7 @@ static bool has_id;
 static char serial_text[2 * FLASH_ID_BYTES + 1];
 static uint32_t boot_id;
 static uint16_t started_by;
-static bool leaving;
+static bool leaving, into_loader;
 static uint32_t leave_us;
 
 static void make_serial_text(void)
@@ -79,7 +79,7 @@ bt_port *port_init(int argc, char **argv)
 {
     note_start();
     flash_start();
-    has_id = flash_unique_id(unique_id);
+    has_id = flash_identify(unique_id);
     watchdog_start();
     make_serial_text();
     make_boot_id();
@@ -92,13 +92,16 @@ bt_port *port_init(int argc, char **argv)
 void port_idle(bt_port *port)
 {
     if (usb_touched()) {
-        (void)port_reboot_bootloader(port);
+        (void)port_reboot(port, true);
     }
     uint32_t since_us = port_now_us(port) - leave_us;
     bool all_sent = usb_all_sent() && uart_all_sent();
     if (leaving && since_us >= LEAVE_AFTER_US && (all_sent || since_us >= LEAVE_LATEST_US)) {
         WATCHDOG_SCRATCH1 = 0;
-        rom_enter_loader();
+        if (into_loader) {
+            rom_enter_loader();
+        }
+        system_reset();
     }
     usb_watch();
     uart_watch();
@@ -106,13 +109,14 @@ void port_idle(bt_port *port)
     sleep_until_woken();
 }
 
-bool port_reboot_bootloader(bt_port *port)
+bool port_reboot(bt_port *port, bool into_bootloader)
 {
-    if (!rom_has_loader()) {
+    if (into_bootloader && !rom_has_loader()) {
         return false;
     }
     if (!leaving) {
         leaving = true;
+        into_loader = into_bootloader;
         leave_us = port_now_us(port);
     }
     return true;

@@ -71,6 +71,7 @@
 // ---- 2.14 resets
 #define RESETS_RESET      REG32(0x4000C000u)
 #define RESETS_RESET_DONE REG32(0x4000C008u)
+#define RESETS_ADC        (1u << 0)
 #define RESETS_DMA        (1u << 2)
 #define RESETS_IO_BANK0   (1u << 5)
 #define RESETS_PADS_BANK0 (1u << 8)
@@ -89,6 +90,7 @@
 #define CLK_SYS_SELECTED   REG32(0x40008044u)
 #define CLK_PERI_CTRL      REG32(0x40008048u)
 #define CLK_USB_CTRL       REG32(0x40008054u)
+#define CLK_ADC_CTRL       REG32(0x40008060u)
 #define CLK_SYS_RESUS_CTRL REG32(0x40008078u)
 #define CLK_REF_SRC_XOSC   2u
 #define CLK_SYS_SRC_AUX    1u // from PLL_SYS, the aux source after reset
@@ -122,6 +124,7 @@
 #define GPIO_OUTOVER_LOW      (2u << 8) // whatever the function says
 #define GPIO_OUTOVER_HIGH     (3u << 8)
 #define PADS_BANK0_GPIO(n)    REG32(0x4001C004u + 4u * (n))
+#define PADS_OD               (1u << 7)
 #define PADS_IE               (1u << 6)
 #define PADS_DRIVE_4MA        (1u << 4)
 #define PADS_PUE              (1u << 3)
@@ -131,6 +134,20 @@
 #define IO_QSPI_OUTOVER_LOW   (2u << 8)
 #define IO_QSPI_OUTOVER_HIGH  (3u << 8)
 #define IO_QSPI_OUTOVER_BITS  (3u << 8)
+
+// ---- 2.20 system information
+#define SYSINFO_CHIP_ID REG32(0x40000000u) // revision, part, manufacturer from the highest bit down
+
+// ---- 4.9 ADC
+#define ADC_CS            REG32(0x4004C000u)
+#define ADC_RESULT        REG32(0x4004C004u)
+#define ADC_INPUT(n)      ((uint32_t)(n) << 12)
+#define ADC_INPUT_OF(pin) ADC_INPUT((pin) - 26)
+#define ADC_INPUT_DIE     ADC_INPUT(4)
+#define ADC_READY         (1u << 8)
+#define ADC_START_ONCE    (1u << 2)
+#define ADC_DIE_ON        (1u << 1)
+#define ADC_EN            (1u << 0)
 
 // ---- 3.7 PIO
 #define PIO0_CTRL          REG32(0x50200000u) // bit sm: runs

@@ -25,10 +25,28 @@ static void output(uint32_t pin, uint32_t function)
     IO_BANK0_GPIO_CTRL(pin) = function;
 }
 
+// The sensors allow 10 MHz. Slower than usual is not possible: a slot's words have their time (slot.c).
+#define SCR_LEAST 6u
+uint32_t spi_control = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+
+#define MOST_KHZ (CLK_PERI_HZ / 1000 / CPSDVSR) // with SCR 0
+
+void port_spi_rate(bt_port *port, uint32_t khz)
+{
+    uint32_t scr = khz == 0 ? SCR : (MOST_KHZ - 1) / khz; // the divider's next whole number, less 1
+    scr = scr > SCR ? SCR : scr < SCR_LEAST ? SCR_LEAST : scr;
+    spi_control = SSPCR0_DSS_16 | scr << SSPCR0_SCR_LSB;
+}
+
+uint32_t spi_khz(void)
+{
+    return MOST_KHZ / ((spi_control >> SSPCR0_SCR_LSB) + 1);
+}
+
 static void configure(void)
 {
     SPI0_SSPCPSR = CPSDVSR;
-    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR0 = spi_control;
     SPI0_SSPCR1 = SSPCR1_SSE;
 }
 
@@ -107,12 +125,12 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     // The width changes while the block is off (PL022 manual, 3.3.1); the clock stays low.
     SPI0_SSPCR1 = 0;
-    SPI0_SSPCR0 = SSPCR0_DSS_8 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR0 = spi_control ^ SSPCR0_DSS_16 ^ SSPCR0_DSS_8;
     SPI0_SSPCR1 = SSPCR1_SSE;
     begin(mosi);
     uint8_t miso = (uint8_t)end();
     SPI0_SSPCR1 = 0;
-    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR0 = spi_control;
     SPI0_SSPCR1 = SSPCR1_SSE;
     return miso;
 }

@@ -23,7 +23,9 @@ void bus_start(void);
 
 // ---- spi.c
 void spi_start(void);
-void spi_reset(void);                  // whatever it was about
+void spi_reset(void); // whatever it was about
+uint32_t spi_khz(void);
+extern uint32_t spi_control;           // SSPCR0 of a word: its rate is port_spi_rate's from the next slot on
 void spi_select_at_once(uint8_t mask); // port_spi_select without its waits
 
 // ---- rom.c: functions of the chip's boot ROM; NULL when it has none of that name
@@ -35,8 +37,10 @@ void rom_enter_loader(void) __attribute__((noreturn));
 #define FLASH_ID_BYTES 8
 // Before any interrupt is on. Keeps what is needed to read the program again after the flash was used.
 void flash_start(void);
-// The flash's own unique number, which is the board's. False when the flash tells none.
-bool flash_unique_id(uint8_t id[FLASH_ID_BYTES]);
+extern uint8_t flash_jedec_id[3];
+extern uint32_t flash_erase_us; // the longest so far
+// The flash's own unique number, which is the board's. False when the flash tells none. Sets flash_jedec_id.
+bool flash_identify(uint8_t id[FLASH_ID_BYTES]);
 
 // ---- usb/
 // serial: text that stays; what the host shows as the serial number.
@@ -45,6 +49,7 @@ void usb_start(const char *serial);
 // In the main loop, often: start over a controller that hears nothing any more.
 void usb_watch(void);
 bool usb_all_sent(void);
+extern uint32_t usb_starts; // of frame
 
 // port_link_up, _write and _read for a host on USB.
 bool usb_link_up(void);

@@ -53,6 +53,21 @@ class Configuration:
         """Send the board to its bootloader; it disconnects and comes back as a drive."""
         self._commands.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
+    def restart(self) -> None:
+        """Restart the board as a reset would; it disconnects and comes back. What was not saved is lost."""
+        self._commands.tell(wire.RebootBootloader(0, wire.RESTART_MAGIC))
+
+    def measure(self) -> wire.BoardFacts:
+        """What the board measures of itself: supply, temperature, clock against USB. Unknown where it cannot."""
+        return self._commands.ask(wire.GetBoardFacts(0), wire.BoardFacts)
+
+    def try_bus_rate(self, khz: int) -> wire.BoardFacts:
+        """Clock the sensors' bus at up to this rate until the next stream; 0 is the usual one.
+
+        Values read meanwhile mean nothing; count the sensors' bad words. Refused while streaming.
+        """
+        return self._commands.ask(wire.SetBusRate(0, khz), wire.BoardFacts)
+
     def settings(self) -> dict[wire.Setting, int]:
         """All settings. For one that the board's firmware does not have, the default."""
         return {setting: self._known_setting(setting) for setting in wire.Setting}

@@ -226,6 +226,20 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("energy_q4", "<u4", (6,)),
         ]
     ),
+    wire.BoardFacts.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("t_us", "<u4"),
+            ("usb_frame", "<u2"),
+            ("usb_starts", "<u4"),
+            ("chip_id", "<u4"),
+            ("flash_id", "u1", (3,)),
+            ("erase_us", "<u4"),
+            ("supply_mv", "<u2"),
+            ("die_centi_c", "<i2"),
+            ("bus_khz", "<u2"),
+        ]
+    ),
     wire.HelloRequest.ID: np.dtype(
         [
             ("req_id", "u1"),
@@ -398,6 +412,17 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("req_id", "u1"),
             ("faults", "<u2"),
             ("finger_faults", "<u4", (5,)),
+        ]
+    ),
+    wire.GetBoardFacts.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+        ]
+    ),
+    wire.SetBusRate.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("bus_khz", "<u2"),
         ]
     ),
     wire.EmuStatus.ID: np.dtype(

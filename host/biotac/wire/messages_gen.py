@@ -13,10 +13,11 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x94D13E9F
+SCHEMA_HASH = 0x84AFE357
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
+RESTART_MAGIC = 0x2E57A27A
 USB_VENDOR = 0x1209
 USB_PRODUCT = 0x0001
 USB_LOADER_VENDOR = 0x2E8A
@@ -1282,6 +1283,57 @@ class Bands:
 
 
 @dataclass(frozen=True, slots=True)
+class BoardFacts:
+    """What a board measures of itself. Reply to GET_BOARD_FACTS."""
+
+    req_id: int
+    t_us: int
+    usb_frame: int
+    usb_starts: int
+    chip_id: int
+    flash_id: tuple[int, ...]
+    erase_us: int
+    supply_mv: int
+    die_centi_c: int
+    bus_khz: int
+
+    ID: ClassVar[int] = 0x19
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIHII3BIHhH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 28 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.t_us,
+            self.usb_frame,
+            self.usb_starts,
+            self.chip_id,
+            *self.flash_id,
+            self.erase_us,
+            self.supply_mv,
+            self.die_centi_c,
+            self.bus_khz,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> BoardFacts:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5 : 8],
+            v[8],
+            v[9],
+            v[10],
+            v[11],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class HelloRequest:
     """First command of a host. Allowed at any time."""
 
@@ -1643,7 +1695,7 @@ class SetSetting:
 
 @dataclass(frozen=True, slots=True)
 class RebootBootloader:
-    """Restart into the board's boot loader: the board replies, leaves USB and comes back as a drive. Allowed at any time."""
+    """Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed at any time."""
 
     req_id: int
     magic: int
@@ -2047,6 +2099,57 @@ class ClearFaults:
 
 
 @dataclass(frozen=True, slots=True)
+class GetBoardFacts:
+    """Ask for BOARD_FACTS."""
+
+    req_id: int
+
+    ID: ClassVar[int] = 0x9B
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 1 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> GetBoardFacts:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SetBusRate:
+    """Clock the sensors' bus at the nearest rate the board has, not above this, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin. Values read meanwhile mean nothing. Refused while streaming."""
+
+    req_id: int
+    bus_khz: int
+
+    ID: ClassVar[int] = 0x9C
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 3 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.bus_khz,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> SetBusRate:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class EmuStatus:
     """State of an emulated sensor board. Reply to every EMU command. Counters start at EMU_PLUG of finger 0."""
 
@@ -2289,7 +2392,7 @@ class EmuKeep:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | BoardFacts | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2309,6 +2412,7 @@ MESSAGES: dict[int, type[Any]] = {
     Touch.ID: Touch,
     Event.ID: Event,
     Bands.ID: Bands,
+    BoardFacts.ID: BoardFacts,
     HelloRequest.ID: HelloRequest,
     Start.ID: Start,
     Stop.ID: Stop,
@@ -2336,6 +2440,8 @@ MESSAGES: dict[int, type[Any]] = {
     Hold.ID: Hold,
     Release.ID: Release,
     ClearFaults.ID: ClearFaults,
+    GetBoardFacts.ID: GetBoardFacts,
+    SetBusRate.ID: SetBusRate,
     EmuStatus.ID: EmuStatus,
     EmuPlug.ID: EmuPlug,
     EmuTape.ID: EmuTape,
@@ -2374,6 +2480,8 @@ ANSWERS: dict[type[Any], type[Any]] = {
     Hold: Reply,
     Release: Reply,
     ClearFaults: Reply,
+    GetBoardFacts: BoardFacts,
+    SetBusRate: BoardFacts,
     EmuPlug: EmuStatus,
     EmuTape: EmuStatus,
     EmuSetFault: EmuStatus,

@@ -90,11 +90,17 @@ void usb_start(const char *serial)
     REG_SET(USB_SIE_CTRL) = USB_SIE_PULLUP_EN; // now the host sees a device
 }
 
+uint32_t usb_starts;
+
 void usb_watch(void)
 {
-    static uint32_t frame, since_us;
+    static uint32_t frame, since_us, latest;
     static bool off;
     uint32_t now_us = port_now_us(ONLY_BOARD);
+    if (latest != USB_SOF_RD) {
+        latest = USB_SOF_RD;
+        usb_starts++;
+    }
     if (off) {
         if (now_us - since_us >= OFF_THE_BUS_US) {
             off = false;
