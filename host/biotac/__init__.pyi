@@ -33,6 +33,7 @@ from .hand.opening import open as open
 from .hand.record import Recorder as Recorder
 from .hand.views import FingerView as FingerView
 from .keep import Calibration as Calibration
+from .recording.labels import Label as Label
 from .recording.reader import Recording as Recording
 from .recording.selection import load as load
 from .recording.tabular import Selection as Selection

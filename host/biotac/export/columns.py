@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..recording.labels import of_rows
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
 from ..wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
@@ -23,6 +24,8 @@ STAMP = Field(
 
 GAP = Field("gap_s", "<f4", "s", "how long the board was away just before this row; 0 where it was there")
 
+LABEL = Field("label", "U", "1", "texts of the labels that hold at this row, joined by '; '; empty without any")
+
 
 def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
     """A table's columns: without the finger, as a table is one finger's, and with stamps after the times."""
@@ -31,7 +34,7 @@ def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
 
 
 #: One row per finger and round of 10 ms.
-COLUMNS = (*_stamped(FRAME_FIELDS), GAP)
+COLUMNS = (*_stamped(FRAME_FIELDS), GAP, LABEL)
 #: One row per finger and round: 22 samples, the k-th (from 0) k/2200 s after t_us.
 PAC_COLUMNS = _stamped(PAC_FIELDS)
 #: One row per finger and round: a spectrogram of PAC, in octaves.
@@ -94,6 +97,7 @@ def _arrays(recording: Recording, columns: Sequence[Field], rows: StructArray) -
     made: dict[str, Callable[[], NDArray[Any]]] = {
         STAMP.name: lambda: recording.stamp_ns(rows["t_us"]),
         GAP.name: lambda: _gap_s(recording, rows["t_us"]),
+        LABEL.name: lambda: of_rows(recording.labels, rows["t_us"], rows["finger"]),
     }
     return {column.name: made[column.name]() if column.name in made else rows[column.name] for column in columns}
 

@@ -20,7 +20,7 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
     names = ["finger", "frame_id", *(name for name, _, _ in made[0].flat())]
     of_table, order = in_order(made)
     row_of = np.concatenate([np.arange(len(table)) for table in made])
-    with place.open("w", newline="", encoding="ascii") as file:
+    with place.open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(names)
         for begin in range(0, len(order), _ROWS):

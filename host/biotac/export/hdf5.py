@@ -24,9 +24,10 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
             group = file.create_group(f"finger{table.finger}/{table.kind}")
             group.attrs["frame_id"] = table.frame_id
             for column in table.columns:
-                data = group.create_dataset(
-                    column.name, data=table.arrays[column.name], compression="gzip", shuffle=True
-                )
+                values = table.arrays[column.name]
+                if values.dtype.kind == "U":
+                    values = values.astype(h5py.string_dtype())
+                data = group.create_dataset(column.name, data=values, compression="gzip", shuffle=True)
                 data.attrs["unit"] = column.unit
                 data.attrs["what"] = column.what
                 if column.parts:

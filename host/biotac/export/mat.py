@@ -14,11 +14,12 @@ KINDS_APART = False
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Write a file of version 5. Its texts, such as the label, are character matrices."""
+    """Write a file of version 5. Labels are a cell array of texts."""
     fingers: dict[str, Any] = {}
     for k, table in enumerate(made):
         show(k / len(made))
-        fingers.setdefault(f"finger{table.finger}", {"frame_id": table.frame_id})[table.kind] = table.arrays
+        cells = {name: v.astype(object) if v.dtype.kind == "U" else v for name, v in table.arrays.items()}
+        fingers.setdefault(f"finger{table.finger}", {"frame_id": table.frame_id})[table.kind] = cells
     columns = {
         kind: {c.name: {"unit": c.unit, "what": c.what, "parts": list(c.parts)} for c in fields}
         for kind, fields in EXPORTED.items()

@@ -16,7 +16,7 @@ from .columns import Show, Table
 KINDS_APART = False
 _SHOW_ROWS = 1000
 _LOG = "rcl_interfaces/msg/Log"
-_WARN = 30
+_INFO, _WARN = 20, 30
 _COUNTS = "std_msgs/msg/UInt16MultiArray"
 #: By kind of table: its topics, with their types.
 _TOPICS = {
@@ -33,7 +33,7 @@ _TOPICS = {
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write a bag with topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``
-    and ``bands``, and ``/biotac/log`` with the gaps.
+    and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
     store = get_typestore(Stores.ROS2_HUMBLE)
     total = sum(len(table) for table in made)
@@ -52,11 +52,13 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
                 if done % _SHOW_ROWS == 0:
                     show(done / total)
                 done += 1
-        if recording.gaps:
-            log = topic("log", _LOG)
-            for gap in recording.gaps:
-                stamp = _time(store.types, gap.back_at_ns)
-                log(gap.back_at_ns, store.types[_LOG](stamp, _WARN, "biotac", gap.words(), "", "", 0))
+        begin_us = recording.begin_us
+        at_ns = recording.stamp_ns(np.array([label.t_us or begin_us for label in recording.labels], np.int64)).tolist()
+        said = [(ns, _INFO, label.words()) for ns, label in zip(at_ns, recording.labels, strict=True)]
+        said += [(gap.back_at_ns, _WARN, gap.words()) for gap in recording.gaps]
+        log = topic("log", _LOG) if said else lambda stamp_ns, message: None
+        for stamp_ns, level, words in said:
+            log(stamp_ns, store.types[_LOG](_time(store.types, stamp_ns), level, "biotac", words, "", "", 0))
 
 
 def _time(types: Any, stamp_ns: int) -> Any:

@@ -32,7 +32,7 @@ from ..wire.frames import Frame, StructArray
 from ..wire.sensor_gen import MAX_SENSORS
 from .commands import Commands
 from .configuration import Configuration
-from .record import Recorder, check_free
+from .record import Mark, Recorder, check_free
 from .views import Fingers, FingerView, Latest, checked_names, finger_index
 
 P = ParamSpec("P")
@@ -452,12 +452,30 @@ class Hand:
 
     # ---- recording -----------------------------------------------------------------------------
 
-    def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
+    def mark(self, text: str, finger: str | SupportsIndex | None = None, **facts: str | float) -> Mark:
+        """Label this moment in the open recording: the round that arrived last. With ``with``, label a span.
+
+        ``facts`` are whatever else is to be found again, such as ``subject="S07"``, ``trial=3`` or ``video_s=12.4``;
+        ``Recording.labels`` has them. Raises InputError when nothing is being recorded, KeyError for a finger that is
+        not there.
+
+        >>> with biotac.open("sim:press.toml") as hand, hand.record("press.mcap", note="a glass plate"):
+        ...     with hand.mark("pressed", trial=1):
+        ...         _ = hand.read(seconds=1)
+        """
+        self._latest.report()
+        number = None if finger is None else self._latest.present(finger)
+        if not self._recorders:
+            raise InputError("nothing is being recorded; call hand.record(...) first")
+        return self._recorders[-1].mark(text, number, facts)
+
+    def record(self, path: str | os.PathLike[str], *, overwrite: bool = False, note: str = "") -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until this hand or the recorder is closed.
 
         Frames that have arrived but not been read yet are not recorded; to have all, call this before ``stream`` or the
         first read. When the board restarts (``reconnect``), a new file is begun (``Recorder.paths``). A program that
-        ends without ``close`` loses nothing that has arrived; one that is killed loses up to a second.
+        ends without ``close`` loses nothing that has arrived; one that is killed loses up to a second. ``note``
+        becomes a label of the whole recording.
 
         Raises InputError when the file exists and ``overwrite`` is false, when it cannot be written, or when another
         recording of this hand is still open.
@@ -475,6 +493,8 @@ class Hand:
             mid_stream=mid_stream,
         )
         self._recorders[:] = [recorder]
+        if note:
+            recorder.mark(note, None, {}, timed=False)
         return recorder
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from .configuration import Configuration
 
 if TYPE_CHECKING:  # otherwise imported where it is used: not every reader records
     from ..recording.facts import Facts
+    from ..recording.labels import Label
 
 # What waits is written this often, or when it is this much: a board that waits for its reader waits for this too.
 WRITE_S = 0.1
@@ -47,7 +49,7 @@ class Recorder:
         self._known = self._facts()
         self._writer = Writer(path, self._known, board.link.port, overwrite=overwrite, mid_stream=mid_stream)
         self._boot_id = board.info.boot_id
-        self._waiting: deque[tuple[int, bytes | Gap]] = deque()
+        self._waiting: deque[tuple[int, bytes | Gap | Label]] = deque()
         self._put_bytes = self._taken_bytes = 0  # each counted by one thread
         self._chunk = b""  # the latest: a Gap that ends with it is written first
         self._dropped: Gap | None = None
@@ -81,6 +83,21 @@ class Recorder:
     def closed(self) -> bool:
         """Whether nothing more is written."""
         return self._writer.closed
+
+    def mark(self, text: str, finger: int | None, facts: Mapping[str, str | float], *, timed: bool = True) -> Mark:
+        """See Hand.mark; without ``timed``, about the whole recording."""
+        from ..recording.labels import Label
+
+        if self.closed:
+            raise InputError(f"the recording {self.path} is closed: mark it with biotac.Recording(...).mark")
+        now_us = self._board.reader.last_t_us
+        label = Label(text, (now_us or 0) if timed else None, None, finger, facts)
+        self._append(label)
+        return Mark(self, label)
+
+    def _end(self, label: Label) -> None:
+        """Write ``label`` again, with now as its end."""
+        self._append(replace(label, end_us=max(self._board.reader.last_t_us or 0, label.t_us or 0)))
 
     def close(self) -> None:
         """Write what has arrived and the file's index. Safe to call twice. Raises OSError when that fails."""
@@ -126,7 +143,7 @@ class Recorder:
         self._append(self._chunk)
         self._chunk = b""
 
-    def _append(self, what: bytes | Gap) -> None:
+    def _append(self, what: bytes | Gap | Label) -> None:
         self._waiting.append((self._board.info.boot_id, what))
         if isinstance(what, bytes):
             self._put_bytes += len(what)
@@ -165,6 +182,8 @@ class Recorder:
                 self._writer.go_on(replace(self._known, info=self._board.info))
             if isinstance(what, Gap):
                 self._writer.write_gap(what)
+            elif not isinstance(what, bytes):
+                self._writer.write_label(what)
             else:
                 self._writer.write(what)
                 self._taken_bytes += len(what)
@@ -179,6 +198,21 @@ class Recorder:
         sensors = [commands.sensor_info(f) for f in range(MAX_SENSORS) if hello.fingers_present >> f & 1]
         settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
         return Facts(hello, sensors, settings, calibrations, maps, dict(commands.names))
+
+
+class Mark:
+    """A label that was just made. Used in a ``with`` block, it becomes a span that ends with the block."""
+
+    def __init__(self, recorder: Recorder, label: Label) -> None:
+        self._recorder, self._label = recorder, label
+
+    def __enter__(self) -> None:
+        """It has begun already."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._recorder._end(self._label)
 
 
 def check_free(recorder: Recorder | None) -> None:

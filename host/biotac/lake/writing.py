@@ -16,12 +16,13 @@ from ..errors import InputError, printable
 from ..export.columns import EXPORTED, HEARTBEATS, Table, tables
 from ..export.messages import message_tables
 from ..export.parquet import Label, frame_ids, write_labelled
+from ..recording.labels import beside
 from ..recording.layout import CHECKSUM
 from ..recording.reader import Recording
 from . import ids
 from .folder import PARTIAL, RECORDINGS
 
-SIZE = b"biotac.size_bytes"  # of the source: a recording that has grown is exported again
+SIZE = b"biotac.size_bytes"  # of the source and its labels: a recording that has grown is exported again
 
 _TEXT, _BY_FINGER = pa.string(), pa.map_(pa.uint8(), pa.string())
 _RECORDINGS = pa.schema(
@@ -30,7 +31,7 @@ _RECORDINGS = pa.schema(
         pa.field("source", _TEXT, metadata={"what": "name of the file it was exported from"}),
         pa.field("begin_ns", pa.int64(), metadata={"unit": "ns", "what": "when it began, Unix time"}),
         pa.field("duration_s", pa.float64(), metadata={"unit": "s", "what": "by the board's clock"}),
-        pa.field("size_bytes", pa.int64(), metadata={"unit": "B", "what": "of the source"}),
+        pa.field("size_bytes", pa.int64(), metadata={"unit": "B", "what": "of the source and the labels beside it"}),
         pa.field("frames_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
         pa.field("pac_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
         pa.field("problems", pa.list_(_TEXT), metadata={"what": "what is missing from the source or damaged in it"}),
@@ -61,7 +62,7 @@ def put(lake: str, force: bool, source: str) -> Written:
     folder, path = Path(lake), Path(source)
     name, partition = ids.recording_id(path)
     file = f"{partition}/{name}.parquet"
-    size = path.stat().st_size
+    size = path.stat().st_size + (beside(path).stat().st_size if beside(path).exists() else 0)
     if not force and _source_bytes(folder / RECORDINGS / file) >= size:
         return Written(name, f"{RECORDINGS}/{file}", False)
     recording = Recording(path)

@@ -79,7 +79,7 @@ class Rest:
 
     ``fingers`` have a table. ``first_us`` and ``last_us`` are the first and last time of FRAMEs and heartbeats, None
     without any. ``lost`` has (finger, seq before, frames lost) for each loss found by the sequence numbers. ``gaps``
-    are times during which the board was away, before this block's first row.
+    are times during which the board was away, before this block's first row. ``labels`` were made during the block.
     """
 
     order: NDArray[np.uint16]
@@ -91,6 +91,7 @@ class Rest:
     lost_pac: int = 0
     disordered: int = 0
     gaps: list[dict[str, Any]] = field(default_factory=list)
+    labels: list[dict[str, Any]] = field(default_factory=list)
 
     def pack(self) -> bytes:
         """A line of JSON, the order, the packets."""

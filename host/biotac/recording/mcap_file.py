@@ -19,6 +19,7 @@ from ..wire.batches import StreamDecoder
 from ..wire.native import BUILT
 from . import layout
 from .block import Rest, schema, take_apart
+from .labels import Label
 from .plots import Plots
 
 # Large enough that only flush() closes a chunk; the library would also close it by size.
@@ -33,6 +34,7 @@ class RecordingFile:
         self._sequence = 0
         self._tail = b""  # of a message whose end has not arrived yet
         self._gaps: list[dict[str, Any]] = []  # to be written with the next block
+        self._labels: list[dict[str, Any]] = []
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
         self._last_ns: int | None = None  # when the last block's bytes had all arrived
@@ -104,10 +106,20 @@ class RecordingFile:
         self._plots.gap(gap)
         self._writer.flush()  # type: ignore[no-untyped-call]  # the index finds a chunk by its first message
 
+    def add_label(self, label: Label) -> None:
+        """Note a label; its times are device times of 32 bits, or unwrapped in any way."""
+        unwrap = self._decoder.unwrap_t_us
+        t_us, end_us = (None if t is None else unwrap(t & 0xFFFFFFFF) for t in (label.t_us, label.end_us))
+        self._labels.append(asdict(label) | {"t_us": t_us, "end_us": end_us})
+        self._plots.label(label, t_us)
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
     def _put(self, tables: dict[int, bytes], rest: Rest, arrived_ns: int, all_here_ns: int | None) -> None:
         """Write a block, each part as a chunk of its own, so that a reader need not open the others."""
         rest.gaps.extend(self._gaps)
+        rest.labels.extend(self._labels)
         self._gaps.clear()
+        self._labels.clear()
         parts = {f"{layout.TABLE}{finger}": data for finger, data in sorted(tables.items())}
         for topic, data in (parts | {layout.PACKETS: rest.pack()}).items():
             if topic not in self._channels:
@@ -124,8 +136,8 @@ class RecordingFile:
         if self.stream.closed:
             return
         try:
-            if self._gaps:
-                at_ns = self._gaps[-1]["back_at_ns"]
+            if self._gaps or self._labels:
+                at_ns = self._gaps[-1]["back_at_ns"] if self._gaps else self._last_ns or 0
                 self._put({}, Rest(np.empty(0, np.uint16), b""), at_ns, at_ns)
             self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # again, in case the first one gets damaged
             self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from ..board.gap import Gap
 from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..core.bands import bands_of
-from ..errors import RecordingError
+from ..errors import InputError, RecordingError
 from ..keep.calibration import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import StreamDecoder
@@ -23,11 +24,13 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire, frames_from_wire
 from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
+from . import labels as labels_module
 from . import layout
 from .block import FRAME, IDLE, PAC, ROWS, Packet, as_sent
 from .blocks import Block, Blocks, lost_between
 from .facts import Facts
 from .index import Index
+from .labels import Label
 from .layout import finger_of
 from .selection import fields_named, part_of
 from .stamps import Stamps, unwrapped_us
@@ -130,6 +133,7 @@ class Recording:
         if self.cut_off and not len(self.seq):
             raise RecordingError(f"{self.path} was cut off before its first second was complete; record it again")
         self._sent = sent
+        self.problems += self._later_labels[1]
         self._describe_losses([loss for rest in rests for loss in rest.lost], in_damaged)
 
     def _rows_of(self, kind: int) -> StructArray:
@@ -181,22 +185,61 @@ class Recording:
         start_s: float = 0.0,
         stop_s: float | None = None,
         fields: Iterable[str] | None = None,
+        labels: str | Iterable[str] | None = None,
     ) -> Selection:
         """A part of the frames, for NumPy, pandas or xarray, to be resampled, or aligned with another sensor's signal.
 
         ``fingers`` are chip selects or recorded names. ``start_s`` (inclusive) and ``stop_s`` (exclusive) are device
         seconds since the first row. ``fields`` are columns of FRAME_DTYPE; ``finger``, ``seq`` and ``t_us`` come with
-        them. Raises InputError for an unknown field or finger. What is damaged or missing is left out; ``problems``
-        says so.
+        them. ``labels`` are texts: only rows in their spans, or within half a second of their points. Raises InputError
+        for an unknown field, finger or label. What is damaged or missing is left out; ``problems`` says so.
         """
         names = (
             None if fields is None else {"finger", "seq", "t_us", *([fields] if isinstance(fields, str) else fields)}
         )
         chosen = fields_named(names)
-        rows, _, _ = part_of(self.path, self._index, chosen, fingers, start_s, stop_s)
+        spans = [(start_s, stop_s)]
+        if labels is not None:
+            found = labels_module.spans_us(self.labels, labels)
+            times_s = [((begin - self.begin_us) / 1e6, (end + 1 - self.begin_us) / 1e6) for begin, end in found]
+            spans = [(max(start_s, a), b if stop_s is None else min(stop_s, b)) for a, b in times_s]
+        rows = np.concatenate([part_of(self.path, self._index, chosen, fingers, *span)[0] for span in spans])
         by_number = {finger: name for name, finger in self.names.items()}
-        label = np.full(len(rows), "")
+        label = labels_module.of_rows(self.labels, rows["t_us"], rows["finger"])
         return Selection(rows, tuple(chosen), by_number, label, self.stamp_ns)
+
+    @cached_property
+    def labels(self) -> list[Label]:
+        """Labels in order of time, those about the whole recording first: made live, and with ``mark`` afterwards."""
+        live = []
+        for facts in (facts for block in self._heads for facts in block.rest.labels):
+            with suppress(TypeError, AttributeError, InputError):  # a damaged one
+                live.append(Label(**facts))
+        return labels_module.in_order([*live, *self._later_labels[0]])
+
+    @cached_property
+    def _later_labels(self) -> tuple[list[Label], list[str]]:
+        return labels_module.read(self.path, self.begin_ns)
+
+    def mark(
+        self,
+        text: str,
+        at_s: float | None = None,
+        until_s: float | None = None,
+        *,
+        finger: int | str | None = None,
+        **facts: str | float,
+    ) -> None:
+        """Add a label, in a file beside the recording: the recording itself is not touched.
+
+        ``at_s`` and ``until_s`` are device seconds since the first row; without them the label is about all of it. See
+        Label for the rest. Raises InputError where that cannot be written, KeyError for an unknown finger.
+        """
+        t_us, end_us = (None if s is None else self.begin_us + round(s * 1e6) for s in (at_s, until_s))
+        number = None if finger is None else finger_of(finger, self.names)
+        labels_module.append(self.path, self.begin_ns, Label(text, t_us, end_us, number, facts))
+        for name in ("labels", "_later_labels"):
+            vars(self).pop(name, None)
 
     def to_pandas(self) -> Any:
         """All frames as a pandas DataFrame: see Selection. Needs the extra ``export``."""

@@ -16,6 +16,7 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
 from . import layout
 from .facts import Facts
+from .labels import Label
 from .mcap_file import RecordingFile
 
 # Less than the one second that may be lost: data keeps arriving between the decision to write and the end of the write.
@@ -106,6 +107,11 @@ class Writer:
         if not self.closed:
             self.flush()
             self._file.add_gap(gap)
+
+    def write_label(self, label: Label) -> None:
+        """Record a label with the block that is being filled."""
+        if not self.closed:
+            self._file.add_label(label)
 
     @property
     def frames(self) -> int:

@@ -30,6 +30,7 @@ from biotac.wire.batches import StreamDecoder
 from biotac.wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
 
 GAP_S = 2.5
+SPAN_S = (1.0, 1.5)
 FINGERS = 2
 
 
@@ -39,6 +40,8 @@ def recorded(tmp_path_factory) -> biotac.Recording:
     folder = tmp_path_factory.mktemp("export")
     whole = biotac.Recording(record_all(f"sim:faults.toml?fingers={FINGERS}", folder / "whole.mcap"))
     recording = written_again(whole, folder / "a.mcap", {1: GAP_S})
+    for text in ("held", "ü"):
+        recording.mark(text, *SPAN_S, finger=1)
     assert np.isnan(recording.frames["poc_mm"]).any() and (recording.frames["counts"] == 65535).any()
     return recording
 
@@ -65,6 +68,8 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
     """What biotac.load gives, from the wire's integers by MESSAGES.md's units; the stamps are the recording's."""
     mine = recording.frames["finger"] == finger
     frames, sent = recording.frames[mine], recording.wire[mine]
+
+    since_us = frames["t_us"] - recording.frames["t_us"].min()
 
     def scaled(name: str, per_unit: int, invalid: int) -> np.ndarray:
         return np.where(sent[name] == invalid, np.nan, sent[name] / per_unit)
@@ -93,6 +98,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "gap_s": np.where(
             np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0
         ),
+        "label": np.where((SPAN_S[0] * 1e6 <= since_us) & (since_us <= SPAN_S[1] * 1e6), "held; ü" * (finger == 1), ""),
     }
 
 
@@ -150,7 +156,7 @@ def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None
     ]
     for kind, columns, wanted_of in KINDS:
         name = f"a{kind}.csv"
-        with (tmp_path / name).open(newline="") as file:
+        with (tmp_path / name).open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         times = [int(row["t_us"]) for row in rows]
         assert times == sorted(times)
@@ -160,8 +166,9 @@ def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None
             for column in columns:
                 names = column.flat_names()
                 wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
-                got = np.array([[float(row[n]) for n in names] for row in mine])
-                assert same(got, wanted.astype(float)), column.name
+                got = np.array([[row[n] for n in names] for row in mine])
+                kind_of = got.dtype if column.dtype == "U" else float
+                assert same(got.astype(kind_of), wanted.astype(kind_of)), column.name
 
 
 def test_units_stand_at_the_end_of_flat_names(recorded, tmp_path) -> None:
@@ -199,7 +206,8 @@ def test_hdf5_has_a_dataset_a_column(recorded, tmp_path) -> None:
                 wanted = wanted_of(recorded, finger)
                 assert set(group) == set(wanted)
                 for column in columns:
-                    assert same(group[column.name][:], wanted[column.name]), column.name
+                    data = group[column.name].asstr() if column.dtype == "U" else group[column.name]
+                    assert same(data[:], wanted[column.name]), column.name
                     assert group[column.name].attrs["unit"] == column.unit
 
 
@@ -222,6 +230,8 @@ def test_matlab_has_a_struct_a_finger(recorded, tmp_path) -> None:
     for finger in range(FINGERS):
         for kind, _, wanted_of in KINDS:
             table = file[f"finger{finger}"][kind[1:] or "frames"]
+            if not kind:  # an empty text is an empty matrix there
+                table["label"] = [text if len(text) else "" for text in table["label"]]
             assert all(same(table[name], values) for name, values in wanted_of(recorded, finger).items())
 
 

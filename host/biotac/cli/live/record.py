@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
     parser.add_argument("--seconds", type=values.seconds, help="device time to record at least (default: until Ctrl-C)")
+    parser.add_argument("--note", default="", metavar="TEXT", help="a label of the whole recording")
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
 
 
@@ -33,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     recorded_s = 0.0
     with biotac.open(args.port) as hand:
         earlier = faults_told(hand)
-        recorder = hand.record(args.out, overwrite=args.force)
+        recorder = hand.record(args.out, overwrite=args.force, note=args.note)
         table = None
         with ExitStack() as shown, suppress(KeyboardInterrupt):  # the usual way to stop a recording
             if not args.json and is_possible():
