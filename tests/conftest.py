@@ -131,6 +131,9 @@ def hello_for(request: bytes, **changes: int) -> bytes:
         "slot_hz": 4400,
         "fingers_present": 1,
         "image_crc32": 0xFFFFFFFF,
+        "fingers": 5,
+        "map_bytes": 20480,
+        "board_name": (0,) * 16,
     }
     return encode(wire.Hello.ID, wire.Hello(**(facts | changes)).pack())
 

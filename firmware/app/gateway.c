@@ -19,10 +19,8 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
                    && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
                "every finger's map must have a record of its own");
 
-_Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES,
-               "the board's serial number goes to the host whole");
-
-#define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
+_Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES && PORT_NAME_BYTES == BT_BOARD_NAME_BYTES,
+               "the board's serial number and name go to the host whole");
 
 // The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If
 // the alarm's time had passed by then, the first slot and its frame's time would be late.
@@ -47,14 +45,16 @@ static void read_flash(void *port, uint32_t offset, uint8_t *data, size_t bytes)
 }
 
 // Maps follow the settings in flash.
-static bool erase_map_sector(void *port, uint32_t sector_offset)
+static bool erase_map_sector(void *context, uint32_t sector_offset)
 {
-    return port_flash_erase(port, BT_STORAGE_BYTES + sector_offset);
+    const bt_gateway *gateway = context;
+    return port_flash_erase(gateway->port, 2 * gateway->flash.sector_bytes + sector_offset);
 }
 
-static bool program_map_page(void *port, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
+static bool program_map_page(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
 {
-    return port_flash_program(port, BT_STORAGE_BYTES + page_offset, page);
+    const bt_gateway *gateway = context;
+    return port_flash_program(gateway->port, 2 * gateway->flash.sector_bytes + page_offset, page);
 }
 
 static bool write_link(void *context, const uint8_t *data, size_t bytes)
@@ -152,7 +152,7 @@ static void load_settings(bt_gateway *gateway)
             bt_calibration_unpack(&session->calibration[f], version, record, (size_t)bytes);
         }
         bytes = bt_storage_read(flash, map_id(f), &version, record, sizeof record);
-        if (bytes > 0
+        if (bytes > 0 && session->board.maps != NULL
             && !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record,
                                    (size_t)bytes)) {
             session->faults |= BT_FAULT_FLAG_STORAGE;
@@ -174,6 +174,7 @@ static void start_uart(const bt_gateway *gateway)
 
 void bt_gateway_init(bt_gateway *gateway, bt_port *port)
 {
+    const port_abilities can = port_describe(port);
     const bt_board_actions actions = {
         .save_settings = save_settings,
         .save_calibration = save_calibration,
@@ -181,30 +182,41 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         .reboot = leave,
         .measure = measure,
         .set_bus_rate = clock_bus,
-        .maps = &gateway->map_flash,
+        .maps = can.map_bytes != 0 ? &gateway->map_flash : NULL,
         .now_us = now_us,
     };
     gateway->port = port;
-    gateway->flash =
-        (bt_flash){.context = port, .erase = erase_sector, .program = program_page, .read = read_flash};
-    gateway->map_flash = (bt_map_flash){.context = port,
-                                        .erase = erase_map_sector,
-                                        .program = program_map_page,
-                                        .bytes = port_flash_maps(port),
-                                        .ram = gateway->map_ram};
+    gateway->flash = (bt_flash){.sector_bytes = can.erase_bytes,
+                                .context = port,
+                                .erase = erase_sector,
+                                .program = program_page,
+                                .read = read_flash};
+    gateway->map_flash = (bt_map_flash){
+        .sector_bytes = can.erase_bytes,
+        .slot_bytes = (can.map_bytes + can.erase_bytes - 1) / can.erase_bytes * can.erase_bytes,
+        .max_bytes = can.map_bytes,
+        .slots = (uint8_t)BT_MAP_SLOTS_OF(can.fingers),
+        .context = gateway,
+        .erase = erase_map_sector,
+        .program = program_map_page,
+        .bytes = can.maps,
+        .ram = can.map_ram,
+    };
     const port_identity board = port_identify(port);
     bt_identity identity = {
         .board = board.board,
+        .fingers = can.fingers,
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
         .boot_id = board.boot_id,
         .image_crc32 = board.image_crc32,
     };
     memcpy(identity.board_serial, board.serial, sizeof identity.board_serial);
+    memcpy(identity.board_name, can.name, sizeof identity.board_name);
     port_delay_us(port, BT_POWER_ON_MS * 1000);
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.faults |= board.started_by;
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+    for (uint8_t f = 0; f < can.fingers; f++) {
         bt_properties_read(port, f, &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
         if (!gateway->session.info[f].present) {
@@ -217,7 +229,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     gateway->link_was_up = false;
     // Absent sensors are read too: one that is plugged in later shows up by itself.
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;
-    bt_sampler_start(&gateway->sampler, port, ALL_FINGERS, start_us);
+    bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us);
     port_alarm_at(port, start_us);
 }
 

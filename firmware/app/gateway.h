@@ -12,8 +12,7 @@ typedef struct {
     bt_session session;
     bt_flash flash;
     bt_map_flash map_flash;
-    _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // maps in force
-    uint32_t round;                                                // being assembled
+    uint32_t round; // being assembled
     bool round_open;
     bool link_was_up;
 } bt_gateway;

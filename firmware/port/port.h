@@ -58,20 +58,18 @@ size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes);
 // True if a host has the port open (DTR), or there is a UART. False once when one takes over from the other.
 bool port_link_up(bt_port *port);
 
-// Call once: a UART to use while no host has the port open, in bits per second, 0 for none, and an enum
-// bt_uart_pins. Does nothing on a board without a UART.
+// Call once: a UART to use while no host has the port open, in bits per second, and an enum bt_uart_pins. 0
+// is none or, on a board without another link, its own default: such a board is never mute. Does nothing on a
+// board without a UART.
 void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins);
 
 // ---- flash for settings and maps ------------------------------------------------------------
-// Storage for the core, as one run of bytes: settings (keep/storage.h), then the slots for maps (map/store.h,
-// which has the total). The port decides where in which chip it lies. Erasing and programming may hold off
-// interrupts for up to 0.4 s, and return false if the flash failed.
+// Storage for the core, as one run of bytes: two sectors of settings (keep/storage.h), then the slots for
+// maps (map/store.h), if there are any. The port decides where in which chip it lies. Erasing and programming
+// may hold off interrupts for as long as an erase takes, and return false if the flash failed.
 bool port_flash_erase(bt_port *port, uint32_t sector_offset);
 bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page);
 void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes);
-
-// The slots for maps as memory, which changes as they are erased and programmed. Aligned to 4 bytes.
-const uint8_t *port_flash_maps(bt_port *port);
 
 // Restart, into the bootloader or into the firmware again, as soon as what was written to the link is out, or
 // after a short while. False if this board cannot.
@@ -101,12 +99,26 @@ void port_spi_rate(bt_port *port, uint32_t khz);
 // ---- identity -------------------------------------------------------------------------------
 #define PORT_SERIAL_BYTES 12
 typedef struct {
-    uint16_t board; // enum bt_board
+    uint16_t board; // enum bt_board, or a private id from BT_BOARD_PRIVATE on
     uint8_t serial[PORT_SERIAL_BYTES];
     uint32_t boot_id;     // random at each boot
     uint16_t started_by;  // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
     uint32_t image_crc32; // of the image that runs, read where it is stored; 0xFFFFFFFF where there is none
 } port_identity;
 port_identity port_identify(bt_port *port);
+
+// ---- abilities: constants of the port, of which the host is told ----------------------------
+#define PORT_NAME_BYTES 16
+typedef struct {
+    char name[PORT_NAME_BYTES]; // of the board, for people; ASCII, the rest zeros
+    uint8_t fingers;            // chip selects: 1 to BT_MAX_FINGERS
+    uint32_t erase_bytes;       // flash is erased in these: 4 KiB or more, a multiple of BT_FLASH_PAGE_BYTES
+    // Of the largest wrench map that there is room for: a multiple of 4, at most BT_MAP_MAX_BYTES. 0: no
+    // maps, and then no slots in flash and nothing below.
+    uint16_t map_bytes;
+    uint8_t *map_ram;    // fingers * map_bytes, aligned to 4: the maps in force
+    const uint8_t *maps; // all slots as memory, aligned to 4, which changes with the flash
+} port_abilities;
+port_abilities port_describe(bt_port *port);
 
 #endif

@@ -3,6 +3,7 @@
 #include "answers.h"
 #include "loop.h"
 #include "only_board.h"
+#include "pins.h"
 #include "version.h"
 #include "wire/framing.h"
 
@@ -71,6 +72,8 @@ static void send_hello(const bt_msg_hello_request *request)
         .firmware_minor = BT_VERSION_MINOR,
         .firmware_patch = BT_VERSION_PATCH,
         .board = identity.board,
+        .fingers = BT_MAX_FINGERS,
+        .board_name = IMAGE_BOARD_NAME,
         .boot_id = identity.boot_id,
         .slot_hz = BT_SLOT_HZ,
         .fingers_present = plugged,

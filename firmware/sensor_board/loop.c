@@ -4,6 +4,7 @@
 #include "keep/storage.h"
 #include "map/store.h"
 #include "only_board.h"
+#include "system.h"
 #include "wire/crc32.h"
 
 #include <string.h>
@@ -33,12 +34,12 @@ static uint32_t known_slots;
 
 static const label *kept(void)
 {
-    return (const label *)(const void *)port_flash_maps(ONLY_BOARD);
+    return (const label *)(const void *)flash_maps();
 }
 
 static const uint8_t *kept_samples(void)
 {
-    return port_flash_maps(ONLY_BOARD) + BT_FLASH_SECTOR_BYTES;
+    return flash_maps() + BT_FLASH_SECTOR_BYTES;
 }
 
 static uint32_t look(void)

@@ -3,11 +3,12 @@
 #define BIOTAC_SENSOR_BOARD_PINS_H
 
 // Who this image is.
-#define IMAGE_BOARD   BT_BOARD_PICO_SENSOR
-#define IMAGE_NAME    "biotac-sensor"
-#define IMAGE_PURPOSE "emulated BioTac sensors on SPI"
-#define IMAGE_PRODUCT "BioTac sensors (Pico)"
-#define PINS_BOARD    "pico"
+#define IMAGE_BOARD      BT_BOARD_PICO_SENSOR
+#define IMAGE_BOARD_NAME "Pico (sensors)"
+#define IMAGE_NAME       "biotac-sensor"
+#define IMAGE_PURPOSE    "emulated BioTac sensors on SPI"
+#define IMAGE_PRODUCT    "BioTac sensors (Pico)"
+#define PINS_BOARD       "pico"
 
 // The gateway's own, so that these leads go straight across.
 #define PIN_MISO 16

@@ -21,6 +21,7 @@ struct bt_port {
     uint8_t selected;
     bool unsent; // the last word was for sensors that are not wired
     _Alignas(4) uint8_t maps[BT_MAPS_BYTES];
+    _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 };
 
 bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id)
@@ -160,11 +161,6 @@ bool port_flash_program(bt_port *board, uint32_t page_offset, const uint8_t *pag
     return true;
 }
 
-const uint8_t *port_flash_maps(bt_port *board)
-{
-    return board->maps;
-}
-
 void port_flash_read(bt_port *board, uint32_t offset, uint8_t *data, size_t bytes)
 {
     (void)board, (void)offset;
@@ -196,5 +192,17 @@ port_identity port_identify(bt_port *board)
         .boot_id = board->boot_id,
         .started_by = BT_FAULT_FLAG_STARTED,
         .image_crc32 = UINT32_MAX,
+    };
+}
+
+port_abilities port_describe(bt_port *board)
+{
+    return (port_abilities){
+        .name = "Linux spidev",
+        .fingers = BT_MAX_FINGERS,
+        .erase_bytes = BT_FLASH_SECTOR_BYTES,
+        .map_bytes = BT_MAP_MAX_BYTES,
+        .map_ram = board->map_ram[0],
+        .maps = board->maps,
     };
 }

@@ -9,6 +9,7 @@
 
 typedef struct {
     uint8_t *bytes;
+    size_t sector_bytes;
     long bytes_left;      // that are still erased or programmed before power fails; -1: it holds
     long operations_left; // erases and programs that are still done before power fails; -1: it holds
     bool inside;          // it fails within the next one: of its bits that change some are done, all over it
@@ -23,7 +24,11 @@ typedef struct {
 static inline void flash_new(failing_flash *flash, uint8_t *bytes, size_t size)
 {
     memset(bytes, 0xFF, size);
-    *flash = (failing_flash){.bytes = bytes, .bytes_left = -1, .operations_left = -1, .seed = 1};
+    *flash = (failing_flash){.bytes = bytes,
+                             .sector_bytes = BT_FLASH_SECTOR_BYTES,
+                             .bytes_left = -1,
+                             .operations_left = -1,
+                             .seed = 1};
 }
 
 // Each byte takes its bits of `page`, or is erased when that is NULL.
@@ -57,7 +62,7 @@ static inline void flash_change(failing_flash *flash, size_t at, size_t size, co
 static inline void flash_erase(failing_flash *flash, size_t at)
 {
     flash->erases++;
-    flash_change(flash, at, BT_FLASH_SECTOR_BYTES, NULL);
+    flash_change(flash, at, flash->sector_bytes, NULL);
 }
 
 // Programming never sets a bit.

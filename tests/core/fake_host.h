@@ -128,7 +128,10 @@ static bt_session session;
 static inline int new_session(void **state)
 {
     (void)state;
-    bt_identity identity = {.board = BT_BOARD_PICO, .firmware_version = {1, 2, 3}, .boot_id = 0xB0071D};
+    bt_identity identity = {.board = BT_BOARD_PICO,
+                            .fingers = BT_MAX_FINGERS,
+                            .firmware_version = {1, 2, 3},
+                            .boot_id = 0xB0071D};
     memcpy(identity.board_serial, "ABCDEFGHIJKL", 12);
     host_reset();
     bt_session_init(&session, &identity, host_write, NULL, 0);

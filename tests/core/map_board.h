@@ -39,7 +39,15 @@ static inline bool program(void *context, uint32_t offset, const uint8_t *page)
 }
 
 static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-static const bt_map_flash map_flash = {NULL, erase, program, slots, map_ram};
+static const bt_map_flash map_flash = {BT_FLASH_SECTOR_BYTES,
+                                       BT_MAP_SLOT_BYTES,
+                                       BT_MAP_MAX_BYTES,
+                                       BT_MAP_SLOTS,
+                                       NULL,
+                                       erase,
+                                       program,
+                                       slots,
+                                       map_ram[0]};
 
 static inline uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
 {

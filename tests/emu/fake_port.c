@@ -9,6 +9,7 @@
 #define TRANSFER_NS (16u * 1000000000u / BT_SPI_HZ)
 
 fake_port fake;
+uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
 
 static uint64_t released_ns;
@@ -165,11 +166,6 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, fake.kept + offset, bytes);
 }
 
-const uint8_t *port_flash_maps(bt_port *port)
-{
-    return fake.kept + BT_STORAGE_BYTES;
-}
-
 bool port_reboot(bt_port *port, bool into_bootloader)
 {
     fake.reboots++;
@@ -189,4 +185,16 @@ port_identity port_identify(bt_port *port)
 {
     return (port_identity){
         .board = BT_BOARD_POSIX_SIM, .serial = "fake-board-1", .boot_id = 42, .image_crc32 = UINT32_MAX};
+}
+
+port_abilities port_describe(bt_port *port)
+{
+    return (port_abilities){
+        .name = "fake",
+        .fingers = BT_MAX_FINGERS,
+        .erase_bytes = BT_FLASH_SECTOR_BYTES,
+        .map_bytes = BT_MAP_MAX_BYTES,
+        .map_ram = fake_map_ram[0],
+        .maps = fake.kept + BT_STORAGE_BYTES,
+    };
 }

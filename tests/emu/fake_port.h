@@ -43,6 +43,7 @@ typedef struct {
 } fake_port;
 
 extern fake_port fake;
+extern _Alignas(4) uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // the maps in force
 
 // Sensors all present, their counts from source, the clock at start_ns.
 void fake_reset(bt_emu_source source, uint64_t start_ns);

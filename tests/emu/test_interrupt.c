@@ -28,6 +28,7 @@
 static bt_gateway gateway;
 static bt_emu_bus bus;
 static _Alignas(4) uint8_t flash[BT_KEPT_BYTES];
+static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 
 // Relaxed, all of them: they must not lend their order to what is watched.
 static _Atomic uint64_t now_ns = 1000000;
@@ -192,11 +193,6 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, flash + offset, bytes);
 }
 
-const uint8_t *port_flash_maps(bt_port *port)
-{
-    return flash + BT_STORAGE_BYTES;
-}
-
 bool port_reboot(bt_port *port, bool into_bootloader)
 {
     return false;
@@ -214,4 +210,16 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 port_identity port_identify(bt_port *port)
 {
     return (port_identity){.board = BT_BOARD_POSIX_SIM, .boot_id = 1, .image_crc32 = UINT32_MAX};
+}
+
+port_abilities port_describe(bt_port *port)
+{
+    return (port_abilities){
+        .name = "fake",
+        .fingers = BT_MAX_FINGERS,
+        .erase_bytes = BT_FLASH_SECTOR_BYTES,
+        .map_bytes = BT_MAP_MAX_BYTES,
+        .map_ram = map_ram[0],
+        .maps = flash + BT_STORAGE_BYTES,
+    };
 }

@@ -72,8 +72,8 @@ static void start(void)
     run_rounds(60);
     for (uint8_t f = 0; f < FINGERS; f++) {
         bt_session *session = &gateway.session;
-        size_t bytes = make_map(gateway.map_ram[f], f + 1u, 2, "");
-        assert_int_equal(bt_map_open(&session->map[f].map, gateway.map_ram[f], bytes), BT_ERROR_OK);
+        size_t bytes = make_map(fake_map_ram[f], f + 1u, 2, "");
+        assert_int_equal(bt_map_open(&session->map[f].map, fake_map_ram[f], bytes), BT_ERROR_OK);
         session->solve[f].map = &session->map[f].map;
         session->finger[f].quantities = 0xFF;
         assert_int_not_equal(session->finger[f].tare.reason, BT_TARE_REASON_NONE);

@@ -54,7 +54,15 @@ static uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place
 }
 
 static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-static const bt_map_flash map_flash = {NULL, erase, program, slots, map_ram};
+static const bt_map_flash map_flash = {BT_FLASH_SECTOR_BYTES,
+                                       BT_MAP_SLOT_BYTES,
+                                       BT_MAP_MAX_BYTES,
+                                       BT_MAP_SLOTS,
+                                       NULL,
+                                       erase,
+                                       program,
+                                       slots,
+                                       map_ram[0]};
 static const bt_board_actions actions = {.save_settings = keep_settings,
                                          .save_calibration = keep_calibration,
                                          .save_map = save_map,
@@ -237,7 +245,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
 {
     static bt_session session;
-    static const bt_identity identity = {.board = BT_BOARD_PICO, .firmware_version = {1, 2, 3}};
+    static const bt_identity identity = {
+        .board = BT_BOARD_PICO, .fingers = BT_MAX_FINGERS, .firmware_version = {1, 2, 3}};
     fuzz_input in = {data, bytes};
     uint32_t now_us = take_u32(&in);
     memset(&host, 0, sizeof host);

@@ -52,7 +52,7 @@ static void read_flash(void *context, uint32_t offset, uint8_t *data, size_t byt
     memcpy(data, flash_bytes + offset, bytes);
 }
 
-static const bt_flash flash = {NULL, erase, program, read_flash};
+static const bt_flash flash = {BT_FLASH_SECTOR_BYTES, NULL, erase, program, read_flash};
 
 typedef struct {
     int bytes; // -1: none

@@ -203,7 +203,7 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> N
         read_image(changed(tmp_path, 5000, 0xEE))
     board_at = (ROOT / "build/pico/biotac-pico.bin").read_bytes().index(b"BIOTAC image") + 14
     other = read_image(changed(tmp_path, board_at, wire.Board.LINUX_SBC, sealed=True))
-    with pytest.raises(InputError, match="is for LINUX_SBC, but PICO answers"):
+    with pytest.raises(InputError, match="is for LINUX_SBC, but Pico answers"):
         bench.flash(other)
     with bench.target.open() as hand:
         assert hand.info.boot_id == boot_id

@@ -42,6 +42,9 @@ def main() -> int:
             section.write(code.bytes_of(image))
             section.flush()
             subprocess.run([args.objcopy, "--update-section", f".image_note={section.name}", str(args.elf)], check=True)
+            subprocess.run([args.objcopy, "-O", "binary", str(args.elf), section.name], check=True)
+            if Path(section.name).read_bytes() != image:
+                sys.exit(f"note.py: {args.elf} does not give {path}: its note is not in a section .image_note")
     wire = ".".join(map(str, note.wire))
     print(f"note  board {note.board}, firmware {note.version}, wire {wire}, CRC-32 {note.crc32:08x}")
     return 0

@@ -199,6 +199,7 @@ def canonical(contract: Contract, *, with_docs: bool) -> str:
     tree: dict[str, Any] = {"link": link, "map": contract.map, "sensor": contract.sensor}
     if with_docs:
         return json.dumps({**tree, "schema_hash": contract.hash}, indent=1, sort_keys=True) + "\n"
+    tree["link"] = {**link, "enum": {name: part for name, part in link["enum"].items() if name != "board"}}
     return json.dumps(strip_docs(tree), sort_keys=True, separators=(",", ":"))
 
 

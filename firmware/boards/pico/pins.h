@@ -3,7 +3,13 @@
 #define BIOTAC_PICO_PINS_H
 
 // Who this image is.
-#define IMAGE_BOARD   BT_BOARD_PICO
+#ifdef BIOTAC_PICO_W
+#define IMAGE_BOARD      BT_BOARD_PICO_W
+#define IMAGE_BOARD_NAME "Pico W"
+#else
+#define IMAGE_BOARD      BT_BOARD_PICO
+#define IMAGE_BOARD_NAME "Pico"
+#endif
 #define IMAGE_NAME    "biotac-gateway"
 #define IMAGE_PURPOSE "BioTac sensors to USB serial"
 #define IMAGE_PRODUCT "BioTac gateway (Pico)"

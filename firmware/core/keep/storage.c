@@ -5,13 +5,13 @@
 
 #include <string.h>
 
-#define PAGES     (BT_FLASH_SECTOR_BYTES / BT_FLASH_PAGE_BYTES)
-#define MAGIC     0x52544F42u // "BOTR"
-#define IN_USE_ID 0xFFFE      // id of a sector's first page, whose data is the generation
-#define CRC_AT    12          // the CRC covers the whole page, with its own four bytes taken as erased
-#define NO_SECTOR (-1)
+#define LEAST_PAGES 16          // in a sector
+#define MAGIC       0x52544F42u // "BOTR"
+#define IN_USE_ID   0xFFFE      // id of a sector's first page, whose data is the generation
+#define CRC_AT      12          // the CRC covers the whole page, with its own four bytes taken as erased
+#define NO_SECTOR   (-1)
 
-_Static_assert(BT_STORAGE_IDS < PAGES - 1, "one record of each id and a new one must fit a sector");
+_Static_assert(BT_STORAGE_IDS < LEAST_PAGES - 1, "one record of each id and a new one must fit a sector");
 
 // ---- one page -------------------------------------------------------------------------------------
 // u32 magic, u16 id, u16 version, u32 size, u32 CRC-32, data; the rest stays erased.
@@ -51,21 +51,26 @@ static bool page_blank(const uint8_t page[BT_FLASH_PAGE_BYTES])
     return true;
 }
 
-static uint32_t page_offset(int sector, int page)
+static int pages(const bt_flash *flash)
 {
-    return (uint32_t)(sector * BT_FLASH_SECTOR_BYTES + page * BT_FLASH_PAGE_BYTES);
+    return (int)(flash->sector_bytes / BT_FLASH_PAGE_BYTES);
+}
+
+static uint32_t page_offset(const bt_flash *flash, int sector, int page)
+{
+    return (uint32_t)sector * flash->sector_bytes + (uint32_t)page * BT_FLASH_PAGE_BYTES;
 }
 
 static void read_page(const bt_flash *flash, int sector, int page, uint8_t out[BT_FLASH_PAGE_BYTES])
 {
-    flash->read(flash->context, page_offset(sector, page), out, BT_FLASH_PAGE_BYTES);
+    flash->read(flash->context, page_offset(flash, sector, page), out, BT_FLASH_PAGE_BYTES);
 }
 
 // Programs a page and reads it back.
 static bool keep_page(const bt_flash *flash, int sector, int page, const uint8_t data[BT_FLASH_PAGE_BYTES])
 {
     uint8_t back[BT_FLASH_PAGE_BYTES];
-    if (!flash->program(flash->context, page_offset(sector, page), data)) {
+    if (!flash->program(flash->context, page_offset(flash, sector, page), data)) {
         return false;
     }
     read_page(flash, sector, page, back);
@@ -97,7 +102,7 @@ static int sector_in_use(const bt_flash *flash, uint32_t *generation)
 // The number of the page with the latest whole record of this id, read into out; 0 when there is none.
 static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT_FLASH_PAGE_BYTES])
 {
-    for (int page = PAGES - 1; page > 0; page--) {
+    for (int page = pages(flash) - 1; page > 0; page--) {
         read_page(flash, sector, page, out);
         if (bt_storage_page_is(out, id)) {
             return page;
@@ -106,11 +111,11 @@ static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT
     return 0;
 }
 
-// The page after the last one ever written; PAGES when none is left.
+// The page after the last one ever written; pages() when none is left.
 static int first_free(const bt_flash *flash, int sector)
 {
     uint8_t page[BT_FLASH_PAGE_BYTES];
-    int at = PAGES;
+    int at = pages(flash);
     while (at > 1) {
         read_page(flash, sector, at - 1, page);
         if (!page_blank(page)) {
@@ -129,7 +134,7 @@ static bool move_on(const bt_flash *flash, int from, uint32_t generation, uint16
     int at = 1;
     uint8_t page[BT_FLASH_PAGE_BYTES];
     uint8_t data[4];
-    if (!flash->erase(flash->context, page_offset(to, 0)) || !keep_page(flash, to, at++, record)) {
+    if (!flash->erase(flash->context, page_offset(flash, to, 0)) || !keep_page(flash, to, at++, record)) {
         return false;
     }
     for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
@@ -171,7 +176,7 @@ bool bt_storage_damaged(const bt_flash *flash)
     int used = sector_in_use(flash, &generation);
     for (int sector = 0; sector < 2; sector++) {
         // In the unused sector only the first page counts: the rest is old, or a copy cut short.
-        for (int at = 0; at < (sector == used ? PAGES : 1); at++) {
+        for (int at = 0; at < (sector == used ? pages(flash) : 1); at++) {
             read_page(flash, sector, at, page);
             if (!page_blank(page) && !page_whole(page)) {
                 return true;
@@ -198,7 +203,7 @@ bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, cons
         return true;
     }
     // A page that fails to take the record stays damaged; the next one may take it.
-    for (int at = first_free(flash, sector); at < PAGES; at++) {
+    for (int at = first_free(flash, sector); at < pages(flash); at++) {
         if (keep_page(flash, sector, at, record)) {
             return true;
         }

@@ -12,11 +12,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define BT_FLASH_SECTOR_BYTES   4096 // the unit of erasing, to 0xFF
-#define BT_FLASH_PAGE_BYTES     256  // the unit of programming, which only clears bits
-#define BT_STORAGE_BYTES        (2 * BT_FLASH_SECTOR_BYTES)
+#define BT_FLASH_PAGE_BYTES 256 // the unit of programming, which only clears bits; once between two erases
 #define BT_STORAGE_HEADER_BYTES 16
 #define BT_STORAGE_MAX_BYTES    (BT_FLASH_PAGE_BYTES - BT_STORAGE_HEADER_BYTES) // data of one record
+
+// Most flash chips' sector.
+#define BT_FLASH_SECTOR_BYTES 4096
+#define BT_STORAGE_BYTES      (2 * BT_FLASH_SECTOR_BYTES)
 
 // Record ids are 1..BT_STORAGE_IDS and never reused.
 #define BT_STORAGE_IDS 12
@@ -29,7 +31,8 @@ enum bt_record {
 // Offsets are bytes from the start of the two sectors. erase and program return false if the flash failed;
 // its contents are then unknown.
 typedef struct {
-    void *context; // the first argument of all three
+    uint32_t sector_bytes; // the unit of erasing, to 0xFF: from 16 pages on, a multiple of a page
+    void *context;         // the first argument of all three
     bool (*erase)(void *context, uint32_t sector_offset);
     bool (*program)(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
     void (*read)(void *context, uint32_t offset, uint8_t *data, size_t bytes);

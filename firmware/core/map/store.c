@@ -6,7 +6,6 @@
 
 #include <string.h>
 
-_Static_assert(BT_MAP_SLOT_BYTES % BT_FLASH_SECTOR_BYTES == 0, "a slot is erased without touching another");
 _Static_assert(BT_MAP_MAX_BYTES <= UINT16_MAX, "the size of a map fits its field");
 
 size_t bt_map_place_pack(const bt_map_place *place, uint8_t record[BT_MAP_RECORD_BYTES])
@@ -27,13 +26,13 @@ void bt_finger_map_reset(bt_finger_map *its)
 
 const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place)
 {
-    return flash->bytes + (size_t)place->slot * BT_MAP_SLOT_BYTES;
+    return flash->bytes + (size_t)place->slot * flash->slot_bytes;
 }
 
 // Returns OK, NOT_WHOLE or OUT_OF_RANGE, see bt_finger_map_use.
 static uint8_t copy_to_ram(bt_map *map, const bt_map_flash *flash, uint8_t finger, const bt_map_place *place)
 {
-    uint8_t *ram = flash->ram[finger];
+    uint8_t *ram = flash->ram + (size_t)finger * flash->max_bytes;
     memcpy(ram, bt_map_bytes(flash, place), place->bytes);
     if (bt_crc32(ram, place->bytes) != place->crc32) {
         return BT_ERROR_NOT_WHOLE;
@@ -63,7 +62,7 @@ bool bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t f
                         const uint8_t *record, size_t bytes)
 {
     bt_finger_map_reset(its);
-    if (bytes < 4 || bt_get_u32(record) >= BT_MAP_SLOTS) {
+    if (bytes < 4 || bt_get_u32(record) >= flash->slots) {
         return false;
     }
     its->stored_slot = (uint8_t)bt_get_u32(record); // also in later versions, which may differ in the rest
@@ -71,7 +70,7 @@ bool bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t f
         return false;
     }
     uint32_t size = bt_get_u32(record + 4), crc32 = bt_get_u32(record + 8);
-    if (size == 0 || size > BT_MAP_MAX_BYTES) {
+    if (size == 0 || size > flash->max_bytes) {
         return size == 0;
     }
     bt_map_place place = {.slot = its->stored_slot, .bytes = (uint16_t)size, .crc32 = crc32};
@@ -92,11 +91,11 @@ static bool is_free(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t slot)
     return true;
 }
 
-uint8_t bt_map_free_slot(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last)
+uint8_t bt_map_free_slot(const bt_map_flash *flash, const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last)
 {
     uint8_t slot = last;
-    do { // ends, as five fingers use at most two slots each and there is one more
-        slot = (uint8_t)((slot + 1) % BT_MAP_SLOTS);
+    do { // ends, as a finger uses at most two slots and there is one more
+        slot = (uint8_t)((slot + 1) % flash->slots);
     } while (!is_free(maps, slot));
     return slot;
 }

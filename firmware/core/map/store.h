@@ -11,19 +11,27 @@
 #include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
-#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES // a multiple of the sector
-#define BT_MAP_SLOTS      (2 * BT_MAX_FINGERS + 1)
+#define BT_MAP_SLOTS_OF(fingers) (2 * (fingers) + 1)
+
+// Of a board with five fingers, the largest maps, and sectors of 4 KiB; with its settings before them.
+#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES
+#define BT_MAP_SLOTS      BT_MAP_SLOTS_OF(BT_MAX_FINGERS)
 #define BT_MAPS_BYTES     (BT_MAP_SLOTS * BT_MAP_SLOT_BYTES)
-#define BT_KEPT_BYTES     (BT_STORAGE_BYTES + BT_MAPS_BYTES) // all that a board keeps: settings, then maps
+#define BT_KEPT_BYTES     (BT_STORAGE_BYTES + BT_MAPS_BYTES)
 
 // Offsets are bytes from the first slot. erase and program: as in bt_flash. bytes: all slots as memory, which
-// changes with the flash. ram: room for each finger's map in force, aligned to 4 bytes.
+// changes with the flash. ram: max_bytes for each finger's map in force, which is a multiple of 4, aligned
+// to 4.
 typedef struct {
+    uint32_t sector_bytes; // the unit of erasing: 1024 at least
+    uint32_t slot_bytes;   // a multiple of that, so that a slot is erased without touching another
+    uint16_t max_bytes;    // of a map: at most slot_bytes and BT_MAP_MAX_BYTES
+    uint8_t slots;
     void *context;
     bool (*erase)(void *context, uint32_t sector_offset);
     bool (*program)(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
     const uint8_t *bytes;
-    uint8_t (*ram)[BT_MAP_MAX_BYTES];
+    uint8_t *ram;
 } bt_map_flash;
 
 // A map in a slot; no map if bytes is 0.
@@ -67,6 +75,6 @@ const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place
 
 // The first slot after `last` that no finger uses, so that all slots wear alike, and one that failed to take
 // a map is passed over.
-uint8_t bt_map_free_slot(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last);
+uint8_t bt_map_free_slot(const bt_map_flash *flash, const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last);
 
 #endif

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-_Static_assert(BT_MAP_SLOT_BYTES / BT_FLASH_SECTOR_BYTES <= 8, "a bit for every sector of a slot");
+_Static_assert(BT_MAP_MAX_BYTES / 1024 <= 32, "a bit for every sector of a slot");
 _Static_assert(BT_FLASH_PAGE_BYTES % BT_MAP_PART_BYTES == 0, "a part lies in one page");
 _Static_assert(BT_MAP_PARTS % 8 == 0, "the parts' bits fill their bytes");
 _Static_assert(BT_MAP_PART_BYTES == sizeof(((bt_msg_map_data *)NULL)->data), "parts must be read as written");
@@ -23,7 +23,7 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     uint8_t page[BT_FLASH_PAGE_BYTES];
     const uint16_t size = upload->place.bytes;
     const size_t part = offset / BT_MAP_PART_BYTES;
-    const uint8_t sector = (uint8_t)(1u << offset / BT_FLASH_SECTOR_BYTES);
+    const uint32_t sector = 1u << offset / flash->sector_bytes;
     if (offset % BT_MAP_PART_BYTES != 0 || offset >= size) {
         return BT_ERROR_OUT_OF_RANGE;
     }
@@ -33,10 +33,10 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     if (is_written(upload, part)) { // its reply was lost, or another host writes too
         return memcmp(there, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
     }
-    const uint32_t at = (uint32_t)(upload->place.slot * BT_MAP_SLOT_BYTES + offset);
+    const uint32_t at = upload->place.slot * flash->slot_bytes + offset;
     if (!(upload->erased & sector)) {
         // Even if it reads as erased: after an erase cut short by a power failure, that may not last.
-        if (!flash->erase(flash->context, at - at % BT_FLASH_SECTOR_BYTES)) {
+        if (!flash->erase(flash->context, at - at % flash->sector_bytes)) {
             return BT_ERROR_NOT_STORED;
         }
         upload->erased |= sector;

@@ -11,7 +11,7 @@ typedef struct {
     bool open;
     uint8_t finger;
     bt_map_place place;
-    uint8_t erased;                    // bit mask of the slot's sectors
+    uint32_t erased;                   // bit mask of the slot's sectors
     uint8_t written[BT_MAP_PARTS / 8]; // bit mask of the parts
 } bt_upload;
 

@@ -35,12 +35,15 @@ static uint8_t hello_request(bt_session *session, const uint8_t *payload)
         .firmware_minor = identity->firmware_version[1],
         .firmware_patch = identity->firmware_version[2],
         .board = identity->board,
+        .fingers = identity->fingers,
+        .map_bytes = session->board.maps != NULL ? session->board.maps->max_bytes : 0,
         .boot_id = identity->boot_id,
         .slot_hz = BT_SLOT_HZ,
         .fingers_present = bt_session_present(session),
         .image_crc32 = identity->image_crc32,
     };
     memcpy(msg.board_serial, identity->board_serial, sizeof msg.board_serial);
+    memcpy(msg.board_name, identity->board_name, sizeof msg.board_name);
     bt_msg_hello_pack(&msg, out);
     bt_session_send(session, BT_HELLO_ID, out);
     return BT_ERROR_OK;
@@ -394,7 +397,10 @@ static const struct {
 
 static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *payload)
 {
-    if (checks & FINGER && payload[BT_COMMAND_FINGER_AT] >= BT_MAX_FINGERS) {
+    // What is kept for a finger needs the finger; questions about one that the board cannot have are answered
+    // as about an absent sensor.
+    uint8_t fingers = checks & STOPPED ? session->identity.fingers : BT_MAX_FINGERS;
+    if (checks & FINGER && payload[BT_COMMAND_FINGER_AT] >= fingers) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
     if (checks & STOPPED && session->streams != 0) {

@@ -45,11 +45,11 @@ uint8_t bt_map_begin(bt_session *session, const uint8_t *payload)
 {
     bt_msg_begin_map msg;
     bt_msg_begin_map_unpack(&msg, payload);
-    if (msg.size_bytes == 0 || msg.size_bytes > BT_MAP_MAX_BYTES) {
+    if (msg.size_bytes == 0 || msg.size_bytes > session->board.maps->max_bytes) {
         return BT_ERROR_OUT_OF_RANGE;
     }
     bt_map_place place = {
-        .slot = bt_map_free_slot(session->map, session->upload.place.slot),
+        .slot = bt_map_free_slot(session->board.maps, session->map, session->upload.place.slot),
         .bytes = msg.size_bytes,
         .crc32 = msg.crc32,
     };

@@ -37,6 +37,11 @@ void bt_msg_hello_pack(const bt_msg_hello *msg, uint8_t out[BT_HELLO_BYTES])
     at = put(at, (uint32_t)msg->slot_hz, 2);
     at = put(at, (uint32_t)msg->fingers_present, 1);
     at = put(at, (uint32_t)msg->image_crc32, 4);
+    at = put(at, (uint32_t)msg->fingers, 1);
+    at = put(at, (uint32_t)msg->map_bytes, 2);
+    for (int k = 0; k < 16; k++) {
+        at = put(at, (uint32_t)msg->board_name[k], 1);
+    }
     (void)at;
 }
 
@@ -74,6 +79,14 @@ void bt_msg_hello_unpack(bt_msg_hello *msg, const uint8_t in[BT_HELLO_BYTES])
     msg->fingers_present = (uint8_t)value;
     at = get(at, &value, 4);
     msg->image_crc32 = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->fingers = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->map_bytes = (uint16_t)value;
+    for (int k = 0; k < 16; k++) {
+        at = get(at, &value, 1);
+        msg->board_name[k] = (uint8_t)value;
+    }
     (void)at;
 }
 

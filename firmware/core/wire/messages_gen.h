@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x84AFE357u
+#define BT_SCHEMA_HASH 0x13DC1CFAu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -78,7 +78,7 @@ enum bt_force_model {
     BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 };
 
-// Pins of a board's UART. On a Pico, four pairs are not used by the sensors.
+// Pins of a board's UART. On a Pico, four pairs are not used by the sensors; a board with one pair ignores this.
 enum bt_uart_pins {
     BT_UART_PINS_GPIO_0_1 = 0, // TX on GPIO 0, RX on GPIO 1
     BT_UART_PINS_GPIO_4_5 = 1, // TX on GPIO 4, RX on GPIO 5
@@ -86,12 +86,15 @@ enum bt_uart_pins {
     BT_UART_PINS_GPIO_12_13 = 3, // TX on GPIO 12, RX on GPIO 13
 };
 
-// What the firmware runs on.
+// What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody.
 enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
     BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
+    BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
+    BT_BOARD_PRIVATE = 32768, // the first of the private ids
 };
 
 // Faults of an emulated sensor. On a tape, these codes stand in place of counts.
@@ -251,7 +254,7 @@ extern const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES]; // enum bt_s
 
 // Identifies the board. Reply to HELLO_REQUEST.
 #define BT_HELLO_ID 0x01
-#define BT_HELLO_BYTES 39
+#define BT_HELLO_BYTES 58
 typedef struct {
     uint8_t req_id; // [1] as in the command
     uint32_t nonce; // [1] copied from the request, so that an old HELLO in a buffer is not taken for this one
@@ -267,6 +270,9 @@ typedef struct {
     uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor
     uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
     uint32_t image_crc32; // [1] CRC-32 of the running flash image, computed at boot (firmware/app/image_note.h); 0xFFFFFFFF: unknown
+    uint8_t fingers; // [1] how many sensors the board has chip selects for
+    uint16_t map_bytes; // [byte] the largest wrench map that it has room for; 0: it keeps none, and answers what is about maps with NOT_HERE
+    uint8_t board_name[16]; // [ASCII] what people call the board, padded with zeros
 } bt_msg_hello;
 void bt_msg_hello_pack(const bt_msg_hello *msg, uint8_t out[BT_HELLO_BYTES]);
 void bt_msg_hello_unpack(bt_msg_hello *msg, const uint8_t in[BT_HELLO_BYTES]);
@@ -945,7 +951,7 @@ int bt_wire_payload_bytes(uint8_t id);
 
 #ifndef BT_CDEF // the rest is macros for the C tests
 // X(name, type, count) for every field, so that tests can compare by name.
-#define BT_HELLO_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1) X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1) X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1) X(image_crc32, u32, 1)
+#define BT_HELLO_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1) X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1) X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1) X(image_crc32, u32, 1) X(fingers, u8, 1) X(map_bytes, u16, 1) X(board_name, u8, 16)
 #define BT_REPLY_FIELDS(X) X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)

@@ -62,7 +62,7 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, flash + offset, bytes);
 }
 
-const uint8_t *port_flash_maps(bt_port *port)
+const uint8_t *flash_maps(void)
 {
     return flash + BT_STORAGE_BYTES;
 }

@@ -3,8 +3,13 @@
 #ifndef BIOTAC_POSIX_FLASH_H
 #define BIOTAC_POSIX_FLASH_H
 
+#include <stdint.h>
+
 // path may be NULL: then nothing outlives the process. A file that does not exist is made. Returns NULL, or
 // what went wrong.
 const char *flash_open(const char *path);
+
+// The slots for maps.
+const uint8_t *flash_maps(void);
 
 #endif

@@ -14,6 +14,7 @@
 #include "bus.h"
 #include "clock.h"
 #include "flash.h"
+#include "map/store.h"
 #include "pty.h"
 #include "tape.h"
 #include "wire/messages_gen.h"
@@ -282,5 +283,18 @@ port_identity port_identify(bt_port *port)
         .boot_id = boot_id,
         .started_by = BT_FAULT_FLAG_STARTED,
         .image_crc32 = UINT32_MAX,
+    };
+}
+
+port_abilities port_describe(bt_port *port)
+{
+    static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
+    return (port_abilities){
+        .name = "simulator",
+        .fingers = BT_MAX_FINGERS,
+        .erase_bytes = BT_FLASH_SECTOR_BYTES,
+        .map_bytes = BT_MAP_MAX_BYTES,
+        .map_ram = map_ram[0],
+        .maps = flash_maps(),
     };
 }

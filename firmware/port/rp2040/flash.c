@@ -110,7 +110,7 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, (const uint8_t *)(uintptr_t)(XIP_BASE + on_chip(offset)), bytes);
 }
 
-const uint8_t *port_flash_maps(bt_port *port)
+const uint8_t *flash_maps(void)
 {
     return (const uint8_t *)(uintptr_t)(XIP_BASE + MAPS_OFFSET);
 }

@@ -8,6 +8,7 @@
 #include "only_board.h"
 
 #include "dma.h"
+#include "map/store.h"
 #include "pins.h"
 #include "selects.h"
 #include "system.h"
@@ -114,4 +115,17 @@ void port_spi_slot_end(bt_port *port, uint16_t *word)
         IO_BANK0_GPIO_CTRL(select_pin[f]) = GPIO_FUNC_SIO; // high by now as the core has it
         word[f] = in_time && (read_mask >> f & 1) ? (uint16_t)got[f] : 0;
     }
+}
+
+port_abilities port_describe(bt_port *port)
+{
+    static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
+    return (port_abilities){
+        .name = IMAGE_BOARD_NAME,
+        .fingers = BT_MAX_FINGERS,
+        .erase_bytes = BT_FLASH_SECTOR_BYTES,
+        .map_bytes = BT_MAP_MAX_BYTES,
+        .map_ram = map_ram[0],
+        .maps = flash_maps(),
+    };
 }

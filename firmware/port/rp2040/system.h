@@ -37,6 +37,8 @@ void rom_enter_loader(void) __attribute__((noreturn));
 #define FLASH_ID_BYTES 8
 // Before any interrupt is on. Keeps what is needed to read the program again after the flash was used.
 void flash_start(void);
+// The slots for maps, or what else the image keeps there.
+const uint8_t *flash_maps(void);
 extern uint8_t flash_jedec_id[3];
 extern uint32_t flash_erase_us; // the longest so far
 // The flash's own unique number, which is the board's. False when the flash tells none. Sets flash_jedec_id.

@@ -186,8 +186,8 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "slots_late": error(
         "The board missed sampling times: those channels are missing from their frames.",
-        "On a Pico, report it with the output of `biotac info --json`. On a Linux computer's own bus, use fewer "
-        "fingers or a faster bus, or stop other programs.",
+        "On a microcontroller, report it with the output of `biotac info --json`. On a Linux computer's own bus, use "
+        "fewer fingers or a faster bus, or stop other programs.",
     ),
     "messages_dropped": warning(
         "The board had messages for which the link had no room: the computer read too slowly, or stalled.",

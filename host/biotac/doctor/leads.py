@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..wire.identity import ascii_text
-from ..wire.sensor_gen import MAX_SENSORS
 from .catalogue import Finding
 from .facts import BoardFacts, Facts, PairFacts
 from .sensors import WORDS
@@ -17,20 +16,20 @@ def check(facts: Facts) -> Iterator[Finding]:
     if board is None or pair is None:
         return
     # More than half of its words were good; one or two may date from before a lead came off.
-    bad = [sum(board.more(finger, kind) for kind in WORDS) for finger in range(MAX_SENSORS)]
-    good = [finger for finger in range(MAX_SENSORS) if board.more(finger, "words_good") > bad[finger]]
+    bad = [sum(board.more(finger, kind) for kind in WORDS) for finger in range(board.hello.fingers)]
+    good = [finger for finger in range(board.hello.fingers) if board.more(finger, "words_good") > bad[finger]]
     if good:
         yield from _selects(board, pair, good)
     elif not (words := pair.more("words")):
         yield Finding("lead_clock", "the sensor board saw no clock while any of its selects was low")
-    elif sum(board.more(finger, "words_error") for finger in range(MAX_SENSORS)):
+    elif sum(board.more(finger, "words_error") for finger in range(board.hello.fingers)):
         yield Finding("lead_mosi", f"{words} words were read, but the sensors understood no command")
     else:
         yield Finding("lead_miso", f"the sensors sent {words} words, but none reached the gateway")
 
 
 def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Finding]:
-    for finger in range(MAX_SENSORS):
+    for finger in range(board.hello.fingers):
         if finger not in good:
             others = ", ".join(map(str, good))
             yield Finding("lead_select", f"finger {finger} gives few good words or none, unlike fingers {others}")

@@ -22,7 +22,7 @@ def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
             what = "which is not a BioTac with 19 electrodes"
             yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, {what}")
     if not board.present:
-        yield Finding("no_sensor", "no sensor answers on any of the five chip selects")
+        yield Finding("no_sensor", f"no sensor answers on any of {board.hello.fingers} chip selects")
         return
     if expected is not None and len(board.present) < expected:
         there = ", ".join(map(str, board.present))

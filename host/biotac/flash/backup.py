@@ -18,7 +18,7 @@ from ..keep import Calibration
 from ..keep.calibration_file import from_dict, to_dict
 from ..map import file as map_file
 from ..wire import messages_gen as wire
-from ..wire.identity import board_text, serial_text, version_text
+from ..wire.identity import board_name, serial_text, version_text
 
 FORMAT = "biotac-settings/1"
 LAST_ID = 255
@@ -72,7 +72,7 @@ def save(hand: Hand, path: Path | None) -> Backup:
     backup = Backup(path.resolve(), read_settings(hand), hand.board.calibrations(), hand.board.maps())
     facts = {
         "format": FORMAT,
-        "board": board_text(hello.board),
+        "board": board_name(hello),
         "serial_number": serial_text(hello),
         "firmware": version_text(hello),
         "boot_id": hello.boot_id,

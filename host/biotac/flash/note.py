@@ -43,6 +43,8 @@ def find(image: bytes) -> Note:
     if layout != LAYOUT:
         raise ValueError(f"its note has layout {layout}, this library knows {LAYOUT}: use the image of this release")
     size, crc32 = PROOF.unpack_from(image, at + FIELDS.size)
+    if size == 0:
+        raise ValueError("its note was never filled in, as in an .elf that the build did not finish: use its .uf2")
     if not at + CRC_AT + CRC_BYTES <= size <= len(image) or any(image[size:]):
         raise ValueError(f"its note says {size} bytes, it has {len(image)}: the file is damaged, get it again")
     seen = _crc32(image[:size], at)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
 from ..wire import messages_gen as wire
-from ..wire.identity import board_text, serial_text, version_text
+from ..wire.identity import board_name, board_text, serial_text, version_text
 from .backup import Backup, Restored, restore, save
 from .image import Image, note_text
 from .interfaces import Loader, Target
@@ -110,7 +110,7 @@ def leave(
     with hand:
         if hand.info.board != image.note.board:
             raise InputError(
-                f"{image.path} is for {board_text(image.note.board)}, but {board_text(hand.info.board)} answers on "
+                f"{image.path} is for {board_text(image.note.board)}, but {board_name(hand.info)} answers on "
                 f"{target.port}; use that board's image"
             )
         if not downgrade and image.note.firmware < firmware(hand.info):
@@ -148,7 +148,7 @@ def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
         )
     if (after.board, firmware(after)) != (image.note.board, image.note.firmware):
         raise FlashError(
-            f"the board that came back is {board_text(after.board)}, firmware {version_text(after)}; expected "
+            f"the board that came back is {board_name(after)}, firmware {version_text(after)}; expected "
             f"{note_text(image.note)}: the image is not running; flash again"
         )
     if after.image_crc32 != image.note.crc32:
@@ -172,33 +172,38 @@ def step(backup: Backup | None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Result:
-    """Result for one board. ``outcome`` is None if the board already ran this image, or if there is an ``error``."""
+    """Result for one board. ``outcome`` is None if it was left alone, and ``why``, or if there is an ``error``."""
 
     port: str
     outcome: Outcome | None = None
     error: BiotacError | None = None
+    why: str = ""
 
 
 def flash_every(image: Image, targets: Iterable[Target], loaders: Sequence[Loader], **options: Any) -> Iterator[Result]:
-    """Flash each of ``targets`` as ``flash`` does with these ``options``, unless it already runs this image.
+    """Flash each of ``targets`` as ``flash`` does with these ``options``.
+
+    One that already runs this image, or that the image is not for, is left alone.
 
     A failure is reported in its Result, and the next board follows. Boards are flashed one after the other, because a
     loader does not say which board it is.
     """
     for target in targets:
         try:
-            outcome = None if runs(image, target) else flash(image, target, loaders, **options)
-            yield Result(target.port, outcome)
+            why = left_alone(image, target)
+            yield Result(target.port, None if why else flash(image, target, loaders, **options), why=why)
         except BiotacError as error:
             yield Result(target.port, error=error)
         finally:
             target.close()
 
 
-def runs(image: Image, target: Target) -> bool:
-    """True if the board's HELLO has the image's CRC-32; False if it differs or the board does not answer."""
+def left_alone(image: Image, target: Target) -> str:
+    """Why a board needs no flashing by its HELLO; empty if it does, or does not answer."""
     try:
         with target.open() as hand:
-            return bool(hand.info.image_crc32 == image.note.crc32)
+            if hand.info.board != image.note.board:
+                return f"is a {board_name(hand.info)}, which {image.path.name} is not for"
+            return "already runs this image" if hand.info.image_crc32 == image.note.crc32 else ""
     except BiotacError:
-        return False
+        return ""

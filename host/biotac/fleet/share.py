@@ -17,7 +17,7 @@ from ..hand.hand import Hand
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
 from ..wire.framing import ENCODED_MAX_BYTES, encode, open_frame
-from ..wire.identity import board_text, serial_text, version_text
+from ..wire.identity import board_name, serial_text, version_text
 from . import network, rights
 
 PAUSE_S = 0.5  # how long the stream stays stopped after a command that needed it stopped
@@ -112,7 +112,7 @@ class Share:
         facts = {
             "name": self.name,
             "epoch": self.epoch,
-            "board": board_text(hello.board),
+            "board": board_name(hello),
             "serial_number": serial_text(hello),
             "firmware": version_text(hello),
             "wire": f"{hello.wire_major}.{hello.wire_minor}",

@@ -5,9 +5,10 @@ from __future__ import annotations
 import zlib
 
 from ..board.board import Board
-from ..errors import CommandRefusedError, PortError
+from ..errors import CommandRefusedError, InputError, PortError
 from ..map.board_map import PART_BYTES, part
 from ..wire import messages_gen as wire
+from ..wire.identity import board_name, maps_text
 
 TRIES = 3
 
@@ -15,8 +16,14 @@ TRIES = 3
 def write(board: Board, finger: int, blob: bytes) -> None:
     """Upload a map, put it into force, and read it back to check it.
 
-    Raises CommandRefusedError with the board's reason; PortError when other bytes read back.
+    Raises InputError for a map that the board has no room for; CommandRefusedError with the board's reason; PortError
+    when other bytes read back.
     """
+    if len(blob) > board.info.map_bytes:
+        raise InputError(
+            f"a wrench map of {len(blob)} bytes, but {board_name(board.info)} keeps {maps_text(board.info)}: choose "
+            "a smaller map, or set force_model and the gains (biotac calibration put)"
+        )
     for left in reversed(range(TRIES)):
         try:
             _write(board, finger, blob)

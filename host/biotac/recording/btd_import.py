@@ -74,7 +74,7 @@ def _write(
         req_id=0, nonce=0, wire_major=wire.WIRE_MAJOR, wire_minor=wire.WIRE_MINOR, schema_hash=wire.SCHEMA_HASH,
         firmware_major=major, firmware_minor=minor, firmware_patch=patch, board=NO_BOARD, board_serial=(0,) * 12,
         boot_id=0, slot_hz=sensor.SLOT_HZ, fingers_present=(1 << fingers) - 1,
-        image_crc32=NO_IMAGE,
+        image_crc32=NO_IMAGE, fingers=sensor.MAX_SENSORS, map_bytes=0, board_name=(0,) * 16,
     )  # fmt: skip
     sensors = [wire.SensorInfo(0, finger, 1, (0,) * 2, (0,) * 4, (0,) * 16, 0, 0) for finger in range(fingers)]
     metadata = Facts(hello, sensors, settings).metadata(f"btd:{path.name}")

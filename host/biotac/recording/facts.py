@@ -15,7 +15,7 @@ from ..keep.calibration_file import from_dict, to_dict
 from ..map.board_map import as_blob
 from ..version import __version__
 from ..wire import messages_gen as wire
-from ..wire.identity import NO_IMAGE, version_text
+from ..wire.identity import version_text
 from . import layout
 
 Settings = Mapping[wire.Setting, int]
@@ -42,7 +42,7 @@ class Facts:
             named = json.loads(metadata["settings"])
             own, maps = (json.loads(metadata.get(name, "{}")) for name in ("calibrations", "maps"))
             facts = cls(
-                wire.Hello(**_tuples({"image_crc32": NO_IMAGE} | json.loads(metadata["hello"]))),
+                wire.Hello(**_tuples(json.loads(metadata["hello"]))),
                 [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
                 # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
                 {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},

@@ -19,7 +19,7 @@ from ..errors import BiotacError, DeviceLostError, InputError, PortError
 from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
-from ..wire.identity import board_text
+from ..wire.identity import board_name
 from .source import Source
 
 SAMPLES_A_MESSAGE = 110
@@ -37,7 +37,7 @@ class SensorBoard:
         self._board = Board(link)
         self.info = self._board.info
         if self.info.board != wire.Board.PICO_SENSOR:
-            seen = board_text(self.info.board)
+            seen = board_name(self.info)
             self._board.close()
             raise PortError(f"{link.port} is {seen}, not a sensor board; name the other port, or `biotac flash` it")
         self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in

@@ -12,9 +12,8 @@ from ..errors import CommandRefusedError, InputError
 from ..hand.hand import Hand
 from ..hand.record import Recorder
 from ..recording.replay.link import ReplayLink
-from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
-from ..wire.identity import version_text
+from ..wire.identity import board_name, version_text
 
 
 class Player:
@@ -32,8 +31,7 @@ class Player:
         self._recording_since_us: int | None = None
         self._last_us = 0
         self.live = self._replay is None
-        self.board = f"{wire.BOARD_DOC.get(hand.info.board, f'board {hand.info.board}')}, firmware "
-        self.board += version_text(hand.info)
+        self.board = f"{board_name(hand.info)}, firmware {version_text(hand.info)}"
         if self._replay is not None:
             self.board += f", recorded from {self._replay.recording.metadata['port']}"
         try:

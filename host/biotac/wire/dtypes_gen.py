@@ -28,6 +28,9 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("slot_hz", "<u2"),
             ("fingers_present", "u1"),
             ("image_crc32", "<u4"),
+            ("fingers", "u1"),
+            ("map_bytes", "<u2"),
+            ("board_name", "u1", (16,)),
         ]
     ),
     wire.Reply.ID: np.dtype(

@@ -15,8 +15,18 @@ SERIAL_BYTES = 8
 
 
 def board_text(board: int) -> str:
-    """A board's name, or its number if this library does not know it."""
+    """The name of a board's id, or the number if this library does not know it."""
     return wire.Board(board).name if board in list(wire.Board) else f"board {board}"
+
+
+def board_name(hello: wire.Hello) -> str:
+    """What people call the board: as it says itself, also where this library does not know it."""
+    return ascii_text(hello.board_name) or board_text(hello.board)
+
+
+def maps_text(hello: wire.Hello) -> str:
+    """Whether the board keeps wrench maps."""
+    return f"wrench maps of up to {hello.map_bytes} bytes" if hello.map_bytes else "no wrench maps"
 
 
 def command_name(message_id: int) -> str:

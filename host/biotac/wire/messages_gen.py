@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x84AFE357
+SCHEMA_HASH = 0x13DC1CFA
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -90,7 +90,7 @@ class ForceModel(IntEnum):
 
 
 class UartPins(IntEnum):
-    """Pins of a board's UART. On a Pico, four pairs are not used by the sensors."""
+    """Pins of a board's UART. On a Pico, four pairs are not used by the sensors; a board with one pair ignores this."""
 
     GPIO_0_1 = 0  # TX on GPIO 0, RX on GPIO 1
     GPIO_4_5 = 1  # TX on GPIO 4, RX on GPIO 5
@@ -99,12 +99,15 @@ class UartPins(IntEnum):
 
 
 class Board(IntEnum):
-    """What the firmware runs on."""
+    """What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody."""
 
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
     PICO_SENSOR = 4  # Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    STM32F405 = 5  # STM32F405 with a UART to the host (firmware/boards/f405)
+    PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
+    PRIVATE = 32768  # the first of the private ids
 
 
 class EmuFault(IntEnum):
@@ -279,6 +282,9 @@ BOARD_DOC: dict[int, str] = {
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
     4: "Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages",
+    5: "STM32F405 with a UART to the host (firmware/boards/f405)",
+    6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
+    32768: "the first of the private ids",
 }
 
 
@@ -466,7 +472,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.UART_BITS_PER_S: SettingSpec(
         "bit/s", 0, 3000000, 0,
-        "bit rate of a UART for this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: off. Used from the board's next start if saved; only a Pico has one",
+        "bit rate of a UART for this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: off, or 921600 on a board that has no other link. Used from the board's next start if saved",
     ),
     Setting.UART_PINS: SettingSpec(
         "enum uart_pins", 0, 3, 0,
@@ -505,12 +511,15 @@ class Hello:
     slot_hz: int
     fingers_present: int
     image_crc32: int
+    fingers: int
+    map_bytes: int
+    board_name: tuple[int, ...]
 
     ID: ClassVar[int] = 0x01
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIBBIBBBH12BIHBI")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIBBIBBBH12BIHBIBH16B")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 39 bytes."""
+        """Payload without id and CRC, 58 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.nonce,
@@ -526,6 +535,9 @@ class Hello:
             self.slot_hz,
             self.fingers_present,
             self.image_crc32,
+            self.fingers,
+            self.map_bytes,
+            *self.board_name,
         )
 
     @classmethod
@@ -547,6 +559,9 @@ class Hello:
             v[22],
             v[23],
             v[24],
+            v[25],
+            v[26],
+            v[27 : 43],
         )
 
 

@@ -192,7 +192,7 @@ static void slots_that_nobody_has_anything_in_are_free(void **state)
         bt_finger_map_reset(&none[f]);
     }
     for (uint8_t slot = 0; slot < BT_MAP_SLOTS; slot++) {
-        assert_int_equal(bt_map_free_slot(none, slot), (slot + 1) % BT_MAP_SLOTS);
+        assert_int_equal(bt_map_free_slot(&map_flash, none, slot), (slot + 1) % BT_MAP_SLOTS);
     }
 }
 

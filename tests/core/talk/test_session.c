@@ -61,6 +61,35 @@ static void hello_tells_who_is_there_and_echoes_the_nonce(void **state)
     assert_int_equal(hello.fingers_present, 1 << 1 | 1 << 4);
 }
 
+// Two fingers, and no place for maps: what is kept is refused, what is asked is answered.
+static void a_board_tells_what_it_can_and_refuses_the_rest(void **state)
+{
+    (void)state;
+    static const bt_board_actions no_maps = {.save_map = NULL};
+    uint8_t payload[BT_HELLO_REQUEST_BYTES] = {1};
+    bt_msg_hello hello;
+    session.identity.fingers = 2;
+    memcpy(session.identity.board_name, "little one", 11);
+    bt_session_use_board(&session, &no_maps);
+    bt_msg_hello_unpack(&hello, host_ask(&session, BT_HELLO_REQUEST_ID, payload, sizeof payload)->payload);
+    assert_true(hello.fingers == 2 && hello.map_bytes == 0);
+    assert_string_equal((const char *)hello.board_name, "little one");
+    for (uint8_t finger = 0; finger < BT_MAX_FINGERS; finger++) {
+        uint8_t one[2] = {3, finger};
+        bt_msg_begin_map map = {.req_id = 3, .finger = finger, .size_bytes = 100};
+        uint8_t begin[BT_BEGIN_MAP_BYTES];
+        bt_msg_begin_map_pack(&map, begin);
+        assert_int_equal(host_ask(&session, BT_GET_SENSOR_INFO_ID, one, 2)->id, BT_SENSOR_INFO_ID);
+        assert_int_equal(host_ask(&session, BT_GET_MAP_ID, one, 2)->id, BT_MAP_INFO_ID);
+        assert_int_equal(host_error(&session, BT_CLEAR_CALIBRATION_ID, one, 2),
+                         finger < 2 ? BT_ERROR_OK : BT_ERROR_NO_SUCH_FINGER);
+        assert_int_equal(host_error(&session, BT_BEGIN_MAP_ID, begin, sizeof begin),
+                         finger < 2 ? BT_ERROR_NOT_HERE : BT_ERROR_NO_SUCH_FINGER);
+    }
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 0x1F, 0),
+                     BT_ERROR_OK); // those that are not there are silent
+}
+
 static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
 {
     (void)state;
@@ -453,6 +482,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         T(hello_tells_who_is_there_and_echoes_the_nonce),
+        T(a_board_tells_what_it_can_and_refuses_the_rest),
         T(every_command_gets_exactly_one_reply_with_its_req_id),
         T(errors_are_told_by_name),
         T(settings_hold_their_ranges_and_refused_values_change_nothing),

@@ -59,7 +59,7 @@ def test_list_shows_what_can_be_simulated(capsys) -> None:
 def test_info_tells_board_sensors_and_settings(capsys) -> None:
     assert main(["info", "sim:press.toml?fingers=3", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert facts["board"] == "POSIX_SIM"
+    assert (facts["board"], facts["fingers"]) == ("simulator", 5)
     assert [s["finger"] for s in facts["sensors"]] == [0, 1, 2]
     assert all(s["serial"].startswith("BT") for s in facts["sensors"])
     assert facts["settings"]["contact_energy_count2"] == 1000

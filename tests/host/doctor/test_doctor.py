@@ -67,7 +67,7 @@ def dynamic_pressure(fingers: tuple[int, ...] = (0, 1), n: int = 300) -> np.ndar
 
 def hello(*firmware: int, **values: Any) -> wire.Hello:
     names = ("firmware_major", "firmware_minor", "firmware_patch")
-    return message(wire.Hello, slot_hz=4400, **dict(zip(names, firmware, strict=True)), **values)
+    return message(wire.Hello, slot_hz=4400, fingers=5, **dict(zip(names, firmware, strict=True)), **values)
 
 
 def healthy(**changes: Any) -> BoardFacts:

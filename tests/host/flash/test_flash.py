@@ -360,6 +360,10 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     assert (first.version, last.version) == ((0, 2, 0), (0, 2, 0))
     again = list(flash_every(image, [first, last], [first, last]))
     assert [(result.outcome, result.error) for result in again] == [(None, None)] * 2
+    first.board = int(wire.Board.PICO_W)  # the same chip, other pins: it keeps its own image
+    for_picos = read_image(make_image(tmp_path, note(version=(0, 3, 0))))
+    (left,) = flash_every(for_picos, [first], [first])
+    assert (left.outcome, left.error) == (None, None) and "is a PICO_W, which new.uf2 is not for" in left.why
     assert first.events == last.events == ["loader", "write"]
 
 

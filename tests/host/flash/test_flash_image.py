@@ -105,11 +105,11 @@ def test_no_flipped_bit_is_overlooked(tmp_path: Path) -> None:
 
 def test_settings_and_maps_are_where_the_firmware_has_them() -> None:
     storage = (ROOT / "firmware/core/keep/storage.h").read_text()
-    assert "#define BT_FLASH_SECTOR_BYTES   4096" in storage
-    assert "#define BT_STORAGE_BYTES        (2 * BT_FLASH_SECTOR_BYTES)" in storage
+    assert "#define BT_FLASH_SECTOR_BYTES 4096" in storage
+    assert "#define BT_STORAGE_BYTES      (2 * BT_FLASH_SECTOR_BYTES)" in storage
     slots = (ROOT / "firmware/core/map/store.h").read_text()
     assert "#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES" in slots
-    assert "#define BT_MAP_SLOTS      (2 * BT_MAX_FINGERS + 1)" in slots
+    assert "#define BT_MAP_SLOTS      BT_MAP_SLOTS_OF(BT_MAX_FINGERS)" in slots
     port = (ROOT / "firmware/port/rp2040/flash.c").read_text()
     assert "#define FLASH_BYTES    (2u * 1024 * 1024)" in port
     assert "#define MAPS_OFFSET    (STORAGE_OFFSET - BT_MAPS_BYTES)" in port

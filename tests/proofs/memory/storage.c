@@ -29,7 +29,7 @@ static uint8_t data[BT_STORAGE_MAX_BYTES];
 
 void main(void)
 {
-    const bt_flash flash = {NULL, erase, program, read_flash};
+    const bt_flash flash = {BT_FLASH_SECTOR_BYTES, NULL, erase, program, read_flash};
     uint16_t version;
     size_t room = (size_t)Frama_C_interval(0, sizeof data);
     Frama_C_make_unknown((char *)data, sizeof data);

@@ -83,8 +83,9 @@ def answer(message: Any) -> bytes:
     """The encoded answer: HELLO, or a Reply of success."""
     if isinstance(message, wire.HelloRequest):
         versions = (wire.WIRE_MAJOR, wire.WIRE_MINOR, wire.SCHEMA_HASH, 0, 0, 0)
+        serial, name = (1,) * 12, (0,) * 16
         hello = wire.Hello(
-            message.req_id, message.nonce, *versions, wire.Board.POSIX_SIM, (1,) * 12, 1, 4400, 31, 0xFFFFFFFF
+            message.req_id, message.nonce, *versions, wire.Board.POSIX_SIM, serial, 1, 4400, 31, 0xFFFFFFFF, 5, 0, name
         )
         return encode(hello.ID, hello.pack())
     return encode(wire.Reply.ID, wire.Reply(message.req_id, message.ID, 0).pack())

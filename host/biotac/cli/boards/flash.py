@@ -90,10 +90,13 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
         if result.error is not None:
             say(f"{result.port}: {result.error}")
         elif not args.json:
-            print(summary(result.outcome) if result.outcome else f"{result.port} already runs this image")
+            print(summary(result.outcome) if result.outcome else f"{result.port} {result.why}")
     if args.json:
-        ends = [(result, facts(image, result.outcome) if result.outcome else {}) for result in results]
-        print(json.dumps([{"port": end.port, "error": end.error and str(end.error), **more} for end, more in ends]))
+        told = []
+        for result in results:
+            done = facts(image, result.outcome) if result.outcome else {"why": result.why}
+            told.append({"port": result.port, "error": result.error and str(result.error), **done})
+        print(json.dumps(told))
     failed = [result.port for result in results if result.error is not None]
     if failed:
         raise FlashError(f"{len(failed)} of {len(results)} boards were not flashed: {', '.join(failed)}; see above")

@@ -13,7 +13,7 @@ from ...keep.calibration_file import to_dict
 from ...map import file as map_file
 from ...map.board_map import made_s_of
 from ...wire import messages_gen as wire
-from ...wire.identity import ascii_text, board_text, serial_text, setting_text, version_text
+from ...wire.identity import ascii_text, board_name, maps_text, serial_text, setting_text, version_text
 from .. import values
 from ..outputs import say
 
@@ -35,7 +35,9 @@ def run(args: argparse.Namespace) -> int:
         warnings = hand.warnings
     facts: dict[str, Any] = {
         "port": hand.port,
-        "board": board_text(hello.board),
+        "board": board_name(hello),
+        "fingers": hello.fingers,
+        "map_bytes": hello.map_bytes,
         "firmware": version_text(hello),
         "wire": f"{hello.wire_major}.{hello.wire_minor}",
         "schema_hash": f"{hello.schema_hash:08x}",
@@ -53,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     }
     lines = [
         f"{facts['board']}, firmware {facts['firmware']}, wire {facts['wire']}",
+        f"{hello.fingers} chip selects, {maps_text(hello)}",
         f"serial {facts['serial_number']}, boot {hello.boot_id:08x}, up {status.uptime_s} s",
         *(f"warning: {warning.text}" for warning in warnings),
     ]

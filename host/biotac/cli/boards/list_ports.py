@@ -11,7 +11,7 @@ from ...hand.hand import Hand
 from ...link import open_link
 from ...link.discovery import SerialPort, serial_ports
 from ...sim.loading import bundled_scenarios
-from ...wire.identity import board_text, serial_text, version_text
+from ...wire.identity import board_name, serial_text, version_text
 from ..outputs import say
 
 EXAMPLE = "biotac list"
@@ -67,7 +67,7 @@ def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
                 facts |= {
                     "is_board": True,
                     "serial_number": serial_text(hand.info),
-                    "board": board_text(hand.info.board),
+                    "board": board_name(hand.info),
                     "firmware": version_text(hand.info),
                     "fingers": hand.fingers,
                 }
