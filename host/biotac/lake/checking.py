@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -46,7 +45,11 @@ def check(lake: str, item: tuple[str, dict[str, str]]) -> Checked:
         elif hashlib.sha256(data).hexdigest() != sha256:
             checked.wrong.append(f"{file} differs from what was exported; export it again with --force")
         elif topic in (RECORDINGS, "frames"):
-            tables[topic] = pq.read_table(io.BytesIO(data))
+            # In Arrow's memory: its threads may outlive the program's end, and one that then lets go of a Python
+            # object aborts it.
+            copy = pa.BufferOutputStream()
+            copy.write(data)
+            tables[topic] = pq.read_table(pa.BufferReader(copy.getvalue()))
     if not any(path.startswith(f"{RECORDINGS}/") for path in sums):
         checked.wrong.append(f"{recording} has no file in {RECORDINGS}; export it again with --force")
     if len(tables) == 2:
