@@ -36,6 +36,7 @@ class Board:
         self.closed = False
         self.sent_s = time.monotonic()  #: when the board last heard from this side
         self._req_ids = cycle(range(1, 256))
+        self.ending = threading.RLock()  #: one thread closes it, and others wait until it has
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
         self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
@@ -197,10 +198,17 @@ class Board:
     def tell_again(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations, maps and subscriptions.
 
-        Not tares: after a restart the board takes its own, and an earlier one may be wrong by then.
+        Not tares: after a restart the board takes its own, and an earlier one may be wrong by then. Raises
+        CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.
         """
-        for again in list(self._lasting.values()):
-            again()
+        for (what, number), again in list(self._lasting.items()):
+            try:
+                again()
+            except CommandRefusedError as error:
+                text = (
+                    f"{self.link.port} came back, but not with its {what} {number}: {error}; open it and set it again"
+                )
+                raise CommandRefusedError(text, error.error) from error
 
 
 def describe_refusal(request: Any, reply: wire.Reply, board: wire.Hello) -> str:

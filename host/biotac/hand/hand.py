@@ -521,12 +521,14 @@ def _reporter(board: Board, troubles: Troubles) -> Callable[[], None]:
 def _end(board: Board, stream: Stream, keeper: Keeper, callbacks: Callbacks, recorders: list[Recorder]) -> None:
     """Close a hand's parts; also called when the hand is garbage-collected or the program ends."""
     reader = board.reader
-    if board.closed or reader.is_inherited():
+    if reader.is_inherited():
         return
     if threading.current_thread() in THREADS:  # it cannot wait for itself, nor are other hands to wait
         threading.Thread(target=_end, args=(board, stream, keeper, callbacks, recorders), name="biotac end").start()
         return
-    with ExitStack() as last:  # these run even when one of them fails
+    with board.ending, ExitStack() as last:  # these run even when one of them fails
+        if board.closed:
+            return
         last.callback(board.close)
         for recorder in recorders:
             last.callback(recorder.close)

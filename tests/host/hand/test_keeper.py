@@ -272,6 +272,23 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
     assert hand.stats.gaps == 1 and hand.connected and hand[0].t_us == 500_000
 
 
+def test_a_board_that_comes_back_and_refuses_what_it_had_ends_the_hand_in_words(world) -> None:
+    # Going on would show forces by another setting than the program's.
+    live = world.opened(there := world.plug(boot_id=1))
+    live.hand.board.set_setting(2, 50)
+    live.hand.stream()
+    live.send(frame(1))
+    world.clock.while_away = lambda pauses: world.plug(boot_id=2).firmware.refuses.update(
+        {wire.SetSetting: wire.Error.OUT_OF_RANGE}
+    )
+    world.unplug(there)
+    with pytest.raises(
+        biotac.CommandRefusedError, match=r"came back, but not with its setting 2: .*OUT_OF_RANGE"
+    ) as told:
+        live.hand.read(1000.0)
+    assert told.value.error == wire.Error.OUT_OF_RANGE and not live.hand.connected
+
+
 def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) -> None:
     for reconnect in (False, True):
         live = world.opened(there := world.plug(boot_id=1), reconnect=reconnect)

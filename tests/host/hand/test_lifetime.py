@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from live_board import Firmware, frame
+from live_board import Firmware, Live, frame
 
 import biotac
 from biotac.hand.hand import Hand
@@ -62,6 +62,28 @@ def test_a_finger_and_an_iteration_keep_their_hand() -> None:
     del batches
     gc.collect()
     assert alive() is None
+
+
+def test_two_threads_that_close_a_hand_close_it_once(scripted_board, hello) -> None:
+    firmware = Firmware(hello)
+    live = Live(scripted_board(firmware), firmware)
+    hand, closed = live.hand, []
+    running, go_on = threading.Event(), threading.Event()
+    hand.on_batch(lambda batch: (running.set(), go_on.wait(WAIT_S)))
+    hand.stream()
+    live.send(frame(1))
+    assert running.wait(WAIT_S)
+    close = hand.link.close
+    hand.link.close = lambda: (closed.append(threading.current_thread()), close())
+    with ThreadPoolExecutor(2) as closing:
+        both = [closing.submit(hand.close) for _ in range(2)]
+        assert hand._reader.closing.wait(WAIT_S)
+        while not both[1].running():
+            pass
+        go_on.set()
+        for one in both:
+            one.result(WAIT_S)
+    assert len(closed) == 1
 
 
 def test_a_hand_collected_on_its_own_reading_thread_ends_too(scripted_board, hello) -> None:
