@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 // N a count, then N a count and gate x, and gate y; of each the compressed electrodes', then the bulging
-// ones'. N of conductances, then of their products, i <= j.
-#define BT_POPULATION_COLUMNS (6 * BT_ELECTRODES + BT_ELECTRODES + BT_ELECTRODES * (BT_ELECTRODES + 1) / 2)
+// ones'.
+#define BT_POPULATION_COLUMNS (6 * BT_ELECTRODES)
 
 // results: poc_mm, force_n, torque_nmm of Lin's, of which force becomes the published one, and torque x what
 // follows. counts: 0..4095 or BT_INVALID_COUNT.

@@ -18,7 +18,7 @@ static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, 
     press_lin;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, rest_events, press_events,
     shaken_events, jolt_events, slip_events;
-static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, scaled_population;
+static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, joined;
 static bt_msg_frame message;
 static bt_msg_frame sent;
 static _Alignas(4) uint16_t encoded[(BT_ENCODED_MAX_BYTES + 1) / 2];
@@ -210,7 +210,7 @@ MAP_SCENE(affine)
 MAP_SCENE(sign_split)
 MAP_SCENE(gated)
 MAP_SCENE(conductance)
-MAP_SCENE(scaled_population)
+MAP_SCENE(joined)
 MAP_SCENE(pooled)
 MAP_SCENE(pooled_6)
 MAP_SCENE(pooled_7)
@@ -219,9 +219,7 @@ SCENE(population)
 {
     int32_t force_100un[3], e_q4[BT_ELECTRODES];
     bt_signals_q4(press_whole.round.electrode, press_whole.tare.electrode_q4, e_q4);
-    bt_population_force(e_q4, press_whole.round.electrode, press_whole.tare.electrode_q4, force_100un);
-    bt_likeness likeness = bt_population_likeness(e_q4);
-    bt_population_mix(&likeness, force_100un);
+    bt_population_force(e_q4, force_100un);
     sink = (uint32_t)force_100un[0];
 }
 
@@ -247,7 +245,7 @@ const bench_scene bench_scenes[] = {
     {"wrench map", "sign-split, 3 axes", map_sign_split},
     {"wrench map", "gated sign-split, 3 axes", map_gated},
     {"wrench map", "quadratic in conductance, 3 axes", map_conductance},
-    {"wrench map", "population and a scale, 3 axes", map_scaled_population},
+    {"wrench map", "joined, 3 axes", map_joined},
     {"wrench map", "pooled, 3 axes", map_pooled},
     {"wrench map", "pooled, 6 axes", map_pooled_6},
     {"wrench map", "pooled, 7 axes", map_pooled_7},
@@ -277,12 +275,12 @@ void bench_scenes_init(void)
     bt_settings all;
     (void)(BENCH_MAP_MAKE(&affine, bench_map_affine, 3)
            && BENCH_MAP_MAKE(&pooled, bench_map_pooled, 3)
-           // Parts of it: models of `biotac calibrate wrench`, less a few cycles for the offset, and the
+           // Parts of it: models of `biotac calibrate wrench`, less a few cycles for the offset; a
            // population map as a finger's own.
            && bench_map_make(&sign_split, bench_map_pooled + 4, 2, 3)
            && bench_map_make(&gated, bench_map_pooled + 4, 6, 3)
            && bench_map_make(&conductance, bench_map_pooled + 2, 2, 3)
-           && bench_map_make(&scaled_population, bench_map_pooled + 2, 8, 3)
+           && bench_map_make(&joined, bench_map_pooled + 2, 8, 3)
            && BENCH_MAP_MAKE(&pooled_6, bench_map_pooled, 6)
            && BENCH_MAP_MAKE(&pooled_7, bench_map_pooled, 7));
     bt_settings_reset(&all);

@@ -14,8 +14,6 @@ from .schema import c_header
 SOURCE = "host/biotac/map/population.json"
 FORCE_PER_N = 1e4
 WORDS_A_LINE = 8
-PAIRS = [*((i, i + 10) for i in range(6)), (7, 8)]
-MIDDLE = (6, 9, 16, 17, 18)
 
 
 def header(root: Path) -> str:
@@ -26,10 +24,6 @@ def header(root: Path) -> str:
     heads = [blob[HEADER_BYTES + k * BLOCK_BYTES :][:2] for k in range(blocks)]
     words = [f"0x{word:08X}" for (word,) in struct.iter_unpack("<I", blob)]
     lines = [", ".join(words[k : k + WORDS_A_LINE]) for k in range(0, len(words), WORDS_A_LINE)]
-    rows = facts["pattern_weights"]
-    pairs = len(PAIRS)
-    weights = [row[k : pairs if k < pairs else None] for k, row in enumerate(rows)]
-    flat = [str(weight) for row in weights for weight in row]
     return c_header(
         "POPULATION",
         ["The population map (host/docs/guides/population.md): a wrench map's blob, which bt_map_open takes."],
@@ -41,14 +35,6 @@ def header(root: Path) -> str:
             f"#define BT_POPULATION_KINDS 0x{sum({1 << kind for kind, _ in heads}):X}",
             f"#define BT_POPULATION_GATES 0x{sum({1 << gate for _, gate in heads}):X}",
             f"#define BT_POPULATION_SIGMA_100UN {{{', '.join(str(round(s * FORCE_PER_N)) for s in facts['sigma_n'])}}}",
-            "",
-            "// Electrodes left and right of each other, those between, and the distance from the training's patterns:",
-            "// rows of what differs between left and right, then of sums and those between; each from its own on.",
-            f"#define BT_POPULATION_PAIRS {pairs}",
-            f"#define BT_POPULATION_PAIR {{{', '.join(f'{{{left}, {right}}}' for left, right in PAIRS)}}}",
-            f"#define BT_POPULATION_MIDDLE {{{', '.join(str(i) for i in MIDDLE)}}}",
-            f"#define BT_POPULATION_PATTERN {{{', '.join(flat)}}}",
-            f"#define BT_POPULATION_PATTERN_MAX {max(abs(weight) for row in weights for weight in row)}",
             "",
             "static const uint32_t bt_population_blob[BT_POPULATION_BYTES / 4] = {",
             *(f"    {line}," for line in lines),

@@ -121,10 +121,6 @@ static uint32_t by_map(const bt_round *round, const bt_tare *tare, const int32_t
         .tare_q4 = tare->electrode_q4,
         .pdc_above_rest_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16)),
     };
-    if (settings->map == NULL) {
-        return bt_solve_uncalibrated(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
-                                     msg->torque_mnmm);
-    }
     return BT_FRAME_FLAG_MAPPED
            | bt_solve_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
                              msg->torque_mnmm, &msg->torsion_mnmm);
@@ -144,8 +140,14 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     }
     int32_t e_q4[BT_ELECTRODES];
     signal_shape shape = signals(round, tare, e_q4);
-    if (settings->map != NULL || settings->population) {
+    if (settings->map != NULL) {
         flags |= by_map(round, tare, e_q4, settings, quantities, msg);
+    } else if (settings->population) {
+        const uint32_t both = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_SIGMA;
+        uint16_t not_asked[3];
+        flags |=
+            bt_solve_uncalibrated(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm,
+                                  (quantities & both) == both ? msg->force_sigma_100un : not_asked);
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
     }

@@ -72,25 +72,21 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
     }
 }
 
-static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                                 int32_t force_100un[3])
+static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3],
+                                 uint16_t sigma_100un[3])
 {
-    bt_likeness likeness = bt_population_likeness(e_q4);
-    if (likeness.share > 0) {
-        bt_population_force(e_q4, frame->counts, frame->tare_q4, force_100un);
-    } else {
-        force_100un[0] = force_100un[1] = force_100un[2] = 0;
+    bt_likeness likeness = bt_population_force(e_q4, force_100un);
+    if (likeness.outside) {
+        return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
     }
-    if (likeness.share < BT_POPULATION_ALL) {
-        bt_population_mix(&likeness, force_100un);
-    }
-    return BT_FRAME_FLAG_POPULATION | (likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0);
+    bt_population_sigma(&likeness, sigma_100un);
+    return BT_FRAME_FLAG_POPULATION;
 }
 
-// Force comes from the gains, or from the population map if `frame` is given; all else is the same.
-static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                                         const bt_solve_settings *settings, uint32_t wanted,
-                                         int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
+// Force comes from the gains, or from the population map if its sigma is given; all else is the same.
+static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
+                                         uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
+                                         int32_t torque_mnmm[3], uint16_t sigma_100un[3])
 {
     bt_point point;
     uint32_t flags = 0;
@@ -98,8 +94,8 @@ static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], cons
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
-        if (frame != NULL) {
-            flags = population_force(e_q4, frame, force_100un);
+        if (sigma_100un != NULL) {
+            flags = population_force(e_q4, force_100un, sigma_100un);
         } else {
             bt_force(e_q4, &settings->gains, force_100un);
         }
@@ -119,14 +115,14 @@ static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], cons
 uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
                   int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
 {
-    return solve_without_map(e_q4, NULL, settings, wanted, poc_um, force_100un, torque_mnmm);
+    return solve_without_map(e_q4, settings, wanted, poc_um, force_100un, torque_mnmm, NULL);
 }
 
-uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                               const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                               int32_t force_100un[3], int32_t torque_mnmm[3])
+uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
+                               uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
+                               int32_t torque_mnmm[3], uint16_t sigma_100un[3])
 {
-    return solve_without_map(e_q4, frame, settings, wanted, poc_um, force_100un, torque_mnmm);
+    return solve_without_map(e_q4, settings, wanted, poc_um, force_100un, torque_mnmm, sigma_100un);
 }
 
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,

@@ -50,9 +50,9 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
 
 // The same without a map, for settings->population: force comes from the population map and from what it is
 // mixed with. Torque y and z are Eq 4's, and x is derived from that force. Also returns POPULATION if a force
-// was computed, and OUTSIDE as bt_population_likeness says.
-uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                               const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                               int32_t force_100un[3], int32_t torque_mnmm[3]);
+// was computed, and OUTSIDE as bt_population_force says. sigma_100un is left as it is where there is none.
+uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
+                               uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
+                               int32_t torque_mnmm[3], uint16_t sigma_100un[3]);
 
 #endif

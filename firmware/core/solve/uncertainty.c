@@ -1,7 +1,6 @@
 #include "solve/uncertainty.h"
 
 #include "fixed_point.h"
-#include "map/population.h"
 
 #include <stdbool.h>
 
@@ -200,12 +199,6 @@ static void force_sigma(const bt_solve_settings *settings, uint32_t sigma_q8, bt
 void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t noise_count2,
               bt_msg_frame *msg)
 {
-    bool forced = msg->force_100un[0] != BT_INVALID_I32;
-    const uint32_t its = BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
-    if (forced && (msg->flags & its) == BT_FRAME_FLAG_POPULATION) {
-        bt_likeness likeness = bt_population_likeness(e_q4);
-        bt_population_sigma(&likeness, msg->force_sigma_100un);
-    }
     if (noise_count2 == 0) {
         return; // not measured yet
     }
@@ -213,7 +206,8 @@ void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settin
     if (msg->poc_um[0] != BT_INVALID_I16) {
         msg->poc_sigma_um = poc_sigma_um(e_q4, settings->poc_weights, msg->poc_um, sigma_q8);
     }
-    if (forced && settings->map == NULL && !settings->population) { // a map's depends on the place
+    bool forced = msg->force_100un[0] != BT_INVALID_I32;
+    if (forced && settings->map == NULL && !settings->population) { // a map's does not come from noise
         force_sigma(settings, sigma_q8, msg);
     }
 }

@@ -1,9 +1,9 @@
 """The population map: a force for fingers without a calibration of their own, its file, and the package's own.
 
-It is linear in 323 columns: those of a wrench map that have no offset and are 0 where counts are at their tare, so that
-rest is 0 N on any finger. Coefficients have seven digits in the file: short, the same on every computer, and off by a
-thousandth of the map's error. A file holds coefficients and their provenance, never recordings. biotac-lab trains such
-maps; ``biotac.calibrate.press.few_shot`` improves one with five presses on a scale, or known weights.
+It is linear in 114 columns: signals by sign, with gains that follow the contact. They are 0 where counts are at their
+tare, so that rest is 0 N on any finger. Coefficients have seven digits in the file: short, the same on every computer,
+and off by a thousandth of the map's error. A file holds coefficients and their provenance, never recordings. biotac-lab
+trains such maps; ``biotac.calibrate.press.few_shot`` improves one with five presses on a scale, or known weights.
 """
 
 from __future__ import annotations
@@ -23,37 +23,34 @@ from ..documents import parse_document, read_document, sealed
 from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
-from ..map.population import LEFT, SHIPPED, WEIGHT_BITS, Integers, board_map, bounded_q4, halves, likeness, shipped
+from ..map.population import SHIPPED, board_map, likeness, shipped
 from ..version import __version__
-from .wrench.models import CONDUCTANCE, GATED
+from ..wire.frames import FORCE_LSB_PER_N
+from .wrench.models import GATED
 
 __all__ = [
-    "AXES", "COLUMNS", "LEFT", "PARTS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "WEIGHT_BITS", "Population", "Sums", "Trained",
-    "bounded_q4", "columns", "dumps", "halves", "load", "provenance_of",
+    "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps", "load",
+    "provenance_of",
 ]  # fmt: skip
 
 FORMAT = "biotac-population-map/1"
 _CURE = f"expected a {FORMAT}, as `biotac-lab population --out` writes it"
 DIGITS = 7
 NOTHING = 1e-9
-MAX_WEIGHT = 30000  # so that firmware/core/map/population.c cannot overflow
 MODEL = "population"
 AXES = map_columns.AXES[:3]
 ROWS_AT_ONCE = 4096
 
-MODELS = (GATED, CONDUCTANCE)
 ALL_COLUMNS = map_columns.width(with_pdc=False)
-INDEX = [model.index(ALL_COLUMNS) for model in MODELS]
-COLUMNS = sum(len(index) for index in INDEX)
-_STACKED = np.concatenate(INDEX)
-PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
-_BLOCKS = [block for model in MODELS for block in map_columns.blocks(with_pdc=False) if block in model.blocks]
+INDEX = GATED.index(ALL_COLUMNS)
+COLUMNS = len(INDEX)
+_BLOCKS = [block for block in map_columns.blocks(with_pdc=False) if block in GATED.blocks]
 _BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in _BLOCKS]
 
 
 @dataclass(frozen=True)
 class Sums:
-    """Means over rows and drift: ``gram`` (323, 323), ``cross`` (323, 3) with force in N, ``mean`` (323,)."""
+    """Means over rows and drift: ``gram`` (114, 114), ``cross`` (114, 3) with force in N, ``mean`` (114,)."""
 
     gram: Floats
     cross: Floats
@@ -62,19 +59,18 @@ class Sums:
 
 @dataclass(frozen=True)
 class Population:
-    """A population map: ``coefficients`` (323, 3) of columns(), in N.
+    """A population map: ``coefficients`` (114, 3) of columns(), in N.
 
-    ``variance`` (323,) is that of the columns in training, with a floor. ``pattern_weights`` (19, 19) measure how far a
-    pattern is from the training's.
+    ``variance`` (114,) is that of the columns in training, with a floor.
     """
 
     coefficients: Floats
     variance: Floats
-    pattern_weights: Integers
 
     def published(self, counts: Floats, tare: Floats) -> Floats:
-        """Force (n, 3) in N as a board publishes it: where the pattern is unlike the training's, along the normals."""
-        return likeness(counts - tare, self.pattern_weights).mixed(self.force(counts, tare))
+        """Force (n, 3) in N as a board publishes it: along the normals where the map contradicts them."""
+        force_n = self.force(counts, tare)
+        return likeness(counts - tare, np.rint(FORCE_LSB_PER_N * force_n).astype(np.int64)).mixed(force_n)
 
     def force(self, counts: Floats, tare: Floats) -> Floats:
         """Force (n, 3) in N on the finger, from counts (n, 19) and their ``tare`` (19,)."""
@@ -83,17 +79,17 @@ class Population:
     def wrench_map(self, tare: Floats) -> WrenchMap:
         """The same map in the form of a calibrated finger's, for ``tare`` (19,), with an offset of 0."""
         every = np.zeros((ALL_COLUMNS + 1, len(AXES)))
-        every[_STACKED] = self.coefficients
+        every[INDEX] = self.coefficients
         return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every)
 
 
 def columns(e: Floats, tare: Floats) -> Floats:
-    """The columns (n, 323) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
-    return map_columns.columns(Signals(e, tare))[:, _STACKED]
+    """The columns (n, 114) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
+    return map_columns.columns(Signals(e, tare))[:, INDEX]
 
 
 def by_columns(counts: Floats, tare: Floats, function: Callable[[Floats], Floats]) -> Floats:
-    """``function`` applied to the columns (n, 323) of counts (n, 19), in chunks of rows that fit the cache."""
+    """``function`` applied to the columns (n, 114) of counts (n, 19), in chunks of rows that fit the cache."""
     rows = range(0, len(counts), ROWS_AT_ONCE)
     return np.concatenate([function(columns(counts[at : at + ROWS_AT_ONCE] - tare, tare)) for at in rows])
 
@@ -154,7 +150,6 @@ def dumps(trained: Trained) -> str:
             "axes": list(AXES),
             "sigma_n": _short(trained.sigma_n),
             "sigma_scale5_n": _short(trained.sigma_scale5_n),
-            "pattern_weights": trained.population.pattern_weights.tolist(),
             "blocks": _BLOCK_NAMES,
             "board_map": base64.b64encode(on_board.blob).decode("ascii"),
             "coefficients_n_and_variance": [_short(row) for row in rows],
@@ -178,14 +173,11 @@ def _trained(content: dict[str, Any]) -> Trained:
         raise ValueError(f"its blocks are {content['blocks']}")
     rows = np.array(content["coefficients_n_and_variance"], dtype=np.float64)
     sigmas = [np.array(content[key], dtype=np.float64) for key in ("sigma_n", "sigma_scale5_n")]
-    weights = np.array(content["pattern_weights"], dtype=np.int64)
-    if weights.shape != (ELECTRODES, ELECTRODES) or (np.abs(weights) > MAX_WEIGHT).any():
-        raise ValueError(f"its pattern weights have shape {weights.shape}, or are above {MAX_WEIGHT}")
     if rows.shape != (COLUMNS, len(AXES) + 1) or any(one.shape != (len(AXES),) for one in sigmas):
         raise ValueError(f"its coefficients have shape {rows.shape}")
     if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
         raise ValueError("a coefficient is not finite, or a variance is not above 0")
-    return Trained(Population(rows[:, :-1], rows[:, -1], weights), sigmas[0], sigmas[1], dict(content["provenance"]))
+    return Trained(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(content["provenance"]))
 
 
 def _short(values: Floats) -> list[float]:

@@ -34,22 +34,15 @@ Block = tuple[Kind, Gate, Floats]
 Integers = npt.NDArray[np.int64]
 
 ALL = 256  # the share 1
-#: Electrodes left and right of each other, and those between; a pattern's halves are in this order.
-LEFT, RIGHT, MIDDLE = [0, 1, 2, 3, 4, 5, 7], [10, 11, 12, 13, 14, 15, 8], [6, 9, 16, 17, 18]
-WEIGHT_BITS = 11
 _NOISE_Q4 = 8 * 16
 _KNEE_Q4 = 256 * 16
 _SUM_BITS = 14
 _UNIT_BITS = 12
 _LEAST_Q4 = 64 * 16
 _LIGHT_Q4 = 1500 * 16
-_FAR_Q5, _NEAR_Q5, _OUTSIDE_Q5 = 8 << 5, 4 << 5, 48 << 5
+_FAR_8, _OUTSIDE = 11, 2
 _CHUNK_ROWS = 4096
-_COMPILED = [
-    *((kind, gate) for gate in (Gate.ONE, Gate.X, Gate.Y) for kind in (Kind.COMPRESSION, Kind.BULGE)),
-    (Kind.CONDUCTANCE, Gate.ONE),
-    (Kind.CONDUCTANCE_PAIRS, Gate.ONE),
-]
+_COMPILED = [(kind, gate) for gate in (Gate.ONE, Gate.X, Gate.Y) for kind in (Kind.COMPRESSION, Kind.BULGE)]
 
 
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:
@@ -78,25 +71,6 @@ def board_map(each: list[Block]) -> BoardMap:
     return quantise({(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in each})
 
 
-def bounded_q4(e: Floats) -> Integers:
-    """Signals (n, 19) in 1/16 count as the pattern has them: less 8 counts, and a quarter of what exceeds 256."""
-    e_q4 = np.rint(16 * e).astype(np.int64)
-    size = np.maximum(np.abs(e_q4) - _NOISE_Q4, 0)
-    bounded: Integers = np.sign(e_q4) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
-    return bounded
-
-
-def halves(x: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """What differs between left and right (n, 7), and then what does not (n, 12), of patterns (n, 19)."""
-    return np.concatenate([x[:, LEFT] - x[:, RIGHT], x[:, LEFT] + x[:, RIGHT], x[:, MIDDLE]], axis=1)
-
-
-@cache
-def pattern_weights() -> Integers:
-    """The rows (19, 19) of the distance from the patterns of the package's map."""
-    return np.array(json.loads(shipped())["pattern_weights"], dtype=np.int64)
-
-
 @dataclass(frozen=True)
 class Likeness:
     """How like the training n frames are; defined in integers, so that all boards agree (SPEC.md, Population map).
@@ -114,22 +88,37 @@ class Likeness:
         return part * force_n + (1 - part) * self.otherwise_n
 
 
-def likeness(e: Floats, weights: Integers) -> Likeness:
-    """How like the patterns that ``weights`` (19, 19) are of the signals ``e`` (n, 19) in counts are."""
-    q4 = bounded_q4(e)
+def likeness(e: Floats, force_100un: Integers) -> Likeness:
+    """How like the training the signals ``e`` (n, 19) in counts are, of which the map makes ``force_100un`` (n, 3)."""
+    e_q4 = np.rint(16 * e).astype(np.int64)
+    size = np.maximum(np.abs(e_q4) - _NOISE_Q4, 0)
+    q4 = np.sign(e_q4) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
     total = np.abs(q4).sum(axis=1)
     up = (_SUM_BITS - np.ceil(np.log2(total + 1.0)).astype(np.int64))[:, None]
     size = np.abs(q4) << np.maximum(up, 0) >> np.maximum(-up, 0)
-    x = np.sign(q4) * size
-    rows = halves(x) @ weights.T >> _SUM_BITS + 1
-    far = (rows**2).sum(axis=1) // np.maximum((x**2).sum(axis=1) >> 2 * _SUM_BITS - 4 - WEIGHT_BITS, 1)
-    share = np.clip(np.minimum((_FAR_Q5 - far) * 2, total - _LIGHT_Q4 >> 6), 0, ALL)
+    strength = total * 25 >> 5
+    otherwise = _along_normals(np.sign(q4) * size, size.sum(axis=1), strength)
+    off = np.abs(force_100un - otherwise).max(axis=1)
+    share = (_FAR_8 * strength - 8 * off) * (ALL // 4) // np.maximum(strength, 1)
+    share = np.clip(np.minimum(share, total - _LIGHT_Q4 >> 6), 0, ALL)
     pressed = -np.minimum(q4, 0).sum(axis=1)
-    outside = (total < _LEAST_Q4) | (far > _OUTSIDE_Q5) | ((far > _NEAR_Q5) & (8 * pressed < total))
-    return Likeness(np.where(total > 0, share, 0), outside, _along_normals(x, size.sum(axis=1), total * 25 >> 5))
+    outside = (total < _LEAST_Q4) | (off > _OUTSIDE * strength) | ((share < ALL) & (8 * pressed < total))
+    return Likeness(share, outside, otherwise / FORCE_LSB_PER_N)
 
 
-def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> Floats:
+def board_force_100un(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Integers:
+    """The map's force (n, 3) as boards compute it, before it is mixed."""
+    pressure = np.zeros(len(counts), np.int32)
+    return on_board().results(counts, tare_q4, pressure)[0].astype(np.int64)
+
+
+@cache
+def on_board() -> BoardMap:
+    """The package's map in a board's 16 bits."""
+    return board_map(blocks())
+
+
+def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> Integers:
     place_um = np.rint(1000 * ELECTRODE_MM).astype(np.int64) * [[3, 3, 5]]  # the tilt is .6
     place_um[:, 0] = np.maximum(place_um[:, 0], 0)  # on the cylinder a normal has no x
     to = np.minimum(x, 0) @ place_um
@@ -138,7 +127,7 @@ def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> Fl
     size = np.abs(to) >> np.maximum(down, 0)[:, None]
     length = np.floor(np.sqrt((size**2).sum(axis=1).astype(np.float64))).astype(np.int64)
     unit = (size << _UNIT_BITS) // np.maximum(length, 1)[:, None]
-    force: Floats = np.sign(to) * (unit * strength_100un[:, None] >> _UNIT_BITS) / FORCE_LSB_PER_N
+    force: Integers = np.sign(to) * (unit * strength_100un[:, None] >> _UNIT_BITS)
     return force
 
 
@@ -152,7 +141,8 @@ def replace_force(
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
         signals = tared(counts[rows], tare_q4[rows])
-        force_n[rows] = likeness(signals.e, pattern_weights()).mixed(summed(blocks(), signals))
+        by_board = board_force_100un(counts[rows], tare_q4[rows])
+        force_n[rows] = likeness(signals.e, by_board).mixed(summed(blocks(), signals))
     torque_nmm[:, 0] = derived_torque_x(poc_mm, force_n)
 
 
@@ -163,5 +153,4 @@ def compiled_coefficients() -> Any:
         raise ValueError(
             f"{SHIPPED} has different blocks from host/binding/population_float64.c; retrain it with this version"
         )
-    per_count = [c / SIGNAL_COUNTS if kind in (Kind.COMPRESSION, Kind.BULGE) else c for kind, _, c in blocks()]
-    return ffi.new("double[]", np.concatenate(per_count).ravel().tolist())
+    return ffi.new("double[]", (np.concatenate([c for *_, c in blocks()]) / SIGNAL_COUNTS).ravel().tolist())

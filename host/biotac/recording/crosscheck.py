@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, reference
 from ..map import population
 from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
 from ..map.bound import bound_of, error_bound
-from ..map.columns import Signals, tared
+from ..map.columns import tared
 from ..map.float64 import exact, replace_gains
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
@@ -164,8 +163,7 @@ class CrossCheck:
     def _judge_model(self, messages: StructArray) -> None:
         """With a force POPULATION must be set, and OUTSIDE exactly where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
-        signals = tared(messages["counts"], messages["tare_q4"])
-        unlike = population.likeness(signals.e, population.pattern_weights()).outside
+        unlike = _likeness(messages).outside
         wanted = wire.FrameFlags.POPULATION | np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
         self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
@@ -221,24 +219,23 @@ def _by_population(
     messages: StructArray, truth: Results, settings: Settings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Replace force and torque in ``truth`` by the population map's. Bounds of force, mN, and torque, N*mm, (n, 3)."""
-    counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    off = _population_bound_n(tared(counts, tare_q4))
-    population.replace_force(counts, tare_q4, truth.poc_mm, truth.force_n, truth.torque_nmm)
+    off = _population_bound_n(messages)
+    population.replace_force(messages["counts"], messages["tare_q4"], truth.poc_mm, truth.force_n, truth.torque_nmm)
     torque_off = torque_bound_nmm(messages, truth, settings)
     torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * off[:, 1:].sum(axis=1)
     return 1e3 * off, torque_off
 
 
-@cache
-def _population_map() -> BoardMap:
-    return population.board_map(population.blocks())
+def _likeness(messages: StructArray) -> population.Likeness:
+    counts, tare_q4 = messages["counts"], messages["tare_q4"]
+    return population.likeness(tared(counts, tare_q4).e, population.board_force_100un(counts, tare_q4))
 
 
-def _population_bound_n(signals: Signals) -> NDArray[np.float64]:
+def _population_bound_n(messages: StructArray) -> NDArray[np.float64]:
     """Bound (n, 3) of the population map's force in N from its formats; what it is mixed with is exact."""
-    part = (population.likeness(signals.e, population.pattern_weights()).share / population.ALL)[:, None]
+    part = (_likeness(messages).share / population.ALL)[:, None]
     wanted = {(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in population.blocks()}
-    off = bound_of(_population_map(), wanted, signals) / FORCE_LSB_PER_N
+    off = bound_of(population.on_board(), wanted, tared(messages["counts"], messages["tare_q4"])) / FORCE_LSB_PER_N
     result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + 0.5 / FORCE_LSB_PER_N
     return result
 

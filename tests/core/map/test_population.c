@@ -26,6 +26,7 @@ static void the_map_is_as_it_is_opened(void **state)
     assert_false(bt_map_needs_pdc(its));
 }
 
+// By the map alone.
 static void force_of(const uint16_t counts[BT_ELECTRODES], uint16_t tare_q4, int32_t force_100un[3])
 {
     uint16_t tares_q4[BT_ELECTRODES];
@@ -34,7 +35,7 @@ static void force_of(const uint16_t counts[BT_ELECTRODES], uint16_t tare_q4, int
         tares_q4[i] = tare_q4;
     }
     bt_signals_q4(counts, tares_q4, e_q4);
-    bt_population_force(e_q4, counts, tares_q4, force_100un);
+    bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
 }
 
 static void rest_is_no_force(void **state)
@@ -75,9 +76,7 @@ static void extremes_do_not_overflow(void **state)
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e_q4[i] = 16 * counts[i] - tare_q4;
         }
-        bt_likeness its = bt_population_likeness(e_q4);
-        force_of(counts, tare_q4, force);
-        bt_population_mix(&its, force);
+        bt_population_force(e_q4, force);
         for (int d = 0; d < 3; d++) {
             assert_true(force[d] > -200000000 && force[d] < 200000000);
         }
@@ -102,8 +101,8 @@ static void a_missing_electrode_counts_as_rest(void **state)
 }
 
 // The map is symmetric, its rounding is not: half up. Of each of four gated blocks half a unit that is met by
-// a gate of at most 2.9 2^13 and divided by 2^8 or more; of 19 rows and eight blocks a unit at most.
-#define ROUNDED_100UN (2 * (4 * 46 + BT_ELECTRODES + 8))
+// a gate of at most 2.9 2^13 and divided by 2^6 or more; of six blocks a unit at most.
+#define ROUNDED_100UN (2 * (4 * 186 + 6))
 
 static void a_mirrored_finger_feels_the_mirrored_force(void **state)
 {
@@ -141,55 +140,57 @@ static void signals_of(const int32_t e[BT_ELECTRODES], int eighths, int32_t e_q4
 static const int32_t plate[BT_ELECTRODES] = {300, 0, 100, 300, 100, 300, -100, -200, -200, -400,
                                              300, 0, 100, 300, 100, 300, -800, 0,    100};
 
-// As it is defined, by division: the rows' squares over the pattern's, and how much of 1024 counts is there.
+// As it is defined, by division: how far the map is off the normals, and how much of 1024 counts is there.
 static void the_likeness_is_what_it_is_defined_as(void **state)
 {
     (void)state;
-    static const int pair[][2] = BT_POPULATION_PAIR, middle[] = BT_POPULATION_MIDDLE;
-    static const double weight[] = BT_POPULATION_PATTERN;
     uint32_t seed = 5;
     int mixed = 0;
     for (int k = 0; k < 20000; k++) {
-        int32_t e_q4[BT_ELECTRODES];
-        double x[BT_ELECTRODES], part[BT_ELECTRODES], sum = 0, energy = 0, far = 0;
+        int32_t e_q4[BT_ELECTRODES], force[3], by_map[3];
+        double sum = 0, pressed = 0, off = 0, along[3] = {0, 0, 0};
         signals_of(plate, 1 + k % 12, e_q4);
         for (int i = 0; i < BT_ELECTRODES; i++) {
             seed = seed * 1664525u + 1013904223u;
             e_q4[i] += ((int32_t)(seed >> 16) - 32768) * (k % 7) / 16;
             double size = fabs(e_q4[i] / 16.0) - 8;
             size = size < 0 ? 0 : size > 256 ? 256 + (size - 256) / 4 : size;
-            x[i] = e_q4[i] < 0 ? -size : size;
             sum += size;
-            energy += size * size;
-        }
-        for (int i = 0; i < BT_POPULATION_PAIRS; i++) {
-            part[i] = x[pair[i][0]] - x[pair[i][1]];
-            part[BT_POPULATION_PAIRS + i] = x[pair[i][0]] + x[pair[i][1]];
-        }
-        for (int i = 2 * BT_POPULATION_PAIRS; i < BT_ELECTRODES; i++) {
-            part[i] = x[middle[i - 2 * BT_POPULATION_PAIRS]];
-        }
-        const double *w = weight;
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            double row = 0;
-            for (int j = i; j < (i < BT_POPULATION_PAIRS ? BT_POPULATION_PAIRS : BT_ELECTRODES); j++) {
-                row += *w++ / 2048 * part[j];
+            if (e_q4[i] < 0) {
+                const int16_t *r = bt_electrode_um[i];
+                pressed += size;
+                along[0] -= .6 * size * (r[0] > 0 ? r[0] : 0);
+                along[1] -= .6 * size * r[1];
+                along[2] -= size * r[2];
             }
-            far += row * row / energy;
         }
-        double like = (8 - far) / 4, firm = (sum - 1500) / 1024, share = like < firm ? like : firm;
+        along[2] += sum / 32 * BT_CORE_RADIUS_UM;
+        double length = hypot(hypot(along[0], along[1]), along[2]), strength = 12.5 * sum;
+        bt_likeness its = bt_population_force(e_q4, force);
+        bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, by_map);
+        for (int d = 0; d < 3; d++) {
+            along[d] *= strength / length;
+            off = fmax(off, fabs(by_map[d] - along[d]) / strength);
+        }
+        double like = (1.375 - off) * 2, firm = (sum - 1500) / 1024, share = like < firm ? like : firm;
         share = share < 0 ? 0 : share > 1 ? 1 : share;
-        bt_likeness its = bt_population_likeness(e_q4);
-        assert_true(fabs(its.share / 256.0 - share) < 0.03);
-        assert_true(fabs(its.strength_100un - 12.5 * sum) <= 12.5 * BT_ELECTRODES / 16 + 1);
-        if (fabs(far - 48) > 0.5) {
-            assert_true(far <= 48 || its.outside);
+        assert_true(fabs(its.share / 256.0 - share) < 0.02);
+        assert_true(fabs(its.strength_100un - strength) <= 12.5 * BT_ELECTRODES / 16 + 1);
+        for (int d = 0; d < 3; d++) {
+            assert_true(fabs(its.otherwise_100un[d] - along[d]) < 0.01 * strength);
+            double expected =
+                its.otherwise_100un[d] + its.share / 256.0 * (by_map[d] - its.otherwise_100un[d]);
+            assert_true(fabs(expected - force[d]) <= 0.5 + 1e-6);
+        }
+        if (fabs(off - 2) > 0.01 && fabs(8 * pressed - sum) > 8 && (its.share == 0 || share < 0.98)) {
+            assert_true(its.outside == (sum < 64 || off > 2 || 8 * pressed < sum));
         }
         mixed += its.share > 0 && its.share < BT_POPULATION_ALL;
     }
     assert_true(mixed > 1000);
     const int32_t none[BT_ELECTRODES] = {0};
-    bt_likeness at_rest = bt_population_likeness(none);
+    int32_t force[3];
+    bt_likeness at_rest = bt_population_force(none, force);
     assert_true(at_rest.share == 0 && at_rest.outside && at_rest.strength_100un == 0);
 }
 
@@ -198,7 +199,7 @@ static void a_mirrored_finger_is_as_like(void **state)
     (void)state;
     uint32_t seed = 9;
     for (int k = 0; k < 5000; k++) {
-        int32_t e_q4[BT_ELECTRODES], image_q4[BT_ELECTRODES];
+        int32_t e_q4[BT_ELECTRODES], image_q4[BT_ELECTRODES], force[3], mirrored[3];
         for (int i = 0; i < BT_ELECTRODES; i++) {
             seed = seed * 1664525u + 1013904223u;
             e_q4[i] = ((int32_t)(seed >> 16) - 32768) >> k % 4;
@@ -206,14 +207,13 @@ static void a_mirrored_finger_is_as_like(void **state)
         for (int i = 0; i < BT_ELECTRODES; i++) {
             image_q4[i] = e_q4[mirror[i]];
         }
-        bt_likeness its = bt_population_likeness(e_q4), image = bt_population_likeness(image_q4);
-        assert_in_range(its.share + 2 - image.share, 0, 4); // rows are rounded down
+        bt_likeness its = bt_population_force(e_q4, force), image = bt_population_force(image_q4, mirrored);
+        uint32_t off = (BT_POPULATION_ALL * 2 * ROUNDED_100UN / (1 + its.strength_100un)) + 1;
+        assert_in_range(its.share + off - image.share, 0, 2 * off); // by the rounding of the map's force
         assert_int_equal(its.strength_100un, image.strength_100un);
-        if (its.share < BT_POPULATION_ALL && image.share < BT_POPULATION_ALL) {
-            assert_int_equal(its.otherwise_100un[0], image.otherwise_100un[0]);
-            assert_int_equal(its.otherwise_100un[1], -image.otherwise_100un[1]);
-            assert_int_equal(its.otherwise_100un[2], image.otherwise_100un[2]);
-        }
+        assert_int_equal(its.otherwise_100un[0], image.otherwise_100un[0]);
+        assert_int_equal(its.otherwise_100un[1], -image.otherwise_100un[1]);
+        assert_int_equal(its.otherwise_100un[2], image.otherwise_100un[2]);
     }
 }
 
@@ -222,15 +222,10 @@ static uint32_t published(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un
     bt_settings all;
     bt_settings_reset(&all);
     const bt_solve_settings settings = bt_solve_settings_from(&all);
-    uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
     int16_t poc[3];
     int32_t torque[3];
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        counts[i] = (uint16_t)(2800 + e_q4[i] / 16);
-        tare_q4[i] = 16 * 2800;
-    }
-    const bt_map_input frame = {.counts = counts, .tare_q4 = tare_q4};
-    return bt_solve_uncalibrated(e_q4, &frame, &settings, BT_WANT_FORCE, poc, force_100un, torque);
+    uint16_t sigma[3];
+    return bt_solve_uncalibrated(e_q4, &settings, BT_WANT_FORCE, poc, force_100un, torque, sigma);
 }
 
 // Nothing in the training is like a point that presses on one electrode or between two; the skin's normal
@@ -282,28 +277,17 @@ static void any_gain_of_ones_own_takes_the_population_away(void **state)
 }
 
 // A plate that touches, one between, and one that presses: along the normals, some of both, the map's.
-static void what_is_published_is_mixed_by_its_share(void **state)
+static void sigma_is_mixed_as_force_is(void **state)
 {
     (void)state;
     static const int eighths[] = {3, 5, 8};
     uint16_t sigma[3][3];
     for (int k = 0; k < 3; k++) {
-        int32_t e_q4[BT_ELECTRODES], map[3], force[3];
-        uint16_t counts[BT_ELECTRODES];
+        int32_t e_q4[BT_ELECTRODES], force[3];
         signals_of(plate, eighths[k], e_q4);
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            e_q4[i] -= e_q4[i] % 16;
-            counts[i] = (uint16_t)(2800 + e_q4[i] / 16);
-        }
-        bt_likeness its = bt_population_likeness(e_q4);
+        bt_likeness its = bt_population_force(e_q4, force);
         assert_int_equal((its.share > 0) + (its.share == BT_POPULATION_ALL), k);
-        force_of(counts, 16 * 2800, map);
         assert_int_equal(published(e_q4, force), BT_FRAME_FLAG_POPULATION);
-        for (int d = 0; d < 3; d++) {
-            double otherwise = its.share == BT_POPULATION_ALL ? 0 : its.otherwise_100un[d];
-            double expected = otherwise + its.share / 256.0 * (map[d] - otherwise);
-            assert_true(fabs(expected - force[d]) <= 1.0);
-        }
         assert_true(force[2] > 0);
         bt_population_sigma(&its, sigma[k]);
     }
@@ -337,7 +321,7 @@ int main(void)
         cmocka_unit_test(a_mirrored_finger_is_as_like),
         cmocka_unit_test(a_poke_presses_in_along_the_skins_normal),
         cmocka_unit_test(any_gain_of_ones_own_takes_the_population_away),
-        cmocka_unit_test(what_is_published_is_mixed_by_its_share),
+        cmocka_unit_test(sigma_is_mixed_as_force_is),
         cmocka_unit_test(what_only_bulges_is_outside),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

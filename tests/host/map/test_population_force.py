@@ -32,6 +32,11 @@ def pressed(n: int, seed: int) -> np.ndarray:
     return np.clip(TARE + e, 0, 4095).astype(np.uint16)
 
 
+def judged(counts: np.ndarray) -> population.Likeness:
+    tare_q4 = np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)
+    return population.likeness(counts - TARE, population.board_force_100un(counts, tare_q4))
+
+
 def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
     finger = Finger(settings, quantities=wire.QuantityFlags(0x7F))
     finger.feed(np.tile(TARE.astype(int), (50, 1)))
@@ -42,12 +47,15 @@ def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
 
 def test_it_is_the_trained_map_to_what_16_bits_leave_and_along_the_normals() -> None:
     counts = pressed(4000, 1)
-    its = population.likeness(counts - TARE, population.pattern_weights())
+    its = judged(counts)
     assert (its.share == population.ALL).sum() > 20
     assert ((its.share > 0) & (its.share < population.ALL)).sum() > 20
     got = biotac.compute(counts, TARE, POPULATION)["force_n"]
-    wanted = population_map.load(None).population.published(counts, TARE)
-    np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9)
+    trained = population_map.load(None).population
+    # shares differ by a step where the board's map is rounded over it
+    step = np.abs(trained.force(counts, TARE) - its.otherwise_n) / population.ALL
+    step[(its.share == 0) | (its.share == population.ALL)] = 0.0
+    assert (np.abs(got - trained.published(counts, TARE)) <= step + 1e-9).all()
 
 
 def test_the_board_keeps_the_bound_and_says_what_it_did() -> None:
@@ -90,7 +98,7 @@ def test_sigma_is_what_a_new_finger_leaves_and_grows_away_from_the_training() ->
     counts = pressed(4000, 6)
     rows = rows_of(POPULATION, counts)
     outside = rows["flags"] & wire.FrameFlags.OUTSIDE != 0
-    its = population.likeness(counts - TARE, population.pattern_weights())
+    its = judged(counts)
     np.testing.assert_array_equal(outside, its.outside)
     assert (rows["force_sigma_100un"][outside] == wire.INVALID_COUNT).all()
     sigma_n, like = rows["force_sigma_100un"] / 1e4, ~outside & (its.share == population.ALL)

@@ -37,7 +37,7 @@ OWN = "its own force plate"
 OWN_MODELS = (
     ("lin-scales", "Lin's scales", "Lin's scales"),
     ("affine", "signals and offset, 3 axes", "affine"),
-    ("joined", "population and a scale, 3 axes", "joined map"),  # on the same blocks
+    ("joined", "joined, 3 axes", "joined map"),
     ("pooled", "pooled, 3 axes", "large map"),
 )
 PANELS = (("Cortex-M0+", "m0plus_divider", "with the RP2040's divider"), ("Cortex-M4F", "m4f", ""))
@@ -146,8 +146,8 @@ LINS, POPULATION, PRESSES, MINUTE = "default", "population", "presses", "minute"
 UNTRAINED = (
     (LINS, "nothing", "Lin's scales, the firmware's", "Lin's scales"),
     (POPULATION, "nothing", "population map", "population"),
-    (PRESSES, "five presses on a scale", "population map, scaled", "population and a scale, 3 axes"),
-    (MINUTE, "a minute of force plate", "population map, pulled", "population and a scale, 3 axes"),
+    (PRESSES, "five presses on a scale", "population map, scaled", "gated sign-split, 3 axes"),
+    (MINUTE, "a minute of force plate", "population map, pulled", "gated sign-split, 3 axes"),
 )
 
 

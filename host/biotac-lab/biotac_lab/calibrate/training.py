@@ -1,4 +1,4 @@
-"""The population map: the mean of two ridge fits, one for each family of columns, over drift and mirrored fingers.
+"""The population map: a ridge fit over drift and mirrored fingers.
 
 Columns have no offset and are 0 where counts are at their tare, so that rest is 0 N on any finger. A
 finger's mirror image (left and right electrodes exchanged, F_y negated) is another possible finger, and the map is
@@ -18,29 +18,22 @@ import numpy.typing as npt
 from biotac.calibrate.population import (
     AXES,
     COLUMNS,
-    LEFT,
-    PARTS,
     ROWS_AT_ONCE,
     SIGNAL_COUNTS,
-    WEIGHT_BITS,
     Population,
     Sums,
-    bounded_q4,
     columns,
-    halves,
 )
 from biotac.calibrate.wrench import DRIFT_NODES, Blocks, Lags, Run
 from biotac.core import geometry as surface
 
 Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up
-RIDGE = (2e-3, 5e-2, 2e-3)  # x, y, z; of each column's variance
+RIDGE = (5e-4, 1e-2, 1e-3)  # x, y, z; of each column's variance
 # N per count, along each compressed electrode's normal: what the ridge pulls to, as data of one rig do not know better.
 NORMAL_N = 1e-3
-PATTERN_FLOOR = 3e-3  # of the patterns' mean variance: what differs between rigs, and no finger of one shows
-VARIANCE_FLOOR = 0.3  # of the median: a column that hardly varies in training must not dominate in use
+VARIANCE_FLOOR = 0.02  # of the median: a column that hardly varies in training must not dominate in use
 
 _MM = np.asarray(surface.ELECTRODE_MM)
 ELECTRODES = len(_MM)
@@ -52,11 +45,10 @@ MIRROR: npt.NDArray[np.intp] = (
 
 @dataclass(frozen=True)
 class FingerSums:
-    """Sums of one finger, and of its mirror image; ``pattern`` (19, 19), the mean product of its unit patterns."""
+    """Sums of one finger, and of its mirror image."""
 
     own: Sums
     mirrored: Sums
-    pattern: Floats
 
 
 def mirrored(run: Run) -> Run:
@@ -82,29 +74,7 @@ def sums_of(run: Run) -> FingerSums:
     truth = run.truth.copy()
     truth[:, 0] -= truth[:, 0].sum() / truth[:, 2].sum() * truth[:, 2]
     level = replace(run, truth=truth)
-    return FingerSums(sums(level), sums(mirrored(level)), _pattern(run))
-
-
-def _pattern(run: Run) -> Floats:
-    total = np.zeros((ELECTRODES, ELECTRODES))
-    for at, weight in DRIFT_NODES:
-        x = bounded_q4(run.counts - run.tare + at * DRIFT_SIGMA_COUNTS * run.drift).astype(np.float64)
-        x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1.0)
-        total += weight * (x.T @ x) / len(x)
-    return total
-
-
-def pattern_weights(fingers: Sequence[FingerSums]) -> Integers:
-    """The rows (19, 19) of a distance from the fingers' patterns and their mirror images: 1 at the middle one."""
-    mean = np.mean([finger.pattern + finger.pattern[np.ix_(MIRROR, MIRROR)] for finger in fingers], axis=0) / 2
-    form = np.linalg.inv(mean + PATTERN_FLOOR * np.trace(mean) / ELECTRODES * np.eye(ELECTRODES)) / ELECTRODES
-    of_halves = np.linalg.inv(halves(np.eye(ELECTRODES)).T)
-    form = of_halves.T @ form @ of_halves
-    rows = np.zeros_like(form)
-    for part in (slice(len(LEFT)), slice(len(LEFT), None)):  # a mirror image's halves do not mix
-        rows[part, part] = np.linalg.cholesky(form[part, part]).T
-    weights: Integers = np.rint(2.0**WEIGHT_BITS * rows).astype(np.int64)
-    return weights
+    return FingerSums(sums(level), sums(mirrored(level)))
 
 
 def sums(run: Run) -> Sums:
@@ -135,24 +105,21 @@ def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: boo
     if not symmetric:
         even = even.copy()
         even[:, 1] = _solve(own)[0][:, 1]
-    return Population(even, variance, pattern_weights(fingers))
+    return Population(even, variance)
 
 
 def _solve(fingers: Sequence[Sums]) -> tuple[Floats, Floats]:
     gram, cross, mean = (np.mean([getattr(one, name) for one in fingers], axis=0) for name in ("gram", "cross", "mean"))
-    found, variance = normals(), np.zeros(COLUMNS)
-    left = cross - gram @ found
-    for part in PARTS:
-        spread = np.diag(gram)[part] - mean[part] ** 2
-        variance[part] = np.maximum(spread, VARIANCE_FLOOR * np.median(spread))
-        for axis, ridge in enumerate(RIDGE):
-            pulled = gram[np.ix_(part, part)] + ridge * np.diag(variance[part])
-            found[part, axis] += np.linalg.solve(pulled, left[part, axis]) / len(PARTS)
-    return found, variance
+    known = normals()
+    spread = np.diag(gram) - mean**2
+    variance = np.maximum(spread, VARIANCE_FLOOR * np.median(spread))
+    left = cross - gram @ known
+    found = [np.linalg.solve(gram + ridge * np.diag(variance), left[:, axis]) for axis, ridge in enumerate(RIDGE)]
+    return known + np.column_stack(found), variance
 
 
 def normals() -> Floats:
-    """Coefficients (323, 3) of a force along the normals of the compressed electrodes."""
+    """Coefficients (114, 3) of a force along the normals of the compressed electrodes."""
     result = np.zeros((COLUMNS, len(AXES)))
     result[:ELECTRODES] = NORMAL_N * SIGNAL_COUNTS * surface.normals_at(_MM)  # COMPRESSION comes first
     return result

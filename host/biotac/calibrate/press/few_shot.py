@@ -58,12 +58,12 @@ def scale_of(felt_n: Floats, shown_n: Floats) -> Scale:
 
 
 def scaled(population: Population, columns: Floats, force_n: Floats) -> Population:
-    """The map corrected by scale_of() presses: mean ``columns`` (k, 323) of each and its force (k, 3) in N, along z."""
+    """The map corrected by scale_of() presses: mean ``columns`` (k, 114) of each and its force (k, 3) in N, along z."""
     return scale_of(columns @ population.coefficients, force_n[:, 2]).on(population)
 
 
 def weighed(population: Population, columns: Floats, force_n: Floats) -> Population:
-    """The map fitted to weights: mean ``columns`` (k, 323) while each lay still, and its force (k, 3) in N.
+    """The map fitted to weights: mean ``columns`` (k, 114) while each lay still, and its force (k, 3) in N.
 
     A mixing of the axes, nine numbers, is fitted first; what it leaves then changes the columns' coefficients.
     """

@@ -26,7 +26,7 @@ FAR_SIGMAS = 3.0
 STRAIGHT_DOWN = (0.0, 0.0, 1.0)
 ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # on a scale: light and firm in turn; starts again after the last
 
-#: From a map, and columns (k, 323) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
+#: From a map, and columns (k, 114) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
 Fit = Callable[[Population, Floats, Floats], Population]
 
 
@@ -44,7 +44,7 @@ class Held:
 
     @cached_property
     def columns(self) -> Floats:
-        """The map's columns (k, 323), a mean over each press."""
+        """The map's columns (k, 114), a mean over each press."""
         every = by_columns(self.counts, self.tare, lambda z: z)
         return np.array([every[self.press == k].mean(axis=0) for k in range(len(self.force_n))])
 
