@@ -111,14 +111,14 @@ def how_long(args: argparse.Namespace) -> str:
     return "saved" if args.save else "until the next reboot (--save keeps it)"
 
 
-def add_port(parser: argparse.ArgumentParser) -> None:
-    """Add PORT, which may be left out."""
+def add_port(parser: argparse.ArgumentParser, more: str = "") -> None:
+    """Add PORT, which may be left out; ``more`` ends its help."""
     parser.add_argument(
         "port",
         metavar="PORT",
         nargs="?",
         help="device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE "
-        "(default: the only board on USB)",
+        f"(default: the only board on USB){more}",
     )
 
 

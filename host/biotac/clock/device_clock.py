@@ -46,6 +46,11 @@ class DeviceClock:
 
     # ---- observations ----------------------------------------------------------------------------
 
+    def __repr__(self) -> str:
+        fit = self.now()
+        known = f"{fit.drift_ppm:+.1f} ppm, within {fit.uncertainty_s * 1e3:.2f} ms" if fit.known else "nothing known"
+        return f"<biotac.clock.DeviceClock: {known}, {self.resets} resets>"
+
     def arrived(self, t_us: int, host_s: float) -> None:
         """Note that a message made at device time ``t_us`` or later had arrived at ``host_s``.
 

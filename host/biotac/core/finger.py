@@ -78,6 +78,10 @@ class Finger:
         self._map = None if wrench_map is None else opened(wrench_map)
         self.reset()
 
+    def __repr__(self) -> str:
+        mapped = ", with a wrench map" if self._map is not None else ""
+        return f"<biotac.Finger {self._index}, {self._next_us / 1e6:.2f} s fed{mapped}>"
+
     def reset(self) -> None:
         """Return to the state after power-up: no tare, and seq 0 comes next."""
         lib.bt_finger_reset(self._finger, self._index)

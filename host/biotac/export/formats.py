@@ -16,10 +16,11 @@ from .columns import Show, Table, tables
 
 @dataclass(frozen=True)
 class Format:
-    """An export format. ``module`` is imported when needed; it may need the extra ``export``."""
+    """An export format. ``module`` is imported when needed; it may need the ``extra``."""
 
     module: str
     what: str
+    extra: str = "export"
 
 
 FORMATS = {
@@ -28,6 +29,7 @@ FORMATS = {
     ".h5": Format("biotac.export.hdf5", "HDF5, one group per finger, one dataset per column"),
     ".mat": Format("biotac.export.mat", "MATLAB and Octave, one struct per finger: finger0.frames.force_n"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
+    ".png": Format("biotac.export.png", "a picture of force and pressure over time, with labels and gaps", "plot"),
     ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
 }
 
@@ -59,7 +61,7 @@ def writer_for(out: Path) -> ModuleType:
         return import_module(kind.module)
     except ImportError as error:
         raise InputError(
-            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[export]'"
+            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"
         ) from error
 
 

@@ -162,6 +162,9 @@ class Hand:
         """How many fingers' sensors answered."""
         return len(self.fingers)
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
     def __bool__(self) -> bool:
         return True
 

@@ -113,6 +113,10 @@ class Recorder:
         if not self._writer.closed:
             self._writer.close()
 
+    def __repr__(self) -> str:
+        state = "closed" if self.closed else "open"
+        return f"<biotac.Recorder of {self.path}, {state}, {self.frames} frames, {self.frames_lost} lost>"
+
     def __enter__(self) -> Recorder:
         return self
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -34,6 +35,7 @@ from .labels import Label
 from .layout import finger_of
 from .selection import fields_named, part_of
 from .stamps import Stamps, unwrapped_us
+from .summary import lines, summary
 from .tabular import Selection
 
 
@@ -212,7 +214,7 @@ class Recording:
     def labels(self) -> list[Label]:
         """Labels in order of time, those about the whole recording first: made live, and with ``mark`` afterwards."""
         live = []
-        for facts in (facts for block in self._heads for facts in block.rest.labels):
+        for facts in (facts for block in self.heads() for facts in block.rest.labels):
             with suppress(TypeError, AttributeError, InputError):  # a damaged one
                 live.append(Label(**facts))
         return labels_module.in_order([*live, *self._later_labels[0]])
@@ -241,6 +243,16 @@ class Recording:
         for name in ("labels", "_later_labels"):
             vars(self).pop(name, None)
 
+    def __repr__(self) -> str:
+        facts = summary(self)
+        return f"<biotac.Recording {lines(facts)[0]}, fingers {list(facts['fingers'])}, {len(self.labels)} label(s)>"
+
+    def _repr_html_(self) -> str:
+        return "<br>".join(html.escape(line) for line in lines(summary(self)))
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.names)
+
     def to_pandas(self) -> Any:
         """All frames as a pandas DataFrame: see Selection. Needs the extra ``export``."""
         return self.select().to_pandas()
@@ -265,17 +277,19 @@ class Recording:
             stamps.arrived(t_us, at_ns)
         return stamps
 
+    def heads(self) -> list[Block]:
+        """The blocks, without their rows unless all has been read."""
+        return self._blocks if "_sent" in vars(self) or self._index is None else self._heads
+
     @cached_property
     def _heads(self) -> list[Block]:
-        """The blocks, until all has been read without their rows."""
-        if "_sent" in vars(self) or self._index is None:
-            return self._blocks
+        assert self._index is not None
         every = range(len(self._index.blocks))
         return list(Blocks(self.path, {}, (), check=False, index=self._index, only=every))
 
     def _arrivals(self) -> Iterator[tuple[int, int]]:
         """Last device time of each block that has rows, and when it had arrived."""
-        for block in self._heads:
+        for block in self.heads():
             if block.rest.last_us is not None and block.all_here_ns != block.arrived_ns:
                 yield block.rest.last_us, block.all_here_ns
 
@@ -346,19 +360,19 @@ class Recording:
     @property
     def begin_us(self) -> int:
         """Device time of the first frame or heartbeat, us; 0 if there is none."""
-        times = [block.rest.first_us for block in self._heads if block.rest.first_us is not None]
+        times = [block.rest.first_us for block in self.heads() if block.rest.first_us is not None]
         return min(times, default=0)
 
     @property
     def end_us(self) -> int:
         """Device time of the last frame or heartbeat, us; 0 if there is none."""
-        times = [block.rest.last_us for block in self._heads if block.rest.last_us is not None]
+        times = [block.rest.last_us for block in self.heads() if block.rest.last_us is not None]
         return max(times, default=0)
 
     @property
     def begin_ns(self) -> int:
         """``begin_us`` on the host's clock (Unix), in ns; late by the delay of the link."""
-        return self._heads[0].arrived_ns if self._heads else 0
+        return self.heads()[0].arrived_ns if self.heads() else 0
 
     def _describe_losses(self, losses: list[tuple[int, int, int]], in_damaged: int) -> None:
         for finger, seq, lost in losses[:10]:

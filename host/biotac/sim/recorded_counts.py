@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import RecordingError
-from ..recording.btd_file import read_btd
+from ..recording.btd.file import read_btd
 from ..recording.npz_file import counts_field, read_npz, to_lin_frame
 from ..wire import slots
 from ..wire.messages_gen import INVALID_COUNT, EmuFault

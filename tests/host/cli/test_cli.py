@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -34,7 +35,7 @@ def fails(capsys, code: int, *words: str) -> str:
 
 def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
     assert parser().format_help().count("\n") <= 40
-    assert len(VERBS) <= 16
+    assert len(VERBS) <= 18
     for name, (place, text) in VERBS.items():
         example = importlib.import_module(f"biotac.cli.{place}").EXAMPLE
         with pytest.raises(SystemExit):
@@ -49,6 +50,17 @@ def test_version_names_release_wire_and_schema(capsys) -> None:
     assert left.value.code == 0
     versions = f"{biotac.__version__}, wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}, schema {wire.SCHEMA_HASH:08x}"
     assert capsys.readouterr().out == f"biotac-gateway {versions}\n"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fdinfo").is_dir(), reason="only Linux tells whose a pty is")
+def test_list_shows_simulated_boards_that_run(capsys) -> None:
+    command = [str(Path(sys.executable).with_name("biotac")), "sim", "press.toml"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as board:
+        assert board.stdout is not None
+        port = board.stdout.readline().split()[0]
+        assert main(["list", "--json"]) == 0
+        board.send_signal(signal.SIGINT)
+    assert json.loads(capsys.readouterr().out)["simulated"][port] == "biotac sim press.toml"
 
 
 def test_list_shows_what_can_be_simulated(capsys) -> None:

@@ -222,6 +222,7 @@ CASES: list[tuple[int, str, str]] = [
     (3, "choose another path", "sim press.toml --link @dir"),
     (2, "use only one", "flash --backup +out.json --no-backup"),
     (2, "drop one of them", f"flash --emulated {NO_PORT} @text.uf2"),
+    (2, "MCAP file", "file cut @text.uf2 +part.mcap"),
     (2, "expected an image, .uf2", f"flash {NO_PORT} +no.uf2"),
     (2, "use the build's .uf2", f"flash {NO_PORT} @text.uf2"),
     (2, "no SOURCE is given", "sim"),
@@ -417,6 +418,6 @@ def test_an_inventory_of_no_lake_does_not_ask_for_duckdb(capsys, monkeypatch, tm
 
 
 def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr("biotac.recording.btd_file._MAX_BYTES", 4)
+    monkeypatch.setattr("biotac.recording.btd.file._MAX_BYTES", 4)
     (tmp_path / "long.btd").write_text("Begin File\n" + "0\n" * 10)
     assert "split it" in line_of(capsys, 2, ["export", str(tmp_path / "long.btd"), str(tmp_path / "a.mcap")])

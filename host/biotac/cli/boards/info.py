@@ -1,30 +1,36 @@
-"""biotac info PORT"""
+"""biotac info PORT|REC"""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import biotac
 
 from ...documents import made_text
+from ...errors import printable
 from ...keep.calibration_file import to_dict
 from ...map import file as map_file
 from ...map.board_map import made_s_of
+from ...recording.summary import lines, summary
 from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_name, maps_text, serial_text, setting_text, version_text
 from .. import values
 from ..outputs import say
+from ..recordings.loading import load
 
 EXAMPLE = "biotac info /dev/ttyACM0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    values.add_port(parser)
+    values.add_port(parser, "; or a recording, .mcap")
 
 
 def run(args: argparse.Namespace) -> int:
+    if args.port is not None and args.port.lower().endswith(".mcap"):
+        return of_recording(args)
     with biotac.open(args.port) as hand:
         hello = hand.info
         sensors = [hand.sensor_info(f) for f in hand.fingers]
@@ -65,4 +71,12 @@ def run(args: argparse.Namespace) -> int:
         own += f", wrench map {made_text(made_s_of(maps[finger]))}" if finger in maps else ""
         lines.append(f"finger {finger}: BioTac {s['serial']}, software {s['software']}{own}")
     say(args, facts, "\n".join([*lines, *(setting_text(setting, value) for setting, value in settings.items())]))
+    return 0
+
+
+def of_recording(args: argparse.Namespace) -> int:
+    """What is in a recording; stderr says what it lacks."""
+    recording = load(Path(args.port))
+    facts = summary(recording, recording.frames[["finger", "flags"]])
+    say(args, facts, "\n".join(map(printable, lines(facts))))
     return 0

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import closing
+from contextlib import closing, suppress
+from pathlib import Path
 from typing import Any
 
-from ...errors import BiotacError
+from ...errors import BiotacError, printable
 from ...hand.hand import Hand
 from ...link import open_link
 from ...link.discovery import SerialPort, serial_ports
@@ -32,8 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
+    running = simulated()
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []
-    lines = [as_line(port) for port in ports]
+    lines = [*map(as_line, ports), *(f"{port}  simulated: {command}" for port, command in running.items())]
     for facts in remote:
         commander = f"commanded by {facts['writer']}" if facts.get("writer") else "not commanded by anyone"
         lines.append(f"{as_line(facts)}  {commander}")
@@ -41,8 +43,33 @@ def run(args: argparse.Namespace) -> int:
         lines.append("no board is shared on the network; `biotac share PORT --zenoh NAME` shares one")
     if not any(port["is_board"] for port in ports):
         lines.append("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
-    say(args, {"ports": ports, "scenarios": scenarios, "zenoh": remote}, "\n".join([*lines, *scenarios]))
+    say(
+        args,
+        {"ports": ports, "simulated": running, "scenarios": scenarios, "zenoh": remote},
+        "\n".join([*lines, *scenarios]),
+    )
     return 0
+
+
+def simulated() -> dict[str, str]:
+    """Ptys of the simulated boards that run on this computer, each with its command; only Linux can tell."""
+    found: dict[str, str] = {}
+    for process in sorted(Path("/proc").glob("[0-9]*")):
+        with suppress(OSError, ValueError):  # it is over, or another user's
+            words = _words(process)
+            if "biotac" not in "".join(Path(word).name for word in words[:2]):
+                continue
+            ttys = [line.split()[1] for file in (process / "fdinfo").iterdir()
+                    for line in file.read_text().splitlines() if line.startswith("tty-index:")]  # fmt: skip
+            if Path(words[0]).name == "biotac-sim":  # the firmware; its parent has the words that were typed
+                words = _words(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
+            command = words[next(k for k, word in enumerate(words) if Path(word).name == "biotac") :]
+            found |= {f"/dev/pts/{tty}": printable(" ".join(["biotac", *command[1:]])) for tty in ttys[:1]}
+    return found
+
+
+def _words(process: Path) -> list[str]:
+    return (process / "cmdline").read_text(errors="replace").rstrip("\0").split("\0")
 
 
 def _shared(endpoint: str | None) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
 from ...partial_file import whole
-from ...recording.btd_import import import_btd
+from ...recording.btd.convert import import_btd
 from ...recording.reader import Recording
 from ...recording.recompute import recompute
 from ...wire import messages_gen as wire

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import RecordingError
-from ..wire import sensor_gen as _sensor
-from ..wire.messages_gen import INVALID_COUNT
+from ...errors import RecordingError
+from ...wire import sensor_gen as _sensor
+from ...wire.messages_gen import INVALID_COUNT
 
 _FIRST_PAIR = 4
 # Channel numbers (44,) of our slots; a command byte is 1SSSSSSP, S the channel.

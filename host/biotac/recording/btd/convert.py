@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.compiled import default_settings
-from ..version import __version__
-from ..wire import messages_gen as wire
-from ..wire import sensor_gen as sensor
-from ..wire import slots
-from ..wire.framing import encode
-from ..wire.identity import NO_IMAGE
-from .btd_file import read_btd
-from .facts import Facts
-from .mcap_file import RecordingFile
-from .rounds import Rounds, frames_and_tares
+from ...core.compiled import default_settings
+from ...version import __version__
+from ...wire import messages_gen as wire
+from ...wire import sensor_gen as sensor
+from ...wire import slots
+from ...wire.framing import encode
+from ...wire.identity import NO_IMAGE
+from ..facts import Facts
+from ..mcap_file import RecordingFile
+from ..rounds import Rounds, frames_and_tares
+from .file import read_btd
 
 NO_BOARD = 0
 _BLOCK_US = 1_000_000

@@ -1,0 +1,64 @@
+"""biotac file cut|recover|label"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ...errors import InputError, printable
+from ...partial_file import whole
+from ...recording.cut import cut
+from ..outputs import say
+from .loading import load
+from .replay import moment
+
+EXAMPLE = "biotac file label grasp.mcap slip --at 12.5 --fact trial=3"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    verbs = parser.add_subparsers(dest="what", required=True, metavar="cut|recover|label")
+    for name, text in (
+        ("cut", "write some seconds of REC, to whole blocks of about a second, as a recording"),
+        ("recover", "write what is readable of a damaged or cut-off REC as a recording with an index"),
+    ):
+        verb = verbs.add_parser(name, help=text, description=text)
+        verb.add_argument("recording", metavar="REC", type=Path)
+        verb.add_argument("out", metavar="OUT", type=Path)
+        if name == "cut":
+            verb.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first row")
+            verb.add_argument("--to", dest="to_s", type=moment, help="seconds since its first row")
+        verb.add_argument("--force", action="store_true", help="overwrite OUT")
+        verb.set_defaults(run=run_cut, from_s=0.0, to_s=None)
+    text = "add a label to REC, in a file beside it; biotac info lists them"
+    verb = verbs.add_parser("label", help=text, description=text)
+    verb.add_argument("recording", metavar="REC", type=Path)
+    verb.add_argument("text", metavar="TEXT")
+    verb.add_argument("--at", dest="at_s", type=moment, help="seconds since its first row (default: about all of it)")
+    verb.add_argument("--until", dest="until_s", type=moment, help="the end of a span")
+    verb.add_argument("--finger", help="name or number (default: all)")
+    verb.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
+    verb.set_defaults(run=run_label)
+
+
+def run_cut(args: argparse.Namespace) -> int:
+    recording = load(args.recording)
+    with whole(args.out, overwrite=args.force) as place:
+        begin_s, end_s = cut(recording, place, args.from_s, args.to_s)
+    facts = {"written": str(args.out), "begin_s": begin_s, "end_s": end_s}
+    say(args, facts, printable(f"{begin_s:.2f} to {end_s:.2f} s of {args.recording} to {args.out}"))
+    return 0
+
+
+def run_label(args: argparse.Namespace) -> int:
+    facts = dict(fact.split("=", 1) if "=" in fact else (fact, "") for fact in args.fact)
+    if "" in facts.values():
+        raise InputError(f"--fact {args.fact}: expected NAME=VALUE, such as subject=S07")
+    recording = load(args.recording, quiet=True)
+    finger = int(args.finger) if (args.finger or "").isdecimal() else args.finger
+    try:
+        recording.mark(args.text, args.at_s, args.until_s, finger=finger, **facts)
+    except KeyError as error:
+        raise InputError(str(error.args[0])) from None
+    made = len(recording.labels)
+    say(args, {"labels": made}, printable(f"{args.recording}: {made} label(s); `biotac info` lists them"))
+    return 0

@@ -1,0 +1,47 @@
+"""PNG: force and pressure of all fingers over time, with labels and gaps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..picture import picture
+from ..recording.reader import Recording
+from .columns import Show, Table
+
+KINDS_APART = False
+_COLOURS = ("C0", "C1", "C2", "C3", "C4")
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """Draw it. Texts of labels that would overprint are left out; `biotac info` has them all."""
+    begin_us, end_us = recording.begin_us, recording.end_us
+    name_of = {finger: name for name, finger in recording.names.items()}
+    with picture(place) as page:
+        page.set_size_inches(12, 6)
+        force, pressure = axes = page.subplots(2, 1, sharex=True)
+        for table in (table for table in made if table.kind == "frames"):
+            t_s = (table.arrays["t_us"] - begin_us) / 1e6
+            finger = table.finger or 0
+            name = name_of.get(finger, str(finger))
+            force.plot(t_s, np.linalg.norm(table.arrays["force_n"], axis=1), _COLOURS[finger], lw=0.8, label=name)
+            rest = np.nanmedian(table.arrays["pdc_tare"]) if np.isfinite(table.arrays["pdc_tare"]).any() else 0.0
+            pdc = np.where(table.arrays["pdc"] == 65535, np.nan, table.arrays["pdc"] - rest)
+            pressure.plot(t_s, pdc, _COLOURS[finger], lw=0.8)
+        for gap in (gap for gap in recording.gaps if gap.last_t_us is not None and gap.next_t_us is not None):
+            for axis in axes:
+                axis.axvspan((gap.last_t_us - begin_us) / 1e6, (gap.next_t_us - begin_us) / 1e6, color="0.85")  # type: ignore[operator]
+        free_s = -np.inf
+        for label in (label for label in recording.labels if label.t_us is not None):
+            at_s, until_s = ((t_us - begin_us) / 1e6 for t_us in (label.t_us or 0, label.end_us or label.t_us or 0))
+            for axis in axes:
+                axis.axvspan(at_s, until_s, color="C5", alpha=0.25)
+            if at_s >= free_s:
+                force.text(at_s, 1.0, label.text, transform=force.get_xaxis_transform(), va="bottom", fontsize=8)
+                free_s = at_s + len(label.text) * (end_us - begin_us) / 1e6 / 150  # as wide as its letters
+        force.set_title(recording.path.name, pad=16)
+        force.set(ylabel="force on the finger, N")
+        force.legend(loc="upper right")
+        pressure.set(xlabel="time, s", ylabel="pressure above rest, count")
+        show(1.0)

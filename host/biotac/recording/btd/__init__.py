@@ -1,0 +1,1 @@
+"""SynTouch's own files: reading them, and making recordings of them."""

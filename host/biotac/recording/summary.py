@@ -1,0 +1,75 @@
+"""A recording in a few lines: for `biotac info`, and as what Python and Jupyter show of one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from datetime import datetime, timezone
+from typing import Any
+
+import numpy as np
+
+from ..wire.frames import StructArray
+from ..wire.identity import ascii_text
+from ..wire.messages_gen import FrameFlags
+from .block import FRAME
+
+
+def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
+    """Facts of a Recording, for JSON. ``flags`` (finger, flags) of all frames, where each flag's share is wanted."""
+    heads = recording.heads()
+    frames: Counter[int] = Counter()
+    for block in heads:
+        numbers, counts = np.unique(block.rest.finger_of_row(FRAME), return_counts=True)
+        frames.update(dict(zip(numbers.tolist(), counts.tolist(), strict=True)))
+    name_of = {finger: name for name, finger in recording.names.items()}
+    serials = {sensor.finger: ascii_text(sensor.serial) for sensor in recording.sensors}
+    fingers: dict[str, dict[str, Any]] = {
+        str(finger): {"name": name_of.get(finger), "serial": serials.get(finger), "frames": frames[finger]}
+        for finger in sorted({*frames, *serials})
+    }
+    if flags is not None:
+        for finger, about in fingers.items():
+            own = flags["flags"][flags["finger"] == int(finger)]
+            shares = {flag.name: float(np.mean((own & int(flag)) != 0)) for flag in FrameFlags if len(own)}
+            about["flags"] = {flag: share for flag, share in shares.items() if share}
+    return {
+        "recording": str(recording.path),
+        "begin": datetime.fromtimestamp(recording.begin_ns / 1e9, timezone.utc).isoformat(timespec="seconds"),
+        "duration_s": (recording.end_us - recording.begin_us) / 1e6,
+        "port": recording.metadata["port"],
+        "firmware": recording.metadata["firmware"],
+        "fingers": fingers,
+        "frames_lost": sum(lost for block in heads for _, _, lost in block.rest.lost),
+        "gaps": sum(len(block.rest.gaps) for block in heads),
+        "labels": [
+            {"text": label.words(), "at_s": at(recording, label.t_us), "until_s": at(recording, label.end_us)}
+            | {"finger": label.finger}
+            for label in recording.labels
+        ],
+    }
+
+
+def at(recording: Any, t_us: int | None) -> float | None:
+    """Seconds since the first row."""
+    return None if t_us is None else (t_us - recording.begin_us) / 1e6
+
+
+def lines(facts: dict[str, Any]) -> list[str]:
+    """``summary`` for people."""
+    out = [
+        f"{facts['recording']}: {facts['duration_s']:.1f} s from {facts['begin']}, {facts['frames_lost']} frames lost, "
+        f"{facts['gaps']} gap(s)",
+        f"port {facts['port']}, firmware {facts['firmware']}",
+    ]
+    for finger, about in facts["fingers"].items():
+        shares = ", ".join(f"{flag} {share:.1%}" for flag, share in about.get("flags", {}).items())
+        out.append(
+            f"finger {finger}: {about['name'] or 'no name'}, sensor {about['serial'] or 'unknown'}, "
+            f"{about['frames']} frames" + (f"; {shares}" if shares else "")
+        )
+    for label in facts["labels"]:
+        span = "" if label["until_s"] is None else f" to {label['until_s']:.2f} s"
+        when = "all of it" if label["at_s"] is None else f"{label['at_s']:.2f} s{span}"
+        whose = "" if label["finger"] is None else f", finger {label['finger']}"
+        out.append(f"label, {when}{whose}: {label['text']}")
+    return out
