@@ -33,7 +33,7 @@ VERBS = {
         "recordings.export",
         "Write a recording for other programs, as a picture or recomputed; many to a lake.",
     ),
-    "lake": ("recordings.lake", "Check a lake of recordings, query it in SQL, or list its boards and sensors."),
+    "lake": ("recordings.lake", "Check a lake of recordings, or query it in SQL."),
     "calibrate": (
         "calibrate",
         "Fit a finger's wrench or pressure to a reference, test it on held-out data, and upload.",

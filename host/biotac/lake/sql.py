@@ -47,11 +47,6 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     return names, _rows(result)
 
 
-def rows(lake: Lake, text: str) -> list[dict[str, Any]]:
-    names, found = query(lake, text)
-    return [dict(zip(names, row, strict=True)) for row in found]
-
-
 def _rows(result: Any) -> Iterator[tuple[Any, ...]]:
     try:
         while found := result.fetchmany(10_000):

@@ -1,4 +1,4 @@
-"""biotac lake check DIR, biotac lake sql QUERY DIR, biotac lake inventory DIR, and what biotac export --lake does"""
+"""biotac lake check DIR, biotac lake sql QUERY DIR, and what biotac export --lake does"""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import functools
 import json
 import sys
 from collections.abc import Callable, Iterator
-from datetime import datetime, timezone
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -43,9 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     sql = add("sql", run_sql, text)
     sql.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
     sql.add_argument("folder", metavar="DIR", nargs="?", type=Path, help="the lake")
-    text = "List boards and sensors, their ages, and their health against their own history."
-    inventory = add("inventory", run_inventory, text)
-    inventory.add_argument("folder", metavar="DIR", type=Path, help="the lake")
 
 
 def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
@@ -123,40 +119,6 @@ def run_sql(args: argparse.Namespace) -> int:
     out.writerow(names)
     out.writerows(rows)
     return 0
-
-
-def run_inventory(args: argparse.Namespace) -> int:
-    """Print the inventory; return 1 if a sensor is not as it used to be."""
-    lake = _opened(args.folder)
-    found = room("inventory").take(lake)
-    lines = [
-        f"board {board['board']}: firmware {board['firmware']}, {board['recordings']} recordings, "
-        f"{board['hours']:.2f} h, {_day(board['first_ns'])} to {_day(board['last_ns'])}, "
-        f"{board['frames_lost']} frames lost"
-        for board in found["boards"]
-    ]
-    say(args, found, "\n".join([*lines, *map(_sensor_line, found["sensors"])]))
-    return 1 if any(sensor["findings"] for sensor in found["sensors"]) else 0
-
-
-def _sensor_line(sensor: dict[str, Any]) -> str:
-    made_ns = sensor["calibration_made_ns"]
-    calibration = f"calibration {sensor['calibration']}" if sensor["calibration"] else "not calibrated"
-    known = {"noise": sensor["noise_count"], "drift": sensor["drift_count"]}
-    usual = "as usual" if sensor["recordings"] > room("inventory").ENOUGH else "no history yet"
-    parts = [
-        f"{sensor['recordings']} recordings",
-        f"{sensor['hours']:.2f} h, last {_day(sensor['last_ns'])}",
-        calibration + (f" of {_day(made_ns)}" if made_ns is not None else ""),
-        *(f"{what} {value:.1f} counts" for what, value in known.items() if value is not None),
-    ]
-    name = sensor["sensor"] or "without a serial number"
-    health = "; ".join(sensor["findings"]) or usual
-    return f"sensor {name} on {sensor['board']}, finger {sensor['finger']}: {', '.join(parts)}: {health}"
-
-
-def _day(at_ns: int) -> str:
-    return f"{datetime.fromtimestamp(at_ns // 10**9, timezone.utc):%Y-%m-%d}"
 
 
 def _opened(folder: Path) -> Any:
