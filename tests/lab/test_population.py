@@ -13,7 +13,9 @@ import wrench_run
 import biotac
 from biotac.calibrate import population as population_map
 from biotac.calibrate.population import Population, Trained
-from biotac.calibrate.press.few_shot import Scale, pulled, scale_of
+from biotac.calibrate.press import known_force
+from biotac.calibrate.press.few_shot import Scale, plated, pulled, scale_of
+from biotac.calibrate.press.known_force import Held, angles_deg, of_plate
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core import geometry as surface
 from biotac.errors import InputError
@@ -202,8 +204,8 @@ def test_fingers_of_the_training_agree_with_the_normals_and_a_poke_does_not(
     assert np.mean(share(runs[0].counts, runs[0].tare) > 0) > np.mean(share(poke, runs[0].tare) > 0) == 0.0
 
 
-def contact_of_another_rig() -> tuple[np.ndarray, np.ndarray]:
-    """Published force (n, 3) and minus the plate's normal (n, 3), where a plate presses a finger of another rig."""
+def contact_of_another_rig() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Counts (n, 19), tare, and minus the plate's normal (n, 3), where a plate presses a finger of another rig."""
     path = SHARED.parent / "robotic_finger/trial_15330.npz"
     if not path.exists():
         pytest.skip("no ../shared/data: real recordings are not part of the project")
@@ -211,13 +213,39 @@ def contact_of_another_rig() -> tuple[np.ndarray, np.ndarray]:
     rest = slice(400)  # nothing touches it
     tare, pdc = np.median(fields["E"][rest], axis=0), np.median(fields["PDC"][rest])
     touched = fields["PDC"] > pdc + 40
-    force = biotac.compute(fields["E"], tare)["force_n"]
-    return force[touched], (fields["z_dir"] * [1.0, -1.0, 1.0])[touched]
+    return fields["E"][touched], tare, (fields["z_dir"] * [1.0, -1.0, 1.0])[touched]
+
+
+def test_a_plate_pressed_by_hand_corrects_the_sides_of_a_finger_of_another_rig() -> None:
+    """Fitted without force and normal to the first half of the trial, tested on the other."""
+    counts, tare, into = contact_of_another_rig()
+    half = len(counts) // 2
+    press = np.arange(half) // 50
+    held = Held(counts[:half].astype(np.float64), tare, press, np.zeros((press[-1] + 1, 3)))
+    trained = population_map.load(None)
+    found = known_force.found(trained.population, of_plate(held, trained.population), plated)
+    own = found.own.wrench_map(tare).on_board()
+    new = counts[half:]
+    tare_q4 = np.tile((16 * tare).astype(np.uint16), (len(new), 1))
+    force = own.results(new, tare_q4, np.zeros(len(new), np.int32))[0]
+    off = angles_deg(force, into[half:])
+    side = np.abs(into[half:, 1]) > 0.3
+    assert np.median(off) <= 9.0 and np.percentile(off, 90) <= 15.0
+    assert np.mean(force[side, 1] * into[half:][side, 1] > 0.0) >= 0.99
+    assert found.held_out_deg < found.before_deg and not found.why_not(trained.sigma_scale5_n)
+
+
+def test_a_plate_on_one_side_is_refused() -> None:
+    pressed = np.tile(2800.0 - 200.0 * np.eye(19)[:3], (2, 1))
+    held = Held(pressed, np.full(19, 2800.0), np.arange(6), np.zeros((6, 3)))
+    with pytest.raises(InputError, match="both sides"):
+        of_plate(held, population_map.load(None).population)
 
 
 def test_the_direction_holds_on_a_finger_of_another_rig() -> None:
     """Issue 30's bars; F1 and F2 are all that the map is trained on."""
-    force, into = contact_of_another_rig()
+    counts, tare, into = contact_of_another_rig()
+    force = biotac.compute(counts, tare)["force_n"]
     unit = force / np.linalg.norm(force, axis=1, keepdims=True)
     for axis in (0, 1):
         side = np.abs(into[:, axis]) > 0.3

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.geometry import Floats
+from ..core.geometry import ELECTRODE_MM, Floats, normals_at
 from ..documents import parse_document, read_document, sealed
 from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
@@ -30,7 +30,7 @@ from .wrench.models import GATED
 
 __all__ = [
     "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps", "load",
-    "provenance_of",
+    "normals", "provenance_of",
 ]  # fmt: skip
 
 FORMAT = "biotac-population-map/1"
@@ -86,6 +86,13 @@ class Population:
 def columns(e: Floats, tare: Floats) -> Floats:
     """The columns (n, 114) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
     return map_columns.columns(Signals(e, tare))[:, INDEX]
+
+
+def normals() -> Floats:
+    """Coefficients (114, 3) of 1 mN per count along the outward normal of each compressed electrode."""
+    result = np.zeros((COLUMNS, len(AXES)))
+    result[:ELECTRODES] = 1e-3 * SIGNAL_COUNTS * normals_at(ELECTRODE_MM)  # COMPRESSION comes first
+    return result
 
 
 def by_columns(counts: Floats, tare: Floats, function: Callable[[Floats], Floats]) -> Floats:

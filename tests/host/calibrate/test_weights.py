@@ -136,6 +136,18 @@ def test_a_recording_says_the_same_and_goes_to_no_board(
     assert "--save" in capsys.readouterr().err
 
 
+def test_a_plate_corrects_directions_from_all_sides_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = tmp_path / "presses.mcap"
+    assert main(["record", "sim:weights.toml", str(recording)]) == 0
+    capsys.readouterr()
+    words = ["calibrate", "press", str(recording), "--plate", "--finger", "index", "--json", "--presses"]
+    assert main([*words, "10"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["held_out_deg"] < 2.0 < facts["before_deg"] and not facts["why_not"]
+    assert main([*words, "5"]) != 0
+    assert "roll the finger further to both sides" in capsys.readouterr().err
+
+
 def test_axes_that_are_mixed_are_told_apart() -> None:
     """What nine numbers can say: a finger that answers with its axes turned and stretched."""
     its = population_map.load(None).population

@@ -19,10 +19,10 @@ from biotac.calibrate.population import (
     AXES,
     COLUMNS,
     ROWS_AT_ONCE,
-    SIGNAL_COUNTS,
     Population,
     Sums,
     columns,
+    normals,
 )
 from biotac.calibrate.wrench import DRIFT_NODES, Blocks, Lags, Run
 from biotac.core import geometry as surface
@@ -30,9 +30,8 @@ from biotac.core import geometry as surface
 Floats = npt.NDArray[np.float64]
 
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up
-RIDGE = (5e-4, 1e-2, 1e-3)  # x, y, z; of each column's variance
-# N per count, along each compressed electrode's normal: what the ridge pulls to, as data of one rig do not know better.
-NORMAL_N = 1e-3
+# x, y, z; of each column's variance. It pulls to the normals, as data of one rig do not know better.
+RIDGE = (5e-4, 1e-2, 1e-3)
 VARIANCE_FLOOR = 0.02  # of the median: a column that hardly varies in training must not dominate in use
 
 _MM = np.asarray(surface.ELECTRODE_MM)
@@ -116,10 +115,3 @@ def _solve(fingers: Sequence[Sums]) -> tuple[Floats, Floats]:
     left = cross - gram @ known
     found = [np.linalg.solve(gram + ridge * np.diag(variance), left[:, axis]) for axis, ridge in enumerate(RIDGE)]
     return known + np.column_stack(found), variance
-
-
-def normals() -> Floats:
-    """Coefficients (114, 3) of a force along the normals of the compressed electrodes."""
-    result = np.zeros((COLUMNS, len(AXES)))
-    result[:ELECTRODES] = NORMAL_N * SIGNAL_COUNTS * surface.normals_at(_MM)  # COMPRESSION comes first
-    return result

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...errors import InputError
-from ..population import Population, Sums
+from ..population import Population, Sums, normals
 
 # How much fingers differ in the two numbers, and the map's error in one press: from F1 and F2, each by the other's map.
 GAIN_SPREAD = 0.04
@@ -76,6 +76,19 @@ def weighed(population: Population, columns: Floats, force_n: Floats) -> Populat
     k = len(columns)
     mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))
     return pulled(mixed, mean, WEIGHT_S * k)
+
+
+def plated(population: Population, columns: Floats, force_n: Floats) -> Population:
+    """A map of the compressed electrodes' normals, fitted to presses of a flat plate from all sides.
+
+    ``columns`` (k, 114) are means of each press, ``force_n`` (k, 3) is against the skin's normal there, in N. The
+    population's own leaning is left out: it is that of a rig.
+    """
+    felt_n = columns @ normals()
+    gain = (felt_n * force_n).sum() / (felt_n**2).sum()
+    k = len(columns)
+    mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))
+    return pulled(replace(population, coefficients=gain * normals()), mean, WEIGHT_S * k)
 
 
 def pulled(population: Population, new: Sums, seconds: float) -> Population:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...core.geometry import Floats
+from ...core.compute import compute
+from ...core.geometry import Floats, normals_at
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...recording.reader import Recording
@@ -25,6 +26,7 @@ LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
 STRAIGHT_DOWN = (0.0, 0.0, 1.0)
 ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # on a scale: light and firm in turn; starts again after the last
+SIDE = 0.3  # component of a plate's normal, on each side
 
 #: From a map, and columns (k, 114) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
 Fit = Callable[[Population, Floats, Floats], Population]
@@ -53,12 +55,15 @@ class Held:
 class Found:
     """The finger's ``own`` map, fitted to all presses, and RMS errors (3,) in N over the presses.
 
-    ``held_out_n`` is with each press predicted by a map fitted to the others, ``before_n`` that of the map as it was.
+    ``held_out_n`` is with each press predicted by a map fitted to the others, ``before_n`` that of the map as it was;
+    ``before_deg`` and ``held_out_deg`` are the median errors of the direction.
     """
 
     own: Population
     before_n: Floats
     held_out_n: Floats
+    before_deg: float
+    held_out_deg: float
 
     def why_not(self, sigma_n: Floats) -> str:
         """Why the own map should not be used; empty if it should.
@@ -84,10 +89,33 @@ def found(population: Population, held: Held, fit: Fit) -> Found:
     own = fit(population, columns, force_n)
     every = np.arange(len(force_n))
     out = [columns[k] @ fit(population, columns[every != k], force_n[every != k]).coefficients for k in every]
-    before, after = (
-        np.sqrt(((felt_n - force_n) ** 2).mean(axis=0)) for felt_n in (columns @ population.coefficients, out)
-    )
-    return Found(own, before, after)
+    both = columns @ population.coefficients, np.array(out)
+    rms = [np.sqrt(((felt_n - force_n) ** 2).mean(axis=0)) for felt_n in both]
+    return Found(own, *rms, *(float(np.median(angles_deg(felt_n, force_n))) for felt_n in both))
+
+
+def angles_deg(a: Floats, b: Floats) -> Floats:
+    """Angles (k,) between the rows of two (k, 3)."""
+    angles: Floats = np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)))
+    return angles
+
+
+def of_plate(held: Held, population: Population) -> Held:
+    """Presses of a flat plate: against the skin's normal at the point of contact, with the population's strength.
+
+    Raises InputError unless both sides were pressed, for nothing corrects a side that was not.
+    """
+    mean = np.array([held.counts[held.press == k].mean(axis=0) for k in range(len(held.force_n))])
+    inward = -normals_at(compute(np.rint(mean).astype(np.uint16), held.tare)["poc_mm"])
+    if not np.isfinite(inward).all():
+        raise InputError("a press has no point of contact: expected one in each; tare the finger, and press harder")
+    if not (inward[:, 1].max() > SIDE and inward[:, 1].min() < -SIDE):
+        raise InputError(
+            f"the plate's normal was {inward[:, 1].min():.2f} to {inward[:, 1].max():.2f} across: expected beyond "
+            f"-{SIDE} and {SIDE}; roll the finger further to both sides"
+        )
+    strength_n = np.linalg.norm(population.published(mean, held.tare), axis=1, keepdims=True)
+    return replace(held, force_n=strength_n * inward)
 
 
 def guided(

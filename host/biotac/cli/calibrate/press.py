@@ -32,9 +32,10 @@ from ..recordings.loading import load
 
 NAME = "press"
 HELP = (
-    "A finger's own force from presses of known force: the population map fitted to presses on a kitchen scale or to "
-    "weights, or one gain from pressure to force. Guided on a board, or from a recording of that."
+    "A finger's own force from presses of known force: the population map fitted to presses on a kitchen scale, to "
+    "weights or to a plate, or one gain from pressure to force. Guided on a board, or from a recording of that."
 )
+SIDES = ("its pad", "E1's side", "its tip", "E11's side")
 EXAMPLE = "biotac calibrate press sim:fingers.toml --scale --finger index --presses 3"
 
 
@@ -51,6 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--weights", action="store_true", help="fit all axes of the population map to weights, level and tilted"
     )
     against.add_argument(
+        "--plate", action="store_true",
+        help="fit directions to a flat plate pressed on from all sides by hand; its size in newtons stays a guess",
+    )  # fmt: skip
+    against.add_argument(
         "--pressure", metavar="FILE", nargs="?", const="",
         help="from pressure to force, one gain per finger: press a plate or scale whose readings are typed in; for a "
         "recording, a CSV with t_s in the board's time and force_n (or fx_n, fy_n, fz_n)",
@@ -64,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--unit", choices=list(UNITS_N), default="N", help="of the readings (default %(default)s)")
     parser.add_argument(
-        "--presses", metavar="N", type=int, default=5, help="on a scale (default %(default)s; 20 are better)"
+        "--presses", metavar="N", type=int, help="on a scale (default 5; 20 are better), or of a plate (default 20)"
     )
     for name, default, metavar, what in (
         ("--masses", weights.MASSES_G, "G,G", "weights in grams"),
@@ -175,7 +180,16 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
             "in a new place each time; hold still until told"
         )
 
-    asked_n = [known_force.ASKED_N[k % len(known_force.ASKED_N)] for k in range(args.presses)]
+    asked_n = _asked_n(args)
+    if args.plate:
+        face = _Guide(
+            lambda step: (
+                f"push a flat plate straight onto {SIDES[(step.press - 1) % len(SIDES)]}; do not rub, hold still"
+            ),
+            lambda step: step.force_n,
+            "take it off",
+        )
+        return known_force.guided(hand, finger, asked_n, face)
     if args.scale:
         with Scale(args.scale) as scale:
             return known_force.guided(hand, finger, asked_n, _Guide(press, lambda step: scale.force_n(), "let go"))
@@ -185,7 +199,14 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
     return known_force.guided(hand, finger, asked_n, face, reference=reference)
 
 
+def _asked_n(args: argparse.Namespace) -> list[float]:
+    count = args.presses or (20 if args.plate else 5)
+    return [known_force.ASKED_N[k % len(known_force.ASKED_N)] for k in range(count)]
+
+
 def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[weights.Load]) -> known_force.Held:
+    if args.plate:
+        return known_force.recorded(recording, args.finger[0], _asked_n(args))
     if not loads and args.readings is None:
         raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
     forces_n = [load.size_n for load in loads] or [value * UNITS_N[args.unit] for value in args.readings]
@@ -197,6 +218,9 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
     trained = population.load(args.population)
     if args.weights:
         fit, how, forces = few_shot.weighed, "weights on tilted blocks", {"force_n": held.force_n.tolist()}
+    elif args.plate:
+        held = known_force.of_plate(held, trained.population)
+        fit, how, forces = few_shot.plated, "presses of a plate", {"force_n": held.force_n.tolist()}
     else:
         scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n[:, 2])
         fit, how = few_shot.scaled, "presses on a scale"
@@ -211,6 +235,8 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         **forces,
         "before_n": found.before_n.tolist(),
         "held_out_n": found.held_out_n.tolist(),
+        "before_deg": found.before_deg,
+        "held_out_deg": found.held_out_deg,
         "why_not": found.why_not(trained.sigma_scale5_n),
         "sigma_n": trained.sigma_scale5_n.tolist(),
         "fixed_point": summary(own, held.counts),
@@ -242,8 +268,8 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
     gain = f": z gain {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N" if "gain" in facts else ""
     return [
         f"finger {facts['finger']}, {facts['presses']} {how}{gain}",
-        f"  error along x, y, z before:   {numbers(facts['before_n'])} N",
-        f"  each press held out:          {numbers(facts['held_out_n'])} N",
+        f"  error along x, y, z before:   {numbers(facts['before_n'])} N, {facts['before_deg']:.1f} deg",
+        f"  each press held out:          {numbers(facts['held_out_n'])} N, {facts['held_out_deg']:.1f} deg",
         f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
         *([f"  not worth using: {facts['why_not']}; {cure}"] if facts["why_not"] else []),
         *([f"  written: {facts['written']}"] if "written" in facts else []),
