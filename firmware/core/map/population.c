@@ -153,6 +153,7 @@ void bt_population_sigma(const bt_likeness *its, uint16_t sigma_100un[3])
     uint32_t across = its->strength_100un * 3 / 20;
     for (int d = 0; d < 3; d++) {
         uint32_t away = d < 2 ? across : 2 * across;
-        sigma_100un[d] = (uint16_t)((trained[d] * its->share + away * (BT_POPULATION_ALL - its->share)) >> 8);
+        uint32_t sigma = (trained[d] * its->share + away * (BT_POPULATION_ALL - its->share)) >> 8;
+        sigma_100un[d] = (uint16_t)(sigma < BT_INVALID_COUNT ? sigma : BT_INVALID_COUNT - 1);
     }
 }

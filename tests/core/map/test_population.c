@@ -296,6 +296,9 @@ static void sigma_is_mixed_as_force_is(void **state)
         assert_int_equal(sigma[2][d], trained[d]);
         assert_true(sigma[0][d] > 0);
     }
+    const bt_likeness strong = {.strength_100un = 303000}; // every electrode at the end of its range
+    bt_population_sigma(&strong, sigma[0]);
+    assert_true(sigma[0][0] == 45450 && sigma[0][2] == BT_INVALID_COUNT - 1); // not wrapped
 }
 
 // Where nothing is compressed no direction is known: the contact is beyond the electrodes.
