@@ -4,6 +4,7 @@
 # PORT is a folder of firmware/port, CPU the compiler's options for the core, LINKER a script in the port's folder. Makes
 # NAME.elf and NAME.bin (what is stored from its first byte on), with whatever PORT/image.cmake adds, and holds it to
 # limits.json of the board's folder.
+#   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with port/semihosted for the chip's bus and flash
 if(NOT CMAKE_TOOLCHAIN_FILE)
   set(CMAKE_TOOLCHAIN_FILE ${CMAKE_CURRENT_LIST_DIR}/arm-none-eabi.cmake)
 endif()
@@ -14,6 +15,7 @@ set(fw ${boards}/..)
 set(tools ${fw}/../tools)
 
 find_package(Python3 3.10 REQUIRED COMPONENTS Interpreter)
+include(${boards}/compile_options.cmake)
 
 function(board_image name port_name cpu linker)
   set(port ${fw}/port/${port_name})
@@ -31,10 +33,9 @@ function(board_image name port_name cpu linker)
     ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m ${port} ${CMAKE_CURRENT_LIST_DIR})
   target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections
     -Wl,--fatal-warnings -Wl,-Map=${name}.map -T ${port}/${linker})
-  include(${boards}/compile_options.cmake)
   board_compile_options(${ARGN})
   add_custom_command(TARGET ${name} POST_BUILD
-    COMMAND ${CMAKE_OBJCOPY} -O binary ${name}.elf ${name}.bin
+    COMMAND ${CMAKE_OBJCOPY} -O binary -R .boot_vectors ${name}.elf ${name}.bin
     COMMAND ${Python3_EXECUTABLE} ${tools}/image/note.py ${name}.bin ${name}.elf --objcopy ${CMAKE_OBJCOPY}
     ${port_after}
     COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${port_name}
@@ -45,4 +46,21 @@ function(gateway_image name port_name cpu linker)
   file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c
     ${fw}/port/cortex_m/*.c ${fw}/port/${port_name}/*.c ${fw}/port/${port_name}/*/*.c)
   board_image(${name} ${port_name} ${cpu} ${linker} ${sources} ${ARGN})
+endfunction()
+
+function(emulated_image name port_name cpu linker)
+  set(port ${fw}/port/${port_name})
+  file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c
+    ${fw}/port/cortex_m/*.c ${fw}/port/semihosted/*.c ${port}/*.c)
+  list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$|/emu/stream\\.c$")
+  separate_arguments(cpu)
+  add_executable(${name} ${sources})
+  set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
+  target_compile_options(${name} PRIVATE ${cpu})
+  target_compile_definitions(${name} PRIVATE BOARD_NEVER_SLEEPS ${ARGN})
+  target_include_directories(${name} PRIVATE ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m
+    ${port} ${boards}/m4f ${CMAKE_CURRENT_LIST_DIR})
+  target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections -Wl,--fatal-warnings
+    -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_idle,--wrap=port_identify -T ${port}/${linker})
+  board_compile_options(${sources})
 endfunction()

@@ -39,8 +39,14 @@ static uint64_t slot_number(const bt_tape *tape, uint64_t t_ns)
 
 static uint16_t sample(const bt_tape *tape, uint64_t round, uint8_t finger, uint64_t slot)
 {
-    size_t at = (size_t)((round * tape->fingers + finger) * BT_SLOTS + slot) * 2;
+    size_t at = (size_t)(((round - tape->first_round) * tape->fingers + finger) * BT_SLOTS + slot) * 2;
     return (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
+}
+
+uint32_t bt_tape_round(const bt_tape *tape, uint64_t t_ns)
+{
+    uint64_t round = tape->started ? slot_number(tape, t_ns) / BT_SLOTS : 0;
+    return (uint32_t)(round < tape->rounds ? round : tape->rounds - 1);
 }
 
 uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
@@ -57,10 +63,7 @@ uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t 
         return BT_EMU_FAULT_STUCK_LOW;
     }
     uint64_t number = slot_number(tape, t_ns);
-    uint64_t round = number / BT_SLOTS;
-    if (round >= tape->rounds) {
-        round = tape->rounds - 1;
-    }
+    uint32_t round = bt_tape_round(tape, t_ns);
     if (channel == BT_EMU_LINE) {
         uint16_t now = sample(tape, round, finger, number % BT_SLOTS);
         return now > BT_FULL_SCALE_COUNT ? now : 0;

@@ -33,7 +33,7 @@ __attribute__((noreturn, used)) static void fault(const uint32_t *frame)
     semihost_write(", BFAR 0x");
     semihost_write_hex(BFAR);
     semihost_write("; find the line: arm-none-eabi-addr2line -e IMAGE ADDRESS\n");
-    semihost(SYS_EXIT, EXIT_FAULT);
+    (void)semihost(SYS_EXIT, EXIT_FAULT);
     for (;;) {
     }
 }

@@ -46,6 +46,9 @@ static inline void interrupt_let_go(uint32_t number)
 // interrupt interrupts those of a larger number. It is let go at once.
 void use_interrupt(int number, uint32_t priority, void (*handler)(void));
 
+// ---- image_note.c: of the image that is stored; see port.h
+uint32_t image_crc32(void);
+
 // ---- what the port defines for startup.c
 // Clocks, and the clock of port_now_us. Runs before there are any variables, from where the image is stored:
 // mark it, and what it calls, with AT_BOOT. False when a clock never came up: the board starts again.
@@ -75,6 +78,12 @@ static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_
     }
     return true;
 }
+
+// ---- systick_alarm.c: port_now_us, port_delay_us and port_alarm_at on SysTick, over a clock of the port's
+// Call from port_init. core_hz: what SysTick counts. The alarm's interrupt has priority 1, so that a UART
+// without a FIFO goes before it.
+void systick_alarm_start(uint32_t core_hz);
+uint32_t clock_us(void); // the port's: 32 bits of us that wrap, from any context
 
 // ---- sleep.c
 // Something came that the main loop should look at. For interrupts.

@@ -8,9 +8,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// ---- image_note.c: of the image in flash; see port.h
-uint32_t image_crc32(void);
-
 // ---- system.c
 void watchdog_start(void);
 void watchdog_feed(void);

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import select
+import shlex
 import subprocess
 import tempfile
 import threading
@@ -54,14 +55,14 @@ class SimBoard:
         self._folder.cleanup()
 
     def _start(self, options: list[str]) -> Any:
-        """The board's process, with three pipes; the environment variable BIOTAC_SIM names another build of it."""
-        path = Path(os.environ.get("BIOTAC_SIM") or BUILT / "bin" / "biotac-sim")
-        if not path.is_file():
+        """The board's process, with three pipes; the environment variable BIOTAC_SIM is the command of another one."""
+        command = shlex.split(os.environ.get("BIOTAC_SIM", "")) or [str(BUILT / "bin" / "biotac-sim")]
+        if not Path(command[0]).is_file():
             raise PortError(
-                f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
+                f"no simulator at {command[0]}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
             )
         pipe = subprocess.PIPE
-        return subprocess.Popen([str(path), *options], stdin=pipe, stdout=pipe, stderr=pipe)
+        return subprocess.Popen([*command, *options], stdin=pipe, stdout=pipe, stderr=pipe)
 
     def hear(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""

@@ -1,0 +1,85 @@
+// The link: USART3, and there is no other. Nothing tells who listens: what finds no room in the ring is dropped
+// by whole frames, and what comes too fast is found by its CRC. No FIFO: at 921 600 bit/s a byte must be taken
+// within 10.8 us, so this interrupt goes before the sampler's.
+#include "only_board.h"
+
+#include "pins.h"
+#include "ring.h"
+#include "stm32f405.h"
+
+#define DEFAULT_BITS_PER_S 921600u // this board has no other link, so "none" cannot be meant
+
+RING(tx, 4096); // 40 ms of five fingers' frames
+RING(rx, 512);  // some commands
+static bool started;
+
+// In the interrupt, or with it held off. On silicon a byte at a time; QEMU's UART is always ready, but never
+// interrupts for it.
+static void send(void)
+{
+    uint8_t byte = 0;
+    for (uint32_t k = ring_filled(&tx); k != 0; k--) {
+        if (!(USART3_SR & USART_SR_TXE)) {
+            break;
+        }
+        (void)ring_take(&tx, &byte, 1);
+        USART3_DR = byte;
+    }
+    if (ring_filled(&tx) != 0) {
+        USART3_CR1 |= USART_CR1_TXEIE;
+    } else {
+        USART3_CR1 &= ~USART_CR1_TXEIE;
+    }
+}
+
+static void uart_interrupt(void)
+{
+    if (USART3_SR & (USART_SR_RXNE | USART_SR_ORE)) {
+        uint8_t byte = (uint8_t)USART3_DR; // a damaged one, too: the CRC judges
+        (void)ring_put(&rx, &byte, 1);
+        wake();
+    }
+    send();
+}
+
+void uart_watch(void)
+{
+    if (started && ring_filled(&tx) != 0) {
+        interrupt_hold_off(USART3_IRQ);
+        send();
+        interrupt_let_go(USART3_IRQ);
+    }
+}
+
+void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
+{
+    bits_per_s = bits_per_s == 0 ? DEFAULT_BITS_PER_S : bits_per_s;
+    pin_function(PORT_UART, PIN_UART_TX, UART_FUNCTION, PULL_NONE);
+    pin_function(PORT_UART, PIN_UART_RX, UART_FUNCTION, PULL_UP); // a line that nobody drives is idle
+    USART3_BRR = (APB1_HZ + bits_per_s / 2) / bits_per_s;
+    USART3_CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
+    use_interrupt(USART3_IRQ, 0, uart_interrupt);
+    started = true;
+}
+
+bool port_link_up(bt_port *port)
+{
+    return started;
+}
+
+bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
+{
+    bool room = ring_put(&tx, data, bytes);
+    uart_watch();
+    return room;
+}
+
+size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
+{
+    return ring_take(&rx, data, bytes);
+}
+
+bool uart_all_sent(void)
+{
+    return ring_filled(&tx) == 0 && USART3_SR & USART_SR_TC;
+}
