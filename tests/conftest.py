@@ -30,6 +30,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--rig", action="append", help="run tests/hil against this rig only; may be repeated")
     parser.addoption("--port", help="a real board's port, for the rigs 'real' and 'bench' of tests/hil")
     parser.addoption("--sensor-port", help="port of the sensor board that is wired to it, for the rig 'bench'")
+    parser.addoption("--image-command", default="", help="what starts a simulated board, for the rig 'image'")
 
 
 def pytest_report_header(config: pytest.Config) -> list[str]:

@@ -13,7 +13,7 @@ typedef struct {
     uint32_t rounds;
     const uint8_t *samples; // from first_round on
     uint32_t first_round;   // 0, unless the caller has but a part of the file in memory
-    uint64_t start_ns; // of round 0's first slot
+    uint64_t start_ns;      // of round 0's first slot
     bool started;
 } bt_tape;
 

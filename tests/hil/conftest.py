@@ -21,9 +21,9 @@ READY: dict[str, str | None] = {}
 
 def missing_port(rig_name: str, config: pytest.Config) -> str | None:
     """The option that would name a board of this rig, when it was not given."""
-    options = {"{port}": "--port", "{sensor_port}": "--sensor-port"}
-    port = RIGS[rig_name]["port"]
-    return next((option for field, option in options.items() if field in port and not config.getoption(option)), None)
+    options = {"{port}": "--port", "{sensor_port}": "--sensor-port", "{image_command}": "--image-command"}
+    named = f"{RIGS[rig_name]['port']} {RIGS[rig_name].get('command', '')}"
+    return next((option for field, option in options.items() if field in named and not config.getoption(option)), None)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -48,9 +48,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
-def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
+def rig(rig_name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
     """The board under test; whatever was opened on it is closed after the test."""
     facts = RIGS[rig_name]
+    if "command" in facts:
+        command = facts["command"].format(image_command=request.config.getoption("--image-command"))
+        monkeypatch.setenv("BIOTAC_SIM", command)
     option = missing_port(rig_name, request.config)
     if option is not None:
         pytest.skip(f"{rig_name}: no {option} was given, so there is no board to test")

@@ -16,13 +16,30 @@ from test_calibration import reboot
 import biotac
 from biotac import CalibrationState
 from biotac.cli.main import main
-from biotac.errors import CommandRefusedError
+from biotac.errors import CommandRefusedError, InputError
 from biotac.map.board_map import PART_BYTES, for_any_sensor, part
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.reader import Recording
 from biotac.wire import messages_gen as wire
 
 SECTOR = 4096
+
+
+@pytest.fixture
+def board(board: Callable[[str], biotac.Hand]) -> Callable[[str], biotac.Hand]:
+    """One that keeps maps."""
+
+    def opened(source: str) -> biotac.Hand:
+        hand = board(source)
+        if hand.info.map_bytes == 0:
+            with pytest.raises(InputError, match="keeps no wrench maps"):
+                hand.board.set_map(0, make_map(1))
+            pytest.skip(f"a {bytes(hand.info.board_name).decode()} keeps no wrench maps (HELLO)")
+        return hand
+
+    return opened
+
+
 PAGE = 256
 PATIENCE_S = 5  # of the board's time, for what takes some ms of it
 

@@ -42,7 +42,9 @@ def main() -> int:
             section.write(code.bytes_of(image))
             section.flush()
             subprocess.run([args.objcopy, "--update-section", f".image_note={section.name}", str(args.elf)], check=True)
-            subprocess.run([args.objcopy, "-O", "binary", "-R", ".boot_vectors", str(args.elf), section.name], check=True)
+            subprocess.run(
+                [args.objcopy, "-O", "binary", "-R", ".boot_vectors", str(args.elf), section.name], check=True
+            )
             if Path(section.name).read_bytes() != image:
                 sys.exit(f"note.py: {args.elf} does not give {path}: its note is not in a section .image_note")
     wire = ".".join(map(str, note.wire))

@@ -1,4 +1,5 @@
-// The Adafruit Feather STM32F405 Express: which of its pins goes where. README.md beside this file has the wiring.
+// The Adafruit Feather STM32F405 Express: which of its pins goes where. README.md beside this file has the
+// wiring.
 #ifndef BIOTAC_F405_PINS_H
 #define BIOTAC_F405_PINS_H
 

@@ -1,10 +1,10 @@
-// What an image for an emulator has in place of its chip's bus, flash and identity: emulated sensors that play a
-// tape, flash in RAM that a file outlives, and a rig's commands. All by ARM semihosting, so that it works on any
-// Cortex-M that QEMU has; interrupts, alarm, clock, sleep and link stay the port's own. tools/qemu_gateway
-// starts such an image, and gives it as its command line
+// What an image for an emulator has in place of its chip's bus, flash and identity: emulated sensors that
+// play a tape, flash in RAM that a file outlives, and a rig's commands. All by ARM semihosting, so that it
+// works on any Cortex-M that QEMU has; interrupts, alarm, clock, sleep and link stay the port's own.
+// tools/qemu_gateway starts such an image, and gives it as its command line
 //   TAPE BOOT_ID GO SERIALS FLASH
-// with - for none. Device time stands still from the first alarm on until a file GO is there, and again once the
-// tape is over. Says "ready", "go" and "end".
+// with - for none. Device time stands still from the first alarm on until a file GO is there, and again once
+// the tape is over. Says "ready", "go" and "end".
 #include "only_board.h"
 #include "spi_word_by_word.h"
 
@@ -19,11 +19,11 @@
 
 #include <string.h>
 
-#define HEADER_BYTES  24
-#define ROUND_BYTES   (2 * BT_SLOTS * BT_MAX_FINGERS)
-#define KEPT_BYTES    32768u // two sectors of up to 16 KiB
-#define LOOKS_FOR_GO  200u   // turns of the main loop between two looks
-#define HANDED_OVER   5000u  // turns in which the link sends what is left
+#define HEADER_BYTES 24
+#define ROUND_BYTES  (2 * BT_SLOTS * BT_MAX_FINGERS)
+#define KEPT_BYTES   32768u // two sectors of up to 16 KiB
+#define LOOKS_FOR_GO 200u   // turns of the main loop between two looks
+#define HANDED_OVER  5000u  // turns in which the link sends what is left
 
 enum mode { READ = 1, UPDATE = 3 }; // "rb", "r+b"
 
@@ -108,7 +108,8 @@ static void read_command_line(void)
     }
 }
 
-// ---- time: the port's, but for where it stands still -------------------------------------------------------
+// ---- time: the port's, but for where it stands still
+// -------------------------------------------------------
 
 uint32_t __real_clock_us(void);
 uint32_t __wrap_clock_us(void);
@@ -173,7 +174,8 @@ void __wrap_port_idle(bt_port *port)
     __real_port_idle(port);
 }
 
-// ---- the sensors -------------------------------------------------------------------------------------------
+// ---- the sensors
+// -------------------------------------------------------------------------------------------
 
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
@@ -213,7 +215,8 @@ void spi_start(void)
     bt_emu_bus_init(&bus, tape.fingers, serials[0] == '-' ? "" : serials, count, &tape);
 }
 
-// ---- flash, as NOR flash is ----------------------------------------------------------------------------------
+// ---- flash, as NOR flash is
+// ----------------------------------------------------------------------------------
 
 uint32_t flash_erase_us;
 
@@ -250,7 +253,8 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, kept + offset, bytes);
 }
 
-// ---- identity: an emulator has neither the chip's number nor its image where the note expects it ---------------
+// ---- identity: an emulator has neither the chip's number nor its image where the note expects it
+// ---------------
 
 port_identity __wrap_port_identify(bt_port *port)
 {

@@ -12,7 +12,7 @@
 // Neither start-up nor a reset clears these.
 static uint32_t running __attribute__((section(".noinit")));
 static uint32_t asked_for __attribute__((section(".noinit")));
-#define RUNNING   0x42544757u // "WGTB"
+#define RUNNING    0x42544757u // "WGTB"
 #define THE_LOADER 0x4C4F4144u
 
 // Before anything else is touched: the ROM wants the chip as it comes out of reset.
@@ -36,7 +36,8 @@ AT_BOOT bool clocks_start(void)
         return CLOCKS_ARE_NOT_MODELLED;
     }
     FLASH_ACR = FLASH_ACR_4_WAITS | FLASH_ACR_PREFETCH | FLASH_ACR_ICEN | FLASH_ACR_DCEN;
-    RCC_PLLCFGR = PLL_M | PLL_N << 6 | RCC_PLLCFGR_FROM_HSE | 6u << 24; // divided by two; by six for the USB's 48
+    RCC_PLLCFGR =
+        PLL_M | PLL_N << 6 | RCC_PLLCFGR_FROM_HSE | 6u << 24; // divided by two; by six for the USB's 48
     RCC_CFGR = RCC_CFGR_APB1_BY_4 | RCC_CFGR_APB2_BY_2;
     RCC_CR |= RCC_CR_PLLON;
     if (!wait_for(&RCC_CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, WAIT_CLOCKS_TURNS)) {

@@ -1,5 +1,5 @@
-// The chip's own flash: settings in its sectors 1 and 2, of 16 KiB each; stm32f405.ld keeps the image off both.
-// While it erases or programs, whatever fetches from it stands still, interrupts too (RM0090 3.6).
+// The chip's own flash: settings in its sectors 1 and 2, of 16 KiB each; stm32f405.ld keeps the image off
+// both. While it erases or programs, whatever fetches from it stands still, interrupts too (RM0090 3.6).
 #include "only_board.h"
 
 #include "stm32f405.h"

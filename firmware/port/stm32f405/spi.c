@@ -1,5 +1,5 @@
-// The sensors' bus: SPI2, mode 0, chip selects as plain outputs of one port. The core does a slot word by word
-// in the alarm's interrupt, 75 of a slot's 227 us with five fingers; the UART interrupts that.
+// The sensors' bus: SPI2, mode 0, chip selects as plain outputs of one port. The core does a slot word by
+// word in the alarm's interrupt, 75 of a slot's 227 us with five fingers; the UART interrupts that.
 #include "only_board.h"
 #include "spi_word_by_word.h"
 
@@ -7,11 +7,10 @@
 #include "stm32f405.h"
 #include "wire/sensor_gen.h"
 
-#define SPI_BY_8  2u
-#define SPI_HZ    (APB1_HZ / 8)
-#define SPI_CR1_ON                                                                                           \
-    (SPI_CR1_MSTR | SPI_CR1_BR(SPI_BY_8) | SPI_CR1_SSI | SPI_CR1_SSM | SPI_CR1_SPE)
-#define NS(ns) ((uint32_t)(((ns) * (uint64_t)(HCLK_HZ / 1000000u) + 999) / 1000))
+#define SPI_BY_8   2u
+#define SPI_HZ     (APB1_HZ / 8)
+#define SPI_CR1_ON (SPI_CR1_MSTR | SPI_CR1_BR(SPI_BY_8) | SPI_CR1_SSI | SPI_CR1_SSM | SPI_CR1_SPE)
+#define NS(ns)     ((uint32_t)(((ns) * (uint64_t)(HCLK_HZ / 1000000u) + 999) / 1000))
 
 static const uint8_t select_pin[BT_MAX_FINGERS] = PIN_SELECTS;
 
@@ -46,8 +45,8 @@ void port_spi_select(bt_port *port, uint8_t mask)
     }
 }
 
-// 0, which reads as a sensor that is not there, for a word that did not come. One that came late, of an earlier
-// exchange, is read away first: it would be taken for another finger's.
+// 0, which reads as a sensor that is not there, for a word that did not come. One that came late, of an
+// earlier exchange, is read away first: it would be taken for another finger's.
 static uint32_t exchange(uint32_t mosi)
 {
     if (SPI2_SR & SPI_SR_RXNE) {

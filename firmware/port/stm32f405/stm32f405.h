@@ -8,17 +8,18 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Turns of wait_for, of six cycles at least: 40 ns at 144 MHz, 375 ns on the oscillator that the chip starts with.
-#define WAIT_CLOCKS_TURNS 100000u  // 37 ms at least: the crystal takes some
+// Turns of wait_for, of six cycles at least: 40 ns at 144 MHz, 375 ns on the oscillator that the chip starts
+// with.
+#define WAIT_CLOCKS_TURNS 100000u   // 37 ms at least: the crystal takes some
 #define WAIT_FLASH_TURNS  25000000u // a second: a sector of 16 KiB takes 0.5 s at most (data sheet 5.3.12)
-#define WAIT_SPI_TURNS    1000u    // 40 us: a word takes 3.6
+#define WAIT_SPI_TURNS    1000u     // 40 us: a word takes 3.6
 
 // ---- clocks.c
 void clock_start(void); // of clock_us
 void watchdog_start(void);
 void watchdog_feed(void);
 void leave(bool to_loader) __attribute__((noreturn)); // by a reset: into the ROM's loader, or back here
-uint16_t started_by(void);                         // once: BT_FAULT_FLAG_STARTED, HUNG or CRASHED
+uint16_t started_by(void);                            // once: BT_FAULT_FLAG_STARTED, HUNG or CRASHED
 
 // ---- pins, by port (0: A) and number
 static inline void pin_output(uint32_t port, uint32_t pin)

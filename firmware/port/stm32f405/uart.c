@@ -1,6 +1,6 @@
-// The link: USART3, and there is no other. Nothing tells who listens: what finds no room in the ring is dropped
-// by whole frames, and what comes too fast is found by its CRC. No FIFO: at 921 600 bit/s a byte must be taken
-// within 10.8 us, so this interrupt goes before the sampler's.
+// The link: USART3, and there is no other. Nothing tells who listens: what finds no room in the ring is
+// dropped by whole frames, and what comes too fast is found by its CRC. No FIFO: at 921 600 bit/s a byte must
+// be taken within 10.8 us, so this interrupt goes before the sampler's.
 #include "only_board.h"
 
 #include "pins.h"
