@@ -54,7 +54,11 @@ def check(lake: str, item: tuple[str, dict[str, str]]) -> Checked:
         checked.wrong.append(f"{recording} has no file in {RECORDINGS}; export it again with --force")
     if len(tables) == 2:
         row = tables[RECORDINGS].to_pylist()[0]
-        facts = Facts.read(dict(row["metadata"]))
+        try:
+            facts = Facts.read(dict(row["metadata"]))
+        except ValueError as error:  # of another version: the checksums say that it is as it was exported
+            checked.wrong.append(f"{recording} ({row['source']}): its metadata cannot be used ({error})")
+            return checked
         own = own_settings(facts.settings, facts.calibrations)
         checked.outcome.add(frames_to_wire(frames_of(tables["frames"])), facts.settings, own, facts.maps)
         checked.wrong.extend(f"{recording} ({row['source']}): {finding}" for finding in checked.outcome.findings)

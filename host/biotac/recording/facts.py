@@ -6,7 +6,7 @@ import base64
 import json
 import struct
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 from ..errors import InputError, printable
@@ -42,8 +42,8 @@ class Facts:
             named = json.loads(metadata["settings"])
             own, maps = (json.loads(metadata.get(name, "{}")) for name in ("calibrations", "maps"))
             facts = cls(
-                wire.Hello(**_tuples(json.loads(metadata["hello"]))),
-                [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
+                _message(wire.Hello, json.loads(metadata["hello"])),
+                [_message(wire.SensorInfo, values) for values in json.loads(metadata.get("sensors", "[]"))],
                 # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
                 {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
                 {int(finger): from_dict(calibration) for finger, calibration in own.items()},
@@ -83,6 +83,14 @@ def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: 
     }
 
 
-def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
-    """A message's fields from JSON, with lists turned into tuples."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
+def _message(kind: type[Any], values: dict[str, Any]) -> Any:
+    """A message from JSON. As on the wire, fields that an older minor version lacks are 0, and a newer one's ignored.
+
+    Raises TypeError for other names.
+    """
+    names = [field.name for field in fields(kind)]
+    if [*values][: len(names)] != names[: len(values)]:
+        raise TypeError(f"{kind.__name__} has {', '.join(values)}, expected {', '.join(names)}")
+    zero = kind.unpack(bytes(kind.STRUCT.size))
+    known = {name: values[name] for name in names if name in values}
+    return replace(zero, **{name: tuple(value) if isinstance(value, list) else value for name, value in known.items()})

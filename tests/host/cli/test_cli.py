@@ -63,6 +63,12 @@ def test_list_shows_simulated_boards_that_run(capsys) -> None:
     assert json.loads(capsys.readouterr().out)["simulated"][port] == "biotac sim press.toml"
 
 
+def test_list_leaves_out_a_simulated_board_that_a_program_uses_itself(capsys) -> None:
+    with biotac.open("sim:press.toml?seconds=1"):
+        assert main(["list", "--json"]) == 0
+    assert not any("pytest" in command for command in json.loads(capsys.readouterr().out)["simulated"].values())
+
+
 def test_list_shows_what_can_be_simulated(capsys) -> None:
     assert main(["list", "--json"]) == 0
     assert "sim:press.toml" in json.loads(capsys.readouterr().out)["scenarios"]

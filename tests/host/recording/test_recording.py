@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -165,6 +165,19 @@ def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:
         damaged.write_bytes(whole.replace(words, change))
         with pytest.raises(biotac.RecordingError, match="damaged metadata"):
             biotac.Recording(damaged)
+
+
+def test_facts_of_other_minor_versions_are_read_as_the_wire_is(recorded) -> None:
+    good = biotac.Recording(recorded[0])
+    metadata, hello = dict(good.metadata), json.loads(good.metadata["hello"])
+    names = list(hello)
+    older = {name: hello[name] for name in names[:-1]}
+    read = Facts.read(metadata | {"hello": json.dumps(older)}).info
+    assert asdict(read) == asdict(good.info) | {names[-1]: (0,) * len(hello[names[-1]])}
+    assert Facts.read(metadata | {"hello": json.dumps(hello | {"appended_later": 1})}).info == good.info
+    for wrong in ({name: hello[name] for name in names[1:]}, {"other": 1} | older):
+        with pytest.raises(ValueError, match="Hello has"):
+            Facts.read(metadata | {"hello": json.dumps(wrong)})
 
 
 def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:

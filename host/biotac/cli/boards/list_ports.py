@@ -63,8 +63,10 @@ def simulated() -> dict[str, str]:
                     for line in file.read_text().splitlines() if line.startswith("tty-index:")]  # fmt: skip
             if Path(words[0]).name == "biotac-sim":  # the firmware; its parent has the words that were typed
                 words = _words(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
-            command = words[next(k for k, word in enumerate(words) if Path(word).name == "biotac") :]
-            found |= {f"/dev/pts/{tty}": printable(" ".join(["biotac", *command[1:]])) for tty in ttys[:1]}
+            names = [Path(word).name for word in words]
+            if "biotac" in names:  # or else it is another program's own
+                command = ["biotac", *words[names.index("biotac") + 1 :]]
+                found |= {f"/dev/pts/{tty}": printable(" ".join(command)) for tty in ttys[:1]}
     return found
 
 
