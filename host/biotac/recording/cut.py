@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
 from ..errors import InputError
@@ -28,14 +30,16 @@ def cut(recording: Recording, place: Path, start_s: float = 0.0, stop_s: float |
     if not chosen:
         duration_s = (recording.end_us - begin_us) / 1e6
         raise InputError(f"{recording.path} has {duration_s:.1f} s and no row from {start_s:g} s on in that time")
-    every = recording.blocks
     first, last = (recording.heads()[k].rest for k in (chosen[0], chosen[-1]))
     from_us, to_us = first.first_us or begin_us, last.last_us or begin_us
     file = RecordingFile(place.open("xb"), recording.metadata | {layout.CUT_FROM: recording.path.name})
-    for k in range(chosen[0], chosen[-1] + 1):
+    for k, packets in groupby(recording.packets(from_us), key=itemgetter(0)):
+        if k > chosen[-1]:
+            break
         for gap in recording.gaps_before(k):
             file.add_gap(gap)
-        file.add(every[k], recording.arrived_ns[k], recording.all_here_ns[k])
+        data = b"".join(packet.data for _, packet in packets)
+        file.add(data, recording.arrived_ns[k], recording.all_here_ns[k])
     for label in recording.labels:
         if label.t_us is None or (label.t_us <= to_us and (label.end_us or label.t_us) >= from_us):
             file.add_label(label)

@@ -141,10 +141,10 @@ class Recording:
     def _rows_of(self, kind: int) -> StructArray:
         return np.concatenate([np.empty(0, ROWS[kind]), *(block.rows[kind] for block in self._blocks)])
 
-    def packets(self) -> Iterator[tuple[int, Packet]]:
-        """All messages in order of arrival, each with the number of its block."""
+    def packets(self, from_us: int = 0) -> Iterator[tuple[int, Packet]]:
+        """Messages in order of arrival, each with its block's number; without blocks that end before ``from_us``."""
         for k, block in enumerate(self._blocks):
-            for packet in block.packets():
+            for packet in block.packets() if from_us <= (block.rest.last_us or from_us) else ():
                 yield k, packet
 
     def gaps_before(self, block: int) -> list[Gap]:

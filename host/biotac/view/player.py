@@ -10,8 +10,12 @@ from typing import Any
 
 from ..errors import CommandRefusedError, InputError
 from ..hand.hand import Hand
+from ..hand.opening import shake_hands
 from ..hand.record import Recorder
+from ..recording.cut import cut
+from ..recording.reader import Recording
 from ..recording.replay.link import ReplayLink
+from ..recording.replay.playback import Playback
 from ..wire.batches import Batch, LinkStats
 from ..wire.identity import board_name, version_text
 
@@ -61,13 +65,23 @@ class Player:
             return None
         return {"path": str(self._recorder.path), "seconds": (self._last_us - self._recording_since_us) / 1e6}
 
-    def do(self, command: str, finger: int | None) -> str:
+    def position(self) -> tuple[float | None, float]:
+        """Where a recording is, in s since its first row, None for a board; and its pace."""
+        if self._replay is None:
+            return None, 1.0
+        playback = self._replay.pacer.playback
+        behind_us = (self._last_us - playback.from_us) % 2**32 if self._last_us else 0  # the wire's times wrap
+        return (playback.from_us + behind_us - playback.recording.begin_us) / 1e6, self._replay.pacer.pace
+
+    def do(self, command: str, finger: int | None, value: float | str | None = None) -> str:
         """Carry out a command of ``COMMANDS``; return what was done, in words.
 
         Raises InputError for a command that this player does not support, any BiotacError for one that failed.
         """
+        if command == "mark":
+            return self._mark(str(value or "mark"), finger)
         if self._replay is not None:
-            return self._pause(self._replay, command)
+            return self._of_recording(self._replay, command, value)
         if command == "tare":
             return self._tare(self._hand.fingers if finger is None else [finger])
         if command == "record":
@@ -76,7 +90,25 @@ class Player:
             return self._stop()
         raise InputError(f"a board cannot {command}; it runs until it is unplugged")
 
-    def _pause(self, replay: ReplayLink, command: str) -> str:
+    def _mark(self, text: str, finger: int | None) -> str:
+        at_s, _ = self.position()
+        if self._replay is not None:
+            self._replay.recording.mark(text, at_s, finger=finger)
+        elif self._recorder is None or self._recorder.closed:
+            raise InputError("nothing is being recorded; start a recording first")
+        else:
+            self._hand.mark(text, finger)
+        return f"marked {text!r}" + (f" at {at_s:.2f} s" if at_s is not None else "")
+
+    def _of_recording(self, replay: ReplayLink, command: str, value: float | str | None) -> str:
+        if command == "pace" and isinstance(value, float) and 0.01 <= value <= 100:
+            replay.pacer.pace = value
+            return f"playing at {value:g} times its pace"
+        if command == "save" and isinstance(value, float):
+            stop_s = self.position()[0] or 0.0
+            place = self._folder / f"{replay.recording.path.stem}-{stop_s:.2f}s.mcap"
+            begin_s, end_s = cut(replay.recording, place, max(0.0, stop_s - value), stop_s + 0.01)
+            return f"{begin_s:.1f} to {end_s:.1f} s saved to {place}"
         if command not in ("pause", "resume"):
             what = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
             raise InputError(f"a recording cannot be {what}; open a board for that")
@@ -115,8 +147,27 @@ class Player:
 
 Opener = Callable[[], Player]
 
-#: Commands of the page. ``again`` replays from the start after the end; it never reaches a Player.
-COMMANDS = ("tare", "record", "stop", "pause", "resume", "again")
+
+class RecordingOpener:
+    """Opens a recording at ``from_s``, once, then from its start, at the pace that it had before."""
+
+    def __init__(self, source: str, folder: Path) -> None:
+        self.recording = Recording(source)
+        if not self.recording.fingers:
+            raise InputError(f"{source} holds no frames; record it again")
+        self._source, self._folder = source, folder
+        self._link: ReplayLink | None = None
+        self.from_s = 0.0
+
+    def __call__(self) -> Player:
+        playback = Playback(self.recording, from_s=self.from_s)
+        pace = self._link.pacer.pace if self._link is not None else 1.0
+        self.from_s, self._link = 0.0, ReplayLink(self._source, playback, pace=pace)
+        return Player(shake_hands(self._link), self._folder)
+
+
+#: Commands of the page. ``again``, from the start after the end, and ``seek``, to another time, never reach a Player.
+COMMANDS = ("tare", "record", "stop", "pause", "resume", "again", "seek", "pace", "mark", "save")
 
 
 def writable(folder: Path) -> Path:

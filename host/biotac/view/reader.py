@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from ..errors import BiotacError, InputError, StreamTakenError
-from .player import COMMANDS, Opener, Player
+from .player import COMMANDS, Opener, Player, RecordingOpener
 from .state import State
 
 RETRY_S = 1.0
@@ -25,7 +25,7 @@ class Reader:
         self._turn = threading.Lock()  # of commands, and of the player's coming and going
         self._tried = threading.Event()  # to open it
         self._go_on = threading.Event()  # ends a rest
-        self._stopping = False
+        self._stopping = self._seeking = False
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
         #: Set before ``over`` when nothing can be played at all: the source is malformed or missing.
         self.failure: BaseException | None = None
@@ -43,7 +43,7 @@ class Reader:
             self._close(self._player)
         self._thread.join()
 
-    def ask(self, name: str, finger: int | None) -> str:
+    def ask(self, name: str, finger: int | None, value: float | str | None = None) -> str:
         """Carry out a command from a browser; return what was done, in words.
 
         Raises InputError for an unknown command and when nothing plays; otherwise what the Player raises.
@@ -52,6 +52,8 @@ class Reader:
             raise InputError(f"unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
         self._tried.wait(OPEN_S)
         with self._turn:
+            if name == "seek":
+                return self._seek(value)
             if name == "again":
                 if self._player is not None:
                     raise InputError("it is already playing")
@@ -59,9 +61,20 @@ class Reader:
                 return "trying again"
             if self._player is None:
                 raise InputError(self._resting)
-            words = self._player.do(name, finger)
+            words = self._player.do(name, finger, value)
             self._say_playing(self._player)
             return words
+
+    def _seek(self, at_s: float | str | None) -> str:
+        opener = self._opener
+        if not isinstance(opener, RecordingOpener) or not isinstance(at_s, float):
+            raise InputError("a board plays as time passes; open a recording to go to a time in it")
+        opener.from_s = min(max(at_s, 0.0), (opener.recording.end_us - opener.recording.begin_us) / 1e6)
+        self._seeking = True
+        self._go_on.set()
+        if self._player is not None:
+            self._player.close()
+        return f"playing from {opener.from_s:.2f} s"
 
     # ---- the thread ----------------------------------------------------------------------------
 
@@ -93,7 +106,7 @@ class Reader:
             # Without a batch nothing is noticed: ``stop`` sets its flag, then closes the player, which ends them.
             for batch in player.batches() if not self._stopping else ():
                 self._state.take(batch, player)
-                if self._stopping:
+                if self._stopping or self._seeking:
                     break
         except (BiotacError, OSError) as error:
             # OSError: the disk is full while recording.
@@ -103,7 +116,9 @@ class Reader:
                 self._loss += f"The recording {kept['path']} is kept up to that point. "
             was_taken = isinstance(error, StreamTakenError)
         self._close(player)
-        if was_taken:  # to open the board again would take it back
+        if self._seeking:  # the player was closed for that
+            self._seeking, self._loss = False, ""
+        elif was_taken:  # to open the board again would take it back
             self._rest("taken", self._loss, None)
         elif self._loss:
             self._rest("lost", f"{self._loss}Retrying every second.", RETRY_S)
@@ -122,7 +137,8 @@ class Reader:
         """Wait, while every command but ``again`` is refused."""
         with self._turn:
             self._player, self._resting = None, words
-            self._go_on.clear()
+            if not self._seeking:
+                self._go_on.clear()
         self._tried.set()
         if not self._stopping:
             self._state.say(link, words)

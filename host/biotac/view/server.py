@@ -9,6 +9,7 @@ number of connections is limited; the oldest one that does not get events makes 
 from __future__ import annotations
 
 import contextlib
+import math
 import secrets
 import socket
 import sys
@@ -144,8 +145,7 @@ class Handler(BaseHTTPRequestHandler):
             self._words(404, f"nothing at {self.path}")
             return
         try:
-            name, finger = parse_command(self._body())
-            self._words(200, self.server.reader.ask(name, finger))
+            self._words(200, self.server.reader.ask(*parse_command(self._body())))
         except ValueError as error:
             self._words(400, str(error))
         except (BiotacError, OSError) as error:
@@ -175,7 +175,7 @@ class Handler(BaseHTTPRequestHandler):
         self._head(200, "text/event-stream", {"Connection": "close"})
         state = self.server.state
         cursor = state.cursor()
-        about = facts() | {"token_header": TOKEN_HEADER}
+        about = facts() | {"token_header": TOKEN_HEADER, "recording": state.recording}
         self._send(f"retry: 500\nevent: about\ndata: {compact(about)}\n\n")
         while not state.closed:
             begin_s = time.monotonic()
@@ -203,11 +203,13 @@ class Handler(BaseHTTPRequestHandler):
         """Log nothing: a library does not print."""
 
 
-def parse_command(body: bytes) -> tuple[str, int | None]:
-    """Name and finger from a command's JSON. Raises ValueError for anything else."""
+def parse_command(body: bytes) -> tuple[str, int | None, float | str | None]:
+    """Name, finger and value from a command's JSON. Raises ValueError for anything else."""
     wish = parse_json(body)
-    name = wish.get("do") if isinstance(wish, dict) else None
-    finger = wish.get("finger") if isinstance(wish, dict) else None
-    if not isinstance(name, str) or not (finger is None or type(finger) is int):
-        raise ValueError('expected {"do": NAME, "finger": NUMBER or null}')
-    return name, finger
+    wish = wish if isinstance(wish, dict) else {}
+    name, finger, value = wish.get("do"), wish.get("finger"), wish.get("value")
+    value = float(value) if type(value) is int and abs(value) < 2**53 else value
+    is_value = value is None or isinstance(value, str) or (isinstance(value, float) and math.isfinite(value))
+    if not isinstance(name, str) or not (finger is None or type(finger) is int) or not is_value:
+        raise ValueError('expected {"do": NAME, "finger": NUMBER or null, "value": NUMBER, TEXT or null}')
+    return name, finger, value

@@ -5,14 +5,11 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from ..errors import InputError, PortError
+from ..errors import PortError
 from ..hand.opening import open as open_hand
-from ..hand.opening import shake_hands
-from ..recording.reader import Recording
-from ..recording.replay.link import ReplayLink
-from ..recording.replay.playback import Playback
 from . import DEFAULT_PORT
-from .player import Opener, Player, writable
+from .overview import overview
+from .player import Opener, Player, RecordingOpener, writable
 from .reader import Reader
 from .server import ViewServer
 from .state import State
@@ -35,6 +32,8 @@ class Viewing:
     def __init__(self, source: str, *, port: int | None = None, folder: Path | None = None, again: bool = True) -> None:
         opener = opener_of(source, writable(folder or Path()))
         self.state = State(source)
+        if isinstance(opener, RecordingOpener):
+            self.state.recording = overview(opener.recording)
         self.reader = Reader(opener, self.state, again=again)
         try:  # the default port first, so that a page left open reconnects when the program runs again
             self.server = ViewServer(self.state, self.reader, DEFAULT_PORT if port is None else port)
@@ -70,10 +69,7 @@ class Viewing:
 def opener_of(source: str, folder: Path) -> Opener:
     """An opener for ``source``; a recording is read now, only once."""
     if source.endswith(RECORDING_SUFFIX):
-        recording = Recording(source)
-        if not recording.fingers:
-            raise InputError(f"{source} holds no frames; record it again")
-        return lambda: Player(shake_hands(ReplayLink(source, Playback(recording), pace=1.0)), folder)
+        return RecordingOpener(source, folder)
     port = lasting(source)
     return lambda: Player(open_hand(port, pace=1.0), folder)  # people watch, so simulated boards run in real time
 

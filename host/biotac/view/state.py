@@ -79,6 +79,8 @@ class Health:
     status: dict[str, int] = field(default_factory=dict)
     fingers: dict[int, dict[str, Any]] = field(default_factory=dict)
     recording: dict[str, Any] | None = None
+    position_s: float | None = None  # in a recording, since its first row
+    pace: float = 1.0
     events: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=MARKS))  # marks, oldest first
 
 
@@ -95,6 +97,7 @@ class State:
         self._health_due_s = 0.0
         self._arrived: deque[tuple[float, int]] = deque()
         self.closed = False  # nothing more will come
+        self.recording: dict[str, Any] | None = None  # overview.py's, of a recording
         with self._news:
             self._publish()
 
@@ -136,6 +139,7 @@ class State:
             if now_s >= self._health_due_s:
                 self._measure(player.stats(), now_s)
                 self._health.recording = player.recording()
+                self._health.position_s, self._health.pace = player.position()
                 self._publish()
             elif frames or pac:
                 self._news.notify_all()

@@ -109,6 +109,16 @@ def test_a_part_of_it_is_the_same_rows(recorded) -> None:
     assert hand.stats.frames_lost == 0
 
 
+def test_a_status_from_before_the_part_is_no_wrap_of_the_clock(tmp_path) -> None:
+    """GET_STATUS, which a hand asks for all the time, was answered with the recording's first, minutes old."""
+    path = record_all("sim:press.toml?seconds=20", tmp_path / "a.mcap")
+    with biotac.open(f"replay:{path}?from=15") as hand:
+        rows = hand.read(0.1)
+        hand.status()
+        rows = np.concatenate([rows, hand.read(4)])
+    assert (np.diff(rows["t_us"]) == 10_000).all() and rows["seq"][0] == 1500
+
+
 @pytest.mark.parametrize("query", ["from=-1", "from=99", "from=3&to=2", "from=nan"])
 def test_parts_that_are_none_are_refused(recorded, query: str) -> None:
     with pytest.raises(biotac.InputError, match=r"expected 0 <= from < to, and from within its 3\.99 s"):

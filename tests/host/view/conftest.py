@@ -52,7 +52,10 @@ class ScriptedPlayer:
     def recording(self) -> None:
         return None
 
-    def do(self, command: str, finger: int | None) -> str:
+    def position(self) -> tuple[None, float]:
+        return None, 1.0
+
+    def do(self, command: str, finger: int | None, value: float | str | None = None) -> str:
         self.commands.append((command, finger))
         if self.refusal is not None:
             raise self.refusal

@@ -107,6 +107,40 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     link_is(page, "playing")
 
 
+def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, tmp_path) -> None:
+    path = tmp_path / "press.mcap"
+    with biotac.open("sim:press.toml?seconds=60&fingers=2") as hand, hand.record(path):
+        hand.read(61)
+    biotac.Recording(path).mark("slip", 40.0)
+    page = open_page(view(str(path)))
+    link_is(page, "playing")
+    page.wait_for_selector("#marks button")
+    page.focus("#marks button")
+    page.keyboard.press("Enter")  # to half a second before it
+    until(page, "() => Math.abs(numbers.dataset.seq - 4000) < 300")
+    assert page.get_attribute("#seek", "aria-valuetext").endswith("of 60.0 s")
+    page.focus("#seek")
+    page.keyboard.press("Home")
+    until(page, "() => numbers.dataset.seq < 500")
+    page.focus("#pace")
+    page.keyboard.press("5")
+    told(page, "Playing at 5 times its pace.")
+    page.focus("#mark-text")
+    page.keyboard.type("tar")  # none of them is a command here
+    page.focus("#mark")
+    page.keyboard.press("m")
+    told(page, "Marked 'tar' at ")
+    until(page, "() => document.querySelectorAll('#marks li').length === 2")
+    page.keyboard.press("s")
+    told(page, "saved to ")
+    (saved,) = set(tmp_path.glob("*.mcap")) - {path}
+    assert biotac.Recording(saved).problems == []
+    assert {label.text for label in biotac.Recording(path).labels} == {"slip", "tar"}
+    with page.expect_download() as download:
+        page.keyboard.press("i")
+    assert download.value.suggested_filename == "biotac.png"
+
+
 def test_five_fingers_are_a_hand_and_each_can_be_picked(view, open_page) -> None:
     page = open_page(view("sim:drift.toml?fingers=5"))
     until(page, FIVE)

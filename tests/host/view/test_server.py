@@ -61,11 +61,14 @@ def test_commands_need_the_secret_the_origin_and_sense(make_player, view_of) -> 
         '{"do": 1}',
         '{"do": "tare", "finger": "x"}',
         '{"do": "tare", "finger": true}',
+        '{"do": "seek", "value": [1]}',
+        '{"do": "seek", "value": NaN}',
         "[" * 999,
     ):
         assert ask(viewing, "POST", "/command", nonsense, **good)[0] == 400
     assert ask(viewing, "POST", "/command", {"do": "x" * 2000}, **good)[0] == 400
     assert ask(viewing, "POST", "/command", {"do": "fly"}, **good)[0] == 409
+    assert ask(viewing, "POST", "/command", {"do": "seek", "value": 3}, **good)[0] == 409  # not in a board's time
     assert player.commands == []
     status, body = ask(viewing, "POST", "/command", tare, **good, Origin=viewing.server.url.rstrip("/"))
     assert (status, json.loads(body)) == (200, {"words": "done as told"})

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    if args.port is not None and args.port.lower().endswith(".mcap"):
+    if (args.port or "").lower().endswith(".mcap") and not args.port.startswith("replay:"):
         return of_recording(args)
     with biotac.open(args.port) as hand:
         hello = hand.info

@@ -38,22 +38,23 @@ class Pacer:
 
     def __init__(self, playback: Playback, pace: float, clock: HostClock) -> None:
         self.playback = playback
-        self.paused = False  # set from any thread
-        self._pace = pace
+        self.paused = False  # set from any thread, as is pace
+        self.pace = pace
         self._clock = clock
-        self._start_s: float | None = None
+        self._start: tuple[float, float] | None = None  # a pace, and when 0 of device time would have been at it
 
     def wait_s(self) -> float | None:
         """Seconds until the next bytes are due; None when none are due for now."""
         due_us = self.playback.next_us() if self.playback.playing and not self.paused else None
         if due_us is None:
-            self._start_s = None
+            self._start = None
             return None
-        if self._pace == 0:
+        pace, start = self.pace, self._start
+        if pace == 0:
             return 0.0
-        if self._start_s is None:
-            self._start_s = self._clock.monotonic_s() - due_us / 1e6 / self._pace
-        return max(0.0, self._start_s + due_us / 1e6 / self._pace - self._clock.monotonic_s())
+        if start is None or start[0] != pace:
+            start = self._start = pace, self._clock.monotonic_s() - due_us / 1e6 / pace
+        return max(0.0, start[1] + due_us / 1e6 / pace - self._clock.monotonic_s())
 
     def due(self) -> bytes:
         """All bytes due now, up to about CHUNK_BYTES."""

@@ -11,6 +11,8 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from ...errors import InputError
 from ...map import board_map as maps
 from ...wire import messages_gen as wire
@@ -20,6 +22,7 @@ from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
 from ..block import Packet
 from ..reader import Recording
+from ..stamps import unwrapped_us
 
 _STREAMS_OF = {message.ID: streams for message, streams in wire.STREAMS_OF.items()}
 _TIME = struct.Struct("<I")
@@ -43,7 +46,7 @@ class Playback:
                 f"{recording.path} cannot be played from {from_s:g}{'' if to_s is None else f' to {to_s:g}'}; "
                 f"expected 0 <= from < to, and from within its {length_s:.2f} s"
             )
-        self._from_us = recording.begin_us + round(from_s * 1e6)
+        self.from_us = recording.begin_us + round(from_s * 1e6)
         self._to_us = None if to_s is None else recording.begin_us + round(to_s * 1e6)
         self._decoder = Decoder()
         self._stream = self._timed()
@@ -51,9 +54,12 @@ class Playback:
         self._asked: wire.Start | None = None
         self.playing = False
         self.over = False
-        # The answer to GET_STATUS: the last one played; before that, the first of the recording.
+        # The answer to GET_STATUS: the last one played; before that, the last one before the part played. One that is
+        # older would be taken for one after a wrap of the board's clock.
         statuses = [m for m in recording.messages if isinstance(m, wire.Status)]
-        self._status: wire.Status | None = statuses[0] if statuses else None
+        times_us = unwrapped_us(recording.begin_us, [m.t_us for m in statuses])
+        before = max(0, int(np.searchsorted(times_us, self.from_us, side="right")) - 1)
+        self._status: wire.Status | None = statuses[before] if statuses else None
         sensors = [m for m in reversed(recording.messages) if isinstance(m, wire.SensorStatus)]
         self._sensor_status: dict[int, wire.SensorStatus] = {m.finger: m for m in sensors}
 
@@ -65,7 +71,7 @@ class Playback:
             t_us, packet = next(self._stream, (0, None))
             self.over = packet is None
             data = None if packet is None else self._wanted(packet)
-            self._next = None if data is None else (t_us - self._from_us, data)
+            self._next = None if data is None else (t_us - self.from_us, data)
         return None if self._next is None else self._next[0]
 
     def take(self) -> bytes:
@@ -77,14 +83,14 @@ class Playback:
 
     def _timed(self) -> Iterator[tuple[int, Packet]]:
         """Packets in the range played, each with the device time at which it came."""
-        now_us = self.recording.begin_us
-        for _, packet in self.recording.packets():
+        now_us = self.from_us - (self.from_us > self.recording.begin_us)  # what comes before a clock is older
+        for _, packet in self.recording.packets(self.from_us):
             if packet.message_id in _CLOCKS:
                 (raw_us,) = _TIME.unpack_from(packet.payload, _TIME_AT)
                 now_us = nearest(raw_us, now_us)
             if self._to_us is not None and now_us >= self._to_us:
                 return
-            if now_us >= self._from_us:
+            if now_us >= self.from_us:
                 yield now_us, packet
 
     def _wanted(self, packet: Packet) -> bytes | None:

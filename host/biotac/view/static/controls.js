@@ -6,7 +6,10 @@ const KEYS = [
   ["T", "tare the finger shown"],
   ["A", "tare all fingers"],
   ["R", "start or stop a recording"],
+  ["M", "mark this moment in the recording"],
   ["P", "pause or resume"],
+  ["I", "save a picture of the charts"],
+  ["S", "save what the charts show of a recording"],
   ["G", "play again, after the end"],
   ["0 … 4", "show that finger"],
   ["← →", "show the previous or next finger"],
@@ -14,7 +17,7 @@ const KEYS = [
   ["?", "this list"],
   ["Tab, Enter", "move to a button, press it"],
 ];
-const BUTTONS = { t: "tare", a: "tare-all", r: "record", p: "pause", g: "again", d: "theme", "?": "help" };
+const BUTTONS = { t: "tare", a: "tare-all", r: "record", m: "mark", p: "pause", i: "picture", s: "save", g: "again", d: "theme", "?": "help" };
 
 export function wireControls({ actions, pick, step }) {
   for (const [id, act] of Object.entries(actions)) byId(id).addEventListener("click", act);
@@ -26,6 +29,7 @@ export function wireControls({ actions, pick, step }) {
     return [term, make("dd", { textContent: words })];
   }));
   document.addEventListener("keydown", (event) => {
+    if (event.target.matches("input, select")) return; // which has its own keys
     if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || keys.open) return;
     const button = byId(BUTTONS[event.key.toLowerCase()] ?? "");
     if (button && !button.hidden) button.click();

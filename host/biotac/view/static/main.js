@@ -4,11 +4,12 @@ import { Limit, readTheme } from "./colours.js";
 import { ThemeSwitch, wireControls } from "./controls.js";
 import { Fingertip } from "./fingertip.js";
 import { HandRow } from "./hand.js";
-import { Model, SPECTRUM_SAMPLES } from "./model.js";
+import { Model, SPECTRUM_SAMPLES, zoom } from "./model.js";
 import { SpectrogramPlot, SpectrumPlot, TimePlot } from "./plots.js";
 import { Flags, Link, Results, byId, number, showLink, showTare, tell } from "./readout.js";
 import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
+import { Timeline, savePicture } from "./timeline.js";
 
 const READ_MS = 100; // numbers that change faster cannot be read
 const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
@@ -42,13 +43,17 @@ class Page {
         tare: () => this.command("tare", this.shown),
         "tare-all": () => this.command("tare"),
         record: () => this.command(this.model?.health?.recording ? "stop" : "record"),
+        mark: () => this.mark(byId("mark-text").value || "mark"),
         pause: () => this.pause(),
+        picture: () => savePicture(this.theme),
+        save: () => this.command("save", null, zoom.s),
         again: () => this.command("again"),
         theme: () => this.themes.next(),
       },
       pick: (index) => this.pick(index),
       step: (by) => this.step(by),
     });
+    byId("zoom").onchange = () => (zoom.s = Number(byId("zoom").value));
     requestAnimationFrame((ms) => this.loop(ms));
   }
 
@@ -61,6 +66,7 @@ class Page {
     this.hand = new HandRow(byId("fingers"), about, (index) => this.pick(index));
     this.results = new Results(about);
     this.flags = new Flags(about);
+    this.timeline = new Timeline(about.recording, (...words) => this.command(...words));
     this.masks = Object.fromEntries(about.flags.map(({ name, mask }) => [name, mask]));
     const hz = about.pac_hz / SPECTRUM_SAMPLES;
     byId("spectrum-words").textContent = `${SPECTRUM_SAMPLES} samples, ${number(hz, 1)} Hz apart`;
@@ -86,9 +92,15 @@ class Page {
     this.showButtons();
   }
 
-  async command(name, finger = null) {
-    const { good, words } = await this.stream.command(name, finger);
+  async command(name, finger = null, value = null) {
+    const { good, words } = await this.stream.command(name, finger, value);
     tell(words.charAt(0).toUpperCase() + words.slice(1) + (good ? "." : ""), good);
+    return good;
+  }
+
+  async mark(name) {
+    const mark = { at_s: this.timeline.at, finger: this.shown, name };
+    if ((await this.command("mark", this.shown, name)) && this.timeline.facts) this.timeline.add(mark);
   }
 
   // ---- what the user does ------------------------------------------------------------------
@@ -138,6 +150,7 @@ class Page {
     const playing = ["live", "playing", "paused"].includes(health?.link);
     const recording = health?.recording;
     const paused = this.frozen || health?.link === "paused";
+    byId("mark").disabled = !(recording || (playing && !health.live));
     for (const id of ["tare", "tare-all", "record"]) byId(id).disabled = !board;
     byId("pause").disabled = !playing;
     byId("again").hidden = !["over", "taken"].includes(health?.link);
@@ -197,7 +210,12 @@ class Page {
     this.readMs = nowMs;
     this.showState();
     const { fingers, about, health, dropped } = this.model;
-    if (health) this.link.show(health, dropped, this.drawsPerS);
+    if (health) {
+      this.link.show(health, dropped, this.drawsPerS);
+      this.timeline.show(health.position_s);
+      this.timeline.draw(this.theme);
+      if (health.live) this.timeline.list(health.events.toReversed().map(({ t_us: tUs, finger, name }) => ({ at_s: tUs / 1e6, finger, name })));
+    }
     if (this.frozen) return;
     byId("shown").textContent = String(this.shown);
     byId("scale-low").textContent = number(-this.limit.counts, 0);

@@ -3,6 +3,7 @@
 import { amplitudes } from "./spectrum.js";
 
 export const HISTORY_S = 10;
+export const zoom = { s: HISTORY_S }; // that the charts show of it
 export const SPECTRUM_SAMPLES = 1024;
 const HISTORY_ROWS = 1100; // a little more than HISTORY_S of frames
 const TRAIL_POINTS = 40;

@@ -2,7 +2,7 @@
 
 import { fit } from "./fingertip.js";
 import { rgb } from "./colours.js";
-import { COLUMNS, HISTORY_S } from "./model.js";
+import { COLUMNS, HISTORY_S, zoom } from "./model.js";
 
 const MARGIN = { left: 46, right: 10, top: 8, bottom: 22 };
 const GAP_S = 0.05; // a line breaks where frames are missing
@@ -53,7 +53,8 @@ class Area {
   }
 
   timeTicks(theme) {
-    for (let s = -HISTORY_S; s <= 0; s += 2) this.tick(theme, { x: this.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
+    const step = zoom.s / 5;
+    for (let k = -5; k <= 0; k++) this.tick(theme, { x: this.x(1 + k / 5), text: k ? `−${Number((-k * step).toFixed(1))}` : "0 s" });
   }
 }
 
@@ -69,14 +70,15 @@ export class TimePlot {
     const { c } = area;
     const order = finger ? [...finger.order()] : [];
     const endS = finger && order.length ? finger.history.t[order.at(-1)] : 0;
-    const shown = order.filter((k) => endS - finger.history.t[k] <= HISTORY_S);
+    const shown = order.filter((k) => endS - finger.history.t[k] <= zoom.s);
     const [low, high] = this.span(finger, shown);
     const step = niceStep((high - low) / 4);
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
       area.tick(theme, { y: area.y((v - low) / (high - low)), text: v.toFixed(step < 1 ? this.digits : 0).replace("-", "−") });
     }
     area.timeTicks(theme);
-    for (const mark of marks) this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / HISTORY_S, mark.name);
+    let free = area.right; // the newest comes first; a text that would reach into it is left out
+    for (const mark of marks.toReversed()) free = this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / zoom.s, mark.name, free);
     c.lineWidth = 1.75;
     c.lineJoin = "round";
     this.names.forEach((name, line) => {
@@ -91,7 +93,7 @@ export class TimePlot {
           before = -Infinity;
           continue;
         }
-        const x = area.x(1 - (endS - t) / HISTORY_S);
+        const x = area.x(1 - (endS - t) / zoom.s);
         const y = area.y((v - low) / (high - low));
         if (t - before > GAP_S) c.moveTo(x, y);
         else c.lineTo(x, y);
@@ -102,8 +104,9 @@ export class TimePlot {
     c.setLineDash([]);
   }
 
-  mark(area, theme, share, words) {
-    if (share < 0 || share > 1) return;
+  // Returns where it begins, in pixels.
+  mark(area, theme, share, words, free) {
+    if (share < 0 || share > 1) return free;
     const { c } = area;
     const x = Math.round(area.x(share)) + 0.5;
     c.strokeStyle = c.fillStyle = words === "slip" ? theme.warn : theme.quiet;
@@ -114,7 +117,8 @@ export class TimePlot {
     c.stroke();
     c.textAlign = "left";
     c.textBaseline = "top";
-    c.fillText(words, x + 3, area.top);
+    if (x + 5 + c.measureText(words).width <= free) c.fillText(words, x + 3, area.top);
+    return x;
   }
 
   span(finger, shown) {
@@ -186,7 +190,8 @@ export class SpectrogramPlot {
       if (wanted.some((one, k) => one !== this.painted[k])) this.paint(columns, paPerCount, rgb(theme.accent));
       this.painted = wanted;
       c.imageSmoothingEnabled = false;
-      c.drawImage(this.picture, area.left, area.top, area.right - area.left, area.bottom - area.top);
+      const from = COLUMNS * (1 - zoom.s / HISTORY_S);
+      c.drawImage(this.picture, from, 0, COLUMNS - from, this.picture.height, area.left, area.top, area.right - area.left, area.bottom - area.top);
     }
     for (let hz = 0; hz <= top; hz += 250) area.tick(theme, { y: area.y(hz / top), text: hz ? String(hz) : "0 Hz" });
     area.timeTicks(theme);

@@ -26,13 +26,13 @@ export class Stream {
   }
 
   // Returns { good, words }.
-  async command(name, finger = null) {
+  async command(name, finger = null, value = null) {
     if (!this.about) return { good: false, words: "Not connected yet." };
     try {
       const answer = await fetch("command", {
         method: "POST",
         headers: { "Content-Type": "application/json", [this.about.token_header]: location.hash.slice(1) },
-        body: JSON.stringify({ do: name, finger }),
+        body: JSON.stringify({ do: name, finger, value }),
       });
       return { good: answer.ok, words: (await answer.json()).words };
     } catch {

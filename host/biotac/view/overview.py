@@ -1,0 +1,38 @@
+"""A whole recording for the page: how hard it was touched over time, and what is marked in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..recording.reader import Recording
+from ..recording.stamps import unwrapped_us
+from ..wire import messages_gen as wire
+from ..wire.events import kind_name
+
+BINS = 600
+MARKS = 500  # more is no list that anybody reads
+
+
+def overview(recording: Recording) -> dict[str, Any]:
+    """``peaks_n``: the largest force of any finger in each of BINS equal times; ``marks``: labels, events and gaps."""
+    begin_us, length_us = recording.begin_us, max(1, recording.end_us - recording.begin_us)
+    force_n = np.nan_to_num(np.linalg.norm(recording.frames["force_n"], axis=1))
+    peaks = np.zeros(BINS)
+    at = np.clip((recording.frames["t_us"] - begin_us) * BINS // length_us, 0, BINS - 1)
+    np.maximum.at(peaks, at, force_n)
+    marks: list[dict[str, Any]] = [
+        {"at_s": ((label.t_us or begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.words()}
+        for label in recording.labels
+    ]
+    events = [message for message in recording.messages if isinstance(message, wire.Event)]
+    times_us = unwrapped_us(begin_us, [event.t_us for event in events]).tolist()
+    marks += [
+        {"at_s": (t_us - begin_us) / 1e6, "finger": event.finger, "name": kind_name(event).lower()}
+        for event, t_us in zip(events, times_us, strict=True)
+    ]
+    for gap in recording.gaps:
+        marks.append({"at_s": ((gap.next_t_us or begin_us) - begin_us) / 1e6, "finger": None, "name": gap.words()})
+    marks.sort(key=lambda mark: mark["at_s"])
+    return {"length_s": length_us / 1e6, "peaks_n": np.round(peaks, 2).tolist(), "marks": marks[:MARKS]}
