@@ -35,7 +35,7 @@ class PatientLink(SerialLink):
     patience = 60.0
 
 
-def record(path: Path, *, fingers: int = 5, seconds: float = 0.05) -> StructArray:
+def record(path: Path, *, fingers: int = 5, seconds: float = 0.1) -> StructArray:
     """Have an emulated Pico write ``path`` while it streams over its UART; returns the FRAMEs that came there."""
     board = EmulatedBoard(
         "pico", load_source("press.toml", fingers=fingers, seconds=60.0), pace=0.0, hold=False, uart=True

@@ -215,6 +215,57 @@ CATALOGUE: dict[str, Entry] = {
         "The board's time and this computer's jumped apart: one of the clocks was set, or stood still.",
         "See board_restarted; otherwise keep this computer from sleeping while it records.",
     ),
+    # ---- the first evening, with --bringup
+    "flash_unknown": warning(
+        "The flash chip is not a Raspberry Pi Pico's: a clone of the board, whose erases may take longer and whose "
+        "commands may differ.",
+        "Try it with nothing at stake first: save settings, cut the power, compare. Tell us the id and the board.",
+    ),
+    "flash_slow": error(
+        "Erasing a sector of flash takes longer than the firmware allows for: its watchdog may restart the board in "
+        "the middle of it, and saving holds up sampling for as long.",
+        "Do not save settings or maps while anything is held. Use a board with a W25Q16JV.",
+    ),
+    "supply": error(
+        "The board's supply (VSYS) is outside its range: a weak USB socket or hub, a long cable, or sensors that draw "
+        "too much.",
+        "Plug the board straight into the computer with a short cable; give the sensors their own 3.3 V.",
+    ),
+    "clock_off": error(
+        "The board's clock differs from USB's frames by more than crystal and host may: all rates and times are off by "
+        "as much.",
+        "Try another computer, to know which of the two it is. A board whose crystal is off must be replaced.",
+    ),
+    "slots_jitter": warning(
+        "Rounds do not begin at equal steps: something holds off the board's interrupts.",
+        "Report it with bringup.md.",
+    ),
+    "usb_frames": error(
+        "Starts of frame are lost between the computer and the board: a hub, a cable or interference spoils USB.",
+        "Connect the board without the hub, with another cable; keep motors' wires away from it.",
+    ),
+    "bus_margin": error(
+        "The sensors' words come damaged at bus rates hardly above the usual one: warmth, another cable or a weaker "
+        "supply will spoil them at the usual one, too.",
+        "Shorten the leads, put a ground beside SCK, or 33 to 100 Ohm in series with SCK and MOSI at the board.",
+    ),
+    "not_pressed": warning(
+        "Nobody pressed the finger when asked to, so nothing is known of its static pressure.",
+        "Run it again, and press every finger on its pad with some newtons.",
+    ),
+    "pdc_weak": error(
+        "Static pressure hardly rises with force: the fluid is gone, there is a bubble in it, or the pressure sensor "
+        "is broken. The board takes a finger without pressure for untouched, and would tare out what it holds.",
+        "Check the inflation (manual), refill the finger, or replace it; do not grip with it until then.",
+    ),
+    "pdc_warm": warning(
+        "Static pressure moves with temperature by more than expected: a warm object looks like a touch.",
+        "Tell us the number. Let the finger warm up before you tare it.",
+    ),
+    "restart": error(
+        "After a restart the board told a fault, or had other sensors than after the first one.",
+        "Check the sensors' supply and plugs; report it with bringup.md.",
+    ),
     # ---- tare
     "no_tare": warning(
         "The finger has no tare, so it gives no point of contact, force or torque: its signals were never steady.",

@@ -33,8 +33,13 @@ def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Fi
         if finger not in good:
             others = ", ".join(map(str, good))
             yield Finding("lead_select", f"finger {finger} gives few good words or none, unlike fingers {others}")
+    yield from crossed(board, pair.serials)
+
+
+def crossed(board: BoardFacts, serials: tuple[str, ...]) -> Iterator[Finding]:
+    """Of sensors whose serial numbers by finger are known: those that answer at another's select."""
     for sensor in board.sensors:
         serial = ascii_text(sensor.serial)
-        if serial in pair.serials and serial != pair.serials[sensor.finger]:
-            ends = pair.serials.index(serial)
+        if serial in serials and serial != serials[sensor.finger]:
+            ends = serials.index(serial)
             yield Finding("lead_crossed", f"the select of finger {sensor.finger} ends at the sensor of finger {ends}")

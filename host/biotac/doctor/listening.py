@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 
 from ..errors import BiotacError, PortError
 from ..hand.hand import Hand
@@ -14,8 +15,17 @@ from .facts import BoardFacts, Facts
 from .system import device_of, look
 
 
-def examine(port: str | None, *, seconds: float = 3.0, expected_fingers: int | None = None) -> Facts:
-    """All facts about ``port``, or about the only board if ``port`` is None; errors become facts."""
+def examine(
+    port: str | None,
+    *,
+    seconds: float = 3.0,
+    expected_fingers: int | None = None,
+    by: Callable[[Hand], BoardFacts] | None = None,
+) -> Facts:
+    """All facts about ``port``, or about the only board if ``port`` is None; errors become facts.
+
+    ``by``: gets them from a hand that reconnects, in place of ``listen`` for some seconds.
+    """
     system = look(port)
     device = device_of(port, system.boards)
     if device is None and port is not None and system.boards:
@@ -26,8 +36,8 @@ def examine(port: str | None, *, seconds: float = 3.0, expected_fingers: int | N
         return Facts(None, system)
     try:
         # pace=1.0: a simulated board runs in real time, unless its PORT says otherwise.
-        with open_board(device, pace=1.0) as hand:
-            return Facts(device, system, None, listen(hand, seconds), expected_fingers)
+        with open_board(device, pace=1.0, reconnect=by is not None) as hand:
+            return Facts(device, system, None, by(hand) if by else listen(hand, seconds), expected_fingers)
     except BiotacError as error:
         return Facts(device, system, error)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
+
 from ..board.board import Board
-from ..errors import CommandRefusedError, WireVersionError
+from ..errors import CommandRefusedError, DeviceLostError, WireVersionError
 from ..keep.calibration import Calibration, own_settings
 from ..map import board_map as maps
 from ..map.board_map import BoardMap
@@ -12,6 +14,8 @@ from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
 from .commands import Commands, Finger
 from .faults import Faults, faults_of
+
+RESTART_S = 10.0  # by a patient link's measure longer
 
 
 class Configuration:
@@ -54,8 +58,19 @@ class Configuration:
         self._commands.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def restart(self) -> None:
-        """Restart the board as a reset would; it disconnects and comes back. What was not saved is lost."""
+        """Restart the board as a reset would, and wait until it is back. What was not saved is lost.
+
+        Raises DeviceLostError unless this hand reconnects, or if the board does not come back within ten seconds.
+        """
+        reader, before = self._board.reader, self._board.info.boot_id
         self._commands.tell(wire.RebootBootloader(0, wire.RESTART_MAGIC))
+        lost = DeviceLostError(f"{self._board.link.port} restarts, and has not come back; open it again")
+        until_s = time.monotonic() + RESTART_S * self._board.link.patience
+        while self._board.info.boot_id == before:  # it may answer once more before it goes
+            reader.lose(lost, "rebooted")
+            if not reader.wait_for(lambda: reader.lost is None or reader.failure, until_s - time.monotonic()):
+                raise lost
+            reader.check()
 
     def measure(self) -> wire.BoardFacts:
         """What the board measures of itself: supply, temperature, clock against USB. Unknown where it cannot."""

@@ -15,16 +15,18 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 import biotac
-from biotac import HandWarning
+from biotac import FrameFlags, HandWarning
 from biotac.cli.main import main
 from biotac.clock import Fit
-from biotac.doctor import CATALOGUE, BoardFacts, Facts, PairFacts, SystemFacts, judge, leads, udev
+from biotac.doctor import CATALOGUE, BoardFacts, Facts, Finding, PairFacts, SystemFacts, bringup, judge, leads, udev
+from biotac.doctor.bringup import Bringup, Restart
 from biotac.doctor.connection import release
 from biotac.errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
 from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder
 from biotac.version import __version__
 from biotac.wire import messages_gen as wire
+from biotac.wire import sensor_gen
 from biotac.wire.batches import LinkStats
 from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE
 
@@ -318,8 +320,75 @@ def test_a_development_version_is_not_newer_than_its_release(version: str) -> No
     assert release(version) == (1, 12, 3)
 
 
+def evening(change: Callable[[Bringup], object] = lambda seen: None) -> list[Finding]:
+    """What the first evening of a healthy board finds, but for a change; its fingers are pressed in the second half."""
+    told = {"usb_frame": 0, "flash_id": (0xEF, 0x40, 0x15), "supply_mv": 4800, "erase_us": 45_000}
+    first = message(wire.BoardFacts, **told)
+    last = dataclasses.replace(first, t_us=10_000_000, usb_frame=10_000 % 2048, usb_starts=10_000)
+    rows = rounds()
+    half = rows[len(rows) // 2 :]
+    half["flags"], half["pdc"], rows["pdc_tare"] = FrameFlags.CONTACT, 2000 + 240, 2000
+    half["force_n"] = [0.0, 0.0, 3.0]
+    clean = np.array([[1000, 0]] * 2 + [[0, 1000]] * 3)
+    restarts = [Restart(1.0, 0b11, int(wire.FaultFlags.STARTED))] * 2
+    rates = {4464: clean, 8928: clean}
+    seen = Bringup(chip=[first, last], idle=[first, last], rates=rates, restarts=restarts, frames=rows)
+    change(seen)
+    return list(bringup.check(seen, board()))
+
+
+def chip(**values: Any) -> Callable[[Bringup], None]:
+    return lambda seen: seen.chip.append(dataclasses.replace(seen.chip.pop(), **values))
+
+
+def rows(name: str, values: Callable[[np.ndarray], Any]) -> Callable[[Bringup], None]:
+    def change(seen: Bringup) -> None:
+        seen.frames[name][1::2] = values(seen.frames[1::2])
+
+    return change
+
+
+EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
+    ("flash_unknown", chip(flash_id=(0xC8, 0x40, 0x15)), "c84015"),
+    ("flash_slow", chip(erase_us=400_001), "400 ms"),
+    ("supply", chip(supply_mv=4099), "4099 mV"),
+    ("supply", chip(supply_mv=5501), "5501 mV"),
+    ("clock_off", chip(t_us=10_007_000), "+700 ppm"),
+    ("usb_frames", lambda seen: seen.idle.append(dataclasses.replace(seen.idle.pop(), usb_starts=9_997)), "3 of 10000"),
+    ("slots_jitter", lambda seen: np.add.at(seen.frames["t_us"], [8], 6), "6 us"),
+    (
+        "bus_margin",
+        lambda seen: seen.rates.update({5000: np.array([[1, 0], [1, 9]])}),
+        "finger 1 is clean up to 4.46 MHz",
+    ),
+    ("not_pressed", rows("force_n", lambda its: 0.2), "finger 1"),
+    ("pdc_weak", rows("pdc", lambda its: 2000 + np.where(its["flags"], 6, 0)), "2.0 counts/N"),
+    ("pdc_warm", lambda seen: warm(seen.frames[1::2]), "finger 1: +40 counts a degree"),
+    ("restart", lambda seen: seen.restarts.append(Restart(1.0, 0b01, int(wire.FaultFlags.STARTED))), "after restart 3"),
+    ("restart", lambda seen: seen.restarts.append(Restart(1.0, 0b11, int(wire.FaultFlags.HUNG))), "HUNG"),
+]
+
+
+def warm(rows: np.ndarray) -> None:
+    """By the product manual's formula two degrees, at 40 counts each."""
+    celsius = np.linspace(25.0, 27.0, len(rows))
+    share = sensor_gen.TDC_A / (np.exp(sensor_gen.TDC_BETA_K / (celsius + 273.15)) + sensor_gen.TDC_B)
+    rows["tdc"] = np.round(4095 * share)
+    rows["pdc"] = rows["pdc"] + np.round(40 * (celsius - 25.0))
+
+
+@pytest.mark.parametrize(("code", "change", "words"), EVENING, ids=[f"{c[0]}-{k}" for k, c in enumerate(EVENING)])
+def test_of_the_first_evening_one_defect_makes_one_finding(
+    code: str, change: Callable[[Bringup], object], words: str
+) -> None:
+    assert evening() == []
+    (found,) = evening(change)
+    assert found.code == code and words in found.seen
+
+
 def test_every_code_has_a_case_and_a_page() -> None:
-    assert {case[0] for case in CASES} | {code for _, all_of in LEADS for code, _ in all_of} == set(CATALOGUE)
+    of_leads = {code for _, all_of in LEADS for code, _ in all_of}
+    assert {case[0] for case in CASES} | of_leads | {case[0] for case in EVENING} == set(CATALOGUE)
     page = (ROOT / "host/docs/reference/doctor.md").read_text()
     for code, entry in CATALOGUE.items():
         assert f"## {code}\n" in page

@@ -12,9 +12,11 @@ from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...doctor import CATALOGUE, Facts, Finding, PairFacts, judge, udev
-from ...doctor.listening import examine
+from ...doctor import CATALOGUE, BoardFacts, Facts, Finding, PairFacts, bringup_report, judge, udev
+from ...doctor.bringup import Bringup, check, measure
+from ...doctor.listening import examine, has_crystal
 from ...doctor.timing import slots_per_s
+from ...hand.hand import Hand
 from ...link import open_link
 from ...partial_file import whole
 from ...sim.loading import load_source
@@ -26,6 +28,7 @@ from ..outputs import say
 
 EXAMPLE = "biotac doctor --fingers 5"
 PLAYED, PLAYED_S = "press.toml", 60.0
+PRESS_S, PLAYED_PRESS_S = 20.0, 8.0
 CODES = f"""
 Exit code 0: healthy; 1: there are findings. Their codes are fixed:
 {textwrap.fill(" ".join(CATALOGUE), 100, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)}"""
@@ -40,6 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report", metavar="FILE", help="also write everything to one JSON file, to attach to a bug report"
     )
     parser.add_argument(
+        "--bringup",
+        action="store_true",
+        help="measure a new board, its sensors and this computer's USB for a minute, restart it ten times, and write "
+        "the report to FILE (default bringup.md), with a picture beside it",
+    )
+    parser.add_argument(
         "--udev-rule",
         choices=("install", "print"),
         help="only install (as root) or print the Linux rule that lets you open boards",
@@ -51,12 +60,22 @@ def run(args: argparse.Namespace) -> int:
     """Examine the board and print the findings; return 1 if there are any."""
     if args.udev_rule is not None:
         return udev_rule(args)
+    seen = Bringup()
+
+    def first_evening(hand: Hand) -> BoardFacts:
+        press_s = PRESS_S if has_crystal(hand) and args.sensor_port is None else PLAYED_PRESS_S
+        return measure(hand, seen, tell, seconds=args.seconds, press_s=press_s)
+
+    how = {"seconds": args.seconds, "by": first_evening if args.bringup else None}
     if args.sensor_port is None:
-        facts = examine(args.port, seconds=args.seconds, expected_fingers=args.fingers)
+        facts = examine(args.port, expected_fingers=args.fingers, **how)
     else:
-        facts = examine_pair(args.port, args.sensor_port, args.seconds)
+        facts = examine_pair(args.port, args.sensor_port, **how)
     findings = judge(facts)
-    if args.report is not None:
+    if args.bringup:
+        findings += check(seen, facts)
+        bringup_report.write(Path(args.report or "bringup.md"), seen, facts, findings)
+    elif args.report is not None:
         with whole(Path(args.report), overwrite=True) as place:
             place.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
     say(args, summary(facts, findings), words(facts, findings))
@@ -72,12 +91,16 @@ def udev_rule(args: argparse.Namespace) -> int:
     return 0
 
 
-def examine_pair(port: str | None, sensor_port: str, seconds: float) -> Facts:
+def tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def examine_pair(port: str | None, sensor_port: str, **how: Any) -> Facts:
     """Facts about a gateway whose sensors are a sensor board of ours, which plays to it meanwhile."""
     with closing(SensorBoard(open_link(sensor_port))) as sensors:
         sensors.plug(load_source(PLAYED, fingers=MAX_SENSORS, seconds=PLAYED_S))
         with sensors.feeding() as before:
-            facts = examine(port, seconds=seconds, expected_fingers=MAX_SENSORS)
+            facts = examine(port, expected_fingers=MAX_SENSORS, **how)
         return replace(facts, pair=PairFacts(before, sensors.status(), sensors.serials))
 
 

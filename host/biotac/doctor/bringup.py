@@ -1,0 +1,283 @@
+"""A board's first evening, measured: itself, its clock, its flash, its bus, this computer's USB, each finger, restarts.
+
+``measure`` takes about a minute, and the user's hand for some seconds of it; ``check`` finds what is outside its range.
+Limits without another source are what the part's data sheet allows.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CommandRefusedError
+from ..hand.hand import Hand
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.frames import FRAME_DTYPE, StructArray
+from ..wire.framing import encode
+from .catalogue import Finding
+from .facts import BoardFacts, Facts
+from .leads import crossed
+from .listening import has_crystal, listen
+
+FLASH = {"ef4015": "W25Q16JV", "ef7015": "W25Q16JV-IM"}  # of a Raspberry Pi Pico
+ERASE_MAX_US = 400_000  # of a sector, W25Q16JV data sheet
+SUPPLY_MV = (4100, 5500)  # VSYS: 4.40 V at a device's end of USB (USB 2.0, 7.2.2) less a diode; the board's most
+CLOCK_PPM = 650.0  # USB frames are within 500 ppm (USB 2.0, 7.1.12), a crystal within 100, a ms of reading in 20 s 50
+LOST_STARTS = 2  # of frame, that two readings may differ by
+JITTER_US = 5.0  # a slot's start; it is read in whole us
+MARGIN = 1.25  # how much faster than usual the bus must still be clean: cables, temperature and supply take their share
+PDC_PER_N = 20.0  # count: fingers have 62 to 111 (Navarro 2015, K of 9 to 16 mN a count)
+PDC_PER_C = 30.0  # count: a degree that looks like a third of a newton
+RESTARTS = 10
+PINGS, WINDOWS, WINDOW = 1000, 64, 8
+RATES_KHZ = (0, 4900, 5300, 5700, 6300, 7000, 7900, 9000)
+RATE_US = 250_000
+Floats = NDArray[np.float64]
+TOUCHED_N = 1.0
+
+
+@dataclass(frozen=True)
+class Restart:
+    """One of them; ``seconds`` by this computer until the board answered again."""
+
+    seconds: float
+    present: int
+    faults: int
+
+
+@dataclass
+class Bringup:
+    """All that was measured; lists and arrays are empty where the board or its sensors could not."""
+
+    emulated: bool = False  #: in a process or an emulator: what follows from silicon, cables and a hub is made up
+    serials: tuple[str, ...] = ()  #: of the sensors by select, where they are known without asking
+    chip: list[wire.BoardFacts] = field(default_factory=list)  #: at the start and the end of all but the restarts
+    idle: list[wire.BoardFacts] = field(default_factory=list)  #: likewise of a time without a stream
+    rates: dict[int, NDArray[np.int64]] = field(default_factory=dict)  #: good and other words (fingers, 2) by kHz
+    ping_s: list[float] = field(default_factory=list)
+    up_bytes_s: float = 0.0
+    down_bytes_s: float = 0.0
+    restarts: list[Restart] = field(default_factory=list)
+    frames: StructArray = field(default_factory=lambda: np.zeros(0, FRAME_DTYPE))  #: at rest, then pressed
+
+    def of(self, finger: int) -> StructArray:
+        """A finger's frames."""
+        rows: StructArray = self.frames[self.frames["finger"] == finger]
+        return rows
+
+
+def measure(hand: Hand, seen: Bringup, tell: Callable[[str], None], *, seconds: float, press_s: float) -> BoardFacts:
+    """Measure a board that ``reconnect``s into ``seen``, step by step; return what the doctor judges, too.
+
+    ``tell`` gets what the user is to do, and what is under way. The board's state is as after a restart.
+    """
+    seen.emulated = not has_crystal(hand)
+    seen.serials = getattr(hand.link.source, "serials", ())
+    with suppress(CommandRefusedError):  # firmware or a board that cannot
+        seen.chip.append(hand.board.measure())
+    tell("listening: touch nothing")
+    facts = listen(hand, seconds)
+    seen.frames = facts.frames
+    if facts.present:
+        tell(f"press each finger on its pad, slowly and firmly, within {press_s:.0f} s")
+        seen.frames = np.concatenate([facts.frames, hand.read(press_s)])
+        hand.stop()
+    if not seen.chip:
+        return facts
+    tell("this computer's USB")
+    _usb(hand, seen)
+    tell("the sensors' bus at higher rates, and the flash")
+    _rates(hand, seen)
+    seen.idle.append(hand.board.measure())
+    _erase(hand)
+    seen.chip.append(hand.board.measure())
+    for k in range(RESTARTS):
+        tell(f"restart {k + 1} of {RESTARTS}")
+        begun_s = time.monotonic()
+        hand.board.restart()
+        status = hand.status()
+        seen.restarts.append(Restart(time.monotonic() - begun_s, status.fingers_present, status.faults))
+    return facts
+
+
+def _usb(hand: Hand, seen: Bringup) -> None:
+    seen.idle.append(hand.board.measure())
+    for _ in range(PINGS):
+        sent_s = time.perf_counter()
+        hand.ping()
+        seen.ping_s.append(time.perf_counter() - sent_s)
+    # The largest that a host may send at any time, which is refused, and the largest that it may ask for.
+    up, down = wire.WriteMap(0, 0, 0, (0,) * 128), wire.GetStatus(0)
+    seen.up_bytes_s = _windows(hand, up) * len(encode(up.ID, up.pack()))
+    seen.down_bytes_s = _windows(hand, down) * len(encode(wire.Status.ID, bytes(wire.Status.STRUCT.size)))
+
+
+def _windows(hand: Hand, message: Any) -> float:
+    """Messages a second, WINDOW at a time."""
+    begun_s = time.perf_counter()
+    for _ in range(WINDOWS):
+        for _ in range(WINDOW - 1):
+            hand._board.send(message)
+        with suppress(CommandRefusedError):
+            hand._board.ask(message, wire.ANSWERS[type(message)])
+    return WINDOWS * WINDOW / (time.perf_counter() - begun_s)
+
+
+def _rates(hand: Hand, seen: Bringup) -> None:
+    with suppress(CommandRefusedError):
+        for khz in RATES_KHZ:
+            at_khz = hand.board.try_bus_rate(khz).bus_khz
+            before, until_us = _words(hand), hand.status().t_us + RATE_US
+            while (hand.status().t_us - until_us) % 2**32 >= 2**31:  # its time, whatever this computer's does
+                pass
+            seen.rates[at_khz] = (_words(hand) - before) % 2**32
+    with suppress(CommandRefusedError):
+        hand.board.try_bus_rate(0)
+
+
+def _words(hand: Hand) -> NDArray[np.int64]:
+    states = [hand.sensor_status(finger) for finger in range(sensor.MAX_SENSORS)]
+    return np.array([[s.words_good, s.words_stuck + s.words_error + s.words_parity] for s in states])
+
+
+def _erase(hand: Hand) -> None:
+    """Begin to upload a map, which erases a sector that no map in force uses, and give it up."""
+    with suppress(CommandRefusedError):
+        hand._board.tell(wire.BeginMap(0, 0, 128, 0))
+        hand._board.tell(wire.WriteMap(0, 0, 0, (0,) * 128))
+    hand.stop()
+    hand._board.tell(wire.Stop(0))
+
+
+# ---- what follows from it -----------------------------------------------------------------------------
+
+
+def clock_ppm(seen: list[wire.BoardFacts]) -> float | None:
+    """How fast the board's clock is against USB's frames; None without USB, or within a second."""
+    if len(seen) < 2:
+        return None
+    first, last = seen[0], seen[-1]
+    elapsed_us = (last.t_us - first.t_us) % 2**32
+    if 0xFFFF in (first.usb_frame, last.usb_frame) or elapsed_us < 1_000_000:
+        return None
+    return (elapsed_us / (1000 * _frames(first, last)) - 1) * 1e6
+
+
+def _frames(first: wire.BoardFacts, last: wire.BoardFacts) -> int:
+    """USB frames in between, of which the numbers tell the last 11 bits."""
+    about = (last.t_us - first.t_us) % 2**32 / 1000
+    return round(about + ((last.usb_frame - first.usb_frame - about + 1024) % 2048 - 1024))
+
+
+def lost_starts(seen: list[wire.BoardFacts]) -> tuple[int, int] | None:
+    """How many starts of frame did not come, and of how many; None without USB."""
+    if clock_ppm(seen) is None:
+        return None
+    frames = _frames(seen[0], seen[-1])
+    return frames - (seen[-1].usb_starts - seen[0].usb_starts) % 2**32, frames
+
+
+def jitter_us(frames: StructArray) -> Floats:
+    """How far each round of one finger began from where the others' steps have it."""
+    late_us = frames["t_us"] - frames["seq"] * (len(sensor.SLOTS) * 1e6 / sensor.SLOT_HZ)
+    return late_us - np.median(late_us)
+
+
+def noise_counts(frames: StructArray) -> Floats:
+    """Standard deviation of each electrode (19,), from its changes' mean change at rest; NaN with too few frames."""
+    rest = frames[frames["flags"] & wire.FrameFlags.CONTACT == 0]
+    if len(rest) < 50:
+        return np.full(rest["counts"].shape[1], np.nan)
+    bends: Floats = np.abs(np.diff(rest["counts"].astype(float), n=2, axis=0)).mean(axis=0)
+    bends *= np.sqrt(np.pi / 12)
+    return bends
+
+
+def pdc_per_n(frames: StructArray) -> tuple[float, float]:
+    """Counts of static pressure per newton of the board's force, and the largest force; NaN where nothing pressed."""
+    force_n = np.linalg.norm(frames["force_n"], axis=1)
+    rise = np.where(frames["pdc"] == wire.INVALID_COUNT, np.nan, frames["pdc"]) - frames["pdc_tare"]
+    good = np.isfinite(force_n) & np.isfinite(rise) & (force_n > TOUCHED_N)
+    if good.sum() < 10:
+        return np.nan, np.nan
+    return float(rise[good] @ force_n[good] / (force_n[good] @ force_n[good])), float(force_n[good].max())
+
+
+def pdc_per_c(frames: StructArray) -> float:
+    """Counts of static pressure per degree, untouched; NaN where the temperature moved by less than half a degree."""
+    rest = frames[(frames["flags"] & wire.FrameFlags.CONTACT == 0) & (frames["tdc"] != wire.INVALID_COUNT)]
+    if len(rest) < 50:
+        return np.nan
+    share = rest["tdc"] / sensor.FULL_SCALE_COUNT
+    celsius = sensor.TDC_BETA_K / np.log(sensor.TDC_A / share - sensor.TDC_B)
+    return float(np.polyfit(celsius, rest["pdc"], 1)[0]) if np.ptp(celsius) > 0.5 else np.nan
+
+
+def clean_khz(seen: Bringup, finger: int) -> tuple[int, int] | None:
+    """The fastest bus rate up to which all words of a finger are good, and the usual one; None without good words."""
+    clean = [khz for khz, words in sorted(seen.rates.items()) if words[finger, 0] > 0]
+    bad = [khz for khz, words in seen.rates.items() if words[finger, 1] > 0]
+    good = [khz for khz in clean if khz < min(bad, default=10**9)]
+    return (max(good), min(seen.rates)) if good else None
+
+
+def check(seen: Bringup, facts: Facts) -> Iterator[Finding]:
+    """What is outside its range, the board first; beside what ``judge`` finds."""
+    yield from _board(seen)
+    yield from _link(seen)
+    if facts.board is not None:
+        yield from crossed(facts.board, seen.serials)
+        for finger in facts.board.present:
+            yield from _finger(seen, finger)
+
+
+def _board(seen: Bringup) -> Iterator[Finding]:
+    if not seen.chip:
+        return
+    last = seen.chip[-1]
+    flash = bytes(last.flash_id).hex()
+    if any(last.flash_id) and flash not in FLASH:
+        yield Finding("flash_unknown", f"JEDEC id {flash}; a Pico has {', '.join(FLASH)}")
+    if last.erase_us > ERASE_MAX_US:
+        yield Finding("flash_slow", f"a sector took {last.erase_us / 1000:.0f} ms to erase; its most is 400 ms")
+    if last.supply_mv and not SUPPLY_MV[0] <= last.supply_mv <= SUPPLY_MV[1]:
+        yield Finding("supply", f"{last.supply_mv} mV; expected {SUPPLY_MV[0]} to {SUPPLY_MV[1]} mV")
+    ppm = clock_ppm(seen.chip)
+    if ppm is not None and abs(ppm) > CLOCK_PPM:
+        yield Finding("clock_off", f"{ppm:+.0f} ppm against USB's frames; up to {CLOCK_PPM:.0f} ppm is normal")
+    if len(seen.frames):
+        late_us = jitter_us(seen.of(seen.frames["finger"][0]))
+        if np.ptp(late_us) > JITTER_US:
+            yield Finding("slots_jitter", f"{np.ptp(late_us):.0f} us; up to {JITTER_US:g} us is normal")
+
+
+def _link(seen: Bringup) -> Iterator[Finding]:
+    lost = lost_starts(seen.idle)
+    if lost is not None and lost[0] > LOST_STARTS:
+        yield Finding("usb_frames", f"{lost[0]} of {lost[1]} starts of frame did not come")
+    for k, restart in enumerate(seen.restarts, 1):
+        if restart.present != seen.restarts[0].present or restart.faults != wire.FaultFlags.STARTED:
+            what = f"sensors {restart.present:#07b}, faults {wire.FaultFlags(restart.faults)!r}"
+            yield Finding("restart", f"after restart {k}: {what}; after the first {seen.restarts[0].present:#07b}")
+
+
+def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:
+    rate = clean_khz(seen, finger)
+    if rate is not None and rate[0] < MARGIN * rate[1]:
+        usual = f"{rate[1] / 1000:.2f} MHz; expected {MARGIN:g} times that"
+        yield Finding("bus_margin", f"finger {finger} is clean up to {rate[0] / 1000:.2f} MHz, of usually {usual}")
+    gain, most_n = pdc_per_n(seen.of(finger))
+    if np.isnan(gain):
+        yield Finding("not_pressed", f"finger {finger} was not pressed with {TOUCHED_N:g} N")
+    elif gain < PDC_PER_N:
+        yield Finding("pdc_weak", f"finger {finger}: {gain:.1f} counts/N, up to {most_n:.1f} N; fingers have 62 to 111")
+    drift = pdc_per_c(seen.of(finger))
+    if abs(drift) > PDC_PER_C:
+        yield Finding("pdc_warm", f"finger {finger}: {drift:+.0f} counts a degree; expected up to {PDC_PER_C:.0f}")

@@ -1,0 +1,91 @@
+"""`biotac doctor --bringup` on the emulated Pico: no finding where nothing is wrong, and each defect by its name."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "hil"))
+
+from rig import all_rigs, in_ci, prepare
+
+from biotac.doctor import bringup, bringup_report, judge
+from biotac.doctor.bringup import Bringup
+from biotac.doctor.listening import examine
+
+FINGERS = 3
+# A defect by the emulator's verbs: the finding's code, and what it says.
+DEFECTS = {
+    "lead SS2 to nothing": ("sensor_missing", "2 of 3 sensors answer: finger 0, 1"),
+    "lead SS0 to SS1;lead SS1 to SS0": ("lead_crossed", "the select of finger 0 ends at the sensor of finger 1"),
+    "late bits above 5 MHz": ("bus_margin", "finger 0 is clean up to 4.81 MHz"),
+    "flash chip c84015": ("flash_unknown", "JEDEC id c84015"),
+    "erase in 600 ms": ("flash_slow", "a sector took 60"),
+    "supply at 3900 mV": ("supply", "mV; expected 4100 to 5500 mV"),
+    "clock 1.005 times as fast": ("clock_off", "+4"),
+    "finger 1 feels 0.02 of PDC": ("pdc_weak", "counts/N, up to "),
+    "finger 1 feels 0 of E7": ("channel_stuck", "finger 1: E7"),
+    "lose a start of frame in 5": ("usb_frames", "starts of frame did not come"),
+}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def emulator() -> None:
+    why = prepare(all_rigs()["pico_emulated"])
+    if why is not None:
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bringup, "PINGS", 50)
+    monkeypatch.setattr(bringup, "RESTARTS", 2)
+
+
+def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
+    """Findings by code, the first of each, and the page."""
+    seen, steps = Bringup(), []
+    facts = examine(
+        f"emu:pico?source=press.toml&fingers={FINGERS}&seconds=120&pace=fast&do={verbs}",
+        expected_fingers=FINGERS,
+        by=lambda hand: bringup.measure(hand, seen, steps.append, seconds=2.0, press_s=6.0),
+    )
+    findings = [*judge(facts), *bringup.check(seen, facts)]
+    bringup_report.write(folder / "bringup.md", seen, facts, findings)
+    assert len(seen.restarts) == bringup.RESTARTS, (facts.error, steps)
+    return {finding.code: finding.seen for finding in reversed(findings)}, (folder / "bringup.md").read_text()
+
+
+@pytest.mark.usefixtures("few")
+def test_a_board_without_a_defect_has_a_report_without_findings(tmp_path: Path) -> None:
+    found, page = report("", tmp_path)
+    assert found == {}
+    for words in (
+        "0x10002927",
+        "ef4015 W25Q16JV",
+        "| erase of a sector | 4",
+        "BTSIM00000000101",
+        "Only silicon can tell",
+    ):
+        assert words in page
+    assert (tmp_path / "bringup.png").stat().st_size > 10_000
+
+
+@pytest.mark.usefixtures("few")
+def test_defects_at_once_are_each_named_with_a_cure(tmp_path: Path) -> None:
+    together = [verbs for verbs in DEFECTS if "feels 0 of" not in verbs and "nothing" not in verbs]
+    found, page = report(";".join(together), tmp_path)
+    for verbs in together:
+        code, words = DEFECTS[verbs]
+        assert words in found[code], (verbs, found)
+    assert page.count("*Cure:*") >= len(together)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("verbs", DEFECTS)
+def test_a_defect_is_named_and_nothing_else(tmp_path: Path, verbs: str) -> None:
+    found, _ = report(verbs, tmp_path)
+    code, words = DEFECTS[verbs]
+    assert words in found.pop(code) and not found
