@@ -16,7 +16,7 @@ _ROWS = 10_000
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Write the file, with numbers in their shortest exact form and NaN as ``nan``."""
+    """Write the file, with numbers in their shortest exact form and NaN as ``NaN``, which Polars knows, too."""
     names = ["finger", "frame_id", *(name for name, _, _ in made[0].flat())]
     of_table, order = in_order(made)
     row_of = np.concatenate([np.arange(len(table)) for table in made])
@@ -33,7 +33,14 @@ def _rows(made: list[Table], of_table: Any, row_of: Any, chosen: Any) -> list[li
     for k, table in enumerate(made):
         at = np.flatnonzero(of_table[chosen] == k)
         rows = row_of[chosen[at]]
-        columns = [values[rows].tolist() for _, _, values in table.flat()]
+        columns = [_cells(values[rows]) for _, _, values in table.flat()]
         for place, values in zip(at.tolist(), zip(*columns, strict=True), strict=True):
             out[place] = [table.finger, table.frame_id, *values]
     return out
+
+
+def _cells(values: Any) -> list[Any]:
+    cells: list[Any] = values.tolist()
+    for k in np.flatnonzero(values != values):  # NaN alone is not itself
+        cells[k] = "NaN"
+    return cells

@@ -95,7 +95,7 @@ class Blocks:
             self.damaged_metadata += 1
             self.scan.problems.append(f"{record.name!r} of {self.scan.path.name} is damaged and was skipped")
             return
-        if record.name == layout.METADATA_NAME and self.metadata is None:
+        if record.name in (layout.METADATA_NAME, layout.METADATA_AGAIN) and self.metadata is None:
             self.metadata = facts
 
     def _report_misplaced(self) -> None:

@@ -22,6 +22,7 @@ TABLE_SCHEMA = "biotac.Table"
 WIRE_SCHEMA = "biotac.link"
 WIRE_SCHEMA_ENCODING = "biotac-schema"
 METADATA_NAME = "biotac"
+METADATA_AGAIN = "biotac again"  # at the end, in case the first one gets damaged; other programs show names once
 CUT_FROM = "cut_from"  # metadata key: the file that it is a part of
 CONTINUES = "continues"  # metadata key: the file that ended when the board restarted
 

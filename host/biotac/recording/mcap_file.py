@@ -139,7 +139,7 @@ class RecordingFile:
             if self._gaps or self._labels:
                 at_ns = self._gaps[-1]["back_at_ns"] if self._gaps else self._last_ns or 0
                 self._put({}, Rest(np.empty(0, np.uint16), b""), at_ns, at_ns)
-            self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # again, in case the first one gets damaged
+            self._writer.add_metadata(layout.METADATA_AGAIN, self._metadata)
             self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import importlib
 import json
@@ -42,6 +43,18 @@ def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
             main([name, "--help"])
         said = capsys.readouterr().out
         assert text[:40] in said and said.rstrip().endswith(f"example: {example}")
+
+
+def test_no_help_text_is_a_request_of_troff() -> None:
+    # The man page is made of it, and a line that begins with a dot vanishes from it.
+    def texts(one: argparse.ArgumentParser) -> Iterator[str]:
+        for action in one._actions:
+            yield action.help or ""
+            if isinstance(action, argparse._SubParsersAction):
+                for below in action.choices.values():
+                    yield from texts(below)
+
+    assert [text for text in texts(parser()) if text.startswith((".", "'"))] == []
 
 
 def test_version_names_release_wire_and_schema(capsys) -> None:
