@@ -98,7 +98,8 @@ static void a_missing_slot_is_marked_and_never_stale(void **state)
     for (int slot = 0; slot < BT_SLOTS; slot++) {
         assert_true(round_without((uint64_t)1 << slot));
         uint32_t want = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK | BT_FRAME_FLAG_POC_LOW
-                        | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+                        | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE
+                        | BT_FRAME_FLAG_TARE_UNSURE;
         if (slot % 2 == 0) {
             assert_int_equal(pac.pac[slot / 2], BT_INVALID_COUNT);
         } else if (slot >= E1_SLOT) {

@@ -39,7 +39,8 @@ class Course:
 
     ``force_n`` (n,): the largest normal force within the frame. ``rest`` (n, 19): counts without load at the frame's
     middle, with drift and temperature; ``reads`` (n, 19): counts with load and creep, without noise; ``signal``
-    (n, 19): what the load alone adds to ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep, no noise.
+    (n, 19): what the load alone adds to ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep, no noise;
+    ``warm_c`` (n,): degrees above the model's 30.
     """
 
     sensor: physics.Finger
@@ -49,6 +50,7 @@ class Course:
     reads: Floats
     signal: Floats
     pressure: Floats
+    warm_c: Floats
 
     def __len__(self) -> int:
         return len(self.force_n)
@@ -127,6 +129,7 @@ class Script:
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
             pressure=sampling.PDC_REST + _middle(sampling.Pressure()(sampling.spring_load(states))),
+            warm_c=_middle(states.warm_c),
         )
 
 

@@ -90,8 +90,9 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     if (bt_tare_touched(tare)) {
         flags |= tare->state == BT_TARE_STATE_DOUBT ? BT_FRAME_FLAG_DOUBT : BT_FRAME_FLAG_CONTACT;
         flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
-        flags |= bt_thermal_warmed(&tare->thermal) ? BT_FRAME_FLAG_TEMP : 0;
     }
+    flags |= tare->unsure && tare->tared ? BT_FRAME_FLAG_TARE_UNSURE : 0;
+    flags |= tare->witness.flat ? BT_FRAME_FLAG_PDC_FLAT : 0;
     return flags;
 }
 
@@ -151,6 +152,9 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
     }
+    uint32_t warmed_q8 = bt_abs32(bt_thermal_warmed_q8(&tare->thermal));
+    uint32_t limit_q8 = settings->map != NULL ? BT_DEGREE_Q8 : settings->warmed_max_q8;
+    flags |= bt_tare_touched(tare) && warmed_q8 > limit_q8 ? BT_FRAME_FLAG_TEMP : 0;
     flags |= shape.energy < POC_LOW * tare->threshold_count2 ? BT_FRAME_FLAG_POC_LOW : 0;
     flags |= shape.bulge > shape.energy - shape.bulge ? BT_FRAME_FLAG_SHEAR_MIX : 0;
     bool complete = !(flags & (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL));

@@ -3,6 +3,9 @@
 #include "fixed_point.h"
 #include "map/population.h"
 #include "solve/poc.h"
+#include "touch/thermal.h"
+
+#define WARMED_100UN 2000 // 0.2 N
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
@@ -28,6 +31,23 @@ static bool wants_population(const bt_settings *settings)
     return wanted;
 }
 
+// The tare follows temperature by about half a count for each of TDC; half of that may be wrong, on all
+// electrodes alike. The maps hardly feel it.
+static uint32_t warmed_max_q8(const bt_gains *gains, bool population)
+{
+    int32_t e_q4[BT_ELECTRODES], force_100un[3];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = 16; // from four counts of TDC
+    }
+    bt_force(e_q4, gains, force_100un);
+    uint32_t most = 1;
+    for (int d = 0; d < 3; d++) {
+        most = bt_abs32(force_100un[d]) > most ? bt_abs32(force_100un[d]) : most;
+    }
+    uint32_t limit_q8 = 4 * 256 * WARMED_100UN / most;
+    return population || limit_q8 > BT_DEGREE_Q8 ? BT_DEGREE_Q8 : limit_q8;
+}
+
 bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
 {
     int32_t force_nn[3] = {bt_settings_get(settings, BT_SETTING_FORCE_GAIN_X_NN),
@@ -40,6 +60,7 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
         .gains = bt_gains_from(force_nn, torque_nn),
         .population = wants_population(settings),
     };
+    kernel.warmed_max_q8 = warmed_max_q8(&kernel.gains, kernel.population);
     for (int d = 0; d < 3; d++) {
         kernel.force_per_count_100un_q16[d] = force_per_count(force_nn[d], d);
     }

@@ -49,7 +49,7 @@ BT_NOINLINE void bt_follow_resume(bt_tare *tare)
 {
     bool known = bt_drift_known(&tare->drift);
     shift_all(tare, bt_drift_unseen(&tare->drift, tare->silence.sweeps));
-    if (bt_tare_touched(tare) && tare->trigger.pressure_now) {
+    if (bt_tare_touched(tare) && tare->trigger.pressure_now && tare->witness.moves) {
         int32_t step_q16 = bt_watch_resume(&tare->watch, &tare->silence, BT_STILL_SPAN_Q3);
         shift_all(tare, known ? 0 : step_q16);
     }

@@ -4,13 +4,8 @@
 
 #include "fixed_point.h"
 
-// Real skin leaves the pressure up to 9 counts low after a press; 12 counts are 0.1 to 0.2 N.
-#define UNDO_BELOW_COUNT 12
-#define LOSE_BELOW_COUNT 20 // unless there was a press, which leaves an undershoot at a tare of rest too
-#define MISSING_SHARE    16 // of the press's peak: after a minute of pressing, more was missing
-#define UNDO_COUNT2      300
-#define LOSE_COUNT2      2000
-#define DOUBT_ROUNDS     3
+#define INVERTED_COUNT2 300
+#define DOUBT_ROUNDS    3
 
 _Static_assert(BT_FULL_SCALE_COUNT * 8 <= INT16_MAX, "a change of a count must fit its type");
 
@@ -69,16 +64,17 @@ static bool is_the_change(const sums *s)
 }
 
 bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, const bt_baseline *base,
-                                int32_t pdc_peak)
+                                int32_t pdc_peak, bool colder)
 {
     bt_tare_doubt doubt = BT_TARE_STANDS;
     int32_t below = (int32_t)(base->pdc_q16 >> 16) - smooth->lane[BT_LANE_PDC];
-    if (base->pdc_q16 != BT_TARE_UNKNOWN && below > UNDO_BELOW_COUNT + pdc_peak / MISSING_SHARE) {
+    if (base->pdc_q16 != BT_TARE_UNKNOWN && below > bt_pdc_missing_max(pdc_peak)) {
         sums s = sums_of(change, smooth, base);
-        if (change->known && s.energy > UNDO_COUNT2 && is_the_change(&s)) {
+        if (s.energy <= INVERTED_COUNT2) {
+            doubt = BT_TARE_STANDS;
+        } else if (change->known && is_the_change(&s)) {
             doubt = BT_TARE_UNDO;
-        } else if (pdc_peak < BT_PDC_PRESSED && below > LOSE_BELOW_COUNT && s.energy > LOSE_COUNT2
-                   && s.net > 0) {
+        } else if (s.net > 0 || !colder) {
             doubt = BT_TARE_LOSE;
         }
     }

@@ -19,10 +19,10 @@ typedef enum { BT_TARE_STANDS, BT_TARE_UNDO, BT_TARE_LOSE } bt_tare_doubt;
 
 void bt_inverted_note(bt_tare_change *change, const bt_baseline *before, const bt_baseline *now);
 
-// Judge a round with a good pressure word. UNDO: the tare before this one explains the signals. LOSE: it does
-// not, or there is none, and yet this cannot be a touch.
+// Judge a round with a good pressure word; colder: so much that pressure may have fallen. UNDO: the tare
+// before this one explains the signals. LOSE: it does not, or there is none, and yet this cannot be a touch.
 bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, const bt_baseline *base,
-                                int32_t pdc_peak);
+                                int32_t pdc_peak, bool colder);
 
 // Put the tare before this one into base, with the drift since then.
 void bt_inverted_undo(const bt_tare_change *change, bt_baseline *base);

@@ -16,7 +16,8 @@ _Static_assert(BT_ELECTRODES == 19, "220753 / 2^22 is 1/19");
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
     bt_tare_doubt doubt =
-        bt_inverted_judge(&tare->last, &tare->trigger.smooth, &tare->base, tare->release.pdc_peak);
+        bt_inverted_judge(&tare->last, &tare->trigger.smooth, &tare->base, tare->release.pdc_peak,
+                          bt_thermal_warmed_q8(&tare->thermal) < -BT_WARMER_Q8);
     if (doubt == BT_TARE_UNDO) {
         bt_baseline before = tare->base;
         bt_inverted_undo(&tare->last, &before);
@@ -28,7 +29,7 @@ BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 }
 
 // Energy that may be due to untracked drift and temperature. Drift is 15 counts a minute, the worst measured,
-// as long as there is pressure to tell it from a load. Of what was followed for temperature, a third may be
+// as long as there is pressure to tell it from a load. Of what was followed for temperature, half may be
 // wrong.
 static uint32_t forgiven_count2(const bt_tare *tare)
 {
@@ -36,7 +37,7 @@ static uint32_t forgiven_count2(const bt_tare *tare)
     uint32_t drift_count2 = BT_DIVIDE_U32(rounds * rounds, DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
     uint32_t warm_count = bt_abs32(tare->thermal.applied_q16) >> 16;
     return BT_ELECTRODES
-           * ((tare->pressure_seen ? drift_count2 : 0) + BT_DIVIDE_U32(warm_count * warm_count, 9));
+           * ((tare->pressure_seen && tare->witness.moves ? drift_count2 : 0) + warm_count * warm_count / 4);
 }
 
 // The energy without what all electrodes have moved by. The division by 19 is a product and a shift, off by
@@ -62,11 +63,17 @@ static void judge_release(bt_tare *tare)
         .above = (mean > now ? mean : now) - bt_baseline_count(tare->base.pdc_q16),
         .still_sweeps = tare->sweep.still_sweeps,
         .level_sweeps = tare->watch.level_sweeps,
+        .warmer = bt_thermal_warmed_q8(&tare->thermal) > BT_WARMER_Q8,
     };
-    bt_release_verdict verdict = bt_release_judge(&tare->release, &sweep);
+    bt_release_verdict verdict = bt_release_judge(&tare->release, &tare->witness, &sweep);
     if (tare->held || verdict == BT_RELEASE_NO) {
         return;
     }
+    // A press from which pressure comes back to the tare began at rest; or else when it ends, pressure will
+    // be far below, and the tare is lost.
+    bool back = sweep.witness && tare->release.pdc_peak >= BT_PDC_PRESSED
+                && sweep.above >= -bt_pdc_missing_max(tare->release.pdc_peak);
+    tare->unsure = tare->unsure && (verdict == BT_RELEASE_SHIFT || !(back || tare->let_go));
     if (verdict == BT_RELEASE_SHIFT) {
         bt_adopt_shift(tare);
     } else if (verdict == BT_RELEASE_CLEAN) {
@@ -107,7 +114,8 @@ static void judge_drift(bt_tare *tare)
     bool rests = tare->state == BT_TARE_STATE_REST;
     bool touched = tare->held || !rests;
     bool valid = rests || bt_watch_sees(watch, &tare->sweep);
-    bool level = valid && !tare->partial && bt_watch_level(watch);
+    bool shown = rests ? !tare->witness.flat : tare->witness.moves; // or a load would pass for drift
+    bool level = valid && shown && !tare->partial && bt_watch_level(watch);
     bool creeps = touched && bt_watch_creeps(watch);
     if (level && !creeps) {
         bt_drift_learn(&tare->drift);
@@ -133,6 +141,7 @@ BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
             // Measured before there is a threshold: a worn sensor's noise must not look like a touch.
             bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
             bt_adopt_present(tare, BT_TARE_REASON_START);
+            tare->unsure = true;
         }
     } else if (tare->state == BT_TARE_STATE_REST && !tare->partial) {
         bt_rollback_keep(&tare->rollback, &tare->base);

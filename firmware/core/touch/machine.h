@@ -32,6 +32,7 @@ typedef struct {
     bool tared;           // there is a tare
     bool held;            // the host says so: no new tare is taken
     bool let_go;          // the host says so: what is in doubt is residue
+    bool unsure;          // the tare is START's, and no release has confirmed it
     bt_baseline base;
     uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
     uint32_t threshold_count2;            // energy above which a round counts as touched
@@ -47,6 +48,7 @@ typedef struct {
     int32_t drift_q16; // drift added to each electrode in this sweep
     bt_thermal thermal;
     bt_release release;
+    bt_witness witness;
 
     int32_t comes_back_q16; // what may come back of the pressure that the latest press left missing
     uint8_t hits;           // consecutive rounds in which the trigger fired

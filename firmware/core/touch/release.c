@@ -7,21 +7,26 @@
 // Pressure above the last tare, from 27 presses of two recordings: a press left at most 5.6 (median 1), and a
 // hold at a tenth of the press's peak at least 11 (median 56). Pressure undershoots at a release, so only
 // pressure that is too high is evidence.
-#define QUIET_PDC_COUNT    4
-#define REST_PDC_COUNT_MAX 10
-#define REST_PDC_SHARE     40 // of the peak
+#define QUIET_PDC_COUNT       4
+#define REST_PDC_COUNT_MAX    10
+#define REST_PDC_SHARE        40 // of the peak
 // Electrodes: a press left at most .053 of its signal, a 356th of its energy.
-#define CALM_COUNT2        400
-#define EVEN_COUNT2        200  // seven sigmas of a worn sensor's means: nothing but noise
-#define RESIDUE_SHARE      64   // of the peak energy
-#define SETTLED_COUNT2     6000 // skin that settled, if pressure never showed a touch
-#define FALLEN_SHARE       4    // what has fallen to a quarter is no longer the press it was
-#define ENDED_STILL_SWEEPS 5    // 400 ms
-#define QUIET_SWEEPS       12   // 960 ms
-#define SHIFT_LEVEL_SWEEPS 18   // 1.4 s
-#define STUCK_SWEEPS       25   // 2 s
-#define EVEN_SWEEPS        100  // 8 s
-#define LOADING_PDC_COUNT  2    // rise of pressure that a slow load makes in a second
+#define CALM_COUNT2           400
+#define EVEN_COUNT2           200  // seven sigmas of a worn sensor's means: nothing but noise
+#define RESIDUE_SHARE         64   // of the peak energy
+#define SETTLED_COUNT2        6000 // skin that settled, if pressure never showed a touch
+// A press's energy against its pressure's square: 1 to 14 in whole presses of a real finger, but up to 200 in
+// the first second of one. At 5 counts/N the sensor model has 400 and more, at 2 counts/N 2500.
+#define MOVES_COUNT2_PER_PDC2 64
+#define FLAT_COUNT2_PER_PDC2  1024
+#define FIRM_COUNT2           36000 // 2 N
+#define FALLEN_SHARE          4     // what has fallen to a quarter is no longer the press it was
+#define ENDED_STILL_SWEEPS    5     // 400 ms
+#define QUIET_SWEEPS          12    // 960 ms
+#define SHIFT_LEVEL_SWEEPS    18    // 1.4 s
+#define STUCK_SWEEPS          25    // 2 s
+#define EVEN_SWEEPS           100   // 8 s
+#define LOADING_PDC_COUNT     2     // rise of pressure that a slow load makes in a second
 
 void bt_release_begin(bt_release *release)
 {
@@ -31,32 +36,38 @@ void bt_release_begin(bt_release *release)
 void bt_release_pressure(bt_release *release, int32_t above)
 {
     release->pdc_peak = above > release->pdc_peak ? above : release->pdc_peak;
+    release->pdc_low = above < release->pdc_low ? above : release->pdc_low;
 }
 
-// True if pressure can tell whether the press has ended: not if pressure did not show the press.
-static bool has_witness(const bt_release *release, const bt_release_sweep *sweep)
+// How far pressure has moved, in counts, and whether that is enough for the electrodes' energy.
+static uint32_t pdc_moved(const bt_release *release)
 {
-    return sweep->pressure
-           && (release->pdc_peak >= BT_PDC_PRESSED || release->uneven_peak < FALLEN_SHARE * SETTLED_COUNT2);
+    int32_t down = -release->pdc_low;
+    return (uint32_t)(down > release->pdc_peak ? down : release->pdc_peak);
 }
 
-// Without a witness only electrodes that are back at rest say that nothing touches.
+static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
+{
+    return pdc_moved(release) * pdc_moved(release) * count2_per_pdc2 >= release->uneven_peak;
+}
+
+// Pressure above rest is a touch, whatever the finger; pressure at rest means no touch only if a touch would
+// move it. Without that witness only electrodes that are back at rest say that nothing touches.
 static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 {
-    bool witness = has_witness(release, sweep);
-    uint32_t left = witness ? release->energy_peak / RESIDUE_SHARE : 0;
-    uint32_t forgiven = witness || !sweep->pressure ? sweep->forgiven_count2 : 0;
+    uint32_t left = sweep->witness ? release->energy_peak / RESIDUE_SHARE : 0;
+    uint32_t forgiven = sweep->witness ? sweep->forgiven_count2 : 0;
     left = (left > CALM_COUNT2 ? left : CALM_COUNT2) + forgiven;
     int32_t rest = bt_clamp(release->pdc_peak / REST_PDC_SHARE, QUIET_PDC_COUNT, REST_PDC_COUNT_MAX);
-    bool back = witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
+    bool back = sweep->witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
     bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_COUNT2 + forgiven;
     return back && gone && sweep->still_sweeps >= ENDED_STILL_SWEEPS;
 }
 
 static bool is_untouched(const bt_release *release, const bt_release_sweep *sweep)
 {
-    return has_witness(release, sweep) && release->pdc_peak <= BT_PDC_HIT
-           && release->quiet_sweeps >= QUIET_SWEEPS && sweep->still_sweeps >= QUIET_SWEEPS
+    return sweep->witness && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= QUIET_SWEEPS
+           && sweep->still_sweeps >= QUIET_SWEEPS
            && sweep->energy_count2 < SETTLED_COUNT2 + sweep->forgiven_count2;
 }
 
@@ -74,8 +85,8 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
 }
 
 // A load makes a pattern. Without one and with little pressure, what was never a press is no touch after a
-// second, once pressure has been level for 1.4 s. A press, or what may have been one as pressure is unknown,
-// is over after eight seconds: the pressure that a long press leaves takes minutes to go.
+// second, once pressure has been level for 1.4 s. A press, or what may have been one as pressure is
+// unknown, is over after eight seconds: the pressure that a long press leaves takes minutes to go.
 static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool pressed = !sweep->pressure || release->pdc_peak >= BT_PDC_PRESSED;
@@ -84,29 +95,21 @@ static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
     return level && sweep->still_sweeps >= QUIET_SWEEPS;
 }
 
+// A press has fallen to a quarter by its pressure; by its energy where pressure is no witness, or may have
+// risen with the temperature.
 static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
 {
-    bool pressed = sweep->pressure && release->pdc_peak >= BT_PDC_PRESSED;
+    bool pressed = sweep->witness && release->pdc_peak >= BT_PDC_PRESSED && !sweep->warmer;
     bool fallen = pressed ? sweep->above < release->pdc_peak / FALLEN_SHARE
-                          : sweep->energy_count2 < release->energy_peak / FALLEN_SHARE;
-    bool stuck = has_witness(release, sweep) && release->quiet_sweeps >= STUCK_SWEEPS;
+                          : sweep->energy_count2 < release->energy_peak / FALLEN_SHARE + sweep->forgiven_count2;
+    bool stuck = sweep->witness && release->quiet_sweeps >= STUCK_SWEEPS;
     return sweep->still_sweeps >= ENDED_STILL_SWEEPS && (fallen || stuck);
 }
 
-bt_release_verdict bt_release_judge(bt_release *release, const bt_release_sweep *sweep)
+static bt_release_verdict verdict(const bt_release *release, const bt_release_sweep *sweep, bool low)
 {
-    uint32_t energy = sweep->energy_count2;
-    release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
-    uint32_t uneven = sweep->uneven_count2;
-    release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
-    // Without pressure the energy itself must have fallen, or the first second of a slow load would
-    // pass for a residue.
-    bool quiet =
-        sweep->pressure ? sweep->above < QUIET_PDC_COUNT : energy < release->energy_peak / FALLEN_SHARE;
-    release->quiet_sweeps =
-        quiet ? (uint8_t)(release->quiet_sweeps + (release->quiet_sweeps < UINT8_MAX)) : 0;
-    count_even(release, sweep);
-    if (energy < CALM_COUNT2 && (quiet || !sweep->pressure)) {
+    // What only passes by the tare is no rest: a finger that was tared in a grip passes by it when it opens.
+    if (sweep->energy_count2 < CALM_COUNT2 && low && sweep->still_sweeps > 0) {
         return BT_RELEASE_CLEAN;
     }
     if (is_residue(release, sweep) || is_untouched(release, sweep)) {
@@ -116,4 +119,30 @@ bt_release_verdict bt_release_judge(bt_release *release, const bt_release_sweep 
         return BT_RELEASE_SHIFT;
     }
     return is_doubtful(release, sweep) ? BT_RELEASE_DOUBT : BT_RELEASE_NO;
+}
+
+bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep)
+{
+    uint32_t energy = sweep->energy_count2, uneven = sweep->uneven_count2;
+    release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
+    release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
+    bool unmoved = release->uneven_peak >= FIRM_COUNT2 && !moved_for(release, FLAT_COUNT2_PER_PDC2);
+    if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED
+        && moved_for(release, MOVES_COUNT2_PER_PDC2)) {
+        *witness = (bt_witness){.moves = true};
+    }
+    sweep->witness = sweep->pressure && witness->moves && !unmoved;
+    bool low = !sweep->pressure || sweep->above < QUIET_PDC_COUNT;
+    // Without a witness the energy itself must have fallen, or the first second of a slow load would pass for
+    // a residue.
+    bool quiet = low && (sweep->witness || energy < release->energy_peak / FALLEN_SHARE);
+    release->quiet_sweeps =
+        quiet ? (uint8_t)(release->quiet_sweeps + (release->quiet_sweeps < UINT8_MAX)) : 0;
+    count_even(release, sweep);
+    bt_release_verdict now = verdict(release, sweep, low);
+    // Electrodes feel a real press up to a second before pressure does, so what it lacks counts only later.
+    if (sweep->pressure && unmoved && (now != BT_RELEASE_NO || sweep->still_sweeps >= ENDED_STILL_SWEEPS)) {
+        *witness = (bt_witness){.flat = true};
+    }
+    return now;
 }

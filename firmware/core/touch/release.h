@@ -22,11 +22,19 @@ typedef enum {
     BT_RELEASE_DOUBT,   // still: a light hold or a residue
 } bt_release_verdict;
 
+// Does this finger's pressure show presses? Where fluid has leaked, or a bubble is in it, it answers but
+// hardly moves. Unproven until a press has moved it; then the latest firm press counts.
+typedef struct {
+    bool moves;
+    bool flat;
+} bt_witness;
+
 // Since the tare was taken.
 typedef struct {
     uint32_t energy_peak;
     uint32_t uneven_peak;
     int32_t pdc_peak;
+    int32_t pdc_low;      // 0 or less
     uint8_t quiet_sweeps; // consecutive sweeps with pressure (if there is none: energy) back at rest
     uint8_t even_sweeps;  // consecutive sweeps with only a shift of all electrodes and no rise of pressure
     int32_t even_above;   // pressure when those began
@@ -38,6 +46,8 @@ typedef struct {
     uint32_t uneven_count2;   // the same without what all electrodes share
     uint32_t forgiven_count2; // of that, what drift and temperature may have made
     bool pressure;            // at least one pressure word was good
+    bool witness;             // and presses move it; set by bt_release_judge
+    bool warmer;              // so much that pressure may have risen
     int32_t above;            // pressure above its tare: now or the mean of eight rounds, whichever is more
     uint8_t still_sweeps;
     uint8_t level_sweeps; // with level pressure
@@ -48,6 +58,14 @@ void bt_release_begin(bt_release *release);
 // Add a round in contact with a good pressure word.
 void bt_release_pressure(bt_release *release, int32_t above);
 
-bt_release_verdict bt_release_judge(bt_release *release, const bt_release_sweep *sweep);
+bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep);
+
+// The most that real skin leaves the pressure low by after a press: 9 counts, and after a minute more.
+#ifndef BT_CDEF
+static inline int32_t bt_pdc_missing_max(int32_t pdc_peak)
+{
+    return 12 + pdc_peak / 16;
+}
+#endif
 
 #endif

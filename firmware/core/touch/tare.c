@@ -173,6 +173,7 @@ uint8_t bt_tare_now(bt_tare *tare)
         return BT_ERROR_NOT_STILL;
     }
     bt_adopt_present(tare, BT_TARE_REASON_HOST_NOW);
+    tare->unsure = false;
     return BT_ERROR_OK;
 }
 
@@ -180,6 +181,7 @@ static void set(bt_tare *tare, const bt_baseline *base, uint8_t reason)
 {
     bt_adopt_in_place(tare, base, reason);
     tare->last.known = false; // never undone: who sets it knows better
+    tare->unsure = false;
 }
 
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base)
@@ -222,6 +224,7 @@ static void let_judge(bt_tare *tare, uint8_t reason)
 void bt_tare_release(bt_tare *tare)
 {
     tare->let_go = true;
+    tare->unsure = tare->unsure && tare->state != BT_TARE_STATE_REST;
     let_judge(tare, BT_TARE_REASON_HOST_RELEASE);
 }
 

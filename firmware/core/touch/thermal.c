@@ -3,7 +3,7 @@
 #include "fixed_point.h"
 #include "signal/round.h"
 
-#define TDC_SHIFT   3 // a low-pass of eight sweeps, as a step of TDC is half an electrode count
+#define TDC_SHIFT   4 // a low-pass of 16 rounds, as a step of TDC is half an electrode count
 #define SLOW_SHIFT  7
 #define APPLIED_MAX (500 << 16) // 15 degrees; more is a broken thermometer
 
@@ -25,8 +25,10 @@ void bt_thermal_add(bt_thermal *thermal, uint16_t tdc, bool end_of_sweep)
         thermal->tdc_q8 = tdc_q8;
         thermal->tdc_then_q8 = tdc_q8;
         thermal->slow_q14 = (int32_t)(tdc_q8 << 6);
-    } else if (end_of_sweep) {
-        thermal->tdc_q8 += (uint32_t)bt_shift_down((int32_t)(tdc_q8 - thermal->tdc_q8), TDC_SHIFT);
+        return;
+    }
+    thermal->tdc_q8 += (uint32_t)bt_shift_down((int32_t)(tdc_q8 - thermal->tdc_q8), TDC_SHIFT);
+    if (end_of_sweep) {
         int32_t ahead_q14 = (int32_t)(thermal->tdc_q8 << 6) - thermal->slow_q14;
         thermal->slow_q14 += bt_shift_down(ahead_q14, SLOW_SHIFT);
     }
@@ -46,14 +48,9 @@ void bt_thermal_begin(bt_thermal *thermal)
     thermal->step_q16 = 0;
 }
 
-static int32_t warmed_q8(const bt_thermal *thermal)
-{
-    return (int32_t)(thermal->tdc_q8 - thermal->tdc_then_q8);
-}
-
 void bt_thermal_follow(bt_thermal *thermal, int32_t gain_q16)
 {
-    int64_t due_q16 = (int64_t)warmed_q8(thermal) * gain_q16 / 256;
+    int64_t due_q16 = (int64_t)bt_thermal_warmed_q8(thermal) * gain_q16 / 256;
     due_q16 = due_q16 > APPLIED_MAX ? APPLIED_MAX : due_q16 < -APPLIED_MAX ? -APPLIED_MAX : due_q16;
     thermal->step_q16 = (int32_t)due_q16 - thermal->applied_q16;
     thermal->applied_q16 = (int32_t)due_q16;

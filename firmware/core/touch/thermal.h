@@ -2,7 +2,7 @@
 // rises; while a contact freezes the tare, it follows the sensor's own thermometer (TDC).
 //
 // All electrodes follow by the same counts. On real fingers TDC alone does not suffice (gradients in the
-// core), which is why a degree of change is flagged.
+// core), which is why a change is flagged.
 //
 // Units: TDC counts in 1/256 (q8), electrode counts in 1/65536 (q16). Products round towards zero.
 #ifndef BIOTAC_THERMAL_H
@@ -11,11 +11,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BT_WARMED_Q8 (33u << 8) // one degree: 30 degrees read about 1000 counts, 31 about 1033
+#define BT_DEGREE_Q8 (33 << 8)          // 30 degrees read about 1000 counts, 31 about 1033
+#define BT_WARMER_Q8 (BT_DEGREE_Q8 / 2) // what pressure may rise by then is a quarter of the lightest press
 
 typedef struct {
-    uint32_t tdc_q8;      // low-passed over eight sweeps; 0 until read
-    int32_t slow_q14;     // low-passed over 128 more
+    uint32_t tdc_q8;      // low-passed over 16 rounds; 0 until read
+    int32_t slow_q14;     // low-passed over 128 sweeps more
     uint32_t tdc_then_q8; // when the contact began
     int32_t applied_q16;  // in the tare, or being added to it
     int32_t step_q16;     // what each electrode gets in this sweep
@@ -24,7 +25,7 @@ typedef struct {
 // Counts per TDC count from the setting's thousandths.
 int32_t bt_thermal_gain_q16(int32_t gain_milli);
 
-// Take a round's TDC word, or none; it is used at the end of a sweep.
+// Take a round's TDC word, or none.
 void bt_thermal_add(bt_thermal *thermal, uint16_t tdc, bool end_of_sweep);
 
 // What temperature adds to every electrode in a sweep, at its rate of the last seconds.
@@ -36,11 +37,11 @@ void bt_thermal_begin(bt_thermal *thermal);
 // After each sweep in contact: sets step_q16, what the coming sweep adds to each electrode.
 void bt_thermal_follow(bt_thermal *thermal, int32_t gain_q16);
 
-// True if it is more than a degree warmer or colder than when the contact began.
+// How much warmer it is than when the contact began.
 #ifndef BT_CDEF
-static inline bool bt_thermal_warmed(const bt_thermal *thermal)
+static inline int32_t bt_thermal_warmed_q8(const bt_thermal *thermal)
 {
-    return thermal->tdc_q8 - thermal->tdc_then_q8 + BT_WARMED_Q8 > 2 * BT_WARMED_Q8;
+    return (int32_t)(thermal->tdc_q8 - thermal->tdc_then_q8);
 }
 #endif
 

@@ -20,8 +20,9 @@ static const bt_release pressed = {.energy_peak = 100000, .uneven_peak = 100000,
 static bt_release_verdict after(bt_release release, bt_release_sweep sweep, int n)
 {
     bt_release_verdict verdict = BT_RELEASE_NO;
+    bt_witness moves = {.moves = true};
     for (int k = 0; k < n; k++) {
-        verdict = bt_release_judge(&release, &sweep);
+        verdict = bt_release_judge(&release, &moves, &sweep);
     }
     return verdict;
 }
@@ -65,34 +66,39 @@ static void each_verdict_has_its_sweep(void **state)
     assert_int_equal(after(unseen, residue, SWEEPS / 2), BT_RELEASE_RESIDUE);
 }
 
-static void peaks_are_the_most_there_was(void **state)
+// A press of this energy, and what stands for a second of this pressure above the tare.
+static bt_witness asked(bt_witness witness, uint32_t uneven_count2, int32_t above, uint8_t still_sweeps)
+{
+    bt_release release;
+    bt_release_begin(&release);
+    bt_release_pressure(&release, above);
+    for (int k = 0; k < 12; k++) {
+        bt_release_sweep sweep = held;
+        sweep.uneven_count2 = uneven_count2;
+        sweep.above = above;
+        sweep.still_sweeps = still_sweeps;
+        (void)bt_release_judge(&release, &witness, &sweep);
+    }
+    return witness;
+}
+
+static void pressure_is_a_witness_once_a_press_has_moved_it(void **state)
 {
     (void)state;
-    bt_release release;
-    memset(&release, 0xFF, sizeof release);
-    bt_release_begin(&release);
-    assert_true(release.energy_peak == 0 && release.uneven_peak == 0 && release.pdc_peak == 0);
-    assert_true(release.quiet_sweeps == 0 && release.even_sweeps == 0);
-    static const int above[] = {-5, 3, 9, 4}, peak[] = {0, 3, 9, 9};
-    for (int k = 0; k < 4; k++) {
-        bt_release_sweep sweep = held;
-        sweep.energy_count2 = (uint32_t)(1000 + above[k]);
-        sweep.uneven_count2 = (uint32_t)(500 - above[k]);
-        (void)bt_release_judge(&release, &sweep);
-        bt_release_pressure(&release, above[k]);
-        assert_int_equal(release.pdc_peak, peak[k]);
-        assert_int_equal(release.energy_peak, k == 0 ? 995 : 1000 + peak[k]);
-        assert_int_equal(release.uneven_peak, 505);
+    const bt_witness unproven = {0}, moves = {.moves = true}, flat = {.flat = true};
+    for (int k = 0; k < 3; k++) {
+        bt_witness before = k == 0 ? unproven : k == 1 ? moves : flat;
+        bt_witness after = asked(before, 100000, 300, 20); // 3 N on a healthy finger
+        assert_true(after.moves && !after.flat);
+        after = asked(before, 100000, -300, 20); // tared in a grip, and let go
+        assert_true(after.moves && !after.flat);
+        after = asked(before, 100000, 3, 20); // a count per newton
+        assert_true(!after.moves && after.flat);
+        after = asked(before, 100000, 3, 0); // real pressure may come a second late
+        assert_memory_equal(&after, &before, sizeof before);
+        after = asked(before, 5000, 3, 20); // too light to say so
+        assert_memory_equal(&after, &before, sizeof before);
     }
-    // Quiet sweeps are in a row, and saturate.
-    bt_release_sweep sweep = held;
-    sweep.above = 0;
-    for (int n = 1; n <= 300; n++) {
-        (void)bt_release_judge(&release, &sweep);
-        assert_int_equal(release.quiet_sweeps, n < 255 ? n : 255);
-    }
-    (void)bt_release_judge(&release, &held);
-    assert_int_equal(release.quiet_sweeps, 0);
 }
 
 #define T(name) cmocka_unit_test(name)
@@ -101,7 +107,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         T(a_press_goes_on),
         T(each_verdict_has_its_sweep),
-        T(peaks_are_the_most_there_was),
+        T(pressure_is_a_witness_once_a_press_has_moved_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -58,7 +58,7 @@ def test_numbers_are_those_of_the_frames_and_thinned(recorded: Path) -> None:
             n = SECONDS * 1_000_000 // period_us
             assert len(messages) in (n, n + 1), topic  # the first period was under way already
             for stamp_ns, seq, message in messages:
-                np.testing.assert_array_equal(message.data, row_of[seq].astype(np.float32), err_msg=topic)
+                np.testing.assert_array_equal(np.float32(message.data), np.float32(row_of[seq]), err_msg=topic)
                 if topic != "pac":
                     assert stamp_ns == stamps[seq]
 
