@@ -5,7 +5,7 @@
 #include "solve/poc.h"
 #include "touch/thermal.h"
 
-#define WARMED_100UN 2000 // 0.2 N
+#define WARMED_100UN 1500 // 0.15 N
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 

@@ -100,8 +100,9 @@ static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool pressed = sweep->witness && release->pdc_peak >= BT_PDC_PRESSED && !sweep->warmer;
-    bool fallen = pressed ? sweep->above < release->pdc_peak / FALLEN_SHARE
-                          : sweep->energy_count2 < release->energy_peak / FALLEN_SHARE + sweep->forgiven_count2;
+    bool fallen = pressed
+                      ? sweep->above < release->pdc_peak / FALLEN_SHARE
+                      : sweep->energy_count2 < release->energy_peak / FALLEN_SHARE + sweep->forgiven_count2;
     bool stuck = sweep->witness && release->quiet_sweeps >= STUCK_SWEEPS;
     return sweep->still_sweeps >= ENDED_STILL_SWEEPS && (fallen || stuck);
 }
