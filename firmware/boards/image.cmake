@@ -51,16 +51,25 @@ endfunction()
 function(emulated_image name port_name cpu linker)
   set(port ${fw}/port/${port_name})
   file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c
-    ${fw}/port/cortex_m/*.c ${fw}/port/semihosted/*.c ${port}/*.c)
+    ${fw}/port/semihosted/*.c ${port}/*.c)
   list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$|/emu/stream\\.c$")
+  qemu_executable(${name} ${port_name} ${cpu} ${linker} "${sources}" ${ARGN})
+  target_link_options(${name} PRIVATE
+    -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_idle,--wrap=port_identify)
+endfunction()
+
+# Whatever runs in QEMU on a port: its start-up, and no limits.
+function(qemu_executable name port_name cpu linker sources)
+  set(port ${fw}/port/${port_name})
+  file(GLOB shared CONFIGURE_DEPENDS ${fw}/port/cortex_m/*.c)
   separate_arguments(cpu)
-  add_executable(${name} ${sources})
+  add_executable(${name} ${sources} ${shared})
   set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
   target_compile_options(${name} PRIVATE ${cpu})
   target_compile_definitions(${name} PRIVATE BOARD_NEVER_SLEEPS ${ARGN})
   target_include_directories(${name} PRIVATE ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m
     ${port} ${boards}/m4f ${CMAKE_CURRENT_LIST_DIR})
   target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections -Wl,--fatal-warnings
-    -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_idle,--wrap=port_identify -T ${port}/${linker})
+    -T ${port}/${linker})
   board_compile_options(${sources})
 endfunction()

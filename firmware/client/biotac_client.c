@@ -4,7 +4,7 @@
 #define CRC_BYTES 4
 
 // COBS then adds exactly one byte.
-_Static_assert(BT_FRAME_MAX_BYTES <= 254, "a frame fits one COBS block");
+typedef char a_frame_fits_one_cobs_block[BT_FRAME_MAX_BYTES <= 254 ? 1 : -1];
 
 // Half a byte at a time: 64 bytes of table in place of 1024.
 uint32_t bt_client_crc(const uint8_t *data, size_t bytes)
@@ -140,7 +140,7 @@ int bt_client_read(const bt_client *client, uint8_t id, void *msg)
     if (layout == NULL || client->id != id) {
         return 0;
     }
-    copy(layout, msg, client->buffer + 1, 0);
+    copy(layout, (uint8_t *)msg, client->buffer + 1, 0);
     return 1;
 }
 
@@ -167,5 +167,5 @@ size_t bt_client_seal(uint8_t id, size_t payload_bytes, uint8_t *out)
 size_t bt_client_write(uint8_t id, const void *msg, uint8_t out[BT_ENCODED_MAX_BYTES])
 {
     const uint8_t *layout = layout_of(id);
-    return layout == NULL ? 0 : bt_client_seal(id, copy(layout, out + 2, msg, 1), out);
+    return layout == NULL ? 0 : bt_client_seal(id, copy(layout, out + 2, (const uint8_t *)msg, 1), out);
 }

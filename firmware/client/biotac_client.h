@@ -7,6 +7,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2)
 
 // What stood between two delimiters and is no message.
@@ -43,5 +47,44 @@ size_t bt_client_write(uint8_t id, const void *msg, uint8_t out[BT_ENCODED_MAX_B
 size_t bt_client_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
 int bt_client_uncobs(uint8_t *data, size_t bytes); // in place; the length, or -1
 uint32_t bt_client_crc(const uint8_t *data, size_t bytes);
+
+// ---- what a controller looks at in a message
+
+// Not the value that stands for "invalid". An invalid number is never 0: test before you use it.
+static inline int bt_valid_i16(int16_t value)
+{
+    return value != BT_INVALID_I16;
+}
+
+static inline int bt_valid_i32(int32_t value)
+{
+    return value != BT_INVALID_I32;
+}
+
+static inline int bt_valid_count(uint16_t value)
+{
+    return value != BT_INVALID_COUNT;
+}
+
+// The sequence of one finger's rounds; all zero before the first and after each START.
+typedef struct {
+    uint16_t next;
+    uint8_t begun;
+} bt_client_rounds;
+
+// How many rounds the link has lost since the message before. seq and rounds: a FRAME's and 1, or an IDLE's
+// and its frames. Give it both, for together they leave nothing out.
+static inline uint16_t bt_client_lost(bt_client_rounds *rounds_of, uint16_t seq, uint16_t rounds)
+{
+    const uint16_t first = (uint16_t)(seq - rounds + 1u);
+    const uint16_t lost = (uint16_t)(rounds_of->begun != 0 ? first - rounds_of->next : 0);
+    rounds_of->next = (uint16_t)(seq + 1u);
+    rounds_of->begun = 1;
+    return lost;
+}
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

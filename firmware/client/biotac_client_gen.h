@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
 #define BT_SCHEMA_HASH 0x13DC1CFAu
@@ -784,6 +785,7 @@ typedef struct {
     uint32_t crc32; // [1] CRC-32, as zlib's, of its samples (u16, little-endian), slot by slot
 } bt_msg_emu_keep;
 
+#endif
 #ifdef BT_CLIENT_LAYOUT
 // Of each message: id, how many runs, and the runs; a run is the size's logarithm (2 bits) and a count (6).
 static const uint8_t bt_client_layout[] = {
@@ -843,60 +845,61 @@ static const uint8_t bt_client_layout[] = {
     BT_EMU_KEEP_ID, 2, 0x01, 0x82,
     0, 0,
 };
-_Static_assert(sizeof(bt_msg_hello) == 68, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_reply) == 3, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_setting) == 8, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_sensor_info) == 30, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_point) == 12, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_calibration) == 56, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_map_info) == 32, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_map_data) == 132, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_frame) == 156, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_pac) == 56, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_tare) == 96, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_status) == 96, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_sensor_status) == 44, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_idle) == 28, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_touch) == 16, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_event) == 24, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_bands) == 36, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_board_facts) == 36, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_hello_request) == 8, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_start) == 6, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_stop) == 1, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_ping) == 1, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_subscribe) == 3, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_point) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_tare_now) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_tare_set) == 42, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_status) == 1, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_sensor_status) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_sensor_info) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_setting) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_set_setting) == 8, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_reboot_bootloader) == 8, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_save_settings) == 1, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_calibration) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_set_calibration) == 56, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_clear_calibration) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_map) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_read_map) == 4, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_begin_map) == 8, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_write_map) == 132, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_end_map) == 8, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_clear_map) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_hold) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_release) == 2, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_clear_faults) == 24, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_get_board_facts) == 1, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_set_bus_rate) == 4, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_status) == 48, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_plug) == 19, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_tape) == 228, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_set_fault) == 4, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_get_status) == 1, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_play) == 12, "numbers lie at multiples of their size");
-_Static_assert(sizeof(bt_msg_emu_keep) == 12, "numbers lie at multiples of their size");
+// Numbers lie at multiples of their size.
+typedef char bt_msg_hello_lies_so[sizeof(bt_msg_hello) == 68 ? 1 : -1];
+typedef char bt_msg_reply_lies_so[sizeof(bt_msg_reply) == 3 ? 1 : -1];
+typedef char bt_msg_setting_lies_so[sizeof(bt_msg_setting) == 8 ? 1 : -1];
+typedef char bt_msg_sensor_info_lies_so[sizeof(bt_msg_sensor_info) == 30 ? 1 : -1];
+typedef char bt_msg_point_lies_so[sizeof(bt_msg_point) == 12 ? 1 : -1];
+typedef char bt_msg_calibration_lies_so[sizeof(bt_msg_calibration) == 56 ? 1 : -1];
+typedef char bt_msg_map_info_lies_so[sizeof(bt_msg_map_info) == 32 ? 1 : -1];
+typedef char bt_msg_map_data_lies_so[sizeof(bt_msg_map_data) == 132 ? 1 : -1];
+typedef char bt_msg_frame_lies_so[sizeof(bt_msg_frame) == 156 ? 1 : -1];
+typedef char bt_msg_pac_lies_so[sizeof(bt_msg_pac) == 56 ? 1 : -1];
+typedef char bt_msg_tare_lies_so[sizeof(bt_msg_tare) == 96 ? 1 : -1];
+typedef char bt_msg_status_lies_so[sizeof(bt_msg_status) == 96 ? 1 : -1];
+typedef char bt_msg_sensor_status_lies_so[sizeof(bt_msg_sensor_status) == 44 ? 1 : -1];
+typedef char bt_msg_idle_lies_so[sizeof(bt_msg_idle) == 28 ? 1 : -1];
+typedef char bt_msg_touch_lies_so[sizeof(bt_msg_touch) == 16 ? 1 : -1];
+typedef char bt_msg_event_lies_so[sizeof(bt_msg_event) == 24 ? 1 : -1];
+typedef char bt_msg_bands_lies_so[sizeof(bt_msg_bands) == 36 ? 1 : -1];
+typedef char bt_msg_board_facts_lies_so[sizeof(bt_msg_board_facts) == 36 ? 1 : -1];
+typedef char bt_msg_hello_request_lies_so[sizeof(bt_msg_hello_request) == 8 ? 1 : -1];
+typedef char bt_msg_start_lies_so[sizeof(bt_msg_start) == 6 ? 1 : -1];
+typedef char bt_msg_stop_lies_so[sizeof(bt_msg_stop) == 1 ? 1 : -1];
+typedef char bt_msg_ping_lies_so[sizeof(bt_msg_ping) == 1 ? 1 : -1];
+typedef char bt_msg_subscribe_lies_so[sizeof(bt_msg_subscribe) == 3 ? 1 : -1];
+typedef char bt_msg_get_point_lies_so[sizeof(bt_msg_get_point) == 2 ? 1 : -1];
+typedef char bt_msg_tare_now_lies_so[sizeof(bt_msg_tare_now) == 2 ? 1 : -1];
+typedef char bt_msg_tare_set_lies_so[sizeof(bt_msg_tare_set) == 42 ? 1 : -1];
+typedef char bt_msg_get_status_lies_so[sizeof(bt_msg_get_status) == 1 ? 1 : -1];
+typedef char bt_msg_get_sensor_status_lies_so[sizeof(bt_msg_get_sensor_status) == 2 ? 1 : -1];
+typedef char bt_msg_get_sensor_info_lies_so[sizeof(bt_msg_get_sensor_info) == 2 ? 1 : -1];
+typedef char bt_msg_get_setting_lies_so[sizeof(bt_msg_get_setting) == 2 ? 1 : -1];
+typedef char bt_msg_set_setting_lies_so[sizeof(bt_msg_set_setting) == 8 ? 1 : -1];
+typedef char bt_msg_reboot_bootloader_lies_so[sizeof(bt_msg_reboot_bootloader) == 8 ? 1 : -1];
+typedef char bt_msg_save_settings_lies_so[sizeof(bt_msg_save_settings) == 1 ? 1 : -1];
+typedef char bt_msg_get_calibration_lies_so[sizeof(bt_msg_get_calibration) == 2 ? 1 : -1];
+typedef char bt_msg_set_calibration_lies_so[sizeof(bt_msg_set_calibration) == 56 ? 1 : -1];
+typedef char bt_msg_clear_calibration_lies_so[sizeof(bt_msg_clear_calibration) == 2 ? 1 : -1];
+typedef char bt_msg_get_map_lies_so[sizeof(bt_msg_get_map) == 2 ? 1 : -1];
+typedef char bt_msg_read_map_lies_so[sizeof(bt_msg_read_map) == 4 ? 1 : -1];
+typedef char bt_msg_begin_map_lies_so[sizeof(bt_msg_begin_map) == 8 ? 1 : -1];
+typedef char bt_msg_write_map_lies_so[sizeof(bt_msg_write_map) == 132 ? 1 : -1];
+typedef char bt_msg_end_map_lies_so[sizeof(bt_msg_end_map) == 8 ? 1 : -1];
+typedef char bt_msg_clear_map_lies_so[sizeof(bt_msg_clear_map) == 2 ? 1 : -1];
+typedef char bt_msg_hold_lies_so[sizeof(bt_msg_hold) == 2 ? 1 : -1];
+typedef char bt_msg_release_lies_so[sizeof(bt_msg_release) == 2 ? 1 : -1];
+typedef char bt_msg_clear_faults_lies_so[sizeof(bt_msg_clear_faults) == 24 ? 1 : -1];
+typedef char bt_msg_get_board_facts_lies_so[sizeof(bt_msg_get_board_facts) == 1 ? 1 : -1];
+typedef char bt_msg_set_bus_rate_lies_so[sizeof(bt_msg_set_bus_rate) == 4 ? 1 : -1];
+typedef char bt_msg_emu_status_lies_so[sizeof(bt_msg_emu_status) == 48 ? 1 : -1];
+typedef char bt_msg_emu_plug_lies_so[sizeof(bt_msg_emu_plug) == 19 ? 1 : -1];
+typedef char bt_msg_emu_tape_lies_so[sizeof(bt_msg_emu_tape) == 228 ? 1 : -1];
+typedef char bt_msg_emu_set_fault_lies_so[sizeof(bt_msg_emu_set_fault) == 4 ? 1 : -1];
+typedef char bt_msg_emu_get_status_lies_so[sizeof(bt_msg_emu_get_status) == 1 ? 1 : -1];
+typedef char bt_msg_emu_play_lies_so[sizeof(bt_msg_emu_play) == 12 ? 1 : -1];
+typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #endif
 
 #ifdef BT_CLIENT_FIELDS // for tests: X(name, type, count) for every field

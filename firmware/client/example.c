@@ -1,4 +1,5 @@
 // Prints what a board's fingers feel: cc -o example example.c biotac_client.c && ./example /dev/ttyACM0 500
+#define _DEFAULT_SOURCE // cfmakeraw
 #include "biotac_client.h"
 
 #include <fcntl.h>

@@ -55,7 +55,10 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, 
     healthy, before = play(HEALTHY)
     faulty, after = play(hurt_by(kind))
     for finger in (0, 2):
-        assert of(faulty, finger).tobytes() == of(healthy, finger).tobytes()
+        alike = of(faulty, finger), of(healthy, finger)
+        if "jitter" in rig.facts:
+            alike[0]["t_us"] = alike[1]["t_us"]
+        assert alike[0].tobytes() == alike[1].tobytes()
         assert getattr(after[finger], counter) == getattr(before[finger], counter) == 0
     # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all, nor one in which the sensor is
     # asked who it is: three of those 30, and one when it is back.

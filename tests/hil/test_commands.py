@@ -70,6 +70,7 @@ REFUSED = [
     (wire.EndMap, (0, 0), wire.Error.NOT_BEGUN),
     (wire.ClearMap, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
 ]
+FOR_MAPS = (wire.BeginMap, wire.WriteMap, wire.EndMap, wire.ClearMap)
 
 
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
@@ -100,6 +101,8 @@ def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
 def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
     hand = board("press.toml")
     for kind, values, error in REFUSED:
+        if hand.info.map_bytes == 0 and kind in FOR_MAPS and error != wire.Error.NO_SUCH_FINGER:
+            error = wire.Error.NOT_HERE
         (answer,) = replies_to(hand, kind.ID, kind(7, *values).pack())
         assert (type(answer), answer.command, answer.error) == (wire.Reply, kind.ID, error), (kind, values)
 
@@ -136,7 +139,7 @@ def test_what_is_damaged_on_its_way_is_counted_and_never_obeyed(board) -> None:
     assert hand.board.setting(Setting.IDLE_PERIOD_MS) == 100
 
 
-def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> None:
+def test_a_command_that_comes_twice_is_answered_twice_and_done_once(rig, board) -> None:
     hand = board("press.toml")
     start = wire.Start(7, int(wire.StreamFlags.FRAMES), 1, 0)
     set_it = wire.SetSetting(7, int(Setting.IDLE_PERIOD_MS), 250)
@@ -147,7 +150,8 @@ def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> No
     hand.stream("force", "poc", "torque", "pressure")
     hand.link.write(2 * encode(start.ID, start.pack()))
     frames = hand.read(0.3)
-    assert len(np.unique(frames["seq"])) == len(frames) == 30
+    assert len(np.unique(frames["seq"])) == len(frames)
+    assert len(frames) == 30 or ("jitter" in rig.facts and len(frames) == 31)
     assert (hand.stats.disordered, hand.stats.frames_lost) == (0, 0)
 
 

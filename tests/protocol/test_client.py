@@ -14,7 +14,13 @@ from biotac.sim.loading import load_source
 from biotac.sim.ports import start_board
 
 CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
-WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wcast-qual", "-Werror"]
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wcast-qual", "-Werror"]
+M4 = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb"]
+COMPILERS = [
+    *([compiler, f"-std={standard}"] for compiler in ("gcc", "clang") for standard in ("c99", "c11")),
+    *([compiler, "-std=c++17", "-x", "c++"] for compiler in ("g++", "clang++")),
+    [*M4, "-std=c99"], [*M4, "-std=c++17", "-x", "c++"],
+]  # fmt: skip
 MOST_BYTES = 4096
 FRAMES = 150
 
@@ -61,6 +67,64 @@ def test_the_example_prints_the_frames_that_python_reads(tmp_path: Path) -> None
         message = wire[finger, t_us]
         assert (message["force_100un"].tolist(), int(message["flags"])) == ([x, y, z], flags)
     assert any(abs(z) < 2**31 - 1 for *_, z, _ in told)
+
+
+@pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)
+def test_it_compiles_wherever_a_hands_controller_does(tmp_path: Path, compiler: list[str]) -> None:
+    if shutil.which(compiler[0]) is None:
+        pytest.skip(f"{compiler[0]} is missing")
+    for source in ("biotac_client.c", "example_bare.c"):
+        subprocess.run([*compiler, *WARNINGS, "-c", str(CLIENT / source), "-o", str(tmp_path / "x.o")], check=True)
+
+
+def test_a_program_in_cpp_links_it(tmp_path: Path) -> None:
+    """The client built as C, a program in C++ that also includes the core's header."""
+    (tmp_path / "main.cpp").write_text(
+        '#include "wire/messages_gen.h"\n#include "biotac_client.h"\n'
+        "int main() {\n"
+        "    static bt_client board;\n"
+        "    bt_client_rounds finger = {};\n"
+        "    bool lost = bt_client_lost(&finger, 65534, 1) == 0 && bt_client_lost(&finger, 1, 3) == 0\n"
+        "                && bt_client_lost(&finger, 4, 1) == 2 && bt_client_lost(&finger, 9, 2) == 3;\n"
+        "    bool valid = !bt_valid_i32(BT_INVALID_I32) && bt_valid_i32(0) && !bt_valid_count(65535);\n"
+        "    return lost && valid ? bt_client_push(&board, 0) : 1;\n"
+        "}\n"
+    )
+    core = CLIENT.parent / "core"
+    subprocess.run(["gcc", "-std=c99", "-c", str(CLIENT / "biotac_client.c"), "-o", str(tmp_path / "c.o")], check=True)
+    words = ["-std=c++17", *WARNINGS, f"-I{CLIENT}", f"-I{core}", str(tmp_path / "main.cpp"), str(tmp_path / "c.o")]
+    subprocess.run(["g++", *words, "-o", str(tmp_path / "main")], check=True)
+    subprocess.run([str(tmp_path / "main")], check=True)
+
+
+@pytest.mark.skipif(not shutil.which("qemu-system-arm"), reason="no qemu-system-arm to run a controller in")
+def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -> None:
+    """example_bare.c on an STM32F405 in QEMU; its UART leads to a simulated board."""
+    for words in (["-S", "firmware", "--preset", "f405"], ["--build", "build/f405"]):
+        subprocess.run(["cmake", *words], cwd=CLIENT.parents[1], check=True, capture_output=True)
+    board = start_board("posix", load_source("press.toml", fingers=2, seconds=60.0), pace=1.0)
+    command = [
+        "qemu-system-arm",
+        "-M",
+        "netduinoplus2",
+        "-kernel",
+        str(CLIENT.parents[1] / "build/f405/f405-client.elf"),
+    ]
+    command += ["-display", "none", "-monitor", "none", "-serial", "null", "-serial", "null"]
+    command += ["-serial", board.path, "-semihosting-config", "enable=on,target=native"]
+    try:
+        prepare(board)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    finally:
+        board.close()
+    *acted, last = done.stderr.splitlines()
+    forces = [tuple(int(word, 16) for word in line.split()) for line in acted]
+    assert len(forces) == 100 and last == "00000000 lost"
+    assert {finger for finger, *_ in forces} == {0, 1}
+    with biotac.open("sim:press.toml?fingers=2&seconds=60") as hand:
+        told = hand.read_batch(4000).wire
+    published = {(int(m["finger"]), *(int(f) & 0xFFFFFFFF for f in m["force_100un"])) for m in told}
+    assert set(forces) <= published
 
 
 def test_what_is_on_no_port_is_said_in_words(tmp_path: Path) -> None:

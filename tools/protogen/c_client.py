@@ -32,10 +32,16 @@ def struct_bytes(message: Message) -> int:
 
 
 def header(contract: Contract) -> str:
-    out = ["#include <stdint.h>", "", *constants(contract), "", *vocabulary(contract)]
+    out = [
+        "#include <stdint.h>",
+        "",
+        "#ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both",
+    ]
+    out += [*constants(contract), "", *vocabulary(contract)]
     for message in contract.messages:
         out += [*define(message), ""]
     out += [
+        "#endif",
         "#ifdef BT_CLIENT_LAYOUT",
         "// Of each message: id, how many runs, and the runs; a run is the size's logarithm (2 bits) and a count (6).",
         "static const uint8_t bt_client_layout[] = {",
@@ -45,8 +51,10 @@ def header(contract: Contract) -> str:
         numbers = [f"0x{size.bit_length() - 1 << 6 | count:02X}" for size, count in its]
         out += [f"    BT_{message.name}_ID, {len(its)}, {', '.join(numbers)},"]
     out += ["    0, 0,", "};"]
+    # C99 and C++ alike.
+    out += ["// Numbers lie at multiples of their size."]
     out += [
-        f'_Static_assert(sizeof({struct_name(m)}) == {struct_bytes(m)}, "numbers lie at multiples of their size");'
+        f"typedef char {struct_name(m)}_lies_so[sizeof({struct_name(m)}) == {struct_bytes(m)} ? 1 : -1];"
         for m in contract.messages
     ]
     out += ["#endif", "", "#ifdef BT_CLIENT_FIELDS // for tests: X(name, type, count) for every field"]

@@ -77,6 +77,10 @@ def header(contract: Contract) -> str:
     out = [
         "#include <stdint.h>",
         "",
+        "#ifdef BIOTAC_CLIENT_GEN_H",
+        '#error "include this before biotac_client.h, which then takes what both have from here"',
+        "#endif",
+        "",
         *constants(contract),
         f"#define BT_BOOTLOADER_MAGIC 0x{wire['bootloader_magic']:08X}u // of REBOOT_BOOTLOADER",
         f"#define BT_RESTART_MAGIC 0x{wire['restart_magic']:08X}u // likewise",

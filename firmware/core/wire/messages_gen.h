@@ -6,6 +6,10 @@
 
 #include <stdint.h>
 
+#ifdef BIOTAC_CLIENT_GEN_H
+#error "include this before biotac_client.h, which then takes what both have from here"
+#endif
+
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
 #define BT_SCHEMA_HASH 0x13DC1CFAu

@@ -1,0 +1,82 @@
+// A controller without an operating system that reads a gateway over a UART: what its interrupt does, and its
+// main loop. The four functions that a chip has of its own are declared; firmware/port/stm32f405/uart.c is
+// how one defines them.
+#include "biotac_client.h"
+
+// Puts bytes into the UART's transmit ring. Whole commands, or the board refuses what is left of one.
+void uart_send(const uint8_t *data, size_t bytes);
+
+// The next byte that the receive interrupt has put into its ring; -1 when there is none.
+int uart_next(void);
+
+uint32_t now_ms(void);
+
+// 100 uN on the finger, along x, y and z, never older than the caller allows: it is told nothing when there
+// is nothing.
+void act_on(uint8_t finger, const int32_t force_100un[3]);
+
+#define KEEPALIVE_MS 500 // the board stops its streams when it has heard nothing for so long
+#define PING_MS      150
+#define FINGERS      5
+
+static bt_client board;
+static bt_client_rounds rounds[FINGERS];
+static uint32_t lost;     // rounds, on the link
+static uint32_t ping_ms;  // when the board last heard from here
+static uint32_t heard_ms; // and when it last told of a finger
+static uint8_t streaming;
+
+static void send(uint8_t id, const void *msg)
+{
+    uint8_t out[BT_ENCODED_MAX_BYTES];
+    uart_send(out, bt_client_write(id, msg, out));
+    ping_ms = now_ms();
+}
+
+static void take(int id)
+{
+    if (id == BT_FRAME_ID || id == BT_IDLE_ID) {
+        heard_ms = now_ms();
+    }
+    bt_msg_hello hello;
+    bt_msg_frame frame;
+    bt_msg_idle idle;
+    if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello)
+        && hello.wire_major == BT_WIRE_MAJOR) {
+        bt_msg_start start = {2, BT_STREAM_FLAG_FRAMES, 0, KEEPALIVE_MS};
+        start.fingers = (uint8_t)((1u << hello.fingers) - 1u);
+        board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
+        send(BT_START_ID, &start);
+        heard_ms = now_ms();
+        streaming = 1;
+    } else if (id == BT_IDLE_ID && bt_client_read(&board, BT_IDLE_ID, &idle) && idle.finger < FINGERS) {
+        lost += bt_client_lost(&rounds[idle.finger], idle.seq, idle.frames);
+    } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame) && frame.finger < FINGERS) {
+        lost += bt_client_lost(&rounds[frame.finger], frame.seq, 1);
+        if (bt_valid_i32(frame.force_100un[2]) && !(frame.flags & BT_FRAME_FLAG_FAULT)) {
+            act_on(frame.finger, frame.force_100un);
+        }
+    }
+}
+
+// Call from the main loop, often. A board that has restarted sends nothing until it is asked again.
+void hand_poll(void)
+{
+    int byte;
+    while ((byte = uart_next()) >= 0) {
+        take(bt_client_push(&board, (uint8_t)byte));
+    }
+    if (now_ms() - heard_ms > KEEPALIVE_MS) {
+        streaming = 0;
+    }
+    if (now_ms() - ping_ms >= PING_MS) {
+        const bt_msg_hello_request hello = {1, 7};
+        const bt_msg_ping ping = {3};
+        streaming ? send(BT_PING_ID, &ping) : send(BT_HELLO_REQUEST_ID, &hello);
+    }
+}
+
+uint32_t hand_lost(void)
+{
+    return lost;
+}

@@ -1,0 +1,69 @@
+// firmware/client/example_bare.c on the STM32F405 in QEMU: its UART leads to a gateway. Prints what it would
+// act on, "finger x y z" in 100 uN, until it has had enough, then how many rounds were lost.
+#include "only_board.h"
+#include "stm32f405.h"
+
+#include "semihosting.h"
+
+#define ENOUGH 100
+
+void hand_poll(void);
+uint32_t hand_lost(void);
+void uart_send(const uint8_t *data, size_t bytes);
+int uart_next(void);
+uint32_t now_ms(void);
+void act_on(uint8_t finger, const int32_t force_100un[3]);
+
+uint32_t flash_erase_us;
+static unsigned acted;
+
+void spi_start(void)
+{
+}
+
+bool bt_port_alarm(void)
+{
+    return false;
+}
+
+void uart_send(const uint8_t *data, size_t bytes)
+{
+    (void)port_link_write(ONLY_BOARD, data, bytes);
+}
+
+int uart_next(void)
+{
+    uint8_t byte;
+    return port_link_read(ONLY_BOARD, &byte, 1) == 1 ? byte : -1;
+}
+
+uint32_t now_ms(void)
+{
+    return port_now_us(ONLY_BOARD) / 1000;
+}
+
+void act_on(uint8_t finger, const int32_t force_100un[3])
+{
+    semihost_write_hex(finger);
+    for (int axis = 0; axis < 3; axis++) {
+        semihost_write(" ");
+        semihost_write_hex((uint32_t)force_100un[axis]);
+    }
+    semihost_write("\n");
+    acted++;
+}
+
+int main(int argc, char **argv)
+{
+    bt_port *port = port_init(argc, argv);
+    port_link_uart(port, 0, 0);
+    for (;;) {
+        hand_poll();
+        port_idle(port);
+        if (acted >= ENOUGH) {
+            semihost_write_hex(hand_lost());
+            semihost_write(" lost\n");
+            (void)semihost(SYS_EXIT, EXIT_DONE);
+        }
+    }
+}
