@@ -16,6 +16,7 @@
 #include "finger.h"
 #include "lin2013.h"
 #include "map/map.h"
+#include "record.h"
 #include "replay.h"
 #include "sbc.h"
 #include "signal/signals.h"

@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 
 from ..errors import NotAGatewayError
+from ..keep import Calibration, harness
 from ..link import Link, open_link
 from ..link.discovery import SERIAL_PREFIX, choose
 from ..wire import messages_gen as wire
@@ -25,7 +26,8 @@ def open(
 
     Without ``port``, opens the only board on USB, found by its USB ids; no other port is opened. ``port`` is
     ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
-    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE per finger;
+    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE per finger
+    (``?calibration=1:0x50:24c02``, one for each, loads the calibrations stored in the EEPROMs on their harnesses);
     ``sim:SOURCE`` for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts
     (``.npz``, ``.btd``); or ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the
     same. ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
@@ -41,12 +43,14 @@ def open(
     latest values are shown until they are ``max_age_s`` old, and are NaN from then on.
 
     Raises PortError, NotAGatewayError or WireVersionError; InputError for a source or a recording that cannot be
-    played.
+    played, or an EEPROM without a calibration; CommandRefusedError for a calibration of another sensor.
     """
     text = None if port is None else os.fspath(port)
     if text is None or text.startswith(SERIAL_PREFIX):
         text = choose(text and text.removeprefix(SERIAL_PREFIX))
-    reconnect = reconnect and not text.startswith("spidev:")
+    if text.startswith("spidev:"):
+        bare, own = harness.load(text)
+        return shake_hands(open_link(bare, pace=pace), fingers=fingers, max_age_s=max_age_s, calibrations=own)
     return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers, max_age_s=max_age_s)
 
 
@@ -56,8 +60,9 @@ def shake_hands(
     reconnect: bool = False,
     fingers: Mapping[str, int] | None = None,
     max_age_s: float = MAX_AGE_S,
+    calibrations: Mapping[int, Calibration] | None = None,
 ) -> Hand:
-    """Make a Hand from an open link.
+    """Make a Hand from an open link, and give it each finger's calibration.
 
     A simulated board gets its source's settings (an emulated finger's own gains) and stored tare, as a real one would
     from its user. Closes the link when any of this fails.
@@ -70,6 +75,8 @@ def shake_hands(
                 f"{link.port} is a sensor board, not a gateway: feed it with `biotac sim SOURCE --sensor-port "
                 f"{link.port}`, and open the port of the gateway it is wired to"
             )
+        for finger, calibration in (calibrations or {}).items():
+            hand.board.set_calibration(finger, calibration)
         for name, value in source.settings.items() if source else ():
             hand.board.set_setting(wire.Setting[name.upper()], value)
         if source and source.tare_q4 is not None:

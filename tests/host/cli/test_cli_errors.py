@@ -1,6 +1,6 @@
 """Each verb's ways to fail, one a line: the fixed exit code, one line on stderr, and the cure in it.
 
-What takes a staged device stands with that device (test_flash.py, test_emulated.py, test_doctor.py),
+What takes a staged device stands with that device (test_flash.py, test_eeprom.py, test_emulated.py, test_doctor.py),
 what argparse refuses in test_cli.py.
 """
 
@@ -196,6 +196,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "check the path", "export +no.btd +out.mcap"),
     (2, "expected a SynTouch .btd", "export @none.btd +out.mcap"),
     (2, "overwrite it (--force", "export @none.btd @rec.mcap"),
+    (3, "expected one such as 1:0x50:24c32", "calibration show i2c:1:0x50"),
     (2, "check the path", "calibration show +no.json"),
     (2, "as `biotac calibration get` and", "calibration show @list.json"),
     (3, "`biotac list`", f"calibration show {NO_PORT}"),
@@ -203,8 +204,13 @@ CASES: list[tuple[int, str, str]] = [
     (3, "`biotac list`", f"calibration get {NO_PORT} +out.json --finger 0"),
     (7, "or send no serial number to force it", "calibration put sim:press.toml @other.json --finger 0"),
     (2, "check the path", "calibration put sim:press.toml +no.json --finger 0"),
+    (3, "expected BUS:ADDRESS", "calibration put i2c:here:24c02 @other.json"),
+    (2, "is a wrench map, which no EEPROM holds", "calibration put i2c:1:0x50:24c02 @map.json"),
+    (3, "check its address pins", "calibration get i2c:1:0x20:24c02 +out.json"),
+    (2, "use a 24c02", "calibration get i2c:1:0x50:24c01 +out.json"),
     (2, "no wrench map; the recording has none", "calibration get @rec.mcap +out.json --finger thumb --kind map"),
     (2, "no calibration and no wrench map; the", "calibration get replay:@rec.mcap +out.json --finger thumb"),
+    (2, "name one with --finger", "calibration get sim:press.toml +out.json"),
     (2, "expected JSON of `biotac calibration get`", "calibration put sim:press.toml @broken.json --finger 0"),
     (7, "or send no serial number to force it", "calibration put sim:press.toml @map.json --finger 0"),
     (2, "expected a scenario's path or one of", "sim nowhere.toml"),

@@ -19,6 +19,7 @@ from biotac import Calibration, CalibrationState, PocWeights, Setting
 from biotac.cli.main import main
 from biotac.documents import write_new
 from biotac.keep import calibration_file as file
+from biotac.keep import eeprom
 from biotac.map import file as map_file
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.facts import Facts
@@ -148,11 +149,51 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
         file.load(tmp_path / "latin.json")
 
 
+# ---- record ------------------------------------------------------------------------------------
+
+
+def test_a_record_is_that_of_the_specification() -> None:
+    data = SERIAL.encode() + struct.pack("<I8i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600, 9_500_000)
+    assert eeprom.pack(ODD) == sealed(2, 1, data)
+    assert eeprom.unpack(eeprom.pack(ODD), "it") == ODD
+    assert eeprom.unpack(eeprom.pack(ODD).ljust(256, b"\xff"), "it") == ODD
+
+
 def sealed(record_id: int, version: int, data: bytes) -> bytes:
-    """A record as SPEC.md has it."""
     header = struct.pack("<IHHI", 0x52544F42, record_id, version, len(data))
     crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
     return header + struct.pack("<I", crc) + data
+
+
+GOOD = eeprom.pack(ODD)[16:]
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "no intact record"),
+        (eeprom.pack(ODD)[:-3], "no intact record: its CRC is wrong"),
+        (eeprom.pack(ODD) + b"\0", "no intact record"),
+        (sealed(1, 1, GOOD), "a record other than a calibration"),
+        (sealed(7, 1, GOOD), "a record other than a calibration"),
+        (sealed(2, 2, GOOD), "a newer format"),
+        (sealed(2, 1, GOOD[:-4]), "a value out of range"),
+        (sealed(2, 1, b""), "a cleared calibration"),
+        (sealed(2, 1, GOOD[:20] + b"\7" + GOOD[21:]), "a value out of range"),
+        (sealed(2, 1, b"B\xe4" + GOOD[2:]), "an invalid calibration"),
+    ],
+)
+def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
+    with pytest.raises(biotac.InputError, match=words):
+        eeprom.unpack(data, "it")
+
+
+@pytest.mark.parametrize("at", range(68))
+def test_no_byte_of_a_record_may_change(at: int) -> None:
+    data = bytearray(eeprom.pack(ODD))
+    data[at] ^= 0x20
+    with pytest.raises(biotac.InputError):
+        eeprom.unpack(bytes(data), "it")
 
 
 # ---- a board with flash --------------------------------------------------------------------------
@@ -166,8 +207,7 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
         hand.board.set_calibration(1, replace(ODD, serial=""))
         hand.board.save_settings()
         hand.board.clear_calibration(1)  # not saved
-    data = mine.serial.encode().ljust(16, b"\0") + struct.pack("<I8i", mine.made_s, *mine.wire_values())
-    assert sealed(2, 1, data) in flash.read_bytes()
+    assert eeprom.pack(mine) in flash.read_bytes()
     with boot(flash) as hand:
         assert hand.board.calibrations() == {0: mine, 1: replace(ODD, serial="")}
         hand.board.clear_calibration(1)

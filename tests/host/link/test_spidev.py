@@ -7,12 +7,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
+import fake_smbus
 import fake_spidev
 import numpy as np
 import pytest
 from overheard import Overheard
 
 import biotac
+from biotac.keep import eeprom
+from biotac.keep.chip import Chip
 from biotac.link import spidev as spidev_link
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
@@ -243,3 +246,26 @@ def test_the_computers_clock_sleeps_through_long_waits_and_never_returns_early(m
     before = now[0]
     clock.delay_ns(5_000)
     assert now[0] >= before + 5_000
+
+
+# ---- calibrations on the harnesses ---------------------------------------------------------------
+
+
+def test_what_the_harnesses_eeproms_hold_is_in_force_when_it_is_opened(board: Board, monkeypatch) -> None:
+    first, bus = board("shear.toml", 2)
+    serial = bytes(first.sensor_info(1).serial).decode()
+    first.close()
+    wires = fake_smbus.Wires({0x50: fake_smbus.Eeprom(256, 8, 1), 0x51: fake_smbus.Eeprom(4096, 32, 2)})
+    monkeypatch.setitem(sys.modules, "smbus2", wires.module())
+    mine = biotac.Calibration(serial=serial, made_s=5, force_gain_nn=(7, 8, 9))
+    with Chip("1:0x51", "24c32") as chip:
+        eeprom.store(chip, mine)
+    with biotac.open("spidev:0.0,0.1?calibration=,1:0x51:24c32") as hand:
+        assert hand.board.calibrations() == {1: mine}
+    # On finger 0's harness it is another sensor's; and finger 0's own chip is blank.
+    with pytest.raises(biotac.CommandRefusedError, match="OTHER_SENSOR"):
+        biotac.open("spidev:0.0,0.1?calibration=1:0x51:24c32")
+    with pytest.raises(biotac.InputError, match="EEPROM 1:0x50 is blank"):
+        biotac.open("spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c32")
+    assert wires.open_buses == 0
+    assert all(spi.closed for spi in bus.opened)

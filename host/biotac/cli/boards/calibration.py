@@ -17,7 +17,8 @@ from biotac import Calibration, Hand
 from ...documents import JSON_BYTES, made_text, parse_json, read_text, write_new
 from ...errors import InputError
 from ...hand.configuration import Configuration
-from ...keep import calibration_file
+from ...keep import calibration_file, eeprom
+from ...keep.chip import Chip, parse_place
 from ...map import file as map_file
 from ...version import __version__
 from ...wire.identity import serial_text, setting_text
@@ -26,6 +27,8 @@ from .. import values
 from ..outputs import say
 
 EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
+EEPROM = "i2c:"
+IN_EEPROM = f"{EEPROM}BUS:ADDRESS:CHIP"
 
 
 @dataclass(frozen=True)
@@ -74,23 +77,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     def add(name: str, action: Callable[..., int], text: str, example: str) -> argparse.ArgumentParser:
         return values.add_subverb(what, name, action, text, f"biotac calibration {name} {example}")
 
-    show = add("show", _show, "What a board, a recording or a file holds.", "index.json")
-    show.add_argument("where", metavar="PORT|REC|FILE")
+    which = f"an EEPROM, for one calibration, is {EEPROM}1:0x50:24c32, for example"
+    show = add("show", _show, "What a board, a recording, a file or an EEPROM holds.", "index.json")
+    show.add_argument("where", metavar=f"PORT|REC|FILE|{IN_EEPROM}", help=which)
 
-    get = add("get", _get, "From a board or recording to a file.", "/dev/ttyACM0 --finger index index.json")
-    get.add_argument("where", metavar="PORT|REC")
+    get = add("get", _get, "From a board, recording or EEPROM to a file.", "/dev/ttyACM0 --finger index index.json")
+    get.add_argument("where", metavar=f"PORT|REC|{IN_EEPROM}", help=which)
     get.add_argument("file", metavar="FILE", type=Path, help="- is standard output")
     get.add_argument("--force", action="store_true", help="overwrite FILE")
 
-    put = add("put", _put, "From a file to a board.", "/dev/ttyACM0 index.json --finger index --save")
-    put.add_argument("where", metavar="PORT")
+    put = add("put", _put, "From a file to a board or an EEPROM.", "/dev/ttyACM0 index.json --finger index --save")
+    put.add_argument("where", metavar=f"PORT|{IN_EEPROM}", help=which)
     put.add_argument("file", metavar="FILE", type=Path, help="- is standard input")
     put.add_argument("--force", action="store_true", help="accept a sensor other than the file's")
 
     clear = add("clear", _clear, "Back to the board's settings.", "/dev/ttyACM0 --finger index --save")
     clear.add_argument("where", metavar="PORT")
     for one in (get, put, clear):
-        values.add_finger(one)
+        values.add_finger(one, required=one is clear, text="name or chip select, of a board")
     for one in (get, clear):
         one.add_argument("--kind", choices=KINDS, help="which of the two, for a finger that has both")
     for one in (put, clear):
@@ -98,8 +102,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _show(args: argparse.Namespace) -> int:
-    if args.where.endswith(".json") or (Path(args.where).is_file() and _port(args.where) == args.where):
-        kind, content = _load(Path(args.where))
+    is_file = args.where.endswith(".json") or (Path(args.where).is_file() and _port(args.where) == args.where)
+    if is_file or args.where.startswith(EEPROM):
+        kind, content = _load(Path(args.where)) if is_file else (KINDS["calibration"], _in_eeprom(args.where))
         lines = [f"{args.where}: {kind.title(content)}", *kind.lines(content)]
         say(args, kind.file.to_dict(content), "\n".join(lines))
         return 0
@@ -122,9 +127,13 @@ def _show(args: argparse.Namespace) -> int:
 
 
 def _get(args: argparse.Namespace) -> int:
-    with biotac.open(_port(args.where)) as hand:
-        had = _had(args, hand)
-        board = {"from": args.where, "board_serial": serial_text(hand.info), "finger": args.finger}
+    if args.where.startswith(EEPROM):
+        had, board = [(KINDS["calibration"], _in_eeprom(args.where))], {"from": args.where}
+    else:
+        _check_named(args)
+        with biotac.open(_port(args.where)) as hand:
+            had = _had(args, hand)
+            board = {"from": args.where, "board_serial": serial_text(hand.info), "finger": args.finger}
     if not had:
         missing = KINDS[args.kind].name if args.kind else "calibration and no wrench map"
         cure = "the recording has none" if _port(args.where).startswith("replay:") else "upload one with `put`"
@@ -141,6 +150,14 @@ def _get(args: argparse.Namespace) -> int:
 
 def _put(args: argparse.Namespace) -> int:
     kind, content = _load(args.file)
+    if args.where.startswith(EEPROM):
+        if kind is not KINDS["calibration"]:
+            raise InputError(f"{args.file} is a {kind.name}, which no EEPROM holds; expected a calibration")
+        with Chip(*parse_place(args.where.removeprefix(EEPROM))) as chip:
+            more = "stored" if eeprom.store(chip, content) else "which it held already"
+        say(args, kind.file.to_dict(content), f"{args.where}: {kind.title(content)}, {more}")
+        return 0
+    _check_named(args)
     with biotac.open(args.where) as hand:
         kind.write(hand.board, args.finger, content, args.force)
         content = kind.read(hand.board, args.finger) or content
@@ -169,6 +186,16 @@ def _had(args: argparse.Namespace, hand: Hand) -> list[tuple[Kind, Any]]:
         both = " or ".join(KINDS)
         raise InputError(f"finger {args.finger} has a calibration and a wrench map; name one: --kind {both}")
     return had
+
+
+def _check_named(args: argparse.Namespace) -> None:
+    if args.finger is None:
+        raise InputError(f"{args.where} has several fingers; name one with --finger")
+
+
+def _in_eeprom(where: str) -> Calibration:
+    with Chip(*parse_place(where.removeprefix(EEPROM))) as chip:
+        return eeprom.load(chip)
 
 
 def _port(where: str) -> str:

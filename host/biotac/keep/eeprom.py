@@ -1,0 +1,103 @@
+"""A calibration in an EEPROM: two slots, written in turn, so that an interrupted write never destroys the old one.
+
+Each slot holds a CRC-32 over the rest of it, a generation, and the record as in a board's flash (protocol/SPEC.md,
+Calibrations). The valid slot with the later generation counts. A write goes to the other slot, whose CRC is wrong
+until its last byte is stored. The slots have the same addresses in every chip, so naming a wrong size does not move
+them.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+from ..errors import InputError, PortError
+from ..wire.native import ffi, lib
+from .calibration import Calibration
+from .chip import Chip
+
+SLOT_BYTES = 128
+SLOTS = 2
+CRC = GENERATION = struct.Struct("<I")
+RECORD_BYTES = 256
+_WHY = {
+    lib.BT_RECORD_DAMAGED: "holds no intact record: its CRC is wrong; store the calibration again",
+    lib.BT_RECORD_OF_SOMETHING: "holds a record other than a calibration; store the calibration again",
+    lib.BT_RECORD_OTHER_VERSION: "holds a calibration in a newer format; install a newer biotac-gateway",
+    lib.BT_RECORD_CLEARED: "holds a cleared calibration; store one again",
+    lib.BT_RECORD_OUT_OF_RANGE: "holds a calibration with a value out of range; store a valid one",
+}
+
+
+def pack(calibration: Calibration) -> bytes:
+    """The record, header and data, as in a page of the board's flash for finger 0; the board's own code packs it."""
+    record = ffi.new("bt_calibration *")
+    record.present = True
+    record.serial = calibration.wire_serial()
+    record.made_s = calibration.made_s
+    record.value = calibration.wire_values()
+    page = ffi.new("uint8_t[]", RECORD_BYTES)
+    return bytes(ffi.buffer(page, lib.bt_record_pack(record, page)))
+
+
+def unpack(data: bytes, where: str) -> Calibration:
+    """The calibration in ``data``, which may end in 0xFF bytes.
+
+    Raises InputError that begins with ``where`` and says why there is none that can be used.
+    """
+    record = ffi.new("bt_calibration *")
+    judgement = lib.bt_record_unpack(record, data, len(data))
+    if judgement != lib.BT_RECORD_GOOD:
+        raise InputError(f"{where} {_WHY[judgement]}")
+    try:
+        return Calibration.from_wire(list(record.serial), record.made_s, list(record.value))
+    except ValueError as error:
+        raise InputError(f"{where} holds an invalid calibration ({error}); store a valid one") from error
+
+
+def load(chip: Chip) -> Calibration:
+    """The calibration in this chip. Raises InputError when there is none that can be used."""
+    raw = [_read(chip, slot) for slot in range(SLOTS)]
+    newest = _newest(raw)
+    if newest is None:
+        if all(set(data) == {0xFF} for data in raw):
+            raise InputError(f"{chip.name} is blank; `biotac calibration put` writes to it")
+        raise InputError(
+            f"{chip.name} holds no calibration: the CRCs of both copies are wrong; check its kind, or store it again"
+        )
+    return unpack(newest[2], chip.name)
+
+
+def store(chip: Chip, calibration: Calibration) -> bool:
+    """Store the calibration; False if it was there already, and nothing is written to spare the chip."""
+    slot, generation, record = _newest([_read(chip, slot) for slot in range(SLOTS)]) or (1, 0, b"")
+    body = pack(calibration).ljust(SLOT_BYTES - CRC.size - GENERATION.size, b"\xff")
+    if record == body:
+        return False
+    slot = 1 - slot
+    covered = GENERATION.pack((generation + 1) % 2**32) + body
+    whole = CRC.pack(zlib.crc32(covered)) + covered
+    chip.write(slot * SLOT_BYTES, whole)
+    if _read(chip, slot) != whole:
+        raise PortError(
+            f"{chip.name} does not read back the bytes written; check --chip and the chip's write protection (WP)"
+        )
+    return True
+
+
+def _read(chip: Chip, slot: int) -> bytes:
+    return chip.read(slot * SLOT_BYTES, SLOT_BYTES)
+
+
+def _newest(raw: list[bytes]) -> tuple[int, int, bytes] | None:
+    """Slot and generation of the newest intact record, and the record, followed by 0xFF."""
+    newest: tuple[int, int, bytes] | None = None
+    for slot, data in enumerate(raw):
+        covered = data[CRC.size :]
+        if CRC.unpack_from(data) != (zlib.crc32(covered),):
+            continue
+        (generation,) = GENERATION.unpack_from(covered)
+        # Modulo 2^32: a generation is later if it is less than 2^31 ahead.
+        if newest is None or 0 < (generation - newest[1]) % 2**32 < 2**31:
+            newest = slot, generation, covered[GENERATION.size :]
+    return newest
