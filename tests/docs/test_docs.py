@@ -14,6 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,21 +58,25 @@ def test_a_pages_python_runs(page: str, tmp_path: Path, monkeypatch, capsys) -> 
         assert "print(" not in code or capsys.readouterr().out
 
 
-def test_the_notebook_runs_and_is_the_one_on_the_page(tmp_path: Path, monkeypatch) -> None:
-    """Ten lines from open to a plotted DataFrame, run as Jupyter would: cell after cell in one place."""
+def test_the_notebook_runs_and_begins_as_the_page_does(tmp_path: Path, monkeypatch, capsys) -> None:
+    """Ten lines from open to a plotted DataFrame, then a day's work; cell after cell in one place, as in Jupyter."""
     plt = pytest.importorskip("matplotlib.pyplot", reason="pip install 'biotac-gateway[plot,export]'")
     monkeypatch.chdir(tmp_path)
     plt.switch_backend("agg")
     cells = ["".join(cell["source"]) for cell in json.loads(NOTEBOOK.read_text())["cells"]]
-    assert len([line for cell in cells for line in cell.splitlines() if line]) <= 10
-    assert "\n\n".join(cells) in (ROOT / "host/docs/start/quickstart.md").read_text()
-    names: dict[str, object] = {}
-    for cell in cells[:-1]:
+    assert "\n\n".join(cells[:3]) in (ROOT / "host/docs/start/quickstart.md").read_text()
+    names: dict[str, Any] = {}
+    for cell in cells[:2]:
         exec(compile(cell, NOTEBOOK.name, "exec"), names)
-    axes = eval(compile(cells[-1], NOTEBOOK.name, "eval"), names)
+    axes = eval(compile(cells[2], NOTEBOOK.name, "eval"), names)
     frames = biotac.load("press.mcap")
     for line, force_n in zip(axes.lines, frames["force_n"].T, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), force_n)
+    for cell in cells[3:]:
+        exec(compile(cell, NOTEBOOK.name, "exec"), names)
+    assert abs(names["lag"].offset_s - 2.5) < 4 * names["lag"].sigma_s < 0.02 and names["share_right"] > 0.8
+    assert {label.text for label in biotac.Recording("day.mcap").labels} == {"glass plate", "presses", "hardest press"}
+    assert len(names["skin"].collections) == 1 and len(names["force"].lines) == 2
     plt.close("all")
 
 

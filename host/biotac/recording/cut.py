@@ -32,6 +32,9 @@ def cut(recording: Recording, place: Path, start_s: float = 0.0, stop_s: float |
         raise InputError(f"{recording.path} has {duration_s:.1f} s and no row from {start_s:g} s on in that time")
     first, last = (recording.heads()[k].rest for k in (chosen[0], chosen[-1]))
     from_us, to_us = first.first_us or begin_us, last.last_us or begin_us
+    labels = [
+        label for label in recording.labels if label.t_us is None or from_us <= (label.end_us or label.t_us)
+    ]  # in order of time
     file = RecordingFile(place.open("xb"), recording.metadata | {layout.CUT_FROM: recording.path.name})
     for k, packets in groupby(recording.packets(from_us), key=itemgetter(0)):
         if k > chosen[-1]:
@@ -40,8 +43,8 @@ def cut(recording: Recording, place: Path, start_s: float = 0.0, stop_s: float |
             file.add_gap(gap)
         data = b"".join(packet.data for _, packet in packets)
         file.add(data, recording.arrived_ns[k], recording.all_here_ns[k])
-    for label in recording.labels:
-        if label.t_us is None or (label.t_us <= to_us and (label.end_us or label.t_us) >= from_us):
-            file.add_label(label)
+        block_us = recording.heads()[k].rest.last_us or from_us
+        while labels and (labels[0].t_us or 0) <= block_us:
+            file.add_label(labels.pop(0))
     file.close()
     return (from_us - begin_us) / 1e6, (to_us - begin_us) / 1e6

@@ -16,6 +16,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from ..board.gap import Gap
 from ..version import __version__
 from ..wire.batches import StreamDecoder
+from ..wire.counters import nearest
 from ..wire.native import BUILT
 from . import layout
 from .block import Rest, schema, take_apart
@@ -37,6 +38,7 @@ class RecordingFile:
         self._labels: list[dict[str, Any]] = []
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
+        self._last_us = 0  # device time of the last row
         self._last_ns: int | None = None  # when the last block's bytes had all arrived
         self.frames = 0  #: FRAMEs written so far
         self._channels: dict[str, int] = {}
@@ -95,6 +97,7 @@ class RecordingFile:
             decoder.lost_pac - lost_pac,
             decoder.disordered - disordered,
         )
+        self._last_us = rest.last_us or self._last_us
         self._put(tables, rest, arrived_ns, all_here_ns)
         self.frames += len(batch.wire)
         self._plots.add(batch, decoder, arrived_ns, all_here_ns)
@@ -107,9 +110,12 @@ class RecordingFile:
         self._writer.flush()  # type: ignore[no-untyped-call]  # the index finds a chunk by its first message
 
     def add_label(self, label: Label) -> None:
-        """Note a label; its times are device times of 32 bits, or unwrapped in any way."""
-        unwrap = self._decoder.unwrap_t_us
-        t_us, end_us = (None if t is None else unwrap(t & 0xFFFFFFFF) for t in (label.t_us, label.end_us))
+        """Note a label whose last time is near that of the rows added last; its times may be unwrapped in any way."""
+        t_us, end_us = label.t_us, label.end_us
+        if t_us is not None:
+            latest_us = t_us if end_us is None else end_us
+            shift_us = nearest(latest_us & 0xFFFFFFFF, self._last_us or latest_us & 0xFFFFFFFF) - latest_us
+            t_us, end_us = t_us + shift_us, None if end_us is None else end_us + shift_us
         self._labels.append(asdict(label) | {"t_us": t_us, "end_us": end_us})
         self._plots.label(label, t_us)
         self._writer.flush()  # type: ignore[no-untyped-call]

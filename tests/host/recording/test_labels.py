@@ -69,6 +69,17 @@ def test_rows_know_which_labels_hold(recorded: Path, tmp_path: Path) -> None:
         recording.select(labels="slip")
 
 
+def test_a_long_span_keeps_its_beginning(tmp_path: Path) -> None:
+    with biotac.open("sim:press.toml?seconds=90") as hand, hand.record(tmp_path / "long.mcap"):
+        hand.read(seconds=1)
+        with hand.mark("long"):
+            hand.read_batch(100)
+    recording = biotac.Recording(tmp_path / "long.mcap")
+    (label,) = recording.labels
+    assert label.t_us is not None and label.end_us == recording.end_us
+    assert recording.begin_us <= label.t_us < recording.begin_us + 60_000_000
+
+
 def test_a_thousand_labels_leave_the_recording_as_it_was(recorded: Path, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(recorded.read_bytes())
