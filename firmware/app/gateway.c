@@ -21,6 +21,7 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
 
 _Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES && PORT_NAME_BYTES == BT_BOARD_NAME_BYTES,
                "the board's serial number and name go to the host whole");
+_Static_assert(PORT_LINKS == BT_LINKS, "the session has a deframer for every link");
 
 // The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If
 // the alarm's time had passed by then, the first slot and its frame's time would be late.
@@ -57,10 +58,10 @@ static bool program_map_page(void *context, uint32_t page_offset, const uint8_t 
     return port_flash_program(gateway->port, 2 * gateway->flash.sector_bytes + page_offset, page);
 }
 
-static bool write_link(void *context, const uint8_t *data, size_t bytes)
+static bool write_link(void *context, unsigned link, const uint8_t *data, size_t bytes)
 {
     const bt_gateway *gateway = context;
-    return port_link_write(gateway->port, data, bytes);
+    return port_link_write(gateway->port, link, data, bytes);
 }
 
 static uint32_t now_us(void *context)
@@ -168,8 +169,7 @@ static void start_uart(const bt_gateway *gateway)
 {
     const bt_settings *settings = &gateway->session.settings;
     int32_t bits_per_s = bt_settings_get(settings, BT_SETTING_UART_BITS_PER_S);
-    uint32_t pins = (uint32_t)bt_settings_get(settings, BT_SETTING_UART_PINS);
-    port_link_uart(gateway->port, bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s, pins);
+    port_link_uart(gateway->port, bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s);
 }
 
 void bt_gateway_init(bt_gateway *gateway, bt_port *port)
@@ -226,7 +226,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     load_settings(gateway); // only now is it known which sensors a calibration can be for
     start_uart(gateway);
     gateway->round_open = false;
-    gateway->link_was_up = false;
+    for (unsigned link = 0; link < PORT_LINKS; link++) {
+        gateway->link_turns[link] = port_link_turns(port, link);
+    }
     // Absent sensors are read too: one that is plugged in later shows up by itself.
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;
     bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us);
@@ -305,19 +307,40 @@ static void take_slot(bt_gateway *gateway, const bt_slot *slot)
     }
 }
 
+// A hand that holds something must not drop it because a program set an odd baud rate.
+static bool may_leave(const bt_session *session)
+{
+    bool may = bt_settings_get(&session->settings, BT_SETTING_LOADER_BY_TOUCH) != 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        const bt_finger *finger = &session->finger[f];
+        may = may && !finger->tare.held && !(finger->present && bt_tare_touched(&finger->tare));
+    }
+    return may;
+}
+
+// One bufferful per turn: a host that floods a link must not starve the slots, or the other host.
+static void read_link(bt_gateway *gateway, unsigned link)
+{
+    uint8_t bytes[64];
+    const uint32_t turns = port_link_turns(gateway->port, link);
+    if (turns != gateway->link_turns[link]) {
+        gateway->link_turns[link] = turns;
+        bt_session_link_down(&gateway->session, link);
+        if (port_link_touched(gateway->port) && may_leave(&gateway->session)) {
+            (void)port_reboot(gateway->port, true);
+        }
+    }
+    const size_t n = port_link_read(gateway->port, link, bytes, sizeof bytes);
+    if (n > 0) {
+        bt_session_receive(&gateway->session, link, bytes, n, port_now_us(gateway->port));
+    }
+}
+
 void bt_gateway_poll(bt_gateway *gateway)
 {
     bt_session *session = &gateway->session;
-    uint8_t bytes[64];
-    size_t n;
-    bool up = port_link_up(gateway->port);
-    if (gateway->link_was_up && !up) {
-        bt_session_link_down(session);
-    }
-    gateway->link_was_up = up;
-    // One bufferful per turn: a host that floods the link must not starve the slots.
-    if ((n = port_link_read(gateway->port, bytes, sizeof bytes)) > 0) {
-        bt_session_receive(session, bytes, n, port_now_us(gateway->port));
+    for (unsigned link = 0; link < PORT_LINKS; link++) {
+        read_link(gateway, link);
     }
     // At most a round's worth: a main loop that is behind must still hear the host and feed the watchdog.
     bt_slot slot;

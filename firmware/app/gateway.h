@@ -14,7 +14,7 @@ typedef struct {
     bt_map_flash map_flash;
     uint32_t round; // being assembled
     bool round_open;
-    bool link_was_up;
+    uint32_t link_turns[PORT_LINKS]; // as of the last poll
 } bt_gateway;
 
 // Wait for the sensors to power up, identify them, start sampling.

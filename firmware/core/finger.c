@@ -6,16 +6,12 @@
 
 #include <string.h>
 
-#define SUBSCRIBED_AT_FIRST                                                                                  \
-    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_PRESSURE     \
-     | BT_QUANTITY_FLAG_REST_FRAMES)
-
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
     bt_settings initial;
     memset(finger, 0, sizeof *finger);
     finger->index = index;
-    finger->quantities = SUBSCRIBED_AT_FIRST;
+    finger->quantities = BT_SUBSCRIBED_AT_FIRST;
     bt_tare_reset(&finger->tare);
     bt_events_reset(&finger->events);
     bt_settings_reset(&initial);

@@ -56,6 +56,11 @@ typedef struct {
     bt_word_counts words;
 } bt_finger;
 
+// What a FRAME contains until a host subscribes to something else.
+#define BT_SUBSCRIBED_AT_FIRST                                                                               \
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_PRESSURE     \
+     | BT_QUANTITY_FLAG_REST_FRAMES)
+
 // After a quarter of a second without a good word the sensor counts as unplugged; a shorter gap may be a bus
 // fault or a late main loop. The tare survives both: talk/sensors.h finds out which sensor answers
 // afterwards.

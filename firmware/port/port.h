@@ -48,20 +48,26 @@ uint32_t port_spi_slot_begin(bt_port *port, uint16_t command, uint8_t mask);
 // The sensors' answers: BT_MAX_FINGERS words; 0 for sensors not in mask, and for all if a word was late.
 void port_spi_slot_end(bt_port *port, uint16_t *word);
 
-// ---- link to the host -----------------------------------------------------------------------
+// ---- links to hosts -------------------------------------------------------------------------
+// Link 0 is USB, or whatever else a board has only one of; link 1 a UART.
+#define PORT_LINKS 2
+
 // Takes all bytes or none; false: no room, or no host.
-bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes);
+bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes);
 
 // Returns how many bytes came, 0 when none did.
-size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes);
+size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes);
 
-// True if a host has the port open (DTR), or there is a UART. False once when one takes over from the other.
-bool port_link_up(bt_port *port);
+// How often the link was opened and closed so far: odd while a host has it open (DTR; a UART is open once it
+// is started). One that was closed and opened between two calls shows by this.
+uint32_t port_link_turns(bt_port *port, unsigned link);
 
-// Call once: a UART to use while no host has the port open, in bits per second, and an enum bt_uart_pins. 0
-// is none or, on a board without another link, its own default: such a board is never mute. Does nothing on a
-// board without a UART.
-void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins);
+// Call once: start the UART, in bits per second. 0 is none or, on a board without another link, its own
+// default: such a board is never mute. Does nothing on a board without a UART.
+void port_link_uart(bt_port *port, uint32_t bits_per_s);
+
+// True once after a host set link 0 to 1200 baud and closed it, the customary way to ask for the bootloader.
+bool port_link_touched(bt_port *port);
 
 // ---- flash for settings and maps ------------------------------------------------------------
 // Storage for the core, as one run of bytes: two sectors of settings (keep/storage.h), then the slots for

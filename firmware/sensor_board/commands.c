@@ -24,7 +24,7 @@ void commands_start(bt_emu_stream *its)
 static void send(uint8_t id, const uint8_t *payload)
 {
     uint8_t frame[BT_ENCODED_MAX_BYTES];
-    (void)port_link_write(ONLY_BOARD, frame,
+    (void)port_link_write(ONLY_BOARD, 0, frame,
                           bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
 }
 
@@ -192,7 +192,10 @@ void commands_poll(void)
 {
     uint8_t bytes[64];
     size_t n;
-    while ((n = port_link_read(ONLY_BOARD, bytes, sizeof bytes)) > 0) {
+    if (port_link_touched(ONLY_BOARD)) {
+        (void)port_reboot(ONLY_BOARD, true);
+    }
+    while ((n = port_link_read(ONLY_BOARD, 0, bytes, sizeof bytes)) > 0) {
         for (size_t k = 0; k < n; k++) {
             if (bt_deframer_push(&deframer, bytes[k]) == BT_DEFRAMED_GOOD && deframer.payload_bytes > 0) {
                 obey(deframer.id, deframer.buffer + 1);

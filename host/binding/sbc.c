@@ -117,25 +117,31 @@ uint8_t port_spi_transfer8(bt_port *board, uint8_t mosi)
 
 // ---- link -------------------------------------------------------------------------------------
 
-bool port_link_write(bt_port *board, const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *board, unsigned link, const uint8_t *data, size_t bytes)
 {
-    return bt_sbc_link_write(board->python, data, bytes);
+    return link == 0 && bt_sbc_link_write(board->python, data, bytes);
 }
 
-size_t port_link_read(bt_port *board, uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *board, unsigned link, uint8_t *data, size_t bytes)
 {
-    return bt_sbc_link_read(board->python, data, bytes);
+    return link == 0 ? bt_sbc_link_read(board->python, data, bytes) : 0;
 }
 
-bool port_link_up(bt_port *board)
+uint32_t port_link_turns(bt_port *board, unsigned link)
 {
     (void)board;
-    return true; // the host is this process
+    return link == 0; // the host is this process
 }
 
-void port_link_uart(bt_port *board, uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *board, uint32_t bits_per_s)
 {
-    (void)board, (void)bits_per_s, (void)pins;
+    (void)board, (void)bits_per_s;
+}
+
+bool port_link_touched(bt_port *board)
+{
+    (void)board;
+    return false;
 }
 
 // ---- flash: none, so settings and maps last as long as the process; maps are kept in memory ------

@@ -11,6 +11,7 @@
 
 typedef struct {
     uint8_t id;
+    uint8_t link;
     uint8_t bytes;
     uint8_t payload[BT_FRAME_MAX_BYTES];
 } received_message;
@@ -18,8 +19,9 @@ typedef struct {
 static struct {
     received_message message[MAX_RECEIVED];
     int count;
-    size_t room; // bytes the link still takes
-    bool broken; // part of a frame was written, or a frame that does not decode
+    size_t room;   // bytes the link still takes
+    bool broken;   // part of a frame was written, or a frame that does not decode
+    unsigned link; // that the latest message was for
     bt_deframer deframer;
 } host;
 
@@ -47,15 +49,17 @@ static inline void host_take_bytes(const uint8_t *data, size_t bytes)
         }
         received_message *message = &host.message[host.count++];
         message->id = host.deframer.id;
+        message->link = (uint8_t)host.link;
         message->bytes = host.deframer.payload_bytes;
         memcpy(message->payload, host.deframer.buffer + 1, message->bytes);
     }
 }
 
 // A bt_link_write: all or none.
-static inline bool host_write(void *context, const uint8_t *data, size_t bytes)
+static inline bool host_write(void *context, unsigned link, const uint8_t *data, size_t bytes)
 {
     (void)context;
+    host.link = link;
     if (bytes > host.room) {
         return false;
     }
@@ -79,7 +83,7 @@ static inline void host_send(bt_session *session, uint8_t id, const void *payloa
                              uint32_t now_us)
 {
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    bt_session_receive(session, encoded, bt_frame_encode(id, payload, bytes, encoded), now_us);
+    bt_session_receive(session, 0, encoded, bt_frame_encode(id, payload, bytes, encoded), now_us);
 }
 
 // Send, and return the one and only message that came of it.

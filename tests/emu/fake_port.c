@@ -26,7 +26,7 @@ void fake_reset(bt_emu_source source, uint64_t start_ns)
     flash_new(&fake.flash, fake.kept, sizeof fake.kept);
     fake.now_ns = start_ns;
     fake.shortest_gap_ns = UINT64_MAX;
-    fake.link_up = true;
+    fake.link_turns = 1;
     released = false;
     armed = false;
     incoming_bytes = 0;
@@ -123,13 +123,16 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
     return miso;
 }
 
-bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
 {
     return fake_host_takes(data, bytes);
 }
 
-size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 {
+    if (link != 0) {
+        return 0;
+    }
     size_t n = incoming_bytes < bytes ? incoming_bytes : bytes;
     memcpy(data, incoming, n);
     incoming_bytes -= n;
@@ -137,12 +140,19 @@ size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
     return n;
 }
 
-bool port_link_up(bt_port *port)
+uint32_t port_link_turns(bt_port *port, unsigned link)
 {
-    return fake.link_up;
+    return link == 0 ? fake.link_turns : 0;
 }
 
-void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
+bool port_link_touched(bt_port *port)
+{
+    const bool touched = fake.touched;
+    fake.touched = false;
+    return touched;
+}
+
+void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
 }
 

@@ -33,7 +33,8 @@ typedef struct {
     uint32_t bytes;                                  // that came one by one
     uint32_t selected_reads;                         // reads with other than one chip select low
 
-    bool link_up;
+    uint32_t link_turns; // odd: open
+    bool touched;        // at 1200 baud
 
     _Alignas(4) uint8_t kept[BT_KEPT_BYTES];
     failing_flash flash; // of what is kept

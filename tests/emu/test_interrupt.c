@@ -88,7 +88,7 @@ static void start_stream(void)
     bt_msg_start start = {1, BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC, 0x1F, 0};
     bt_msg_start_pack(&start, payload);
     size_t bytes = bt_frame_encode(BT_START_ID, payload, sizeof payload, encoded);
-    bt_session_receive(&gateway.session, encoded, bytes, port_now_us(ONLY_BOARD));
+    bt_session_receive(&gateway.session, 0, encoded, bytes, port_now_us(ONLY_BOARD));
 }
 
 int main(int argc, char **argv)
@@ -152,7 +152,7 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
     return miso;
 }
 
-bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
 {
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(&deframer, data[k]);
@@ -162,17 +162,22 @@ bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
     return true;
 }
 
-size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 {
     return 0;
 }
 
-bool port_link_up(bt_port *port)
+uint32_t port_link_turns(bt_port *port, unsigned link)
 {
-    return true;
+    return link == 0;
 }
 
-void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
+bool port_link_touched(bt_port *port)
+{
+    return false;
+}
+
+void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
 }
 

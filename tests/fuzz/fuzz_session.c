@@ -74,8 +74,9 @@ static struct {
     int messages;
 } host;
 
-static bool host_write(void *context, const uint8_t *data, size_t bytes)
+static bool host_write(void *context, unsigned link, const uint8_t *data, size_t bytes)
 {
+    (void)link;
     (void)context;
     if (host.full) {
         return false;
@@ -99,10 +100,10 @@ static void give_frame(bt_session *session, fuzz_input *in, bool damage, uint32_
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
     fuzz_message message = take_message(in, damage, encoded);
     uint8_t nothing = 0;
-    bt_session_receive(session, &nothing, 1, now_us); // whatever came before ends here
+    bt_session_receive(session, 0, &nothing, 1, now_us); // whatever came before ends here
     int before = host.messages, erases_before = erases;
     uint32_t dropped = session->messages_dropped;
-    bt_session_receive(session, encoded, message.wire_bytes, now_us);
+    bt_session_receive(session, 0, encoded, message.wire_bytes, now_us);
     int answers = host.messages - before + (int)(session->messages_dropped - dropped);
     if (!damage && answers != (message.id >= 0x80)) {
         FAIL("command %02x with %zu bytes is answered %d times", message.id, message.payload_bytes, answers);
@@ -116,7 +117,7 @@ static void give(bt_session *session, uint8_t id, const uint8_t *payload, uint32
 {
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
     size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
-    bt_session_receive(session, encoded, bytes, now_us);
+    bt_session_receive(session, 0, encoded, bytes, now_us);
 }
 
 // A map of a few blocks with coefficients of the input's, its parts in any order, some of them not at all.
@@ -169,7 +170,7 @@ static void give_raw(bt_session *session, fuzz_input *in, uint32_t now_us)
 {
     size_t bytes = take_u8(in);
     bytes = bytes < in->left ? bytes : in->left;
-    bt_session_receive(session, in->data, bytes, now_us);
+    bt_session_receive(session, 0, in->data, bytes, now_us);
     in->data += bytes;
     in->left -= bytes;
 }
@@ -270,7 +271,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
             bt_session_tick(&session, now_us);
             break;
         case UNPLUG:
-            bt_session_link_down(&session);
+            bt_session_link_down(&session, 0);
             break;
         case UPLOAD:
             give_upload(&session, &in, now_us);

@@ -23,6 +23,7 @@ COMMANDS = {
     wire.Start: ((int(wire.StreamFlags.FRAMES), 1, 0), wire.Reply),
     wire.Stop: ((), wire.Reply),
     wire.Ping: ((), wire.Reply),
+    wire.TakeLink: ((1000,), wire.Reply),
     wire.Subscribe: ((1, int(wire.QuantityFlags.POC)), wire.Reply),
     wire.GetPoint: ((0,), wire.Point),
     wire.TareNow: ((0,), wire.Reply),

@@ -1,4 +1,4 @@
-"""The Pico's UART: the same wire for a hand's own controller, the C client among them, while no host has USB open."""
+"""The Pico's UART: the same wire for a hand's own controller, the C client among them, whatever is done at USB."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from rig import Rig
 
 import biotac
-from biotac import FaultFlags, InputError, Setting
+from biotac import CommandRefusedError, FaultFlags, InputError, Setting
 from biotac.hand.opening import shake_hands
 from biotac.link.serial_port import SerialLink
 from biotac.sim.emulated import EmulatedBoard, new_pty
@@ -31,7 +31,7 @@ class UartLink(SerialLink):
     patience = 60.0
 
 
-def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
+def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None:
     rig.need("uart")
     # Its time runs by the clock while the client is compiled and waited for, and stands still behind the tape.
     board = EmulatedBoard("pico", load_source("press.toml", fingers=2, seconds=900.0), pace=1.0, hold=True, uart=True)
@@ -39,7 +39,6 @@ def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
     board.release()
     with biotac.open(board.path) as hand:
         hand.board.set_setting(Setting.UART_BITS_PER_S, BAUD)
-        hand.board.set_setting(Setting.UART_PINS, wire.UartPins.GPIO_4_5)
         hand.board.save_settings()
         assert board.counters()["uart"] is None  # not before the next start
     board.do("cut power")
@@ -53,7 +52,11 @@ def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
             hand.stream("results", "pac")
         with biotac.open(board.path) as other:
             assert other.info.boot_id == hand.info.boot_id
-            assert other.status().streams == 0  # USB has the word, and the UART's stream has ended
+            assert other.status().streams == hand.status().streams != 0
+            with pytest.raises(CommandRefusedError, match="LINK_BUSY"):
+                other.read(0.1)
+            assert len(hand.read(0.1)) > 0
+            hand.stop()
             assert len(other.read(0.1)) > 0
     with shake_hands(UartLink(board.uart_path)) as hand:  # which knows no limit
         status = hand.status()

@@ -22,6 +22,13 @@ const DATA_SEQ_ERROR = 1 << 31
 const SETUP_REC = 1 << 17
 const SUSPENDED = 1 << 4
 const SOF_RD = 0x48
+const INTE = 0x90
+const INT_SUSPEND = 1 << 14
+const INT_SOF = 1 << 17
+const LINE_J = 1 << 2 // of SIE_STATUS: what the lines show, D+ up
+const LINE_K = 2 << 2
+const AT_REST_FRAMES = 3 // on hold, without a transaction: nothing more comes of them
+const E15_NS = 800_000 // RP2040-E15: a bulk IN that is armed this late in a frame
 const RESET_USBCTRL = 1 << 24
 const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
 const BITS_PER_S = 12e6
@@ -34,11 +41,18 @@ export class UsbBus {
     this.view = mcu.usbDPRAMView
     this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
     this.written = new Map()
-    this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0 }
+    this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0, armed_late: 0 }
+    this.lateHangs = 0 // chance that RP2040-E15 strikes when one is armed late
+    this.hungAsleep = false // a hung controller says that the bus is suspended
+    this.draw = Math.random
     this.onArmed = () => {}
     this.onSetupSeen = () => {}
     this.onReset = () => {}
     this.hungAt = null // ns: the controller has met RP2040-E15, and hears nothing until its block is reset
+    this.silentAt = 0 // ns: since when the host has sent no frames; null: it does
+    this.idleFrames = 0
+    this.held = () => false
+    this.frames = mcu.clock.createAlarm(() => this.#frame())
     this.wire = mcu.clock.createAlarm(() => {
       const finish = this.finish
       this.finish = null
@@ -53,8 +67,49 @@ export class UsbBus {
     return this.finish !== null
   }
 
+  /** The host sends a start of frame every ms, or none. */
+  sendFrames(sends) {
+    if (sends === (this.silentAt === null)) return
+    this.silentAt = sends ? null : this.mcu.clock.nanos
+    this.goOn()
+  }
+
+  /** Frames may matter again. */
+  goOn() {
+    this.idleFrames = 0
+    this.frames.cancel()
+    if (this.silentAt === null && this.usb.intEnable & INT_SOF) this.frames.schedule(this.board.frameNanos - this.#inFrame)
+  }
+
+  get #inFrame() {
+    return this.mcu.clock.nanos % this.board.frameNanos
+  }
+
+  #frame() {
+    if (!this.hung && !this.#isLost(Math.round(this.mcu.clock.nanos / this.board.frameNanos))) {
+      this.usb.intRaw |= INT_SOF
+      this.usb.checkInterrupts()
+    }
+    const idle = ++this.idleFrames
+    if (this.held() && idle >= AT_REST_FRAMES) return
+    this.goOn()
+    this.idleFrames = idle
+  }
+
+  /** The interrupt of a change to suspended: late, which is that it is not so any more, or out of nothing. */
+  tellSuspended(late) {
+    if (late) {
+      this.usb.sieStatus |= SUSPENDED
+      this.usb.sieStatusUpdated()
+    } else {
+      this.usb.intRaw |= INT_SUSPEND
+      this.usb.checkInterrupts()
+    }
+  }
+
   /** Run `then` after so many bytes have crossed the wire. */
   transact(bytes, then) {
+    this.goOn()
     this.finish = then
     const bits = (bytes + OVERHEAD_BYTES) * 8
     this.wire.schedule(Math.ceil((bits / BITS_PER_S) * 125e6) * 8) // whole cycles of 8 ns
@@ -73,6 +128,7 @@ export class UsbBus {
   hang() {
     this.hungAt = this.mcu.clock.nanos
     this.counters.hangs++
+    if (this.hungAsleep) this.tellSuspended(true)
   }
 
   control(endpoint, out) {
@@ -176,6 +232,12 @@ export class UsbBus {
       return
     }
     if ((before & ~AVAILABLE) !== (value & ~AVAILABLE)) this.counters.available_not_last++
+    const isBulkIn = offset >= CONTROLS + 8 && offset % 8 === 0
+    if (isBulkIn && this.silentAt === null && !this.held() && this.#inFrame >= E15_NS) {
+      this.counters.armed_late++
+      if (this.draw() < this.lateHangs) this.hang()
+    }
+    this.goOn()
     this.onArmed()
   }
 
@@ -201,15 +263,28 @@ export class UsbBus {
       const seen = offset === SIE_STATUS && usb.rawWriteValue & usb.sieStatus & SETUP_REC
       write(offset, value)
       if (seen) this.onSetupSeen()
+      if (offset === INTE) this.goOn()
     }
-    usb.readUint32 = (offset) =>
-      // A device reads the host's frame number there.
-      offset === SOF_RD ? this.#frame() : read(offset)
+    usb.readUint32 = (offset) => {
+      if (offset === SIE_STATUS) {
+        // A host that goes on talking to a hung controller moves the lines.
+        const moves = this.hung && this.silentAt === null && this.draw() < 0.1
+        return read(offset) | (moves ? LINE_K : LINE_J)
+      }
+      if (offset !== SOF_RD) return read(offset)
+      usb.intRaw &= ~INT_SOF
+      usb.checkInterrupts()
+      return this.#number
+    }
   }
 
-  /** The number of the latest frame whose start has come. */
-  #frame() {
-    const frame = Math.floor((this.hungAt ?? this.mcu.clock.nanos) / this.board.frameNanos)
-    return (frame % this.board.lostFrames === 1 ? frame - 1 : frame) & 0x7ff
+  /** Of the latest frame whose start has come: a device reads it. */
+  get #number() {
+    const frame = Math.floor((this.hungAt ?? this.silentAt ?? this.mcu.clock.nanos) / this.board.frameNanos)
+    return (this.#isLost(frame) ? frame - 1 : frame) & 0x7ff
+  }
+
+  #isLost(frame) {
+    return frame % this.board.lostFrames === 1
   }
 }

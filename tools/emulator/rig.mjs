@@ -84,6 +84,10 @@ export class Rig {
       'supply at (\\d+) mV': (mv) => (this.board.supplyMv = Number(mv)),
       'clock ([0-9.]+) times as fast': (times) => (this.board.frameNanos = 1e6 * Number(times)),
       'lose a start of frame in (\\d+)': (n) => (this.board.lostFrames = Number(n)),
+      'hang ([0-9.]+) of late armings': (share) => (this.usb.bus.lateHangs = Number(share)),
+      'hang as if asleep': () => (this.usb.bus.hungAsleep = true),
+      'tell of a suspend (late|falsely)': (how) => this.usb.bus.tellSuspended(how === 'late'),
+      'open and close (\\d+) times': (times) => this.usb.flap(Number(times)),
       'flip a written bit': () => (this.machine.mcu.flash[this.board.writtenAt + 40] ^= 1),
       'switch off quad reads': () => (this.board.quad = false),
       'silence the flash': () => (this.board.quad = null),
@@ -139,6 +143,7 @@ export class Rig {
         device: usb.device,
         failed: usb.failed,
         hurried: usb.hurried,
+        driven_unpowered: usb.drivenUnpowered,
         ...usb.bus.counters,
       },
       uart: this.uarts.find((one) => one.wired)?.counters ?? null,
@@ -193,6 +198,7 @@ export class Rig {
       if ((this.waiting && this.sensors.started) || this.sensors.over) machine.time.hold()
     }
     this.usb = new UsbHost(machine.mcu, this.board, {
+      time: machine.time,
       onData: (bytes) => {
         this.latency.received(bytes, machine.time.nanos)
         this.port.put(bytes)

@@ -25,6 +25,8 @@ const CONNECTED = 1 << 16
 const SUSPENDED = 1 << 4
 const RESUMED = 1 << 11
 const MS = 1e6
+const VBUS_SENSE = 24 // the Pico's pin
+const PULLUP_GONE_NS = 20 * MS // a board that can sense VBUS has let D+ go by then
 const DEBOUNCE_NS = 10 * MS // a real host waits ten times as long before it resets and after
 const SUSPEND_NS = 3 * MS
 const ANSWER_NS = 500 * MS // a control transfer that takes longer has failed
@@ -33,8 +35,14 @@ const u16 = (value) => [value & 0xff, value >> 8]
 
 export class UsbHost {
   /** onData(bytes) gets what the device sends; canTake() says whether more may come. */
-  constructor(mcu, board, { onData, canTake, take }) {
+  constructor(mcu, board, { onData, canTake, take, time }) {
     this.bus = new UsbBus(mcu, board)
+    this.mcu = mcu
+    if (time) {
+      this.bus.held = () => time.held
+      time.onRelease.push(() => this.bus.goOn())
+    }
+    this.drivenUnpowered = 0 // D+ was up, into a host that gives no power
     this.usb = mcu.usbCtrl
     this.onData = onData
     this.canTake = canTake
@@ -43,7 +51,7 @@ export class UsbHost {
     this.plugged = true
     this.pulledUp = false // by the program, which so says that it is there
     this.asleep = false
-    this.state = 'detached'
+    this.place = 'detached'
     this.device = {} // what enumeration found
     this.transfers = [] // control transfers to do
     this.failed = []
@@ -56,6 +64,15 @@ export class UsbHost {
     this.hurried = { asked: 0, wrong: 0 } // requests that came before the one before was answered
     this.second = mcu.clock.createAlarm(() => this.#secondSetup())
     this.#watchPullup()
+  }
+
+  get state() {
+    return this.place
+  }
+
+  set state(place) {
+    this.place = place
+    this.bus.sendFrames(!this.asleep && place !== 'detached' && place !== 'reset')
   }
 
   /** Some program opens or closes the port: DTR follows. */
@@ -72,6 +89,14 @@ export class UsbHost {
     this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, 0, 0, [])
   }
 
+  /** Some program closes and opens the port, so often, as fast as it can. */
+  flap(times) {
+    for (let k = 0; k < times; k++) {
+      this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, 0, 0, [])
+      this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, DTR | RTS, 0, [])
+    }
+  }
+
   /** A SETUP, and so many ns later another one, which is the one to be answered (USB 2.0, 8.4.6.4). */
   hurry(nanos) {
     const abandoned = Uint8Array.from([IN, GET_DESCRIPTOR, 0, CONFIGURATION, 0, 0, 255, 0])
@@ -86,13 +111,18 @@ export class UsbHost {
   setPlugged(plugged) {
     if (plugged === this.plugged) return
     this.plugged = plugged
-    if (plugged) return this.#attach()
+    this.mcu.gpio[VBUS_SENSE].setInputValue(plugged)
+    if (plugged) {
+      if (this.#isUp) this.#attach()
+      return
+    }
     this.bus.abort()
     this.#lose()
     this.usb.sieStatus &= ~CONNECTED
     this.#after(SUSPEND_NS, () => {
       this.usb.sieStatus |= SUSPENDED
       this.usb.sieStatusUpdated()
+      this.#after(PULLUP_GONE_NS, () => (this.drivenUnpowered += this.#isUp ? 1 : 0))
     })
   }
 
@@ -100,6 +130,7 @@ export class UsbHost {
   setAsleep(asleep) {
     if (asleep === this.asleep) return
     this.asleep = asleep
+    this.state = this.place
     if (asleep) this.bus.abort()
     this.usb.sieStatus = asleep ? this.usb.sieStatus | SUSPENDED : (this.usb.sieStatus & ~SUSPENDED) | RESUMED
     this.usb.sieStatusUpdated()
@@ -235,12 +266,17 @@ export class UsbHost {
     this.timer.schedule(nanos)
   }
 
+  get #isUp() {
+    return !!(this.usb.sieCtrl & PULLUP) && !!(this.usb.mainCtrl & CONTROLLER_ON)
+  }
+
   #watchPullup() {
     const { usb } = this
+    this.mcu.gpio[VBUS_SENSE].setInputValue(true)
     const write = usb.writeUint32.bind(usb)
     usb.writeUint32 = (offset, value) => {
       write(offset, value)
-      const up = !!(usb.sieCtrl & PULLUP) && !!(usb.mainCtrl & CONTROLLER_ON)
+      const up = this.#isUp
       if (up && !this.pulledUp) this.#attach()
       this.pulledUp = up
     }

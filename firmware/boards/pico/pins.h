@@ -37,11 +37,13 @@
 // sheet, 2.1): it stays off, and the sensors' supply ripples more under light load.
 #define PINS_BOARD "pico_w"
 #else
-#define PINS_BOARD   "pico"
+#define PINS_BOARD     "pico"
+// Divided down to 3.3 V on the Pico's board: high while a host gives power.
+#define PIN_VBUS_SENSE 24
 // The Pico's own regulator, not on a board pin: high keeps it from its power-save mode, which ripples more.
-#define PIN_SMPS_PWM 23
+#define PIN_SMPS_PWM   23
 // A third of VSYS, at the ADC; on a Pico W it is the radio's clock, too.
-#define PIN_SUPPLY   29
+#define PIN_SUPPLY     29
 #endif
 
 #endif

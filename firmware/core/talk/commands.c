@@ -19,9 +19,51 @@ static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t 
     bt_session_send(session, BT_REPLY_ID, payload);
 }
 
+static void subscribe_as_at_first(bt_session *session)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        session->finger[f].quantities = BT_SUBSCRIBED_AT_FIRST;
+    }
+}
+
+// Nothing goes on of what the host at the other port wanted, except that what it holds is held.
+static void take_over(bt_session *session)
+{
+    const uint8_t before = session->owner, after = session->link;
+    const bool told = bt_session_is_kept(session) || session->streams != 0;
+    bt_session_stop(session);
+    subscribe_as_at_first(session);
+    session->owner = after;
+    session->heard_us = session->command_us;
+    if (told) {
+        session->faults |= BT_FAULT_FLAG_LINK_TAKEN;
+        session->link = before;
+        bt_session_send_status(session, 0, session->command_us);
+        session->link = after;
+        bt_session_send_status(session, 0, session->command_us);
+    }
+}
+
+static uint8_t take_link(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_take_link msg;
+    bt_msg_take_link_unpack(&msg, payload);
+    if (msg.keepalive_ms == 0) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    if (session->owner != session->link) {
+        take_over(session);
+    }
+    session->keepalive_ms = msg.keepalive_ms;
+    return BT_ERROR_OK;
+}
+
 static uint8_t hello_request(bt_session *session, const uint8_t *payload)
 {
     uint8_t out[BT_HELLO_BYTES];
+    if (session->owner == session->link && session->streams == 0) {
+        subscribe_as_at_first(session); // what another program on this port chose is not this one's
+    }
     const bt_identity *identity = &session->identity;
     bt_msg_hello_request request;
     bt_msg_hello_request_unpack(&request, payload);
@@ -61,6 +103,7 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     }
     if (msg.streams == 0) {
         bt_session_stop(session);
+        return BT_ERROR_OK;
     }
     bt_session_end_trial(session);
     session->streams = msg.streams;
@@ -74,10 +117,13 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     return BT_ERROR_OK;
 }
 
+// Of what the other port's host streams it ends nothing: every program begins with it.
 static uint8_t stop(bt_session *session, const uint8_t *payload)
 {
     (void)payload;
-    bt_session_stop(session);
+    if (session->owner == session->link) {
+        bt_session_stop(session);
+    }
     return BT_ERROR_OK;
 }
 
@@ -166,14 +212,14 @@ static uint8_t clear_faults(bt_session *session, const uint8_t *payload)
 
 static uint8_t get_status(bt_session *session, const uint8_t *payload)
 {
-    bt_session_send_status(session, payload[BT_COMMAND_REQ_ID_AT], session->heard_us);
+    bt_session_send_status(session, payload[BT_COMMAND_REQ_ID_AT], session->command_us);
     return BT_ERROR_OK;
 }
 
 static uint8_t get_sensor_status(bt_session *session, const uint8_t *payload)
 {
     bt_session_send_sensor_status(session, payload[BT_COMMAND_REQ_ID_AT], payload[BT_COMMAND_FINGER_AT],
-                                  session->heard_us);
+                                  session->command_us);
     return BT_ERROR_OK;
 }
 
@@ -357,6 +403,7 @@ enum check {
     FINGER = 2,  // the byte at BT_COMMAND_FINGER_AT must be a finger
     STOPPED = 4, // not while streaming: one recording, one set of values; and flash stops the sampling
     MAPS = 8,    // the board must have a place for maps
+    READS = 16,  // changes nothing of another host's: for whoever is not the owner, too
 };
 
 static const struct {
@@ -364,39 +411,43 @@ static const struct {
     uint8_t checks; // in the order of enum check
     uint8_t (*run)(bt_session *session, const uint8_t *payload);
 } commands[] = {
-    {BT_HELLO_REQUEST_ID, ANSWERS, hello_request},
+    {BT_HELLO_REQUEST_ID, READS | ANSWERS, hello_request},
+    {BT_TAKE_LINK_ID, READS, take_link},
     {BT_START_ID, 0, start},
-    {BT_STOP_ID, 0, stop},
-    {BT_PING_ID, 0, ping},
+    {BT_STOP_ID, READS, stop},
+    {BT_PING_ID, READS, ping},
     {BT_SUBSCRIBE_ID, 0, subscribe},
     {BT_TARE_NOW_ID, FINGER, tare_now},
     {BT_TARE_SET_ID, FINGER, tare_set},
     {BT_HOLD_ID, 0, hold},
     {BT_RELEASE_ID, 0, release},
     {BT_CLEAR_FAULTS_ID, 0, clear_faults},
-    {BT_GET_STATUS_ID, ANSWERS, get_status},
-    {BT_GET_SENSOR_STATUS_ID, ANSWERS | FINGER, get_sensor_status},
-    {BT_GET_SENSOR_INFO_ID, ANSWERS | FINGER, get_sensor_info},
-    {BT_GET_POINT_ID, ANSWERS | FINGER, get_point},
-    {BT_GET_SETTING_ID, ANSWERS, get_setting},
+    {BT_GET_STATUS_ID, READS | ANSWERS, get_status},
+    {BT_GET_SENSOR_STATUS_ID, READS | ANSWERS | FINGER, get_sensor_status},
+    {BT_GET_SENSOR_INFO_ID, READS | ANSWERS | FINGER, get_sensor_info},
+    {BT_GET_POINT_ID, READS | ANSWERS | FINGER, get_point},
+    {BT_GET_SETTING_ID, READS | ANSWERS, get_setting},
     {BT_SET_SETTING_ID, ANSWERS | STOPPED, set_setting},
-    {BT_GET_CALIBRATION_ID, ANSWERS | FINGER, get_calibration},
+    {BT_GET_CALIBRATION_ID, READS | ANSWERS | FINGER, get_calibration},
     {BT_SET_CALIBRATION_ID, ANSWERS | FINGER | STOPPED, set_calibration},
     {BT_CLEAR_CALIBRATION_ID, FINGER | STOPPED, clear_calibration},
-    {BT_GET_MAP_ID, ANSWERS | FINGER, bt_map_get},
-    {BT_READ_MAP_ID, ANSWERS | FINGER, bt_map_read},
+    {BT_GET_MAP_ID, READS | ANSWERS | FINGER, bt_map_get},
+    {BT_READ_MAP_ID, READS | ANSWERS | FINGER, bt_map_read},
     {BT_BEGIN_MAP_ID, FINGER | STOPPED | MAPS, bt_map_begin},
     {BT_WRITE_MAP_ID, FINGER | STOPPED | MAPS, bt_map_write},
     {BT_END_MAP_ID, ANSWERS | FINGER | STOPPED | MAPS, bt_map_end},
     {BT_CLEAR_MAP_ID, FINGER | STOPPED | MAPS, bt_map_clear},
     {BT_SAVE_SETTINGS_ID, STOPPED, save},
     {BT_REBOOT_BOOTLOADER_ID, 0, reboot},
-    {BT_GET_BOARD_FACTS_ID, ANSWERS, get_board_facts},
+    {BT_GET_BOARD_FACTS_ID, READS | ANSWERS, get_board_facts},
     {BT_SET_BUS_RATE_ID, ANSWERS | STOPPED, set_bus_rate},
 };
 
 static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *payload)
 {
+    if (!(checks & READS) && session->owner != session->link && bt_session_is_kept(session)) {
+        return BT_ERROR_LINK_BUSY;
+    }
     // What is kept for a finger needs the finger; questions about one that the board cannot have are answered
     // as about an absent sensor.
     uint8_t fingers = checks & STOPPED ? session->identity.fingers : BT_MAX_FINGERS;
@@ -414,7 +465,10 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
     if (id < 0x80) {
         return; // one of our own messages, echoed by a terminal driver
     }
-    session->heard_us = now_us;
+    session->command_us = now_us;
+    if (session->owner == session->link || session->owner == BT_NO_LINK) {
+        session->heard_us = now_us;
+    }
     if (payload == NULL) { // of a payload of another length nothing can be trusted, not even where req_id is
         reply(session, 0, id, bt_wire_payload_bytes(id) < 0 ? BT_ERROR_UNKNOWN_COMMAND : BT_ERROR_BAD_LENGTH);
         return;
@@ -425,6 +479,9 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
             continue;
         }
         error = check(session, commands[k].checks, payload);
+        if (error == BT_ERROR_OK && !(commands[k].checks & READS) && session->owner != session->link) {
+            take_over(session);
+        }
         error = error == BT_ERROR_OK ? commands[k].run(session, payload) : error;
         if (error == BT_ERROR_OK && commands[k].checks & ANSWERS) {
             return;

@@ -9,22 +9,26 @@ static void damaged(bt_session *session)
     session->faults |= BT_FAULT_FLAG_LINK_DAMAGED;
 }
 
-void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us)
+void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data, size_t bytes,
+                        uint32_t now_us)
 {
+    bt_deframer *deframer = &session->deframer[link];
+    session->link = (uint8_t)link;
     for (size_t k = 0; k < bytes; k++) {
-        enum bt_deframed outcome = bt_deframer_push(&session->deframer, data[k]);
+        enum bt_deframed outcome = bt_deframer_push(deframer, data[k]);
         if (outcome == BT_DEFRAMED_GOOD) {
             session->rx_frames++;
-            bool empty = session->deframer.payload_bytes == 0; // the id is unknown; there is no req_id
-            bt_command(session, session->deframer.id, empty ? NULL : session->deframer.buffer + 1, now_us);
+            bool empty = deframer->payload_bytes == 0; // the id is unknown; there is no req_id
+            bt_command(session, deframer->id, empty ? NULL : deframer->buffer + 1, now_us);
         } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {
             // The CRC is right, so this was sent on purpose: bt_command answers it with an error.
             damaged(session);
-            bt_command(session, session->deframer.id, NULL, now_us);
+            bt_command(session, deframer->id, NULL, now_us);
         } else if (outcome != BT_DEFRAMED_NOTHING) {
             damaged(session);
         }
     }
+    session->link = session->owner;
 }
 
 // If the controller is gone, holds last for a while; then the fingers are judged by their signals again.
@@ -48,8 +52,8 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
         session->uptime_s++;
     }
     if (session->keepalive_ms != 0 && now_us - session->heard_us > session->keepalive_ms * 1000u) {
+        session->faults |= session->streams != 0 ? BT_FAULT_FLAG_HOST_SILENT : 0;
         bt_session_stop(session);
-        session->faults |= BT_FAULT_FLAG_HOST_SILENT;
     }
     lapse_holds(session, now_us);
     if (now_us - session->status_us < session->status_period_us) {
@@ -66,8 +70,11 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
     }
 }
 
-void bt_session_link_down(bt_session *session)
+void bt_session_link_down(bt_session *session, unsigned link)
 {
-    bt_session_stop(session);
-    bt_deframer_reset(&session->deframer);
+    bt_deframer_reset(&session->deframer[link]);
+    if (session->owner == link) {
+        bt_session_stop(session);
+        session->owner = session->link = BT_NO_LINK;
+    }
 }

@@ -5,13 +5,14 @@
 
 #include "talk/session.h"
 
-// Bytes from the host. Every command gets exactly one reply.
-void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us);
+// Bytes from the host at a port. Every command gets exactly one reply.
+void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data, size_t bytes,
+                        uint32_t now_us);
 
 // Call often: keep-alive and periodic status.
 void bt_session_tick(bt_session *session, uint32_t now_us);
 
-// The host closed the port: stop streaming.
-void bt_session_link_down(bt_session *session);
+// A port was closed, or opened by another host: what its host streamed ends.
+void bt_session_link_down(bt_session *session, unsigned link);
 
 #endif

@@ -17,7 +17,10 @@ void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_w
     }
     bt_settings_reset(&session->settings);
     bt_session_use_settings(session);
-    bt_deframer_reset(&session->deframer);
+    session->owner = session->link = BT_NO_LINK;
+    for (unsigned link = 0; link < BT_LINKS; link++) {
+        bt_deframer_reset(&session->deframer[link]);
+    }
 }
 
 void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
@@ -77,7 +80,7 @@ void bt_session_use_settings(bt_session *session)
 void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame)
 {
     size_t bytes = bt_frame_seal(id, (size_t)bt_wire_payload_bytes(id), frame);
-    if (session->write(session->context, frame, bytes)) {
+    if (session->write(session->context, session->link, frame, bytes)) {
         session->messages_sent++;
     } else {
         session->messages_dropped++;
@@ -117,6 +120,15 @@ void bt_session_stop(bt_session *session)
     session->other = session->refused = 0;
     bt_session_end_trial(session);
     bt_session_use_settings(session);
+}
+
+bool bt_session_is_kept(const bt_session *session)
+{
+    bool kept = session->keepalive_ms != 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        kept = kept || session->finger[f].tare.held;
+    }
+    return kept && session->owner != BT_NO_LINK;
 }
 
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other)

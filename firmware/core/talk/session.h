@@ -1,6 +1,10 @@
-// One session with the host: fingers, settings, calibrations, maps, streams and link statistics. It knows no
-// transport: bytes leave through one function that takes a whole frame or nothing, and arrive through
-// host_link.h. Times are device time in us, wrapping at 2^32.
+// What the board does for its host: fingers, settings, calibrations, maps, streams and link statistics. It
+// knows no transport: bytes leave through one function that takes a whole frame or nothing, and arrive
+// through host_link.h. Times are device time in us, wrapping at 2^32.
+//
+// A board has one or two ports, and each may have a host. Both are answered, but only one of them, the owner,
+// changes anything: who changed something last. While it streams with a keep-alive, holds a finger or has
+// taken the link, commands of the other that would change something are refused, LINK_BUSY.
 #ifndef BIOTAC_SESSION_H
 #define BIOTAC_SESSION_H
 
@@ -27,8 +31,11 @@ typedef struct {
 // What a sensor says about itself, as sent to the host.
 typedef bt_msg_sensor_info bt_sensor_info;
 
-// Takes all bytes or none; false: no room, or no host.
-typedef bool (*bt_link_write)(void *context, const uint8_t *data, size_t bytes);
+#define BT_LINKS   2
+#define BT_NO_LINK BT_LINKS
+
+// To the host at a port, 0 to BT_LINKS - 1. Takes all bytes or none; false: no room, or no host.
+typedef bool (*bt_link_write)(void *context, unsigned link, const uint8_t *data, size_t bytes);
 
 // What the session needs from its board. The actions return an enum bt_error.
 typedef struct {
@@ -83,14 +90,17 @@ typedef struct {
     bt_link_write write;
     void *context;
     bt_board_actions board;
-    bt_deframer deframer;
+    bt_deframer deframer[BT_LINKS];
+    uint8_t owner; // port whose host may change things; BT_NO_LINK until one does
+    uint8_t link;  // port that messages go to: the owner's, or while a command runs, its own
 
     uint8_t streams;              // BT_STREAM_FLAG_*
     uint8_t fingers;              // bit mask of the fingers that START named
     uint8_t event_fingers;        // bit mask of the fingers that send EVENTs in this round
     uint8_t events_due[BT_SLOTS]; // and of those for which each slot may show one
     uint16_t keepalive_ms;
-    uint32_t heard_us; // when the host last said anything
+    uint32_t heard_us;   // when the owner last said anything
+    uint32_t command_us; // when the latest command came, whoever sent it
     uint32_t status_us;
     uint32_t second_us; // uptime is counted in whole seconds from here
     uint32_t uptime_s;
@@ -123,6 +133,8 @@ void bt_session_stop(bt_session *session);
 
 // The sensors' bus is at its usual rate again.
 void bt_session_end_trial(bt_session *session);
+// The owner streams with a keep-alive, holds a finger or has taken the link.
+bool bt_session_is_kept(const bt_session *session);
 
 // Finger f's sensor has told its serial number; other: it is not the one that was there before.
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);

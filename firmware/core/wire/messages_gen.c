@@ -990,6 +990,25 @@ void bt_msg_subscribe_unpack(bt_msg_subscribe *msg, const uint8_t in[BT_SUBSCRIB
     (void)at;
 }
 
+void bt_msg_take_link_pack(const bt_msg_take_link *msg, uint8_t out[BT_TAKE_LINK_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->keepalive_ms, 2);
+    (void)at;
+}
+
+void bt_msg_take_link_unpack(bt_msg_take_link *msg, const uint8_t in[BT_TAKE_LINK_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->keepalive_ms = (uint16_t)value;
+    (void)at;
+}
+
 void bt_msg_get_point_pack(const bt_msg_get_point *msg, uint8_t out[BT_GET_POINT_BYTES])
 {
     uint8_t *at = out;
@@ -1740,6 +1759,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_PING_BYTES;
     case BT_SUBSCRIBE_ID:
         return BT_SUBSCRIBE_BYTES;
+    case BT_TAKE_LINK_ID:
+        return BT_TAKE_LINK_BYTES;
     case BT_GET_POINT_ID:
         return BT_GET_POINT_BYTES;
     case BT_TARE_NOW_ID:
@@ -1823,7 +1844,7 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_HOLD_TIMEOUT_MS, 0, 3600000, 2000},
     {BT_SETTING_FORCE_MODEL, 0, 1, 1},
     {BT_SETTING_UART_BITS_PER_S, 0, 3000000, 0},
-    {BT_SETTING_UART_PINS, 0, 3, 0},
+    {BT_SETTING_LOADER_BY_TOUCH, 0, 1, 1},
 };
 
 const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {

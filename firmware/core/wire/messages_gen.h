@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x13DC1CFAu
+#define BT_SCHEMA_HASH 0x63FFA723u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -40,6 +40,7 @@ enum bt_error {
     BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
     BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
     BT_ERROR_NOT_WHOLE = 13, // data are missing or do not match the CRC-32: upload them again
+    BT_ERROR_LINK_BUSY = 14, // the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or send TAKE_LINK
 };
 
 // State of a finger's tare machine (SPEC.md, Tare).
@@ -80,14 +81,6 @@ enum bt_poc_weights {
 enum bt_force_model {
     BT_FORCE_MODEL_LIN = 0, // Lin's three gains, force_gain_*_nn
     BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
-};
-
-// Pins of a board's UART. On a Pico, four pairs are not used by the sensors; a board with one pair ignores this.
-enum bt_uart_pins {
-    BT_UART_PINS_GPIO_0_1 = 0, // TX on GPIO 0, RX on GPIO 1
-    BT_UART_PINS_GPIO_4_5 = 1, // TX on GPIO 4, RX on GPIO 5
-    BT_UART_PINS_GPIO_8_9 = 2, // TX on GPIO 8, RX on GPIO 9
-    BT_UART_PINS_GPIO_12_13 = 3, // TX on GPIO 12, RX on GPIO 13
 };
 
 // What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody.
@@ -171,7 +164,9 @@ enum bt_event_kind {
 #define BT_FAULT_FLAG_LINK_DAMAGED (1u << 6) // frames from the host were damaged or had a wrong length
 #define BT_FAULT_FLAG_HOST_SILENT (1u << 7) // a stream ended because the host sent nothing for keepalive_ms
 #define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host sent nothing for hold_timeout_ms
-#define BT_FAULT_FLAGS 0x1FFu // all there are
+#define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its streams
+#define BT_FAULT_FLAG_TARE_RESTORED (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
+#define BT_FAULT_FLAGS 0x7FFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
@@ -207,7 +202,7 @@ enum bt_setting {
     BT_SETTING_HOLD_TIMEOUT_MS = 13, // [ms]
     BT_SETTING_FORCE_MODEL = 14, // [enum force_model]
     BT_SETTING_UART_BITS_PER_S = 15, // [bit/s]
-    BT_SETTING_UART_PINS = 16, // [enum uart_pins]
+    BT_SETTING_LOADER_BY_TOUCH = 17, // [bool]
 };
 #define BT_SETTINGS 16
 
@@ -242,8 +237,8 @@ enum bt_setting {
 #define BT_SETTING_FORCE_MODEL_MAX 1
 #define BT_SETTING_UART_BITS_PER_S_MIN (0)
 #define BT_SETTING_UART_BITS_PER_S_MAX 3000000
-#define BT_SETTING_UART_PINS_MIN (0)
-#define BT_SETTING_UART_PINS_MAX 3
+#define BT_SETTING_LOADER_BY_TOUCH_MIN (0)
+#define BT_SETTING_LOADER_BY_TOUCH_MAX 1
 
 typedef struct {
     uint8_t id;
@@ -601,7 +596,7 @@ typedef struct {
 void bt_msg_ping_pack(const bt_msg_ping *msg, uint8_t out[BT_PING_BYTES]);
 void bt_msg_ping_unpack(bt_msg_ping *msg, const uint8_t in[BT_PING_BYTES]);
 
-// Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot.
+// Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, as after a reboot, whenever another host begins: a port is opened, its host sends HELLO_REQUEST while nothing streams, or the other port's host takes over.
 #define BT_SUBSCRIBE_ID 0x8B
 #define BT_SUBSCRIBE_BYTES 3
 typedef struct {
@@ -611,6 +606,16 @@ typedef struct {
 } bt_msg_subscribe;
 void bt_msg_subscribe_pack(const bt_msg_subscribe *msg, uint8_t out[BT_SUBSCRIBE_BYTES]);
 void bt_msg_subscribe_unpack(bt_msg_subscribe *msg, const uint8_t in[BT_SUBSCRIBE_BYTES]);
+
+// Take the board over from the host at its other port: its streams and uploads end, holds stay. It is refused (LINK_BUSY) until this host sends STOP, closes its port or has sent nothing for keepalive_ms. Both are sent a STATUS with LINK_TAKEN.
+#define BT_TAKE_LINK_ID 0xAF
+#define BT_TAKE_LINK_BYTES 3
+typedef struct {
+    uint8_t req_id; // [1] 1 to 255
+    uint16_t keepalive_ms; // [ms] how long this host may be silent
+} bt_msg_take_link;
+void bt_msg_take_link_pack(const bt_msg_take_link *msg, uint8_t out[BT_TAKE_LINK_BYTES]);
+void bt_msg_take_link_unpack(bt_msg_take_link *msg, const uint8_t in[BT_TAKE_LINK_BYTES]);
 
 // Ask for POINT, without waiting for the round to end. Refused (OTHER_SENSOR) if SENSOR_OTHER leaves no results.
 #define BT_GET_POINT_ID 0x8C
@@ -978,6 +983,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
 #define BT_PING_FIELDS(X) X(req_id, u8, 1)
 #define BT_SUBSCRIBE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(quantities, u8, 1)
+#define BT_TAKE_LINK_FIELDS(X) X(req_id, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_GET_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_TARE_NOW_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_TARE_SET_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
@@ -1009,7 +1015,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1)
 #define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif

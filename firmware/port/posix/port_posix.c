@@ -220,14 +220,14 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 
 // ---- link -------------------------------------------------------------------------------------
 
-bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
+bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
 {
-    return pty_write(data, bytes);
+    return link == 0 && pty_write(data, bytes);
 }
 
-size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 {
-    if (!link_due) {
+    if (link != 0 || !link_due) {
         return 0; // a system call per half slot would cost more than all else
     }
     // What is read now was sent before now: a board that is late catches up first, unless it never does.
@@ -246,17 +246,25 @@ size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
     return n;
 }
 
-bool port_link_up(bt_port *port)
+uint32_t port_link_turns(bt_port *port, unsigned link)
 {
-    static bool up;
-    if (link_due) {
-        up = pty_up();
+    static uint32_t turns;
+    if (link != 0) {
+        return 0;
     }
-    return up;
+    if (link_due && pty_up() != (turns & 1)) {
+        turns++;
+    }
+    return turns;
 }
 
-void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
+}
+
+bool port_link_touched(bt_port *port)
+{
+    return false;
 }
 
 bool port_reboot(bt_port *port, bool into_bootloader)

@@ -1,8 +1,5 @@
 # What an RP2040's image has beside the rest: the second-stage boot, and a .uf2 to drop on its drive.
 
-# The hardware's divider and CRC, in place of a library call of a hundred cycles and a table.
-add_compile_options("$<$<COMPILE_LANGUAGE:C>:SHELL:-include ${port}/divider.h -include ${port}/sniffer.h>")
-
 # Assembled, checksummed, and linked as the 256 bytes that the chip's ROM wants to see.
 add_library(boot2_code OBJECT ${port}/boot2.S)
 add_custom_command(OUTPUT boot2_block.S

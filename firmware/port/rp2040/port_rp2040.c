@@ -91,9 +91,6 @@ bt_port *port_init(int argc, char **argv)
 
 void port_idle(bt_port *port)
 {
-    if (usb_touched()) {
-        (void)port_reboot(port, true);
-    }
     uint32_t since_us = port_now_us(port) - leave_us;
     bool all_sent = usb_all_sent() && uart_all_sent();
     if (leaving && since_us >= LEAVE_AFTER_US && (all_sent || since_us >= LEAVE_LATEST_US)) {

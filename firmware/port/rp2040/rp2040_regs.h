@@ -15,6 +15,7 @@
 #define CLK_SYS_HZ 125000000u
 
 // ---- 2.3.1 SIO: single-cycle IO
+#define SIO_GPIO_IN      REG32(0xD0000004u)
 #define SIO_GPIO_OUT_SET REG32(0xD0000014u)
 #define SIO_GPIO_OUT_CLR REG32(0xD0000018u)
 #define SIO_GPIO_OE_SET  REG32(0xD0000024u)
@@ -24,7 +25,7 @@
 #define USBCTRL_IRQ 5
 #define PIO0_IRQ_0  7
 #define PIO0_IRQ_1  8
-#define UART_IRQ(n) (20 + (n))
+#define UART0_IRQ   20
 
 // ---- 2.5 DMA
 #define DMA_READ_ADDR(channel)   REG32(0x50000000u + 0x40u * (channel))
@@ -41,7 +42,7 @@
 #define DMA_UNPACED                       (0x3Fu << 15)
 #define DMA_BY_TIMER0                     (0x3Bu << 15)
 #define DMA_BY_PIO0_RX(sm)                ((4u + (sm)) << 15)
-#define DMA_BY_UART_TX(n)                 ((20u + 2u * (n)) << 15)
+#define DMA_BY_UART0_TX                   (20u << 15)
 #define DMA_CHAIN_TO(channel)             ((uint32_t)(channel) << 11)
 #define DMA_CHAIN_TO_ITSELF(channel)      DMA_CHAIN_TO(channel) // that is, to none
 #define DMA_WRITES_WRAP                   (1u << 10)
@@ -80,7 +81,7 @@
 #define RESETS_PLL_USB    (1u << 13)
 #define RESETS_SPI0       (1u << 16)
 #define RESETS_TIMER      (1u << 21)
-#define RESETS_UART(n)    (1u << (22 + (n)))
+#define RESETS_UART0      (1u << 22)
 #define RESETS_USBCTRL    (1u << 24)
 
 // ---- 2.15 clocks
@@ -209,12 +210,15 @@
 #define USB_SIE_SETUP_REC      (1u << 17)
 #define USB_SIE_RESUME         (1u << 11)
 #define USB_SIE_SUSPENDED      (1u << 4)
+#define USB_SIE_LINE_STATE     (3u << 2)
+#define USB_SIE_LINE_J         (1u << 2)
 #define USB_STALL_EP0_IN       (1u << 0)
 #define USB_STALL_EP0_OUT      (1u << 1)
 #define USB_MUXING_TO_PHY      (1u << 0)
 #define USB_MUXING_SOFTCON     (1u << 3)
 #define USB_PWR_VBUS_DETECT    (1u << 3)
 #define USB_PWR_VBUS_OVERRIDE  (1u << 2)
+#define USB_INT_SOF            (1u << 17) // until SOF_RD is read
 #define USB_INT_SETUP_REQ      (1u << 16)
 #define USB_INT_RESUME         (1u << 15)
 #define USB_INT_SUSPEND        (1u << 14)
@@ -222,15 +226,15 @@
 #define USB_INT_BUFF_STATUS    (1u << 4)
 
 // ---- 4.2 UART: an ARM PL011
-#define UART_DR(n)        REG32(0x40034000u + 0x4000u * (n))
-#define UART_FR(n)        REG32(0x40034018u + 0x4000u * (n))
-#define UART_IBRD(n)      REG32(0x40034024u + 0x4000u * (n))
-#define UART_FBRD(n)      REG32(0x40034028u + 0x4000u * (n))
-#define UART_LCR_H(n)     REG32(0x4003402Cu + 0x4000u * (n)) // a write puts IBRD and FBRD in force
-#define UART_CR(n)        REG32(0x40034030u + 0x4000u * (n))
-#define UART_IMSC(n)      REG32(0x40034038u + 0x4000u * (n))
-#define UART_ICR(n)       REG32(0x40034044u + 0x4000u * (n))
-#define UART_DMACR(n)     REG32(0x40034048u + 0x4000u * (n))
+#define UART_DR           REG32(0x40034000u)
+#define UART_FR           REG32(0x40034018u)
+#define UART_IBRD         REG32(0x40034024u)
+#define UART_FBRD         REG32(0x40034028u)
+#define UART_LCR_H        REG32(0x4003402Cu) // a write puts IBRD and FBRD in force
+#define UART_CR           REG32(0x40034030u)
+#define UART_IMSC         REG32(0x40034038u)
+#define UART_ICR          REG32(0x40034044u)
+#define UART_DMACR        REG32(0x40034048u)
 #define UART_FIFO_BYTES   32
 #define UART_FR_RXFE      (1u << 4)
 #define UART_FR_BUSY      (1u << 3)

@@ -48,25 +48,21 @@ void usb_start(const char *serial);
 // In the main loop, often: start over a controller that hears nothing any more.
 void usb_watch(void);
 bool usb_all_sent(void);
-extern uint32_t usb_starts; // of frame
+extern volatile uint32_t usb_starts; // of frame
 
-// port_link_up, _write and _read for a host on USB.
-bool usb_link_up(void);
+// port_link_turns, _write and _read for a host on USB.
+uint32_t usb_turns(void);
 bool usb_link_write(const uint8_t *data, size_t bytes);
 size_t usb_link_read(uint8_t *data, size_t bytes);
 
-// Once: a host set 1200 baud and let DTR go, the customary sign to enter the loader.
-bool usb_touched(void);
-
 // ---- uart.c
-// bits_per_s: 120 to 7.8 million. pins: an enum bt_uart_pins.
-void uart_start(uint32_t bits_per_s, uint32_t pins);
+// bits_per_s: 120 to 7.8 million.
+void uart_start(uint32_t bits_per_s);
 bool uart_started(void);
 
 // Takes all bytes or none; false means no room.
 bool uart_write(const uint8_t *data, size_t bytes);
 size_t uart_read(uint8_t *data, size_t bytes);
-void uart_forget_heard(void);
 
 // In the main loop, often: what is written goes out a run of the ring at a time.
 void uart_watch(void);

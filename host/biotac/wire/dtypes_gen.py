@@ -274,6 +274,12 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("quantities", "u1"),
         ]
     ),
+    wire.TakeLink.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("keepalive_ms", "<u2"),
+        ]
+    ),
     wire.GetPoint.ID: np.dtype(
         [
             ("req_id", "u1"),

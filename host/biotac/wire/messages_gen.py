@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x13DC1CFA
+SCHEMA_HASH = 0x63FFA723
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -43,6 +43,7 @@ class Error(IntEnum):
     OTHER_SENSOR = 11  # made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
     NOT_BEGUN = 12  # no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
     NOT_WHOLE = 13  # data are missing or do not match the CRC-32: upload them again
+    LINK_BUSY = 14  # the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or send TAKE_LINK
 
 
 class TareState(IntEnum):
@@ -87,15 +88,6 @@ class ForceModel(IntEnum):
 
     LIN = 0  # Lin's three gains, force_gain_*_nn
     POPULATION = 1  # the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
-
-
-class UartPins(IntEnum):
-    """Pins of a board's UART. On a Pico, four pairs are not used by the sensors; a board with one pair ignores this."""
-
-    GPIO_0_1 = 0  # TX on GPIO 0, RX on GPIO 1
-    GPIO_4_5 = 1  # TX on GPIO 4, RX on GPIO 5
-    GPIO_8_9 = 2  # TX on GPIO 8, RX on GPIO 9
-    GPIO_12_13 = 3  # TX on GPIO 12, RX on GPIO 13
 
 
 class Board(IntEnum):
@@ -187,6 +179,8 @@ class FaultFlags(IntFlag):
     LINK_DAMAGED = 1 << 6  # frames from the host were damaged or had a wrong length
     HOST_SILENT = 1 << 7  # a stream ended because the host sent nothing for keepalive_ms
     HOLD_LAPSED = 1 << 8  # a HOLD ended because the host sent nothing for hold_timeout_ms
+    LINK_TAKEN = 1 << 9  # the host at one of the board's ports took over from the one at the other, and ended its streams
+    TARE_RESTORED = 1 << 10  # after a hang or a crash, a finger has the tare and HOLD of before
 
 
 class StreamFlags(IntFlag):
@@ -226,6 +220,7 @@ ERROR_DOC: dict[int, str] = {
     11: "made for a sensor with another serial number: plug that sensor in, or send no serial number to force it",
     12: "no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload",
     13: "data are missing or do not match the CRC-32: upload them again",
+    14: "the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or send TAKE_LINK",
 }
 
 
@@ -266,14 +261,6 @@ POC_WEIGHTS_DOC: dict[int, str] = {
 FORCE_MODEL_DOC: dict[int, str] = {
     0: "Lin's three gains, force_gain_*_nn",
     1: "the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN",
-}
-
-
-UART_PINS_DOC: dict[int, str] = {
-    0: "TX on GPIO 0, RX on GPIO 1",
-    1: "TX on GPIO 4, RX on GPIO 5",
-    2: "TX on GPIO 8, RX on GPIO 9",
-    3: "TX on GPIO 12, RX on GPIO 13",
 }
 
 
@@ -359,6 +346,8 @@ FAULT_FLAG_DOC: dict[int, str] = {
     64: "frames from the host were damaged or had a wrong length",
     128: "a stream ended because the host sent nothing for keepalive_ms",
     256: "a HOLD ended because the host sent nothing for hold_timeout_ms",
+    512: "the host at one of the board's ports took over from the one at the other, and ended its streams",
+    1024: "after a hang or a crash, a finger has the tare and HOLD of before",
 }
 
 
@@ -400,7 +389,7 @@ class Setting(IntEnum):
     HOLD_TIMEOUT_MS = 13
     FORCE_MODEL = 14
     UART_BITS_PER_S = 15
-    UART_PINS = 16
+    LOADER_BY_TOUCH = 17
 
 
 class SettingSpec(NamedTuple):
@@ -472,11 +461,11 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.UART_BITS_PER_S: SettingSpec(
         "bit/s", 0, 3000000, 0,
-        "bit rate of a UART for this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: off, or 921600 on a board that has no other link. Used from the board's next start if saved",
+        "bit rate of a UART for this protocol, beside USB: 8 data bits, no parity, one stop bit; below 1200: off, or 921600 on a board that has no other link. Used from the board's next start if saved; only a Pico has one",
     ),
-    Setting.UART_PINS: SettingSpec(
-        "enum uart_pins", 0, 3, 0,
-        "pins of that UART; likewise from the next start",
+    Setting.LOADER_BY_TOUCH: SettingSpec(
+        "bool", 0, 1, 1,
+        "1: opening and closing the USB port at 1200 baud enters the boot loader, unless a finger is touched or held; 0: only REBOOT_BOOTLOADER does",
     ),
 }
 
@@ -1458,7 +1447,7 @@ class Ping:
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot."""
+    """Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, as after a reboot, whenever another host begins: a port is opened, its host sends HELLO_REQUEST while nothing streams, or the other port's host takes over."""
 
     req_id: int
     fingers: int
@@ -1483,6 +1472,33 @@ class Subscribe:
             v[0],
             v[1],
             v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class TakeLink:
+    """Take the board over from the host at its other port: its streams and uploads end, holds stay. It is refused (LINK_BUSY) until this host sends STOP, closes its port or has sent nothing for keepalive_ms. Both are sent a STATUS with LINK_TAKEN."""
+
+    req_id: int
+    keepalive_ms: int
+
+    ID: ClassVar[int] = 0xAF
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 3 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.keepalive_ms,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> TakeLink:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
         )
 
 
@@ -2407,7 +2423,7 @@ class EmuKeep:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | BoardFacts | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | BoardFacts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2433,6 +2449,7 @@ MESSAGES: dict[int, type[Any]] = {
     Stop.ID: Stop,
     Ping.ID: Ping,
     Subscribe.ID: Subscribe,
+    TakeLink.ID: TakeLink,
     GetPoint.ID: GetPoint,
     TareNow.ID: TareNow,
     TareSet.ID: TareSet,
@@ -2473,6 +2490,7 @@ ANSWERS: dict[type[Any], type[Any]] = {
     Stop: Reply,
     Ping: Reply,
     Subscribe: Reply,
+    TakeLink: Reply,
     GetPoint: Point,
     TareNow: Reply,
     TareSet: Reply,

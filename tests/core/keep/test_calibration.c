@@ -234,7 +234,7 @@ static void every_end_of_a_stream_counts(void **state)
         if (way == 0) {
             assert_int_equal(stop(), BT_ERROR_OK);
         } else if (way == 1) {
-            bt_session_link_down(&session);
+            bt_session_link_down(&session, 0);
         } else if (way == 2) {
             bt_session_tick(&session, 100001); // the host has been silent for too long
         } else {

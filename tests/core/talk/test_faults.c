@@ -110,7 +110,7 @@ static void the_link_and_the_host_have_faults_of_their_own(void **state)
 {
     (void)state;
     uint8_t garbage[] = {7, 1, 2, 3, 4, 5, 6, 0};
-    bt_session_receive(&session, garbage, sizeof garbage, 0);
+    bt_session_receive(&session, 0, garbage, sizeof garbage, 0);
     assert_int_equal(status().faults, BT_FAULT_FLAG_LINK_DAMAGED);
     clear(UINT16_MAX, 0);
 

@@ -268,9 +268,9 @@ static void at_first_everything_but_sigmas_and_touches_is_sent(void **state)
 
 static size_t bytes_written;
 
-static bool count_bytes(void *context, const uint8_t *data, size_t bytes)
+static bool count_bytes(void *context, unsigned link, const uint8_t *data, size_t bytes)
 {
-    (void)context;
+    (void)context, (void)link;
     (void)data;
     bytes_written += bytes;
     return true;

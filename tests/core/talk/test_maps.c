@@ -168,7 +168,7 @@ static void every_way_out_ends_an_upload(void **state)
             assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
             assert_int_equal(stop(), BT_ERROR_OK);
         } else if (way == 2) {
-            bt_session_link_down(&session);
+            bt_session_link_down(&session, 0);
         } else {
             assert_int_equal(begin(4, 24, 0), BT_ERROR_OK);
         }

@@ -152,11 +152,11 @@ static void a_tares_age_is_told_in_milliseconds(void **state)
 static void who_is_refused_has_no_results(void **state)
 {
     (void)state;
-    session.finger[2].quantities = 0x7F;
     for (int k = 0; k < 60; k++) {
         host_round(&session, 1 << 2, 2000);
     }
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 2, 0), BT_ERROR_OK);
+    session.finger[2].quantities = 0x7F;
     for (int refused = 0; refused <= 1; refused++) {
         bt_msg_frame frame;
         session.refused = (uint8_t)(refused << 2);

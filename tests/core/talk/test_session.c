@@ -125,6 +125,7 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_CLEAR_FAULTS_ID, BT_REPLY_ID, 0, 37},
         {BT_GET_BOARD_FACTS_ID, BT_REPLY_ID, 0, 38}, // this board measures nothing
         {BT_SET_BUS_RATE_ID, BT_REPLY_ID, 0, 39},
+        {BT_TAKE_LINK_ID, BT_REPLY_ID, 0, 40},
     };
     for (int id = 0x80; id < OF_THE_SENSOR_BOARD; id++) { // the table holds every command there is
         int listed = 0;
@@ -243,7 +244,7 @@ static void a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port(void **st
         } else if (way == 1) {
             assert_int_equal(host_error(&session, BT_STOP_ID, &req_id, 1), BT_ERROR_OK);
         } else {
-            bt_session_link_down(&session);
+            bt_session_link_down(&session, 0);
         }
         assert_int_equal(bus_khz, 4464);
     }

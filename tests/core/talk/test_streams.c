@@ -33,7 +33,7 @@ static void the_keep_alive_stops_the_stream_and_any_good_frame_keeps_it(void **s
     host_send(&session, BT_PING_ID, "\x01", 1, 1500000);
     bt_session_tick(&session, 3000000);
     assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
-    bt_session_receive(&session, (const uint8_t *)"noise\0", 6, 2900000); // says nothing
+    bt_session_receive(&session, 0, (const uint8_t *)"noise\0", 6, 2900000); // says nothing
     bt_session_tick(&session, 3000001);
     assert_int_equal(session.streams, 0);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK); // 0: never
@@ -121,13 +121,13 @@ static void a_closed_port_ends_the_stream_and_half_a_command(void **state)
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
     size_t bytes = bt_frame_encode(BT_PING_ID, (const uint8_t *)"\x31", 1, encoded);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
-    bt_session_receive(&session, encoded, 3, 0);
-    bt_session_link_down(&session);
+    bt_session_receive(&session, 0, encoded, 3, 0);
+    bt_session_link_down(&session, 0);
     host_forget();
     host_round(&session, 1, 2000);
     assert_int_equal(host.count, 0);
     assert_int_equal(session.streams, 0);
-    bt_session_receive(&session, encoded, bytes, 0); // the next host's first frame is whole
+    bt_session_receive(&session, 0, encoded, bytes, 0); // the next host's first frame is whole
     assert_int_equal(host.count, 1);
     assert_int_equal(host.message[0].payload[0], 0x31);
 }
@@ -140,7 +140,7 @@ static void replies_leave_in_the_order_of_the_commands(void **state)
     for (uint8_t req_id = 1; req_id <= 100; req_id++) {
         bytes += bt_frame_encode(BT_PING_ID, &req_id, 1, stream + bytes);
     }
-    bt_session_receive(&session, stream, bytes, 0);
+    bt_session_receive(&session, 0, stream, bytes, 0);
     assert_int_equal(host.count, 100);
     for (int k = 0; k < 100; k++) {
         assert_int_equal(host.message[k].payload[0], k + 1);

@@ -119,8 +119,9 @@ static void what_is_not_cobs_has_no_length(void **state)
     assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7\1", 3, out), 2);
 }
 
-static bool discard(void *context, const uint8_t *data, size_t bytes)
+static bool discard(void *context, unsigned link, const uint8_t *data, size_t bytes)
 {
+    (void)link;
     (void)context;
     (void)data;
     (void)bytes;
@@ -143,7 +144,7 @@ static void chunks_of_any_size_give_the_same(void **state)
                 size_t bytes = rest < sizes[s] ? rest : sizes[s];
                 uint8_t *chunk = malloc(bytes);
                 memcpy(chunk, now->wire + at, bytes);
-                bt_session_receive(&session, chunk, bytes, 0);
+                bt_session_receive(&session, 0, chunk, bytes, 0);
                 free(chunk);
             }
             assert_int_equal(session.rx_frames, now->frames);

@@ -101,7 +101,7 @@ def test_settings_with_names_are_shown_by_name(capsys) -> None:
     assert main(["info", "sim:press.toml?fingers=1"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert {"force_model = POPULATION (1)", "poc_weights = COMPRESS_N1 (1)", "status_period_ms = 1000 ms"} < set(lines)
-    assert setting_text(wire.Setting.UART_PINS, 9) == "uart_pins = 9"  # of a newer board
+    assert setting_text(wire.Setting.FORCE_MODEL, 9) == "force_model = 9"  # of a newer board
 
 
 def test_stream_prints_one_json_object_a_frame(capsys) -> None:

@@ -1,6 +1,7 @@
 // The USB device controller in device mode: its interrupt, and a start over when it hears nothing any more.
 #include "only_board.h"
 
+#include "pins.h"
 #include "rp2040_regs.h"
 #include "system.h"
 #include "usb/buffers.h"
@@ -16,11 +17,16 @@
 
 // RP2040-E15: bus errors in an IN transfer, of which a corrupt handshake behind a hub is one, can stop the
 // controller for good: it hears neither tokens nor bus resets, and so no start of frame, which a host sends
-// every millisecond even while nobody reads. Only a reset of the block helps.
+// every millisecond even while nobody reads. Only a reset of the block helps. data.c avoids what is known to
+// cause it; this is for what is left.
 #define HEARS_NOTHING_US 100000u
+#define SUSPENDED_US     3000u  // without a start of frame, USB 2.0, 7.1.7.6
 #define OFF_THE_BUS_US   20000u // so that a hub sees it leave
 
-static const char *serial_number;
+// The controller says that the bus is suspended. By itself this means little: it is told once when that
+// changes, maybe long after it has changed back. So it counts while no frame has begun since.
+static volatile bool suspend_told;
+volatile uint32_t usb_starts;
 
 static void buffers_done(void)
 {
@@ -40,6 +46,12 @@ static void buffers_done(void)
     }
 }
 
+static void not_suspended(void)
+{
+    suspend_told = false;
+    usb_data_suspend(false);
+}
+
 static void usb_interrupt(void)
 {
     uint32_t status = USB_INTS;
@@ -47,30 +59,35 @@ static void usb_interrupt(void)
     if (status & USB_INT_BUFF_STATUS) {
         buffers_done();
     }
-    if (status & USB_INT_SETUP_REQ) {
-        usb_data_suspend(false);
-        usb_control_setup();
-    }
-    if (status & USB_INT_BUS_RESET) {
-        USB_SIE_STATUS = USB_SIE_BUS_RESET; // writing 1 clears, here and below
-        usb_data_suspend(false);
-        usb_control_bus_reset();
-    }
     if (status & USB_INT_SUSPEND) {
-        USB_SIE_STATUS = USB_SIE_SUSPENDED;
-        usb_data_suspend(true);
+        suspend_told = USB_SIE_STATUS & USB_SIE_SUSPENDED;
+        USB_SIE_STATUS = USB_SIE_SUSPENDED; // writing 1 clears, here and below
     }
     if (status & USB_INT_RESUME) {
         USB_SIE_STATUS = USB_SIE_RESUME;
-        usb_data_suspend(false);
     }
-    wake();
+    if (status & ~(USB_INT_SUSPEND | USB_INT_RESUME)) {
+        not_suspended(); // nothing else comes on a bus that sleeps
+    }
+    if (status & USB_INT_SETUP_REQ) {
+        usb_control_setup();
+    }
+    if (status & USB_INT_BUS_RESET) {
+        USB_SIE_STATUS = USB_SIE_BUS_RESET;
+        usb_control_bus_reset();
+    }
+    if (status & USB_INT_SOF) {
+        (void)USB_SOF_RD; // reading clears
+        usb_starts = usb_starts + 1;
+        usb_data_frame();
+    }
+    if (status != USB_INT_SOF) {
+        wake();
+    }
 }
 
-void usb_start(const char *serial)
+static void attach(void)
 {
-    serial_number = serial;
-    usb_control_start(serial);
     for (uint32_t offset = 0; offset < USB_EP0_BUFFER; offset += 4) {
         REG32(USB_DPRAM_BASE + offset) = 0; // it comes up with anything in it
     }
@@ -84,38 +101,81 @@ void usb_start(const char *serial)
     USB_EP_OUT_CONTROL(USB_EP_DATA) =
         USB_EP_ENABLE | USB_EP_INT_PER_BUFFER | USB_EP_TYPE_BULK | USB_DATA_OUT_BUFFER;
     USB_SIE_CTRL = USB_SIE_EP0_INT_1BUF;
-    USB_INTE = USB_INT_BUFF_STATUS | USB_INT_SETUP_REQ | USB_INT_BUS_RESET | USB_INT_SUSPEND | USB_INT_RESUME;
+    USB_INTE = USB_INT_BUFF_STATUS | USB_INT_SETUP_REQ | USB_INT_BUS_RESET | USB_INT_SUSPEND | USB_INT_RESUME
+               | USB_INT_SOF;
     use_interrupt(USBCTRL_IRQ, 3, usb_interrupt); // sampling goes first
     USB_MAIN_CTRL = USB_CONTROLLER_EN;
     REG_SET(USB_SIE_CTRL) = USB_SIE_PULLUP_EN; // now the host sees a device
 }
 
-uint32_t usb_starts;
+// Whether a host gives power: without one, nothing may pull its lines up (USB 2.0, 7.1.5). Where the board
+// cannot tell, it is taken for there.
+static bool has_host(void)
+{
+#ifdef PIN_VBUS_SENSE
+    return SIO_GPIO_IN >> PIN_VBUS_SENSE & 1;
+#else
+    return true;
+#endif
+}
 
+static bool off = true;
+static uint32_t since_us = 0u - OFF_THE_BUS_US; // of the latest frame, or since it is off
+
+static void detach(uint32_t now_us)
+{
+    interrupt_hold_off(USBCTRL_IRQ);
+    usb_control_bus_reset();
+    (void)take_out_of_reset(RESETS_USBCTRL);
+    off = true;
+    since_us = now_us;
+}
+
+void usb_start(const char *serial)
+{
+    usb_control_start(serial);
+#ifdef PIN_VBUS_SENSE
+    PADS_BANK0_GPIO(PIN_VBUS_SENSE) = PADS_IE | PADS_SCHMITT;
+#endif
+    usb_watch();
+}
+
+// In the main loop: suspended is what lasts, and hung what is silent without being suspended.
 void usb_watch(void)
 {
-    static uint32_t frame, since_us, latest;
-    static bool off;
-    uint32_t now_us = port_now_us(ONLY_BOARD);
-    if (latest != USB_SOF_RD) {
-        latest = USB_SOF_RD;
-        usb_starts++;
-    }
+    static uint32_t frame;
+    static bool line_moves;
+    const uint32_t now_us = port_now_us(ONLY_BOARD);
+    const uint32_t silent_us = now_us - since_us;
     if (off) {
-        if (now_us - since_us >= OFF_THE_BUS_US) {
+        if (has_host() && silent_us >= OFF_THE_BUS_US) {
             off = false;
-            usb_start(serial_number);
+            attach();
         }
         return;
     }
-    if (!usb_data_waits() || frame != USB_SOF_RD) {
-        frame = USB_SOF_RD;
+    if (!has_host()) {
+        detach(now_us);
+        return;
+    }
+    if (frame != usb_starts) {
+        frame = usb_starts;
         since_us = now_us;
-    } else if (now_us - since_us >= HEARS_NOTHING_US) {
+        line_moves = false;
+        return;
+    }
+    if (silent_us < SUSPENDED_US) {
+        return;
+    }
+    // On a bus that sleeps the lines do not change; on one whose host still talks, a hung controller believes
+    // it asleep.
+    line_moves = line_moves || (USB_SIE_STATUS & USB_SIE_LINE_STATE) != USB_SIE_LINE_J;
+    const bool expects = usb_data_configured() || USB_BUFFER_IN(0) & USB_BUFFER_AVAILABLE;
+    if (suspend_told && !line_moves) {
         interrupt_hold_off(USBCTRL_IRQ);
-        usb_control_bus_reset();
-        (void)take_out_of_reset(RESETS_USBCTRL);
-        off = true;
-        since_us = now_us;
+        usb_data_suspend(suspend_told);
+        interrupt_let_go(USBCTRL_IRQ);
+    } else if (expects && silent_us >= HEARS_NOTHING_US) {
+        detach(now_us);
     }
 }

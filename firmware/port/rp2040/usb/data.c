@@ -2,7 +2,8 @@
 // one writer and one reader.
 #include "usb/data.h"
 
-#include "dma.h"
+#include "only_board.h"
+#include "ring.h"
 #include "rp2040_regs.h"
 #include "system.h"
 #include "usb/buffers.h"
@@ -17,7 +18,11 @@ static volatile bool configured;
 static volatile bool suspended;
 static volatile bool dtr;
 static volatile bool touched;
-static volatile bool in_busy; // the controller holds a packet for the host
+static volatile uint32_t turns;     // port_link_turns
+static volatile uint32_t turned_at; // rx.head then: what is older is from another host
+static uint32_t read_turns;         // the main loop's
+static volatile uint32_t frame_us;  // when the latest frame of the bus began
+static volatile bool in_busy;       // the controller holds a packet for the host
 static volatile bool out_armed;
 static bool last_was_full;
 static bool delimiter_due;
@@ -32,6 +37,25 @@ static bool link_open(void)
     return configured && dtr;
 }
 
+// RP2040-E15: a bulk IN that is armed at the end of a frame may hang the controller. From here on it waits
+// for the next frame, as it does where there are none; what the interrupt of the frame's start may be late is
+// off.
+#define FRAME_US          1000u
+#define ARM_BEFORE_END    200u
+#define INTERRUPT_LATE_US 60u // behind a slot's interrupt in which sensors are asked who they are
+static bool may_arm(void)
+{
+    return port_now_us(ONLY_BOARD) - frame_us < FRAME_US - ARM_BEFORE_END - INTERRUPT_LATE_US;
+}
+
+static void count_turn(void)
+{
+    if ((link_open() && !suspended) != (turns & 1)) {
+        turned_at = ring_get(&rx.head);
+        turns = turns + 1;
+    }
+}
+
 static uint32_t min(uint32_t a, uint32_t b)
 {
     return a < b ? a : b;
@@ -39,21 +63,20 @@ static uint32_t min(uint32_t a, uint32_t b)
 
 static void send_next(void)
 {
-    if (in_busy || !link_open()) {
+    if (in_busy || !link_open() || !may_arm()) {
         return;
     }
     volatile uint8_t *out = usb_memory(USB_DATA_IN_BUFFER);
     uint32_t tail = ring_get(&tx.tail);
-    uint32_t waiting = ring_filled(&tx);
     uint32_t bytes = 0;
     if (delimiter_due) {
         out[bytes++] = 0;
         delimiter_due = false;
     }
-    uint32_t taken = min(waiting, USB_PACKET_BYTES - bytes);
-    uint32_t first = ring_run(&tx, tail, taken);
-    dma_copy(DMA_OF_USB, out + bytes, ring_at(&tx, tail), first);
-    dma_copy(DMA_OF_USB, out + bytes + first, tx.bytes, taken - first);
+    const uint32_t taken = min(ring_filled(&tx), USB_PACKET_BYTES - bytes);
+    const uint32_t first = ring_run(&tx, tail, taken);
+    copy_bytes(out + bytes, ring_at(&tx, tail), first);
+    copy_bytes(out + bytes + first, tx.bytes, taken - first);
     bytes += taken;
     tail += taken;
     // A host waits for more after a full packet; when there is none, an empty one tells it so.
@@ -87,8 +110,9 @@ void usb_data_line_state(bool now_dtr)
         ring_forget(&tx);
         delimiter_due = now_dtr;
     }
+    touched = touched || (dtr && !now_dtr && line_rate == TOUCH_BITS_PER_S);
     dtr = now_dtr;
-    touched = touched || (!dtr && line_rate == TOUCH_BITS_PER_S);
+    count_turn();
     send_next();
 }
 
@@ -101,6 +125,7 @@ void usb_data_configure(bool now_configured)
 {
     dtr = false;
     configured = now_configured;
+    count_turn();
     USB_BUFFER_IN(USB_EP_DATA) = 0;
     USB_BUFFER_OUT(USB_EP_DATA) = 0;
     in_busy = out_armed = last_was_full = false;
@@ -126,6 +151,13 @@ void usb_data_reset_toggle(uint8_t endpoint_address)
 void usb_data_suspend(bool now_suspended)
 {
     suspended = now_suspended;
+    count_turn();
+}
+
+void usb_data_frame(void)
+{
+    frame_us = port_now_us(ONLY_BOARD);
+    send_next();
 }
 
 void usb_data_sent(void)
@@ -145,9 +177,9 @@ void usb_data_received(void)
     receive_next();
 }
 
-bool usb_data_waits(void)
+bool usb_data_configured(void)
 {
-    return in_busy && !suspended;
+    return configured;
 }
 
 // ---- main loop -------------------------------------------------------------------------------------------
@@ -157,19 +189,21 @@ bool usb_all_sent(void)
     return !in_busy && ring_filled(&tx) == 0;
 }
 
-bool usb_touched(void)
+bool port_link_touched(bt_port *port)
 {
-    return touched;
+    const bool was = touched;
+    touched = false;
+    return was;
 }
 
-bool usb_link_up(void)
+uint32_t usb_turns(void)
 {
-    return link_open() && !suspended;
+    return turns;
 }
 
 bool usb_link_write(const uint8_t *data, size_t bytes)
 {
-    if (!usb_link_up() || !dma_put(DMA_OF_FRAMES, &tx, data, (uint32_t)bytes)) {
+    if (!(turns & 1) || !ring_put(&tx, data, bytes)) {
         return false;
     }
     // The interrupt either sees the new bytes, or has left in_busy false by now; likewise when reading.
@@ -182,11 +216,20 @@ bool usb_link_write(const uint8_t *data, size_t bytes)
     return true;
 }
 
+// Nothing at first when the port was opened or closed since the last call: by the next, whoever reads has
+// seen that, too.
 size_t usb_link_read(uint8_t *data, size_t bytes)
 {
-    size_t taken = ring_take(&rx, data, bytes);
+    const bool turned = turns != read_turns;
+    size_t taken = 0;
+    if (turned) {
+        read_turns = turns;
+        ring_set(&rx.tail, turned_at);
+    } else {
+        taken = ring_take(&rx, data, bytes);
+    }
     atomic_signal_fence(memory_order_seq_cst);
-    if (taken > 0 && !out_armed) {
+    if ((turned || taken > 0) && !out_armed) {
         interrupt_hold_off(USBCTRL_IRQ);
         receive_next();
         interrupt_let_go(USBCTRL_IRQ);

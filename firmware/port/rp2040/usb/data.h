@@ -11,10 +11,10 @@ void usb_data_line_state(bool dtr);
 void usb_data_line_rate(uint32_t bits_per_s);
 
 void usb_data_suspend(bool suspended); // asleep, or the cable is out while something else powers the board
+void usb_data_frame(void);             // a frame of the bus begins
 void usb_data_sent(void);              // the host has the last packet
 void usb_data_received(void);          // one from the host is in the controller's memory
 
-// A packet waits for a host that is awake.
-bool usb_data_waits(void);
+bool usb_data_configured(void);
 
 #endif

@@ -1,0 +1,213 @@
+// Hosts at both of a board's ports: whose commands count, who is answered, and who is told of a change.
+#include "../fake_host.h"
+
+enum { USB, UART };
+
+static uint32_t now_us;
+
+// Sends to a port; the latest REPLY's error, or OK if another message came. Whatever came is in host.message.
+static uint8_t ask(unsigned link, uint8_t id, const void *payload, size_t bytes)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES], error = BT_ERROR_OK;
+    host_forget();
+    bt_session_receive(&session, link, encoded, bt_frame_encode(id, payload, bytes, encoded), now_us);
+    assert_true(host.count > 0);
+    const received_message *last = &host.message[host.count - 1];
+    assert_int_equal(last->link, link); // whoever asks is answered
+    if (last->id == BT_REPLY_ID) {
+        error = last->payload[2];
+    }
+    return error;
+}
+
+static uint8_t stream_at(unsigned link, uint16_t keepalive_ms)
+{
+    uint8_t payload[BT_START_BYTES];
+    bt_msg_start msg = {
+        .req_id = 9, .streams = BT_STREAM_FLAG_FRAMES, .fingers = 1, .keepalive_ms = keepalive_ms};
+    bt_msg_start_pack(&msg, payload);
+    return ask(link, BT_START_ID, payload, sizeof payload);
+}
+
+static uint8_t take_at(unsigned link, uint16_t keepalive_ms)
+{
+    const uint8_t payload[BT_TAKE_LINK_BYTES] = {7, (uint8_t)keepalive_ms, (uint8_t)(keepalive_ms >> 8)};
+    return ask(link, BT_TAKE_LINK_ID, payload, sizeof payload);
+}
+
+static uint8_t subscribe_at(unsigned link, uint8_t quantities)
+{
+    return ask(link, BT_SUBSCRIBE_ID, (const uint8_t[]){6, 0x1F, quantities}, BT_SUBSCRIBE_BYTES);
+}
+
+// The ports that got a STATUS which nobody asked for, with LINK_TAKEN, in the answer to the latest command.
+static unsigned told(void)
+{
+    unsigned ports = 0;
+    for (int k = 0; k < host.count; k++) {
+        bt_msg_status status;
+        if (host.message[k].id == BT_STATUS_ID) {
+            bt_msg_status_unpack(&status, host.message[k].payload);
+            ports |= status.req_id == 0 && status.faults & BT_FAULT_FLAG_LINK_TAKEN
+                         ? 1u << host.message[k].link
+                         : 0;
+        }
+    }
+    return ports;
+}
+
+// The port that FRAMEs go to.
+static unsigned frames_go_to(void)
+{
+    host_forget();
+    host_round(&session, 1, 2000);
+    assert_true(host.count > 0);
+    return host.message[0].link;
+}
+
+static void who_streams_with_a_keep_alive_keeps_the_link(void **state)
+{
+    (void)state;
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
+    for (int id = 0x80; id < 0xC0; id++) { // whatever a host may say
+        uint8_t payload[BT_FRAME_MAX_BYTES] = {1};
+        int bytes = bt_wire_payload_bytes((uint8_t)id);
+        bool asks = id == BT_HELLO_REQUEST_ID || id == BT_STOP_ID || id == BT_PING_ID || id == BT_READ_MAP_ID
+                    || (id >= BT_GET_STATUS_ID && id <= BT_GET_SENSOR_INFO_ID) || id == BT_GET_POINT_ID
+                    || id == BT_GET_BOARD_FACTS_ID || id == BT_GET_SETTING_ID || id == BT_GET_CALIBRATION_ID
+                    || id == BT_GET_MAP_ID;
+        if (bytes >= 0 && id != BT_TAKE_LINK_ID) {
+            uint8_t error = ask(USB, (uint8_t)id, payload, (size_t)bytes);
+            assert_int_equal(error == BT_ERROR_LINK_BUSY, !asks);
+        }
+    }
+    assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+    assert_int_equal(frames_go_to(), UART);
+    // What the other one asks is no sign of life of the first.
+    now_us = 500001;
+    assert_int_equal(ask(USB, BT_PING_ID, "\1", 1), BT_ERROR_OK);
+    bt_session_tick(&session, now_us);
+    assert_int_equal(session.faults, BT_FAULT_FLAG_HOST_SILENT);
+    assert_int_equal(stream_at(USB, 500), BT_ERROR_OK);
+    assert_int_equal(told(), 0); // nobody had anything
+    assert_int_equal(frames_go_to(), USB);
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
+    bt_session_link_down(&session, USB);
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
+}
+
+static void a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told(void **state)
+{
+    (void)state;
+    assert_int_equal(subscribe_at(USB, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
+    assert_int_equal(stream_at(USB, 0), BT_ERROR_OK);
+    assert_int_equal(ask(UART, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // every program begins with it
+    assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
+    assert_int_equal(told(), 1 << USB | 1 << UART);
+    assert_int_equal(frames_go_to(), UART);
+    assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST); // not what the other one chose
+}
+
+static void the_next_program_at_a_port_does_not_inherit_a_subscription(void **state)
+{
+    (void)state;
+    uint8_t payload[BT_HELLO_REQUEST_BYTES] = {1};
+    assert_int_equal(subscribe_at(UART, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
+    assert_int_equal(stream_at(UART, 100), BT_ERROR_OK);
+    assert_int_equal(ask(UART, BT_HELLO_REQUEST_ID, payload, sizeof payload), BT_ERROR_OK);
+    assert_int_equal(session.finger[0].quantities, BT_QUANTITY_FLAG_EVENTS); // its own question
+    bt_session_tick(&session, now_us += 100001);
+    assert_int_equal(ask(UART, BT_HELLO_REQUEST_ID, payload, sizeof payload), BT_ERROR_OK);
+    assert_int_equal(stream_at(UART, 100), BT_ERROR_OK);
+    assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST);
+}
+
+static void the_link_can_be_taken_and_is_kept_until_the_taker_is_silent(void **state)
+{
+    (void)state;
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
+    assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
+    assert_int_equal(take_at(USB, 0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(take_at(USB, 1000), BT_ERROR_OK);
+    assert_int_equal(told(), 1 << USB | 1 << UART);
+    assert_int_equal(session.streams, 0);
+    assert_true(session.finger[0].tare.held); // what it holds it still holds
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
+    assert_int_equal(ask(USB, BT_RELEASE_ID, "\4\1", 2), BT_ERROR_OK);
+    bt_session_tick(&session, now_us += 1000001);
+    assert_int_equal(session.faults & BT_FAULT_FLAG_HOST_SILENT, 0); // no stream ended
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
+    assert_int_equal(take_at(USB, 1000), BT_ERROR_OK);
+    assert_int_equal(ask(USB, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // gives it back
+    assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
+}
+
+static void a_host_that_only_holds_keeps_the_link_until_its_hold_lapses(void **state)
+{
+    (void)state;
+    assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
+    assert_int_equal(ask(USB, BT_RELEASE_ID, "\3\1", 2), BT_ERROR_LINK_BUSY);
+    for (int k = 0; k < 30; k++) { // a chatty neighbour does not keep alive what a dead controller held
+        now_us += 100000;
+        assert_int_equal(ask(USB, BT_PING_ID, "\1", 1), BT_ERROR_OK);
+        bt_session_tick(&session, now_us);
+    }
+    assert_false(session.finger[0].tare.held);
+    assert_int_equal(session.faults, BT_FAULT_FLAG_HOLD_LAPSED);
+    assert_int_equal(ask(USB, BT_RELEASE_ID, "\3\1", 2), BT_ERROR_OK);
+}
+
+// A controller streams and holds; at the other port programs come and go, and say anything.
+static void a_controller_does_not_notice_what_happens_at_the_other_port(void **state)
+{
+    (void)state;
+    uint32_t draw = 12345;
+    assert_int_equal(stream_at(UART, 200), BT_ERROR_OK);
+    assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
+    for (int turn = 0; turn < 20000; turn++) {
+        uint8_t bytes[BT_ENCODED_MAX_BYTES], payload[BT_FRAME_MAX_BYTES] = {1, 1, 1, 1};
+        draw = draw * 1664525 + 1013904223;
+        const uint8_t id = (uint8_t)(0x80 + (draw >> 8) % 0x40);
+        const int of_id = bt_wire_payload_bytes(id);
+        size_t length = bt_frame_encode(id, payload, of_id < 0 ? 1 : (size_t)of_id, bytes);
+        length = draw >> 28 == 0 ? length / 2 : length; // cut off
+        if (draw >> 24 % 16 == 1) {
+            bt_session_link_down(&session, USB);
+        }
+        if (id != BT_TAKE_LINK_ID) {
+            bt_session_receive(&session, USB, bytes, length, now_us);
+        }
+        now_us += 10000;
+        if (turn % 8 == 0) {
+            assert_int_equal(ask(UART, BT_PING_ID, "\1", 1), BT_ERROR_OK);
+        }
+        bt_session_tick(&session, now_us);
+        assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+        assert_true(session.finger[0].tare.held);
+        if (turn % 100 == 0) {
+            assert_int_equal(frames_go_to(), UART);
+        }
+    }
+    assert_int_equal(session.faults & ~BT_FAULT_FLAG_LINK_DAMAGED, 0);
+}
+
+static int at_time_0(void **state)
+{
+    now_us = 0;
+    return new_session(state);
+}
+
+#define T(name) cmocka_unit_test_setup(name, at_time_0)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(who_streams_with_a_keep_alive_keeps_the_link),
+        T(a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told),
+        T(the_next_program_at_a_port_does_not_inherit_a_subscription),
+        T(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent),
+        T(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses),
+        T(a_controller_does_not_notice_what_happens_at_the_other_port),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
