@@ -50,10 +50,15 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     )
 
 
+def bundled_scenario(name: str) -> bytes:
+    """A scenario that comes with the package, by its file name."""
+    return (resources.files(__package__) / "scenarios" / name).read_bytes()
+
+
 def _scenario_bytes(place: Path) -> bytes:
     try:
         if not place.exists() and place.parent == Path() and place.name in bundled_scenarios():
-            return (resources.files(__package__) / "scenarios" / place.name).read_bytes()
+            return bundled_scenario(place.name)
         return place.read_bytes()
     except OSError as error:
         raise InputError(

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from biotac import sim
+from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
-from biotac.sim.scenario import FAULT_CODES, parse_scenario
+from biotac.sim.scenario import FAULT_CODES, STEP_KEYS, parse_scenario
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as _wire
 from biotac.wire import slots
@@ -23,6 +24,8 @@ from biotac.wire.slots import ELECTRODE_SLOT, FRAME_S
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
 PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def play(tmp_path: Path, text: str, **options: float) -> Source:
@@ -210,8 +213,28 @@ def test_no_gains_unless_asked(tmp_path: Path) -> None:
 
 
 def test_the_bundled_scenarios_are_these() -> None:
-    names = ["calibrate", "calibrate_gaps", "drift", "faults", "fingers", "grasp", "poke", "press", "shear", "weights"]
+    names = [
+        "calibrate",
+        "calibrate_gaps",
+        "drift",
+        "faults",
+        "fingers",
+        "grasp",
+        "poke",
+        "press",
+        "shear",
+        "verbs",
+        "weights",
+    ]
     assert bundled_scenarios() == [f"{name}.toml" for name in names]
+
+
+def test_the_page_and_a_new_scenario_have_every_verb_and_fault(tmp_path: Path) -> None:
+    new = tmp_path / "new.toml"
+    assert main(["sim", "--new", str(new)]) == 0
+    page, text = (ROOT / "host/docs/guides/simulator.md").read_text(encoding="utf-8"), new.read_text(encoding="utf-8")
+    for word in (*STEP_KEYS, *(key for keys in STEP_KEYS.values() for key in keys), *FAULT_CODES):
+        assert f"`{word}" in page and word in text, word
 
 
 @pytest.mark.parametrize("name", bundled_scenarios())

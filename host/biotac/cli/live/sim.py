@@ -6,13 +6,15 @@ import argparse
 import signal
 from pathlib import Path
 
+from ...documents import write_new
 from ...errors import InputError
 from ...hand.opening import shake_hands
 from ...link.serial_port import SerialLink
-from ...sim.loading import load_source
+from ...sim.loading import bundled_scenario, load_source
 from ...sim.ports import start_board
 from ...sim.process import SimBoard
 from .. import values
+from ..outputs import say
 from . import sensor_board
 from .board_on_pty import tell, tell_over, until_ctrl_c
 
@@ -36,11 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--image", help="flash image for --board pico (default: build/pico/biotac-pico.bin)")
     parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
+    parser.add_argument("--new", metavar="FILE", type=Path, help="only write a scenario with every verb, and comments")
     sensor_board.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the pty's path, then run until Ctrl-C; or play on a sensor board."""
+    if args.new is not None:
+        write_new(args.new, bundled_scenario("verbs.toml").decode())
+        say(args, {"scenario": str(args.new)}, f"{args.new}: change it, and play it with `biotac view sim:{args.new}`")
+        return 0
     seconds = args.seconds or (SCENARIO_S if (args.source or "").endswith(".toml") else None)
     if args.sensor_port is not None:
         values.refuse(args, ("board", "image", "pace", "link"), "is for a board on a pty; drop it, or --sensor-port")
