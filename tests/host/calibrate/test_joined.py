@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,10 @@ from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
+from biotac.calibrate.wrench.run import load_run
+from biotac.calibrate.wrench.share import share
 from biotac.calibrate.wrench.sources import Loaded, check_serial
+from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.recording.alignment import align
@@ -218,3 +222,21 @@ def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
     assert (its["serial"], its["made_s"], its["files"]) == ("BTA", 86_400, ["a", "b"])
     b.write_bytes(b"forcf")
     assert loaded.provenance(0)["data_sha256"] != its["data_sha256"]
+
+
+def test_a_shared_finger_is_the_same_finger_to_a_stranger(
+    recorded: tuple[Recording, Source], board: Board, reference: Reference, tmp_path: Path, capsys
+) -> None:
+    run = join("board.mcap", board, reference).run
+    share(run, tmp_path / "thumb.npz", plate="Nano17, emulated", licence="CC0-1.0")
+    again = load_run(tmp_path / "thumb.npz")
+    assert again.serial == run.serial and abs(again.counts - run.counts).max() <= 0.5
+    np.testing.assert_allclose(again.truth[:, :6], run.truth[:, :6])
+    np.testing.assert_allclose(again.tare, run.tare, atol=0.5)
+    assert main(["check", str(tmp_path / "thumb.npz")]) == 0
+    assert "licence CC0-1.0" in capsys.readouterr().out
+    fields = dict(np.load(tmp_path / "thumb.npz"))
+    about = json.loads(str(fields["about"]))
+    for wrong in ({"licence": ""}, {"units": about["units"] | {"F": "gf"}}, {"units": 3}):
+        np.savez(tmp_path / "bad.npz", **fields | {"about": json.dumps(about | wrong)})
+        assert main(["check", str(tmp_path / "bad.npz")]) == 2

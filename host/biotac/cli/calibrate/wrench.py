@@ -20,6 +20,7 @@ from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
 from ...calibrate.wrench.guided import Procedure, walk
 from ...calibrate.wrench.joined import choose_finger
+from ...calibrate.wrench.share import share
 from ...calibrate.wrench.sources import Loaded, check_serial, load, read_reference
 from ...calibrate.wrench.upload import upload
 from ...documents import Provenance, made_text
@@ -57,6 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_finger(parser, required=False, text="of a recording with several: name or chip select")
     text = "regularize towards this map of other fingers, or none (default: the package's)"
     parser.add_argument("--population", metavar="FILE", help=text)
+    parser.add_argument("--share", metavar="OUT.npz", type=Path, help="also pack the one FILE for others to train with")
+    parser.add_argument("--plate", metavar="TEXT", default="", help="with --share: the force sensor's make and number")
+    parser.add_argument("--licence", metavar="SPDX", default="", help="with --share: such as CC-BY-4.0")
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data from any other sensor")
     parser.add_argument("--force", action="store_true", help="overwrite existing files; accept another sensor's data")
     guided = parser.add_argument_group("guided, on a board")
@@ -79,6 +83,9 @@ def run(args: argparse.Namespace) -> int:
         return _live(args)
     if args.upload is not None and len(args.files) != 1:
         raise InputError(f"--upload with {len(args.files)} files: expected one, the finger's")
+    if args.share is not None and not (len(args.files) == 1 and args.plate and args.licence):
+        raise InputError("--share packs one FILE, for others: expected --plate and --licence with it")
+    outputs.check_file(args.share, overwrite=args.force)
     if args.out is not None:
         _check_out(args.out, args.files, overwrite=args.force)
     recordings = [path for path in args.files if path.suffix.lower() == ".mcap"]
@@ -91,7 +98,11 @@ def run(args: argparse.Namespace) -> int:
     for path in args.files:
         reference = references.get(path)
         beside = None if reference is None else (Path(reference), read_reference(reference, mounting))
-        facts = _calibrate(args, load(path, beside, finger=args.finger, serial=args.serial, force=args.force))
+        loaded = load(path, beside, finger=args.finger, serial=args.serial, force=args.force)
+        facts = _calibrate(args, loaded)
+        if args.share is not None:
+            with whole(args.share, overwrite=args.force) as place:
+                share(loaded.run, place, plate=args.plate, licence=args.licence)
         outputs.say(args, facts, _text(facts))
     return 0
 

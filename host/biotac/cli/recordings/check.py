@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ...calibrate.wrench.share import check_shared
 from ...errors import printable
 from ...recording.crosscheck import CrossCheck
 from ..outputs import note, say
@@ -16,7 +17,7 @@ EXAMPLE = "biotac check grasp.mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
+    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record; or shared, .npz")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,6 +25,11 @@ def run(args: argparse.Namespace) -> int:
 
     A recording with gaps is good, with holes that are listed. Raises if it cannot be read (code 2).
     """
+    if args.recording.suffix.lower() == ".npz":
+        about = check_shared(args.recording)
+        words = ", ".join(f"{name} {about[name]}" for name in ("sensor", "plate", "licence"))
+        say(args, about, printable(f"{args.recording}: {about['rows']} rows, good; {words}"))
+        return 0
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck()
     outcome.add(recording.wire, recording.settings, recording.finger_settings, recording.maps)
