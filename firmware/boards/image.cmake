@@ -27,6 +27,9 @@ function(board_image name port_name cpu linker)
   if(EXISTS ${port}/image.cmake)
     include(${port}/image.cmake)
   endif()
+  if(EXISTS ${port}/timer.c) # in place of SysTick
+    list(FILTER ARGN EXCLUDE REGEX "/systick_alarm\\.c$")
+  endif()
   add_executable(${name} ${ARGN} ${port_objects})
   set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
   target_include_directories(${name} PRIVATE
