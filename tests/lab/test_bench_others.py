@@ -1,11 +1,11 @@
-"""biotac-lab bench batch, idle and recording: contestants agree, and sizes are ordered as what they hold is."""
+"""biotac-lab bench batch and recording: contestants agree, and sizes are ordered as what they hold is."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from biotac_lab.bench import batch, idle, recording
+from biotac_lab.bench import batch, recording
 
 
 def test_the_contestants_of_batch_agree() -> None:
@@ -20,14 +20,6 @@ def test_a_contestant_of_batch_that_is_off_is_named() -> None:
     off = tuple(result[name] + (name == "force_n") * 1e-6 for name in result.dtype.names or ())
     with pytest.raises(RuntimeError, match="all frames: two contestants differ in force_n"):
         batch.check([result, off], "all frames")
-
-
-def test_heartbeats_save_most_of_a_resting_link() -> None:
-    link, skipped = idle.measure("press.toml")
-    bytes_per_s = {row[0]: row[4] for row in link.rows}
-    assert bytes_per_s["at rest"] < 0.2 * bytes_per_s["in contact"]
-    assert bytes_per_s["at rest, REST_FRAMES"] > 0.8 * bytes_per_s["in contact"]
-    assert dict(skipped.rows)["frames_idle"] > 0
 
 
 def test_both_readers_give_back_every_integer() -> None:

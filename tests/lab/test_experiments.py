@@ -23,7 +23,6 @@ from biotac_lab.experiments import (
     command,
     estimates,
     laboratory,
-    plate_contact,
     plate_normal,
     poke,
     shear,
@@ -269,20 +268,6 @@ def test_bad_fields_are_refused(tmp_path: Path, figure10: Trial, field: str, val
     arrays = {"M": recorded_axes(figure10.torque_nmm)} | {field: values}
     with pytest.raises(RecordingError, match=words):
         laboratory.load(save(tmp_path / "bad.npz", figure10, **arrays), needs=("F", "M"))
-
-
-# ---- plate-contact -------------------------------------------------------------------------------
-
-
-def test_the_closed_form_is_exact_and_the_mesh_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plate_contact, "CONTACTS", 1500)
-    (table,) = plate_contact.run(Options()).tables
-    found = {(row[0], row[1]): row[2:] for row in table.rows}
-    assert found["exact wrench", "closed form"][2] < 1e-9
-    assert found["exact wrench", "closed form"][3] == 1500
-    assert found["Nano17's resolution", "closed form"][0] < 0.06
-    rms_mm, _, most_mm, _ = found["exact wrench", "mesh of 0.5 mm"]
-    assert 0.2 < rms_mm < 0.35 and most_mm > 0.5
 
 
 # ---- the command ---------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import pytest
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac_lab.calibrate import normal
-from biotac_lab.cli import main
 
 
 def looks(contacts: int = 12, frames: int = 20) -> normal.Looks:
@@ -62,20 +60,3 @@ def test_a_frame_without_a_point_has_no_normal() -> None:
 def test_few_contacts_are_refused() -> None:
     with pytest.raises(InputError, match="7 contacts with the plate: expected 8"):
         normal.fit(looks(7))
-
-
-def test_its_file_is_read_back_and_a_damaged_one_refused(tmp_path: Path) -> None:
-    its, place = normal.fit(looks()), tmp_path / "x.normal.json"
-    place.write_text(normal.dumps(its), encoding="utf-8")
-    assert np.array_equal(normal.load(place).coefficients, its.coefficients)
-    for damage in (("biotac-normal/1", "other"), ("[[", "["), ("[[", "[[NaN, ")):
-        place.write_text(normal.dumps(its).replace(*damage), encoding="utf-8")
-        with pytest.raises(InputError, match="biotac-lab normal --out"):
-            normal.load(place)
-
-
-def test_a_file_without_a_plate_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    place = tmp_path / "x.npz"
-    np.savez(place, E=np.zeros((10, 19), np.uint16))
-    assert main(["normal", str(place)]) != 0
-    assert "z_dir" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from biotac import BiotacError, InputError
 
 from .bench import command as bench
-from .calibrate import normal_command as normal
+from .calibrate import direction_command as direction
 from .calibrate import population_command as population
 from .experiments import command as experiments
 
@@ -19,7 +19,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
     parser = argparse.ArgumentParser(prog="biotac-lab", description=__doc__.splitlines()[0], allow_abbrev=False)
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    for name, module in (("experiment", experiments), ("population", population), ("normal", normal), ("bench", bench)):
+    known = {"experiment": experiments, "population": population, "direction": direction, "bench": bench}
+    for name, module in known.items():
         verb = verbs.add_parser(name, help=module.ABOUT, description=module.ABOUT, allow_abbrev=False)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")
         verb.epilog = f"example: {module.EXAMPLE}"

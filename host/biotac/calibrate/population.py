@@ -23,7 +23,7 @@ from ..documents import parse_document, read_document, sealed
 from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
-from ..map.population import SHIPPED, board_map, likeness, shipped
+from ..map.population import SHIPPED, Likeness, board_map, likeness, shipped
 from ..version import __version__
 from ..wire.frames import FORCE_LSB_PER_N
 from .wrench.models import GATED
@@ -69,8 +69,12 @@ class Population:
 
     def published(self, counts: Floats, tare: Floats) -> Floats:
         """Force (n, 3) in N as a board publishes it: along the normals where the map contradicts them."""
-        force_n = self.force(counts, tare)
-        return likeness(counts - tare, np.rint(FORCE_LSB_PER_N * force_n).astype(np.int64)).mixed(force_n)
+        return self.judged(counts, tare).mixed(self.force(counts, tare))
+
+    def judged(self, counts: Floats, tare: Floats) -> Likeness:
+        """How like the training the signals are, as a board says."""
+        force_100un = np.rint(FORCE_LSB_PER_N * self.force(counts, tare)).astype(np.int64)
+        return likeness(counts - tare, force_100un)
 
     def force(self, counts: Floats, tare: Floats) -> Floats:
         """Force (n, 3) in N on the finger, from counts (n, 19) and their ``tare`` (19,)."""

@@ -12,13 +12,12 @@ from biotac import InputError
 
 from ..report import Show, Table
 
-ABOUT = "Measure batch maths, decoding, the live path, an idle link, recordings, force against cycles."
+ABOUT = "Measure batch maths, decoding, the live path, recordings, force against cycles."
 EXAMPLE = "biotac-lab bench batch"
 #: Each is a module beside this one with ``measure``, and the arguments that it takes.
 WHAT = {
     "batch": ("biotac.compute on whole recordings, against NumPy", ("frames",)),
     "decode": ("the link's bytes to arrays, against pymavlink and Python", ("frames",)),
-    "idle": ("bytes on the link at rest and in contact", ("source",)),
     "live": ("reading thread to callback, against a pyserial thread", ("rounds",)),
     "newtons": ("cycles of a force against its error on real fingers", ("files", "picture")),
     "recording": ("size and load time of a recording", ("source", "fingers", "seconds")),
@@ -37,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--picture", metavar="FILE", type=Path, help="newtons: draw it here (.png)")
     parser.add_argument("--frames", type=int, metavar="N", help="batch: default 200000; decode: default 30000")
-    parser.add_argument("--source", default="press.toml", help="idle, recording: what to play (default %(default)s)")
+    parser.add_argument("--source", default="press.toml", help="recording: what to play (default %(default)s)")
     parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
     parser.add_argument("--seconds", type=float, default=600.0, help="recording: device time (default %(default)g)")
     parser.add_argument("--rounds", type=int, default=5, metavar="N", help="live: of each reader (default %(default)s)")

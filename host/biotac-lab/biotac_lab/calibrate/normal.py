@@ -6,9 +6,7 @@ Frames of one contact are one look at the finger, so whatever is chosen or judge
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +16,9 @@ from biotac.core import geometry as surface
 
 Floats = npt.NDArray[np.float64]
 
-FORMAT = "biotac-normal/1"
 RIDGES = (0.01, 0.1, 1.0)  # of each input's variance
 VARIANCE_FLOOR = 1e-9
 LEAST_CONTACTS = 8
-INPUTS = 3 + len(surface.ELECTRODE_MM)
 
 Contacts = npt.NDArray[np.int64]
 
@@ -84,26 +80,6 @@ def angles_deg(one: Floats, other: Floats) -> Floats:
     cross = np.linalg.norm(np.cross(one, other), axis=1)
     result: Floats = np.degrees(np.arctan2(cross, (one * other).sum(axis=1)))
     return result
-
-
-def dumps(fitted: Normal) -> str:
-    """The correction as JSON."""
-    return json.dumps({"format": FORMAT, "coefficients": fitted.coefficients.tolist()}) + "\n"
-
-
-def load(path: Path) -> Normal:
-    """The correction in a file. Raises InputError that says what is wrong with it."""
-    try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
-        if facts["format"] != FORMAT:
-            raise ValueError(f"format {facts['format']!r}")
-        found = np.array(facts["coefficients"], dtype=np.float64)
-        if found.shape != (INPUTS + 1, 3) or not np.isfinite(found).all():
-            raise ValueError(f"coefficients {found.shape}")
-    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
-        seen = str(error) or type(error).__name__
-        raise InputError(f"{path}: {seen}: expected a {FORMAT} written by `biotac-lab normal --out`") from None
-    return Normal(found)
 
 
 class _Fitting:

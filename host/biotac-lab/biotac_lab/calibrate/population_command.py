@@ -15,7 +15,7 @@ from biotac.calibrate.wrench import Run, load
 
 from ..report import Show, Table
 from . import held_out_error, training
-from .normal_command import check_free
+from .direction_command import of_population
 
 ABOUT = "A force map for uncalibrated fingers, trained on other fingers on a force plate."
 EXAMPLE = "biotac-lab population F1.npz F2.npz --out population.json"
@@ -43,15 +43,20 @@ def run(args: argparse.Namespace, show: Show) -> int:
     """Train the map, judge it, write it."""
     if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
         raise InputError(f"{args.test} is both a training file and --test: expected another finger; drop it from one")
-    check_free(args.out, overwrite=args.force)
+    if args.out is not None and args.out.exists() and not args.force:
+        raise InputError(f"{args.out} exists; overwrite it (--force) or name another")
     with threadpool_limits(limits=THREADS, user_api="blas"):
         runs = [training.aligned(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
         facts, trained = _calibrated(args, runs, tested)
+        tables = _tables(facts)
+        if tested is not None:
+            tables.append(of_population(args.test.name, trained.population, tested))
+            facts["direction"] = tables[-1].facts()
     if args.out is not None:
         args.out.write_text(dumps(trained), encoding="utf-8")
         facts["written"] = str(args.out)
-    print(json.dumps(facts) if args.json else "\n".join(line for table in _tables(facts) for line in table.page()))
+    print(json.dumps(facts) if args.json else "\n".join(line for table in tables for line in table.page()))
     return 0
 
 

@@ -27,7 +27,6 @@ NAMES = {
     "torsion": "a weight turned both ways (Lin 2013, figure 9)",
     "torsion-shear": "a weight turned while it is pushed (Lin 2013, figure 10)",
     "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
-    "plate-contact": "where a wrench says the finger is touched: closed form against the paper's 0.5 mm mesh",
     "hold": "light holds spliced into presses, against the residue that presses leave",
     "navarro2015": "pressure calibration and its verification press (Navarro et al. 2015)",
     "wettels2011": "every table and figure on learning point of contact, curvature and force (Wettels and Loeb 2011)",
