@@ -14,7 +14,7 @@ import numpy as np
 from biotac import InputError
 from biotac.core import geometry as surface
 
-ROWS_AT_ONCE = 2000
+ROWS_AT_ONCE = 500
 _GRID = (16, 16, 8)
 _M = np.asarray(surface.ELECTRODE_MM) / 1e3
 _EDGES = [np.linspace(low, high, n) for low, high, n in zip(_M.min(axis=0), _M.max(axis=0), _GRID, strict=True)]
