@@ -3,8 +3,8 @@
 //
 // It was trained on fingers of one rig, with a flat plate. Another estimate of the force is along the normals
 // of the compressed electrodes: a direction that holds on every rig, with a strength that holds roughly. In a
-// touch lighter than the training's, and where the two differ by more than they did on any finger that the
-// map did not know, force goes over to the normals.
+// touch lighter than the training's, and where the two differ by more than they did on fingers left out of
+// it, force goes over to the normals.
 #ifndef BIOTAC_POPULATION_H
 #define BIOTAC_POPULATION_H
 
