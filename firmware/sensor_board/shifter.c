@@ -196,7 +196,7 @@ uint32_t shifter_lost(void)
 // ---- start -----------------------------------------------------------------------------------------------
 
 // The DMA's two who hand addresses on, one when the other has come to its end, and the one who fetches.
-enum { ASKER = DMA_DEALER, FETCHER = DMA_WORKER, ASKER_TOO = DMA_OF_USB + 1 };
+enum { ASKER = DMA_DEALER, FETCHER = DMA_WORKER, ASKER_TOO = DMA_OF_UART + 1 };
 
 static void start_asker(uint32_t channel, uint32_t next)
 {
