@@ -47,9 +47,9 @@ def header(contract: Contract) -> str:
         "static const uint8_t bt_client_layout[] = {",
     ]
     for message in contract.messages:
-        its = runs(message)
-        numbers = [f"0x{size.bit_length() - 1 << 6 | count:02X}" for size, count in its]
-        out += [f"    BT_{message.name}_ID, {len(its)}, {', '.join(numbers)},"]
+        found = runs(message)
+        numbers = [f"0x{size.bit_length() - 1 << 6 | count:02X}" for size, count in found]
+        out += [f"    BT_{message.name}_ID, {len(found)}, {', '.join(numbers)},"]
     out += ["    0, 0,", "};"]
     # C99 and C++ alike.
     out += ["// Numbers lie at multiples of their size."]

@@ -59,8 +59,13 @@ def reciprocal(contract: Contract) -> tuple[list[int], int]:
 
 
 def header(contract: Contract) -> str:
-    its = contract.map
-    blob, fixed, centroid, conductance = its["blob"], its["fixed"], its["centroid"], its["conductance"]
+    layout = contract.map
+    blob, fixed, centroid, conductance = (
+        layout["blob"],
+        layout["fixed"],
+        layout["centroid"],
+        layout["conductance"],
+    )
     guesses, twice = reciprocal(contract)
     lines = [
         f"#define BT_MAP_VERSION {blob['version']}",
@@ -70,23 +75,23 @@ def header(contract: Contract) -> str:
         f"#define BT_MAP_SERIAL_BYTES {blob['serial_bytes']}",
         "",
         "// How many axes a map has.",
-        *(f"#define BT_MAP_AXES_{name} {count}" for name, count in its["axes"].items()),
-        f"#define BT_MAP_AXES_MAX {max(its['axes'].values())}",
+        *(f"#define BT_MAP_AXES_{name} {count}" for name, count in layout["axes"].items()),
+        f"#define BT_MAP_AXES_MAX {max(layout['axes'].values())}",
         f"#define BT_MAP_EXPONENTS {EXPONENTS}",
         "",
         "enum bt_map_kind {",
-        *(f"    BT_MAP_KIND_{name} = {k['value']}, // {k['doc']}" for name, k in its["kind"].items()),
+        *(f"    BT_MAP_KIND_{name} = {k['value']}, // {k['doc']}" for name, k in layout["kind"].items()),
         "};",
-        f"#define BT_MAP_KINDS {len(its['kind'])}",
+        f"#define BT_MAP_KINDS {len(layout['kind'])}",
         "// Columns of each kind, in this order.",
-        f"#define BT_MAP_KIND_COLUMNS {{{', '.join(str(columns(contract, k)) for k in its['kind'].values())}}}",
+        f"#define BT_MAP_KIND_COLUMNS {{{', '.join(str(columns(contract, k)) for k in layout['kind'].values())}}}",
         "// Coefficients of each as they lie in the blob, of an axis.",
-        f"#define BT_MAP_KIND_COEFFICIENTS {{{', '.join(str(halves(contract, k)) for k in its['kind'].values())}}}",
+        f"#define BT_MAP_KIND_COEFFICIENTS {{{', '.join(str(halves(contract, k)) for k in layout['kind'].values())}}}",
         "",
         "enum bt_map_gate {",
-        *(f"    BT_MAP_GATE_{name} = {g['value']}, // {g['doc']}" for name, g in its["gate"].items()),
+        *(f"    BT_MAP_GATE_{name} = {g['value']}, // {g['doc']}" for name, g in layout["gate"].items()),
         "};",
-        f"#define BT_MAP_GATES {len(its['gate'])}",
+        f"#define BT_MAP_GATES {len(layout['gate'])}",
         "",
         f"#define BT_MAP_FLOOR_Q4 {16 * centroid['floor_counts']}",
         f"#define BT_MAP_REACH_X_UM {centroid['reach_x_um']}",

@@ -26,9 +26,9 @@ def messages(contract: Contract) -> str:
     for m in contract.messages:
         out += ["", f"## {m.name} (0x{m.id:02X})", "", m.doc, "", *field_table(m)]
     for kind, number in (("enum", "value"), ("flags", "bit")):
-        for name, its in link[kind].items():
-            out += ["", f"## {kind} {name}", "", its["doc"], "", f"| {number} | name | meaning |", "|---|---|---|"]
-            out += [f"| {e[number]} | `{k}` | {e['doc']} |" for k, e in entries(its).items()]
+        for name, table in link[kind].items():
+            out += ["", f"## {kind} {name}", "", table["doc"], "", f"| {number} | name | meaning |", "|---|---|---|"]
+            out += [f"| {e[number]} | `{k}` | {e['doc']} |" for k, e in entries(table).items()]
     out += ["", "## Settings", "", "`per finger`: a finger's CALIBRATION has a value of its own for it.", ""]
     out += ["| id | name | per finger | unit | range | default | meaning |", "|---|---|---|---|---|---|---|"]
     for name, s in link["setting"].items():

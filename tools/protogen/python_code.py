@@ -44,7 +44,7 @@ def sensor(contract: Contract) -> str:
 
 
 def wrench_map(contract: Contract) -> str:
-    its = contract.map
+    wrench = contract.map
     out = [
         f'"""{GENERATED}',
         "",
@@ -54,17 +54,17 @@ def wrench_map(contract: Contract) -> str:
         "from enum import IntEnum",
         "from typing import Literal, NamedTuple",
         "",
-        *(f"AXES_{name} = {count}" for name, count in its["axes"].items()),
+        *(f"AXES_{name} = {count}" for name, count in wrench["axes"].items()),
         f"EXPONENTS = {EXPONENTS}",
         f"HEADER_BYTES = {HEADER_BYTES}",
         f"BLOCK_BYTES = {BLOCK_BYTES}",
         f"GATE_MAX = {gate_max(contract)}",
     ]
     for name in ("blob", "centroid", "conductance", "fixed"):
-        out += [f"{key.upper()} = {value}" for key, value in its[name].items()]
+        out += [f"{key.upper()} = {value}" for key, value in wrench[name].items()]
     for table_name, title in (("kind", "A block's columns."), ("gate", "What a block's columns are multiplied by.")):
         out += ["", "", f"class {table_name.capitalize()}(IntEnum):", f'    """{title}"""', ""]
-        out += [f"    {name} = {entry['value']}  # {entry['doc']}" for name, entry in its[table_name].items()]
+        out += [f"    {name} = {entry['value']}  # {entry['doc']}" for name, entry in wrench[table_name].items()]
     out += ["", "", "class KindSpec(NamedTuple):", '    """How many columns, in what shape, of what."""', ""]
     out += [
         "    columns: int",
@@ -72,7 +72,7 @@ def wrench_map(contract: Contract) -> str:
         '    shape: Literal["one", "electrodes", "pairs"]',
     ]
     out += ['    of: Literal["one", "signal", "conductance", "pressure"]', "", "", "KINDS: dict[Kind, KindSpec] = {"]
-    for name, kind in its["kind"].items():
+    for name, kind in wrench["kind"].items():
         spec = f'{columns(contract, kind)}, {halves(contract, kind)}, "{kind["columns"]}", "{kind["of"]}"'
         out.append(f"    Kind.{name}: KindSpec({spec}),")
     return "\n".join([*out, "}"]) + "\n"
@@ -188,9 +188,9 @@ def class_name(message: Message) -> str:
     return "SettingValue" if message.name == "SETTING" else camel(message.name)
 
 
-def enum_class(name: str, base: str, its: dict[str, Any], key: str, form: str) -> list[str]:
-    members = [f"    {member} = {form.format(e[key])}  # {e['doc']}" for member, e in entries(its).items()]
-    return ["", f"class {name}({base}):", f'    """{its["doc"]}"""', "", *members, ""]
+def enum_class(name: str, base: str, enum: dict[str, Any], key: str, form: str) -> list[str]:
+    members = [f"    {member} = {form.format(e[key])}  # {e['doc']}" for member, e in entries(enum).items()]
+    return ["", f"class {name}({base}):", f'    """{enum["doc"]}"""', "", *members, ""]
 
 
 def doc_table(name: str, rows: Iterable[tuple[int, dict[str, Any]]]) -> list[str]:

@@ -50,8 +50,8 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
                 np.copyto(samples[:, k], laid, where=laid > 0)
 
     def middles(frames: int) -> list[States]:
-        its = [track.states(_seconds(np.arange(frames) + 0.5)) for track in scenario.tracks[:count]]
-        return [its[k % own] for k in range(count)]
+        states = [track.states(_seconds(np.arange(frames) + 0.5)) for track in scenario.tracks[:count]]
+        return [states[k % own] for k in range(count)]
 
     return Source(
         name=scenario.name,
@@ -65,10 +65,10 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
 
 def _truth(middles: list[States], frame: Rows) -> Truth:
     """The truth for each finger, from its states at the middle of each frame of the timeline."""
-    contact = np.stack([its.force_n > 0.0 for its in middles], axis=1)
-    poc_mm = np.stack([its.contact_mm for its in middles], axis=1)
-    wrenches = [its.wrench() for its in middles]
-    force_n, torque_nmm = (np.stack([its[part] for its in wrenches], axis=1) for part in (0, 1))
+    contact = np.stack([states.force_n > 0.0 for states in middles], axis=1)
+    poc_mm = np.stack([states.contact_mm for states in middles], axis=1)
+    wrenches = [states.wrench() for states in middles]
+    force_n, torque_nmm = (np.stack([wrench[part] for wrench in wrenches], axis=1) for part in (0, 1))
     return Truth(contact, np.where(contact[:, :, None], poc_mm, np.nan), force_n, torque_nmm, frame)
 
 
@@ -102,7 +102,8 @@ def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
 def _fit(emulated: tuple[Finger, ...], middles: list[States]) -> dict[str, int]:
     """Gains fitted over one whole timeline, even if only part of it is played, and over all fingers together."""
     signals = [
-        finger.counts(its) - finger.rest_counts(its.warm_c) for finger, its in zip(emulated, middles, strict=True)
+        finger.counts(states) - finger.rest_counts(states.warm_c)
+        for finger, states in zip(emulated, middles, strict=True)
     ]
-    forces, torques = zip(*(its.wrench() for its in middles), strict=True)
+    forces, torques = zip(*(states.wrench() for states in middles), strict=True)
     return fit_gains(np.concatenate(signals), np.concatenate(forces), np.concatenate(torques))

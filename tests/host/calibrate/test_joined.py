@@ -45,8 +45,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, Sourc
 @pytest.fixture(scope="module")
 def board(recorded: tuple[Recording, Source]) -> Board:
     recording, _ = recorded
-    its = board_of(recording.wire, recording.frames["t_us"], 0, "BTSIM00000000006")
-    return its.only(its.t_s >= FROM_S)
+    board = board_of(recording.wire, recording.frames["t_us"], 0, "BTSIM00000000006")
+    return board.only(board.t_s >= FROM_S)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,9 @@ def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:
     recording, source = recorded
     assert source.truth is not None
     row = np.rint((board.t_s - recording.frames["t_us"][0] / 1e6) * 100.0).astype(np.int64)
-    force, torque, poc = (its[row, 0] for its in (source.truth.force_n, source.truth.torque_nmm, source.truth.poc_mm))
+    force, torque, poc = (
+        values[row, 0] for values in (source.truth.force_n, source.truth.torque_nmm, source.truth.poc_mm)
+    )
     touched = source.truth.contact[row, 0]
     torsion = np.zeros(len(row))
     about_poc = torque[touched] - np.cross(poc[touched], force[touched])
@@ -72,38 +74,38 @@ def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:
 
 
 def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board, reference: Reference) -> None:
-    its = join("board.mcap", board, reference)
+    joined = join("board.mcap", board, reference)
     first_s = recorded[0].frames["t_us"][0] / 1e6
     # by the emulated clock: 417.3 s when the board's source begins, 60 ppm from then on
-    expected_s = 417.3 + (its.alignment.middle_s - first_s) * (1.0 + 60e-6) - its.alignment.middle_s
-    assert its.alignment.offset_s == pytest.approx(expected_s, abs=0.002)
-    assert its.alignment.peak > 0.9
-    assert its.alignment.runner_up < 0.5
-    np.testing.assert_allclose(its.zero, Nano17().zero, atol=0.02)
+    expected_s = 417.3 + (joined.alignment.middle_s - first_s) * (1.0 + 60e-6) - joined.alignment.middle_s
+    assert joined.alignment.offset_s == pytest.approx(expected_s, abs=0.002)
+    assert joined.alignment.peak > 0.9
+    assert joined.alignment.runner_up < 0.5
+    np.testing.assert_allclose(joined.zero, Nano17().zero, atol=0.02)
     truth = truth_of(recorded, board)
-    assert its.run.axes[6:] == ("torsion",)
-    error = its.run.truth - truth[: len(its.run.truth)]
+    assert joined.run.axes[6:] == ("torsion",)
+    error = joined.run.truth - truth[: len(joined.run.truth)]
     # a contact's corners are 0.2 s long; a millisecond off them is what the clocks are known to
     assert np.sqrt((error[:, :3] ** 2).mean(axis=0)).max() < 0.05
     assert np.sqrt((error[:, 3:] ** 2).mean(axis=0)).max() < 0.5
-    assert its.on_skin_share > 0.99
-    assert its.run.serial == "BTSIM00000000006"
+    assert joined.on_skin_share > 0.99
+    assert joined.run.serial == "BTSIM00000000006"
     # the board's own signals, to the last bit
-    np.testing.assert_allclose(its.run.counts - its.run.tare, board.e[: len(its.run.counts)], atol=1e-9)
+    np.testing.assert_allclose(joined.run.counts - joined.run.tare, board.e[: len(joined.run.counts)], atol=1e-9)
 
 
 def test_three_axes_are_enough_for_force(board: Board, reference: Reference) -> None:
     samples = replace(reference.samples, wrench=reference.samples.force_n)
-    its = join("board.mcap", board, replace(reference, samples=samples))
-    assert its.run.truth.shape[1] == 3
-    assert np.isnan(its.on_skin_share)
+    joined = join("board.mcap", board, replace(reference, samples=samples))
+    assert joined.run.truth.shape[1] == 3
+    assert np.isnan(joined.on_skin_share)
 
 
 def test_a_reference_of_a_tenth_of_the_rate(
     recorded: tuple[Recording, Source], board: Board, reference: Reference
 ) -> None:
-    its = reference.samples
-    thin = Samples(its.t_s[::10], its.force_n[::10])
+    samples = reference.samples
+    thin = Samples(samples.t_s[::10], samples.force_n[::10])
     found = join("board.mcap", board, replace(reference, samples=thin)).run.truth
     truth = truth_of(recorded, board)[: len(found), :3]
     assert np.sqrt(((found - truth) ** 2).mean(axis=0)).max() < 0.1
@@ -111,15 +113,15 @@ def test_a_reference_of_a_tenth_of_the_rate(
 
 def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: Board, reference: Reference) -> None:
     whole = join("board.mcap", board, reference)
-    its = reference.samples
-    gone = (its.t_s > its.t_s[0] + 135.0) & (its.t_s < its.t_s[0] + 137.0)
-    found = join("board.mcap", board, replace(reference, samples=Samples(its.t_s[~gone], its.force_n[~gone])))
+    samples = reference.samples
+    gone = (samples.t_s > samples.t_s[0] + 135.0) & (samples.t_s < samples.t_s[0] + 137.0)
+    found = join("board.mcap", board, replace(reference, samples=Samples(samples.t_s[~gone], samples.force_n[~gone])))
     assert len(whole.run.truth) - len(found.run.truth) == pytest.approx(200, abs=10)
 
 
 def spoilt(reference: Reference, how: str) -> Reference:
-    its = reference.samples
-    t_s, force, torque = its.t_s.copy(), its.force_n.copy(), its.wrench[:, 3:].copy()
+    samples = reference.samples
+    t_s, force, torque = samples.t_s.copy(), samples.force_n.copy(), samples.wrench[:, 3:].copy()
     mounting = reference.mounting
     if how == "another run":
         order = np.argsort((t_s // 1.7 * 0.61803) % 1.0, kind="stable")
@@ -204,11 +206,11 @@ def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:
     board_s = true_s[::10] + 7.0
     counts = load[::10] ** 1.3 * 40.0 + rng.normal(0.0, 1.0, len(board_s))
     reference_s = true_s * (1.0 - 120e-6) - 55.1234
-    its = align("x", board_s, counts, reference_s, load + rng.normal(0.0, 0.02, len(load)))
-    wrong_s = its.to_reference_s(board_s) - ((board_s - 7.0) * (1.0 - 120e-6) - 55.1234)
+    alignment = align("x", board_s, counts, reference_s, load + rng.normal(0.0, 0.02, len(load)))
+    wrong_s = alignment.to_reference_s(board_s) - ((board_s - 7.0) * (1.0 - 120e-6) - 55.1234)
     # a fraction of a step, though counts grow faster than force; without the drift the ends would be 7 ms off
     assert np.abs(wrong_s).max() < 2e-3
-    assert its.drift_ppm == pytest.approx(-120.0, abs=15.0)
+    assert alignment.drift_ppm == pytest.approx(-120.0, abs=15.0)
 
 
 def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
@@ -216,12 +218,12 @@ def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
     a.write_bytes(b"counts")
     b.write_bytes(b"force")
     loaded = Loaded(SimpleNamespace(serial="BTA"), (a, b))  # type: ignore[arg-type]
-    its = loaded.provenance(86_400)
+    provenance = loaded.provenance(86_400)
     # sha256sum of "countsforce"
-    assert its["data_sha256"] == hashlib.sha256(b"countsforce").hexdigest()
-    assert (its["serial"], its["made_s"], its["files"]) == ("BTA", 86_400, ["a", "b"])
+    assert provenance["data_sha256"] == hashlib.sha256(b"countsforce").hexdigest()
+    assert (provenance["serial"], provenance["made_s"], provenance["files"]) == ("BTA", 86_400, ["a", "b"])
     b.write_bytes(b"forcf")
-    assert loaded.provenance(0)["data_sha256"] != its["data_sha256"]
+    assert loaded.provenance(0)["data_sha256"] != provenance["data_sha256"]
 
 
 def test_a_shared_finger_is_the_same_finger_to_a_stranger(

@@ -56,92 +56,92 @@ def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, s
     ("counts_per_min", "warm"), [(0.0, True), (19.0, True), (-19.0, True), (21.0, False), (-40.0, False)]
 )
 def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> None:
-    its = Procedure(0, LIN)
-    its.frames(frames(0, 5900, counts_per_min))
-    assert its.step is Step.WARM_UP  # a minute is a minute
-    its.frames(frames(5900, 600, counts_per_min))
-    assert (its.step is Step.TARE) == warm
-    assert its.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
-    words = its.take_events()
+    procedure = Procedure(0, LIN)
+    procedure.frames(frames(0, 5900, counts_per_min))
+    assert procedure.step is Step.WARM_UP  # a minute is a minute
+    procedure.frames(frames(5900, 600, counts_per_min))
+    assert (procedure.step is Step.TARE) == warm
+    assert procedure.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
+    words = procedure.take_events()
     assert words[0] == "warming up: leave the finger alone"
-    assert (words[1:] == [f"warm: {its.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
-    assert its.take_events() == []
+    assert (words[1:] == [f"warm: {procedure.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
+    assert procedure.take_events() == []
 
 
 def test_the_drift_is_the_last_minutes() -> None:
-    its = Procedure(0, LIN, max_drift_counts_per_min=5.0)
-    its.frames(frames(0, 12_000, 60.0))
-    assert its.step is Step.WARM_UP
+    procedure = Procedure(0, LIN, max_drift_counts_per_min=5.0)
+    procedure.frames(frames(0, 12_000, 60.0))
+    assert procedure.step is Step.WARM_UP
     rest = frames(12_000, 3_000)
     rest["counts"] = 3120
-    its.frames(rest)
-    assert its.step is Step.WARM_UP
+    procedure.frames(rest)
+    assert procedure.step is Step.WARM_UP
     rest = frames(15_000, 3_200)
     rest["counts"] = 3120
-    its.frames(rest)
-    assert its.step is Step.TARE
+    procedure.frames(rest)
+    assert procedure.step is Step.TARE
 
 
 def test_other_fingers_and_touches_do_not_warm_it_up() -> None:
-    its = Procedure(0, LIN)
-    its.frames(frames(0, 12_000, finger=1))
-    assert its.take_events() == []
-    its.frames(frames(0, 12_000, flags=FrameFlags.CONTACT))
-    assert its.step is Step.WARM_UP
+    procedure = Procedure(0, LIN)
+    procedure.frames(frames(0, 12_000, finger=1))
+    assert procedure.take_events() == []
+    procedure.frames(frames(0, 12_000, flags=FrameFlags.CONTACT))
+    assert procedure.step is Step.WARM_UP
 
 
 def test_a_finger_that_never_gets_warm_is_given_up() -> None:
-    its = Procedure(0, LIN)
-    its.frames(frames(0, 100, 100.0))
+    procedure = Procedure(0, LIN)
+    procedure.frames(frames(0, 100, 100.0))
     with pytest.raises(InputError, match=r"after 60 minutes the finger still drifts by .* expected at most 20"):
-        its.frames(frames(round(MAX_WARM_UP_S * 100) + 1, 100, 100.0))
+        procedure.frames(frames(round(MAX_WARM_UP_S * 100) + 1, 100, 100.0))
 
 
-def tare(its: Procedure, at: int, *, force_n: float = 0.4) -> int:
+def tare(procedure: Procedure, at: int, *, force_n: float = 0.4) -> int:
     """Feed until the board is to tare; the next frame's number."""
-    while its.step is Step.WARM_UP:
-        its.frames(frames(at, 500))
+    while procedure.step is Step.WARM_UP:
+        procedure.frames(frames(at, 500))
         at += 500
-    its.samples(still(3.0, force_n=force_n))
-    its.frames(frames(at, TARE_FRAMES))
-    assert its.wants_tare
+    procedure.samples(still(3.0, force_n=force_n))
+    procedure.frames(frames(at, TARE_FRAMES))
+    assert procedure.wants_tare
     return at + TARE_FRAMES
 
 
 def test_the_board_is_asked_again_after_a_refusal_and_quiet() -> None:
-    its = Procedure(0, LIN)
-    at = tare(its, 0)
-    its.tared(accepted=False)
-    assert not its.wants_tare
-    its.frames(frames(at, TARE_FRAMES - 1))
-    assert not its.wants_tare
-    its.frames(frames(at, 1, flags=FrameFlags.CONTACT))
-    its.frames(frames(at, TARE_FRAMES))
-    assert its.wants_tare
-    its.tared(accepted=True)
-    assert not its.wants_tare and its.step is Step.TARE
-    its.frames(frames(at, TARE_FRAMES, flags=FrameFlags.UNTARED))
-    assert its.step is Step.TARE
-    its.frames(frames(at, 1))
-    assert its.step is Step.LOADS
-    assert its.zero is not None
-    np.testing.assert_allclose(its.zero, [0.4, 0.4, 0.4, 0.0, 0.0, 0.0])
+    procedure = Procedure(0, LIN)
+    at = tare(procedure, 0)
+    procedure.tared(accepted=False)
+    assert not procedure.wants_tare
+    procedure.frames(frames(at, TARE_FRAMES - 1))
+    assert not procedure.wants_tare
+    procedure.frames(frames(at, 1, flags=FrameFlags.CONTACT))
+    procedure.frames(frames(at, TARE_FRAMES))
+    assert procedure.wants_tare
+    procedure.tared(accepted=True)
+    assert not procedure.wants_tare and procedure.step is Step.TARE
+    procedure.frames(frames(at, TARE_FRAMES, flags=FrameFlags.UNTARED))
+    assert procedure.step is Step.TARE
+    procedure.frames(frames(at, 1))
+    assert procedure.step is Step.LOADS
+    assert procedure.zero is not None
+    np.testing.assert_allclose(procedure.zero, [0.4, 0.4, 0.4, 0.0, 0.0, 0.0])
 
 
 def test_a_reference_that_moves_is_not_zeroed() -> None:
-    its = Procedure(0, LIN)
-    at = tare(its, 0)
+    procedure = Procedure(0, LIN)
+    at = tare(procedure, 0)
     moving = still(1.0, 3.0)
-    its.samples(Samples(moving.t_s, moving.wrench + np.linspace(0.0, 1.0, 500)[:, None]))
-    its.tared(accepted=True)
-    its.frames(frames(at, TARE_FRAMES))
-    assert its.step is Step.TARE and its.zero is None
-    assert "the reference moves by 0." in its.take_events()[-1]
-    its.samples(still(3.0, 5.0))
-    its.frames(frames(at, TARE_FRAMES))
-    assert its.step is Step.LOADS
+    procedure.samples(Samples(moving.t_s, moving.wrench + np.linspace(0.0, 1.0, 500)[:, None]))
+    procedure.tared(accepted=True)
+    procedure.frames(frames(at, TARE_FRAMES))
+    assert procedure.step is Step.TARE and procedure.zero is None
+    assert "the reference moves by 0." in procedure.take_events()[-1]
+    procedure.samples(still(3.0, 5.0))
+    procedure.frames(frames(at, TARE_FRAMES))
+    assert procedure.step is Step.LOADS
     with pytest.raises(InputError, match="no torque: expected six axes"):
-        its.samples(Samples(moving.t_s, moving.force_n))
+        procedure.samples(Samples(moving.t_s, moving.force_n))
 
 
 # ---- coverage ----------------------------------------------------------------------------------
@@ -159,11 +159,11 @@ def test_a_reference_that_moves_is_not_zeroed() -> None:
     ],
 )
 def test_regions(point: tuple[float, float, float], region: str) -> None:
-    its = Coverage()
-    its.add(press(point).wrench, 0.002)
-    touched = [name for name, cells in zip(REGIONS, its.cells, strict=True) if cells]
+    coverage = Coverage()
+    coverage.add(press(point).wrench, 0.002)
+    touched = [name for name, cells in zip(REGIONS, coverage.cells, strict=True) if cells]
     assert touched == [region]
-    assert its.cells.sum() == 1
+    assert coverage.cells.sum() == 1
 
 
 def test_every_cell_can_be_reached_and_no_other_is_named() -> None:
@@ -178,29 +178,29 @@ def test_every_cell_can_be_reached_and_no_other_is_named() -> None:
 
 
 def test_ways_and_forces_by_hand() -> None:
-    its = Coverage()
+    coverage = Coverage()
     # at the pad's middle: 1 N to the tip, and -4 N mm about z, which is +4 about the outward normal
     at = np.array([-8.0, 0.0, -R])
     shear, twist = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -4.0])
     extra = np.concatenate([shear, np.cross(at, shear) + twist])
-    its.add(press((-8.0, 0.0, -R), extra).wrench, 0.002)
-    (line,) = [line for line in its.missing() if line.startswith("pad")]
+    coverage.add(press((-8.0, 0.0, -R), extra).wrench, 0.002)
+    (line,) = [line for line in coverage.missing() if line.startswith("pad")]
     # 3 N exactly is neither light nor firm
     assert line == (
         "pad: 1 of 8 cells; no light press; no firm press; no shear from the tip; no shear to E11's side; "
         "no shear to E1's side; no twist the other way"
     )
-    assert its.missing()[0] == "tip: 0 of 8 cells"
+    assert coverage.missing()[0] == "tip: 0 of 8 cells"
 
 
 def test_too_short_or_too_light_is_not_covered() -> None:
-    its = Coverage()
-    its.add(press((-8.0, 0.0, -R), seconds=0.2).wrench, 0.002)
-    its.add(0.3 * press((-8.0, 0.0, -R)).wrench, 0.002)
-    its.add(np.full((500, 6), np.nan), 0.002)
-    assert its.cells.sum() == 0
-    its.add(press((-8.0, 0.0, -R), seconds=0.1).wrench, 0.002)
-    assert its.cells.sum() == 1
+    coverage = Coverage()
+    coverage.add(press((-8.0, 0.0, -R), seconds=0.2).wrench, 0.002)
+    coverage.add(0.3 * press((-8.0, 0.0, -R)).wrench, 0.002)
+    coverage.add(np.full((500, 6), np.nan), 0.002)
+    assert coverage.cells.sum() == 0
+    coverage.add(press((-8.0, 0.0, -R), seconds=0.1).wrench, 0.002)
+    assert coverage.cells.sum() == 1
 
 
 # ---- on a simulated board with an emulated Nano17 ----------------------------------------------
@@ -306,8 +306,8 @@ def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> Non
 def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
     with pytest.raises(DeviceLostError):
         walked(tmp_path, "calibrate.toml", 150.0, DeviceLostError)
-    its = Reference("again", read_csv(tmp_path / "walk.csv").samples, LIN)
-    assert len(its.samples) > 140 * 500
+    again = Reference("again", read_csv(tmp_path / "walk.csv").samples, LIN)
+    assert len(again.samples) > 140 * 500
     assert not Recording(tmp_path / "walk.mcap").problems
     with pytest.raises(InputError, match="already exists; choose another name"):
         walked(tmp_path, "calibrate.toml")

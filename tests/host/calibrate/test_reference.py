@@ -41,16 +41,16 @@ def written(tmp_path: Path, header: str, rows: np.ndarray, comment: str = "") ->
 
 def test_a_mounting_turns_by_hand() -> None:
     # the sensor's z is Lin's x, its x is Lin's y, its y is Lin's z; its origin 10 mm behind Lin's
-    its = Mounting(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([-10.0, 0.0, 0.0]))
+    mounting = Mounting(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([-10.0, 0.0, 0.0]))
     # 2 N dorsal through Lin's origin: seen from 10 mm behind it has a moment of -20 N mm about y
     lin = np.array([[0.0, 0.0, 2.0, 0.0, 0.0, 0.0]])
-    sensor = its.to_sensor(lin)
+    sensor = mounting.to_sensor(lin)
     # lin (0, 0, 2) is the sensor's y; the moment (10, 0, 0) x (0, 0, 2) = (0, -20, 0), the sensor's x
     np.testing.assert_allclose(sensor, [[0.0, 2.0, 0.0, -20.0, 0.0, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(its.to_finger(sensor), lin, atol=1e-12)
-    on_itself = Mounting(its.rotation, its.offset_mm, -1.0)
+    np.testing.assert_allclose(mounting.to_finger(sensor), lin, atol=1e-12)
+    on_itself = Mounting(mounting.rotation, mounting.offset_mm, -1.0)
     np.testing.assert_allclose(on_itself.to_finger(-sensor), lin, atol=1e-12)
-    np.testing.assert_allclose(its.to_finger(sensor[:, :3]), lin[:, :3], atol=1e-12)
+    np.testing.assert_allclose(mounting.to_finger(sensor[:, :3]), lin[:, :3], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -77,10 +77,10 @@ def test_a_wrong_mounting_is_refused(text: str, words: str, tmp_path: Path) -> N
 def test_a_mounting_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "mounting.toml"
     path.write_text('rotation = [[0,1,0],[1,0,0],[0,0,-1]]\noffset_mm = [1,2,3]\nreads = "force on sensor"\n')
-    its = read_mounting(str(path))
-    assert its.rotation.tolist() == [[0, 1, 0], [1, 0, 0], [0, 0, -1]]
-    assert its.offset_mm.tolist() == [1, 2, 3]
-    assert its.sign == -1.0
+    mounting = read_mounting(str(path))
+    assert mounting.rotation.tolist() == [[0, 1, 0], [1, 0, 0], [0, 0, -1]]
+    assert mounting.offset_mm.tolist() == [1, 2, 3]
+    assert mounting.sign == -1.0
     assert read_mounting("lin") is LIN
 
 
@@ -96,21 +96,21 @@ def test_a_mounting_from_a_file(tmp_path: Path) -> None:
     ],
 )
 def test_units_of_a_csv_are_read(header: str, torque_factor: float, tmp_path: Path) -> None:
-    its = wrench()
-    rows = np.column_stack([5.0 + np.arange(N) * 0.002, its])
+    loads = wrench()
+    rows = np.column_stack([5.0 + np.arange(N) * 0.002, loads])
     found = read_reference(str(written(tmp_path, header, rows)), LIN).samples
     np.testing.assert_allclose(found.t_s, rows[:, 0], rtol=1e-8)
-    np.testing.assert_allclose(found.force_n, its[:, :3], rtol=1e-8)
-    np.testing.assert_allclose(found.wrench[:, 3:], its[:, 3:] * torque_factor, rtol=1e-8)
+    np.testing.assert_allclose(found.force_n, loads[:, :3], rtol=1e-8)
+    np.testing.assert_allclose(found.wrench[:, 3:], loads[:, 3:] * torque_factor, rtol=1e-8)
 
 
 def test_a_csv_may_have_three_axes_semicolons_and_other_columns(tmp_path: Path) -> None:
     path = tmp_path / "plate.csv"
-    its = wrench()
-    lines = [f"{k};{v[2]};{v[0]};{v[1]};{k * 0.01}" for k, v in enumerate(its)]
+    loads = wrench()
+    lines = [f"{k};{v[2]};{v[0]};{v[1]};{k * 0.01}" for k, v in enumerate(loads)]
     path.write_text("\n".join(["sample;Fz [N];Fx [N];Fy [N];t [s]", *lines]))
     found = read_reference(str(path), LIN).samples
-    np.testing.assert_allclose(found.force_n, its[:, :3])
+    np.testing.assert_allclose(found.force_n, loads[:, :3])
     assert found.wrench.shape[1] == 3
 
 
@@ -160,10 +160,10 @@ def test_a_csv_that_cannot_be_believed_is_refused(header: str, change: str, word
 def test_a_csv_of_ours_has_its_mounting_and_others_must_be_told(tmp_path: Path) -> None:
     path = tmp_path / "ours.csv"
     writer = CsvWriter(path, MOUNTING, "some\nsensor")
-    its = wrench()
+    loads = wrench()
     for begin in (0, 700):
         part = slice(begin, begin + 700)
-        writer.add(Samples(np.arange(N)[part] * 0.002, its[part]))
+        writer.add(Samples(np.arange(N)[part] * 0.002, loads[part]))
     # a kill here loses nothing: what was added can be read before the file is closed
     found = read_reference(str(path))
     assert len(found.samples) == 1400
@@ -174,7 +174,7 @@ def test_a_csv_of_ours_has_its_mounting_and_others_must_be_told(tmp_path: Path) 
     assert read_reference(str(path), LIN).mounting is LIN
     with pytest.raises(InputError, match="already exists; choose another name"):
         CsvWriter(path, MOUNTING, "")
-    bare = written(tmp_path, GOOD, np.column_stack([np.arange(N) * 0.002, its]))
+    bare = written(tmp_path, GOOD, np.column_stack([np.arange(N) * 0.002, loads]))
     with pytest.raises(RecordingError, match="how the sensor is mounted on the finger: expected --mounting"):
         read_reference(str(bare))
 
@@ -189,14 +189,14 @@ def mcap_json(
     *,
     stamp: tuple[str, str] = ("sec", "nanosec"),
 ) -> Path:
-    its = wrench()
+    loads = wrench()
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
         number = writer.register_schema(schema, "jsonschema", b"{}")
         for topic in topics:
             channel = writer.register_channel(topic, "json", number)
-            for k, row in enumerate(its.tolist()):
+            for k, row in enumerate(loads.tolist()):
                 message: dict[str, Any] = {
                     "header": {
                         "stamp": dict(zip(stamp, (5 + k // 500, k % 500 * 2_000_000), strict=True)),
@@ -219,10 +219,10 @@ def test_json_stamps_have_the_names_of_ros_2_of_foxglove_and_of_ros_1(tmp_path: 
 
 
 def test_json_wrenches_in_an_mcap_file(tmp_path: Path) -> None:
-    its = wrench()
+    loads = wrench()
     found = read_reference(str(mcap_json(tmp_path / "ft.mcap")), MOUNTING)
     np.testing.assert_allclose(found.samples.t_s, 5.0 + np.arange(N) * 0.002)
-    np.testing.assert_allclose(found.samples.wrench, its, atol=1e-12)
+    np.testing.assert_allclose(found.samples.wrench, loads, atol=1e-12)
     assert found.mounting is MOUNTING
     two = mcap_json(tmp_path / "two.mcap", ("/a", "/b"))
     with pytest.raises(RecordingError, match=r"holds /a, /b: expected one topic .* FILE:TOPIC"):
@@ -247,10 +247,10 @@ def test_wrenches_of_a_ros_2_bag(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_HUMBLE)
     make = store.types
     kind = "geometry_msgs/msg/WrenchStamped"
-    its = wrench(200)
+    loads = wrench(200)
     with Bag(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         connection = bag.add_connection("/ft", kind, typestore=store)
-        for k, row in enumerate(its):
+        for k, row in enumerate(loads):
             vector = make["geometry_msgs/msg/Vector3"]
             message = make[kind](
                 make["std_msgs/msg/Header"](
@@ -261,7 +261,7 @@ def test_wrenches_of_a_ros_2_bag(tmp_path: Path) -> None:
             bag.write(connection, k, store.serialize_cdr(message, kind))
     (file,) = (tmp_path / "bag").glob("*.mcap")
     found = read_reference(str(file), LIN).samples
-    np.testing.assert_allclose(found.wrench, its, atol=1e-9)
+    np.testing.assert_allclose(found.wrench, loads, atol=1e-9)
     np.testing.assert_allclose(found.t_s, 7.0 + np.arange(200) * 0.002)
 
 
@@ -284,9 +284,9 @@ def test_a_record_by_hand() -> None:
     decoder = RdtDecoder(Scale(1_000_000.0, 1000.0, 1000.0))
     words = [2500, 17500, 0, 1_500_000, -2_000_000, 3_250_000, 4_000, -5_500, 6_000]
     decoder.feed(b"".join((w % 2**32).to_bytes(4, "big") for w in words))
-    its = decoder.take(all_of_them=True)
-    assert its.t_s.tolist() == [2.5]
-    assert its.wrench.tolist() == [[1.5, -2.0, 3.25, 4.0, -5.5, 6.0]]
+    taken = decoder.take(all_of_them=True)
+    assert taken.t_s.tolist() == [2.5]
+    assert taken.wrench.tolist() == [[1.5, -2.0, 3.25, 4.0, -5.5, 6.0]]
 
 
 def test_lost_doubled_and_reordered_datagrams(sent: np.ndarray) -> None:
@@ -326,8 +326,8 @@ def test_the_sequence_wraps_and_a_restart_is_noticed(sent: np.ndarray) -> None:
     records = sent[:300].copy()
     records["rdt_sequence"] = (2**32 - 150 + np.arange(300)) % 2**32
     decoder.feed(records.tobytes())
-    its = decoder.take(all_of_them=True)
-    np.testing.assert_allclose(np.diff(its.t_s), 0.01, rtol=1e-4)
+    taken = decoder.take(all_of_them=True)
+    np.testing.assert_allclose(np.diff(taken.t_s), 0.01, rtol=1e-4)
     assert decoder.lost == 0
     decoder = RdtDecoder(Nano17().scale)
     decoder.feed(sent[:300].tobytes())
@@ -344,8 +344,8 @@ def test_a_reading_with_the_error_bit_is_nan_and_a_strange_datagram_is_counted(s
     decoder.feed(records.tobytes())
     decoder.feed(b"")
     decoder.feed(b"x" * 35)
-    its = decoder.take(all_of_them=True)
-    assert np.flatnonzero(np.isnan(its.force_n).any(axis=1)).tolist() == [10, 11, 12]
+    taken = decoder.take(all_of_them=True)
+    assert np.flatnonzero(np.isnan(taken.force_n).any(axis=1)).tolist() == [10, 11, 12]
     assert (decoder.bad, decoder.refused) == (3, 2)
 
 
@@ -403,11 +403,11 @@ def test_a_configuration_that_cannot_be_used(text: str, words: str) -> None:
 
 
 def test_addresses() -> None:
-    its = parse_address("netft:192.168.1.1")
-    assert (its.host, its.port, its.scale) == ("192.168.1.1", 49152, None)
-    its = parse_address("netft:box:5000?cpf=2000&cpt=5000&rate=7000")
-    assert its.port == 5000
-    assert its.scale == Scale(2000.0, 5.0, 7000.0)
+    address = parse_address("netft:192.168.1.1")
+    assert (address.host, address.port, address.scale) == ("192.168.1.1", 49152, None)
+    address = parse_address("netft:box:5000?cpf=2000&cpt=5000&rate=7000")
+    assert address.port == 5000
+    assert address.scale == Scale(2000.0, 5.0, 7000.0)
     for text, words in (
         ("netft:", "is not valid: expected netft:HOST"),
         ("netft:a?speed=1", "option 'speed' is not valid"),

@@ -38,20 +38,20 @@ def test_equation_5_is_the_weighted_mean_of_three() -> None:
     force = electrode_force(row)[0]
     three = [0, 1, 17]
     expected = (force[three, None] * ELECTRODE_DR_MM[three]).sum(axis=0) / force[three].sum()
-    its = paf(row, threshold_n=0.0)
-    np.testing.assert_allclose(its["dr_mm"][0], expected)
-    assert its["force_n"][0] == pytest.approx(force[three].sum()) and its["valid"][0]
+    found = paf(row, threshold_n=0.0)
+    np.testing.assert_allclose(found["dr_mm"][0], expected)
+    assert found["force_n"][0] == pytest.approx(force[three].sum()) and found["valid"][0]
 
 
 def test_what_is_too_light_or_missing_is_flagged_and_the_printed_threshold_holds_nothing_back() -> None:
     rest = np.zeros((1, 19))
-    its = paf(rest)
-    assert not its["valid"][0] and np.isnan(its["dr_mm"]).all() and its["force_n"][0] == 0.0
+    found = paf(rest)
+    assert not found["valid"][0] and np.isnan(found["dr_mm"]).all() and found["force_n"][0] == 0.0
     assert paf(rest, as_printed=True)["valid"][0]
     missing = counts(E3=-0.9)
     missing[0, 7] = np.nan
-    its = paf(missing, threshold_n=0.0)
-    assert not its["valid"][0] and np.isnan(its["force_n"][0])
+    found = paf(missing, threshold_n=0.0)
+    assert not found["valid"][0] and np.isnan(found["force_n"][0])
 
 
 def test_rows_of_a_board_and_their_missing_electrodes() -> None:

@@ -18,23 +18,23 @@ def rows(tdc: list[float]) -> np.ndarray:
 
 
 def test_counts_of_the_reference_are_its_temperatures() -> None:
-    its = thermal(rows([700, 830, 1000, 1240]))  # biotac.md 2.1
-    np.testing.assert_allclose(its["celsius"], [21.4, 25.3, 29.8, 35.2], atol=0.06)
+    found = thermal(rows([700, 830, 1000, 1240]))  # biotac.md 2.1
+    np.testing.assert_allclose(found["celsius"], [21.4, 25.3, 29.8, 35.2], atol=0.06)
     there_and_back = thermal(rows(np.rint(tdc_counts(np.array([5.0, 30.0, 60.0]))).tolist()))
     np.testing.assert_allclose(there_and_back["celsius"], [5.0, 30.0, 60.0], atol=0.05)
 
 
 def test_what_is_missing_or_not_credible_is_flagged() -> None:
-    its = thermal(rows([INVALID_COUNT, 0, 4095, 1000]))
-    assert its["valid"].tolist() == [False, False, False, True]
-    assert np.isnan(its["celsius"][:3]).all()
+    found = thermal(rows([INVALID_COUNT, 0, 4095, 1000]))
+    assert found["valid"].tolist() == [False, False, False, True]
+    assert np.isnan(found["celsius"][:3]).all()
 
 
 def test_heat_flux_stays_in_counts() -> None:
     some = rows([1000, 1000, 1000])
     some["tac"] = [2053, 2060, INVALID_COUNT]
-    its = thermal(some)
-    assert its["flux_counts"][:2].tolist() == [0.0, 7.0] and np.isnan(its["flux_counts"][2])
-    assert not its["flux_is_si"].any()
+    found = thermal(some)
+    assert found["flux_counts"][:2].tolist() == [0.0, 7.0] and np.isnan(found["flux_counts"][2])
+    assert not found["flux_is_si"].any()
     with pytest.raises(InputError, match="rows have no tac: expected frames"):
         thermal(some[["tdc"]])
