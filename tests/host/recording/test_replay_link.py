@@ -75,7 +75,7 @@ def test_it_answers_as_its_board_did(recorded, capsys) -> None:
         assert replay.status().fingers_present == 0b11
         assert replay.sensor_status(0).finger == 0
     assert main(["info", f"replay:{path}", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["board"] == "POSIX_SIM"
+    assert json.loads(capsys.readouterr().out)["board"] == "simulator"
 
 
 @pytest.mark.parametrize(
