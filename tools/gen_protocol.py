@@ -14,6 +14,7 @@ from make.committed import ROOT, write_or_check
 from protogen import (
     c_client,
     c_crc,
+    c_estimates,
     c_map,
     c_population,
     c_rsqrt,
@@ -39,6 +40,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/solve/rsqrt_gen.c": c_rsqrt.source(contract),
         root / "firmware/core/map/map_gen.h": c_map.header(contract),
         root / "firmware/core/map/population_gen.h": c_population.header(root),
+        root / "firmware/core/map/estimates_gen.h": c_estimates.header(root),
         root / "firmware/client/biotac_client_gen.h": c_client.header(contract),
         root / "firmware/core/wire/messages_gen.h": c_wire.header(contract),
         root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),

@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x63FFA723u
+#define BT_SCHEMA_HASH 0x51DE3159u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -40,6 +40,18 @@ enum bt_tare_state {
     BT_TARE_STATE_CONTACT = 2, // touched; the tare follows only temperature and drift common to all electrodes
     BT_TARE_STATE_FAULT = 3, // more than two electrodes railed or missing; the tare is frozen, and no new one is taken
     BT_TARE_STATE_DOUBT = 4, // still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
+};
+
+// What shows that an electrode, or a whole sensor, is broken.
+enum bt_sensor_fault {
+    BT_SENSOR_FAULT_NONE = 0, // nothing
+    BT_SENSOR_FAULT_RAILED = 1, // it reads 0 or at least 4090: shorted or open
+    BT_SENSOR_FAULT_MISSING = 2, // no good word comes from it
+    BT_SENSOR_FAULT_ALONE = 3, // it moved while the rest of the skin did not: it floats, drifts or is loose
+    BT_SENSOR_FAULT_STUCK = 4, // it repeats one count while the skin moves
+    BT_SENSOR_FAULT_FROZEN = 5, // every electrode has repeated its word for ten rounds
+    BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
+    BT_SENSOR_FAULT_NOISY = 7, // at least five electrodes jump from round to round, too much for a tare to be taken
 };
 
 // The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE.
@@ -117,7 +129,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_UNTARED (1u << 1) // no tare: point of contact (PoC), force, torque and torsion are invalid
 #define BT_FRAME_FLAG_POC_INVALID (1u << 2) // all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
 #define BT_FRAME_FLAG_POC_LOW (1u << 3) // the signal energy is below four times the contact threshold: the PoC is noisy
-#define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame; its signal counts as 0
+#define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame
 #define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090
 #define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
@@ -142,7 +154,10 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
 #define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
-#define BT_FRAME_FLAGS 0x1FFFFFFFu // all there are
+#define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
+#define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
+#define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
+#define BT_FRAME_FLAGS 0xFFFFFFFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
@@ -300,7 +315,7 @@ typedef struct {
 
 // One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md).
 #define BT_FRAME_ID 0x10
-#define BT_FRAME_BYTES 146
+#define BT_FRAME_BYTES 150
 typedef struct {
     uint16_t seq; // [1] counts this finger's rounds with a good word, sent or not; wraps
     uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later; wraps
@@ -322,6 +337,7 @@ typedef struct {
     int32_t pressure_force_100un; // [100 uN] force magnitude from pdc_filtered_q4 - pdc_tare_q4, negative below rest; -2147483648: either is invalid, or pressure_gain_nn is 0
     int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench map gives it; else -2147483648
     uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
+    uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its signal
 } bt_msg_frame;
 
 // The 22 dynamic pressure samples of one finger in one round.
@@ -377,7 +393,7 @@ typedef struct {
 
 // Health of one sensor. Sent periodically for each present sensor, and as reply to GET_SENSOR_STATUS. Counters start at boot.
 #define BT_SENSOR_STATUS_ID 0x14
-#define BT_SENSOR_STATUS_BYTES 37
+#define BT_SENSOR_STATUS_BYTES 43
 typedef struct {
     uint16_t seq; // [1] counts SENSOR_STATUS messages
     uint32_t t_us; // [us] device time at which the message was made
@@ -393,6 +409,9 @@ typedef struct {
     uint32_t words_error; // [1] error words from the sensor
     uint32_t words_parity; // [1] other words with bad parity
     uint16_t last_error_word; // [1] last error word; 0: none
+    uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1
+    uint8_t electrode_fault; // [enum sensor_fault] why, of the electrode that went out last; 0: none is out
+    uint8_t sensor_fault; // [enum sensor_fault] what is wrong with the whole sensor
 } bt_msg_sensor_status;
 
 // Heartbeat of an untouched finger, in place of the FRAMEs that were not sent.
@@ -800,11 +819,11 @@ static const uint8_t bt_client_layout[] = {
     BT_CALIBRATION_ID, 2, 0x13, 0x89,
     BT_MAP_INFO_ID, 4, 0x13, 0x81, 0x41, 0x81,
     BT_MAP_DATA_ID, 5, 0x02, 0x41, 0x3F, 0x3F, 0x02,
-    BT_FRAME_ID, 9, 0x41, 0x81, 0x02, 0x81, 0x59, 0x86, 0x59, 0x82, 0x41,
+    BT_FRAME_ID, 10, 0x41, 0x81, 0x02, 0x81, 0x59, 0x86, 0x59, 0x82, 0x41, 0x81,
     BT_PAC_ID, 4, 0x41, 0x81, 0x01, 0x56,
     BT_TARE_ID, 4, 0x41, 0x81, 0x03, 0x95,
     BT_STATUS_ID, 8, 0x41, 0x81, 0x01, 0x81, 0x02, 0x8D, 0x41, 0x85,
-    BT_SENSOR_STATUS_ID, 5, 0x41, 0x81, 0x05, 0x86, 0x41,
+    BT_SENSOR_STATUS_ID, 7, 0x41, 0x81, 0x05, 0x86, 0x41, 0x81, 0x02,
     BT_IDLE_ID, 7, 0x41, 0x81, 0x02, 0x81, 0x41, 0x81, 0x42,
     BT_TOUCH_ID, 4, 0x41, 0x81, 0x02, 0x81,
     BT_EVENT_ID, 5, 0x41, 0x81, 0x04, 0x82, 0x41,
@@ -858,11 +877,11 @@ typedef char bt_msg_point_lies_so[sizeof(bt_msg_point) == 12 ? 1 : -1];
 typedef char bt_msg_calibration_lies_so[sizeof(bt_msg_calibration) == 56 ? 1 : -1];
 typedef char bt_msg_map_info_lies_so[sizeof(bt_msg_map_info) == 32 ? 1 : -1];
 typedef char bt_msg_map_data_lies_so[sizeof(bt_msg_map_data) == 132 ? 1 : -1];
-typedef char bt_msg_frame_lies_so[sizeof(bt_msg_frame) == 156 ? 1 : -1];
+typedef char bt_msg_frame_lies_so[sizeof(bt_msg_frame) == 160 ? 1 : -1];
 typedef char bt_msg_pac_lies_so[sizeof(bt_msg_pac) == 56 ? 1 : -1];
 typedef char bt_msg_tare_lies_so[sizeof(bt_msg_tare) == 96 ? 1 : -1];
 typedef char bt_msg_status_lies_so[sizeof(bt_msg_status) == 96 ? 1 : -1];
-typedef char bt_msg_sensor_status_lies_so[sizeof(bt_msg_sensor_status) == 44 ? 1 : -1];
+typedef char bt_msg_sensor_status_lies_so[sizeof(bt_msg_sensor_status) == 52 ? 1 : -1];
 typedef char bt_msg_idle_lies_so[sizeof(bt_msg_idle) == 28 ? 1 : -1];
 typedef char bt_msg_touch_lies_so[sizeof(bt_msg_touch) == 16 ? 1 : -1];
 typedef char bt_msg_event_lies_so[sizeof(bt_msg_event) == 24 ? 1 : -1];
@@ -916,11 +935,11 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
 #define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
 #define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
-#define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1)
+#define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1) X(electrodes_out, u32, 1) X(electrode_fault, u8, 1) X(sensor_fault, u8, 1)
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)

@@ -1,10 +1,12 @@
 #include "finger.h"
 
 #include "fixed_point.h"
-#include "signal/signals.h"
 #include "solve/poc.h"
+#include "touch/adopt.h"
 
 #include <string.h>
+
+#define PDC_FREE 6 // counts above the tare
 
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
@@ -13,6 +15,7 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
     finger->index = index;
     finger->quantities = BT_SUBSCRIBED_AT_FIRST;
     bt_tare_reset(&finger->tare);
+    bt_health_reset(&finger->health);
     bt_events_reset(&finger->events);
     bt_settings_reset(&initial);
     bt_pressure_use(&finger->pressure, &initial);
@@ -22,6 +25,7 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
 void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *settings)
 {
     bt_tare_begin(&finger->tare, settings);
+    finger->health.same = 0;
     finger->round.t_us = t_us;
     finger->round.good_words = 0;
     finger->next_slot = 0;
@@ -38,8 +42,9 @@ static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
     }
     unsigned electrode = channel - BT_CHANNEL_E1;
     if (electrode < BT_ELECTRODES) {
+        uint16_t used = bt_health_word(&finger->health, electrode, count, round->electrode[electrode]);
         round->electrode[electrode] = count;
-        return bt_tare_electrode(&finger->tare, electrode, count);
+        return bt_tare_electrode(&finger->tare, electrode, used);
     }
     switch (channel) {
     case BT_CHANNEL_PDC:
@@ -119,6 +124,7 @@ static void fall_silent(bt_finger *finger)
 void bt_finger_forget(bt_finger *finger)
 {
     bt_tare_reset(&finger->tare);
+    bt_health_reset(&finger->health);
     bt_events_reset(&finger->events);
     finger->answered = false;
 }
@@ -137,6 +143,33 @@ void bt_finger_pass(bt_finger *finger)
     close_round(finger);
 }
 
+// Without pressure nothing touches, whatever the electrodes say, if pressure has shown that it works.
+static bool may_be_touched(const bt_finger *finger)
+{
+    const bt_tare *tare = &finger->tare;
+    bool free =
+        finger->health.pressure_alive && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) < PDC_FREE;
+    return tare->state != BT_TARE_STATE_REST && !free;
+}
+
+// What the tare begins anew with, electrodes that rest again, and what a new tare ends.
+static void recover(bt_finger *finger)
+{
+    bool rests = finger->tare.state == BT_TARE_STATE_REST;
+    if (rests) {
+        finger->health.alone = 0;
+    }
+    if (rests && finger->tare.changed) {
+        bt_health_tared(&finger->health);
+    }
+    if (finger->health.out != 0 && (rests || !bt_usable_without(finger->health.out))) {
+        uint32_t back = bt_health_back(&finger->health);
+        if (rests) {
+            bt_adopt_forget(&finger->tare, back);
+        }
+    }
+}
+
 bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
 {
     close_round(finger);
@@ -150,7 +183,10 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     finger->silent_rounds = 0;
     // A tare command between two rounds may already have changed the tare.
     finger->tare_unsent = finger->tare.changed;
+    bt_health_round(&finger->health, &finger->round, &finger->tare.trigger, &finger->tare.noise,
+                    may_be_touched(finger));
     bt_tare_end(&finger->tare, finger->round.t_us, settings);
+    recover(finger);
     finger->tare_unsent = finger->tare_unsent || finger->tare.changed;
     finger->tare.changed = false;
     return true;
@@ -172,6 +208,12 @@ bool bt_finger_moved(const bt_finger *finger)
         energy += (uint32_t)(change * change);
     }
     return energy > finger->tare.threshold_count2;
+}
+
+static uint32_t health_flags(const bt_health *health)
+{
+    return (health->sensor_fault != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
+           | (health->alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }
 
 // The sequence number of the round that has ended.
@@ -249,9 +291,16 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     memcpy(msg->counts, round->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
     tell_results(finger, settings, quantities, shed, msg);
+    msg->flags |= health_flags(&finger->health);
+    msg->electrodes_out = finger->tare.trigger.without;
     tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     finger->sent = finger->tare.trigger.smooth;
+}
+
+uint32_t bt_finger_flags(const bt_finger *finger)
+{
+    return bt_channel_flags(&finger->round, &finger->tare) | health_flags(&finger->health);
 }
 
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg)
@@ -260,7 +309,7 @@ void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_
     msg->t_us = finger->round.t_us;
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
-    msg->flags = bt_channel_flags(&finger->round, &finger->tare) | BT_FRAME_FLAG_NOT_ASKED;
+    msg->flags = bt_finger_flags(finger) | BT_FRAME_FLAG_NOT_ASKED;
     msg->frames = finger->unsent;
     msg->energy_count2 = bt_trigger_energy(&finger->tare.trigger);
     msg->pdc = finger->round.pdc;
@@ -305,7 +354,7 @@ void bt_finger_point(bt_finger *finger, const bt_solve_settings *settings, bt_ms
 {
     int32_t e_q4[BT_ELECTRODES];
     bt_point point = {.um = {BT_INVALID_I16, BT_INVALID_I16, BT_INVALID_I16}};
-    bt_signals_q4(finger->round.electrode, finger->tare.electrode_q4, e_q4);
+    bt_point_signals(&finger->round, &finger->tare, e_q4);
     if (finger->tare.tared) {
         (void)bt_poc(e_q4, settings->poc_weights, &point);
     }

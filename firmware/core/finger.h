@@ -5,6 +5,7 @@
 
 #include "events/events.h"
 #include "signal/bands.h"
+#include "signal/health.h"
 #include "signal/round.h"
 #include "solve/pressure.h"
 #include "solve/results.h"
@@ -46,6 +47,7 @@ typedef struct {
     bool fresh;         // nothing sent since START: the first message is a FRAME
     bool tare_unsent;   // the tare changed in the latest round
     bt_round round;     // the latest round, or the one being assembled
+    bt_health health;
     bt_tare tare;
     bt_pressure pressure;
     bt_lanes sent; // filtered counts when the last FRAME was sent
@@ -91,7 +93,10 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings);
 // End a round in which this finger was not sampled; the round counts for nothing.
 void bt_finger_pass(bt_finger *finger);
 
-// Another sensor is connected: forget the tare.
+// The flags of the round that do not depend on any result.
+uint32_t bt_finger_flags(const bt_finger *finger);
+
+// Another sensor is connected: forget the tare, and what was wrong with the one before.
 void bt_finger_forget(bt_finger *finger);
 
 // True when there is nothing to compute: nothing touches the finger, the tare has not changed, and nobody

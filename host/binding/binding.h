@@ -15,6 +15,7 @@
 #include "device.h"
 #include "finger.h"
 #include "lin2013.h"
+#include "map/complete.h"
 #include "map/map.h"
 #include "record.h"
 #include "replay.h"

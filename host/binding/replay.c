@@ -23,8 +23,10 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
     msg->t_us = finger->round.t_us;
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
+    msg->electrodes_out = (1u << BT_ELECTRODES) - 1;
     msg->flags = BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_PDC_MISSING
-                 | BT_FRAME_FLAG_TAC_MISSING | BT_FRAME_FLAG_TDC_MISSING | BT_FRAME_FLAG_FAULT;
+                 | BT_FRAME_FLAG_TAC_MISSING | BT_FRAME_FLAG_TDC_MISSING | BT_FRAME_FLAG_FAULT
+                 | BT_FRAME_FLAG_ELECTRODE_OUT;
 }
 
 int64_t bt_replay_row_bytes(void)

@@ -103,7 +103,8 @@ static void a_missing_slot_is_marked_and_never_stale(void **state)
         if (slot % 2 == 0) {
             assert_int_equal(pac.pac[slot / 2], BT_INVALID_COUNT);
         } else if (slot >= E1_SLOT) {
-            want |= BT_FRAME_FLAG_ELECTRODE_MISSING;
+            want |= BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_ELECTRODE_OUT;
+            assert_int_equal(frame.electrodes_out, 1u << (slot - E1_SLOT) / 2);
             assert_int_equal(frame.counts[(slot - E1_SLOT) / 2], BT_INVALID_COUNT);
         } else {
             static const uint32_t flags[] = {BT_FRAME_FLAG_PDC_MISSING, BT_FRAME_FLAG_TAC_MISSING,
@@ -407,15 +408,15 @@ static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
     return msg.flags & BT_FRAME_FLAG_TORSION_OK;
 }
 
-// A finger with these signals on its first electrodes; the last one is missing, or not.
-static uint32_t shape_flags(const int e_q4[7], bool missing, uint32_t threshold_count2)
+// A finger with these signals on its first electrodes; the last one was never read, or was.
+static uint32_t shape_flags(const int e_q4[7], bool unread, uint32_t threshold_count2)
 {
     bt_round round;
     bt_tare tare;
     bt_msg_frame msg;
     tared_at_3000(&round, &tare, threshold_count2);
-    if (missing) {
-        tare.trigger.missing = true;
+    if (unread) {
+        tare.trigger.unknown = 1u << (BT_ELECTRODES - 1);
         round.electrode[BT_ELECTRODES - 1] = BT_INVALID_COUNT;
     }
     for (int i = 0; i < 7; i++) {

@@ -25,7 +25,7 @@ void bt_round_clear(bt_round *round);
 #define BT_RAIL_COUNT 4090 // from this count on, and at 0, a reading is at the end of its range
 
 #ifndef BT_CDEF // called for every electrode in every round, hence inline
-// Neither missing nor railed. One comparison: 0 wraps to the top.
+// Neither missing nor railed, which is shorted or open. One comparison: 0 wraps to the top.
 static inline bool bt_count_usable(uint16_t count)
 {
     return (uint32_t)count - 1 < BT_RAIL_COUNT - 1;
@@ -37,6 +37,13 @@ static inline bool bt_count_railed(uint16_t count)
 }
 #endif
 
-#define BT_USABLE_WITHOUT 2 // electrodes that may be missing or railed; with more the round is faulty
+#ifndef BT_CDEF
+// Results can do without two electrodes of the mask; with more the round is faulty.
+static inline bool bt_usable_without(uint32_t electrodes)
+{
+    electrodes &= electrodes - 1;
+    return (electrodes & (electrodes - 1)) == 0;
+}
+#endif
 
 #endif

@@ -21,10 +21,9 @@ void bt_trigger_reset(bt_trigger *trigger)
     bt_trigger_begin(trigger, BT_TRIGGER_NEVER);
 }
 
-int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode, uint16_t count)
+int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode)
 {
-    trigger->missing = (uint8_t)(trigger->missing + (count == BT_INVALID_COUNT));
-    trigger->railed = (uint8_t)(trigger->railed + bt_count_railed(count));
+    trigger->without |= 1u << electrode;
     // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten.
     int32_t e = (int32_t)trigger->smooth.lane[electrode] - trigger->rest.lane[electrode];
     return trigger->room -= e * e;
@@ -40,6 +39,12 @@ uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count)
         return count;
     }
     trigger->far |= bit;
+    int jump = count - trigger->smooth.lane[lane];
+    if (jump > BT_TRIGGER_JUMP) {
+        trigger->up |= bit;
+    } else if (jump < -BT_TRIGGER_JUMP) {
+        trigger->down |= bit;
+    }
     return trigger->far_before & bit ? count : trigger->smooth.lane[lane];
 }
 

@@ -40,8 +40,9 @@ typedef struct {
     uint32_t met;     // lanes whose first good word has come, until the owner takes note of it
     uint32_t far;     // lanes whose word of this round was far off, held back or not
     uint32_t far_before;
-    uint8_t missing; // electrodes of this round
-    uint8_t railed;
+    uint32_t up; // lanes whose word of this round jumped by more than BT_TRIGGER_JUMP from the filter's value
+    uint32_t down;
+    uint32_t without;  // electrodes whose word of this round is not used: missing, railed or condemned
     bool pressure_now; // this round had a good pressure word
 } bt_trigger;
 
@@ -58,18 +59,20 @@ static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
     trigger->room = limit_count2;
     trigger->far_before = trigger->far;
     trigger->far = 0;
-    trigger->missing = 0;
-    trigger->railed = 0;
+    trigger->up = 0;
+    trigger->down = 0;
+    trigger->without = 0;
     trigger->pressure_now = false;
 }
 #endif
 
-// The rare cases: a word that is missing or railed, and one that is far off. The first returns the room left,
+// The rare cases: a word that is not used, and one that is far off. The first returns the room left,
 // the second the filter's new value.
-int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode, uint16_t count);
+int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode);
 uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count);
 
-#define BT_TRIGGER_FAR 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
+#define BT_TRIGGER_FAR  24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
+#define BT_TRIGGER_JUMP 48
 
 #ifndef BT_CDEF // called in every slot, hence inline
 static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uint16_t count, uint16_t from)
@@ -87,7 +90,7 @@ static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, ui
     if (bt_count_usable(count)) {
         (void)bt_trigger_filter(trigger, electrode, count, trigger->smooth.lane[electrode]);
     } else {
-        (void)bt_trigger_repeat(trigger, electrode, count);
+        (void)bt_trigger_repeat(trigger, electrode);
     }
 }
 
@@ -95,7 +98,7 @@ static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, ui
 static inline int32_t bt_trigger_electrode(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
     if (!bt_count_usable(count)) {
-        return bt_trigger_repeat(trigger, electrode, count);
+        return bt_trigger_repeat(trigger, electrode);
     }
     uint16_t smooth = bt_trigger_filter(trigger, electrode, count, trigger->rest.lane[electrode]);
     int32_t e = smooth - trigger->rest.lane[electrode]; // a first word sets its own rest

@@ -1,6 +1,7 @@
 #include "solve/results.h"
 
 #include "fixed_point.h"
+#include "map/complete.h"
 #include "signal/signals.h"
 #include "solve/uncertainty.h"
 
@@ -43,13 +44,14 @@ static BT_NOINLINE signal_shape all_signals(const uint16_t counts[BT_ELECTRODES]
     return shape_q2;
 }
 
-static signal_shape signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES])
+static signal_shape signals(const uint16_t counts[BT_ELECTRODES], const bt_tare *tare,
+                            int32_t e_q4[BT_ELECTRODES])
 {
     signal_shape shape = {0, 0};
-    if (tare->trigger.missing == 0 && !(tare->trigger.unknown & ((1u << BT_ELECTRODES) - 1))) {
-        shape = all_signals(round->electrode, tare->electrode_q4, e_q4);
+    if (tare->trigger.without == 0 && !(tare->trigger.unknown & ((1u << BT_ELECTRODES) - 1))) {
+        shape = all_signals(counts, tare->electrode_q4, e_q4);
     } else {
-        bt_signals_q4(round->electrode, tare->electrode_q4, e_q4);
+        bt_signals_q4(counts, tare->electrode_q4, e_q4);
         for (int i = 0; i < BT_ELECTRODES; i++) {
             add_to_shape(&shape, e_q4[i]);
         }
@@ -62,8 +64,12 @@ static signal_shape signals(const bt_round *round, const bt_tare *tare, int32_t 
 static BT_NOINLINE uint32_t trouble(const bt_round *round, const bt_tare *tare)
 {
     uint32_t flags = 0;
-    flags |= tare->trigger.missing > 0 ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
-    flags |= tare->trigger.railed > 0 ? BT_FRAME_FLAG_RAIL : 0;
+    flags |= tare->trigger.without != 0 ? BT_FRAME_FLAG_ELECTRODE_OUT : 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        uint16_t count = round->electrode[i];
+        flags |= count == BT_INVALID_COUNT ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
+        flags |= bt_count_railed(count) ? BT_FRAME_FLAG_RAIL : 0;
+    }
     flags |= bt_tare_faulty(tare) ? BT_FRAME_FLAG_FAULT : 0;
     flags |= round->pdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_PDC_MISSING : 0;
     flags |= round->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
@@ -80,7 +86,7 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     uint32_t flags = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
     // One comparison for what hardly ever happens: a missing word is above every count.
     uint32_t counts = (uint32_t)(round->pdc | round->tac | round->tdc);
-    if (counts > BT_FULL_SCALE_COUNT || tare->trigger.missing + tare->trigger.railed > 0) {
+    if (counts > BT_FULL_SCALE_COUNT || tare->trigger.without != 0) {
         flags |= trouble(round, tare);
     }
     if (!tare->tared) {
@@ -114,17 +120,25 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
     return false;
 }
 
-static uint32_t by_map(const bt_round *round, const bt_tare *tare, const int32_t e_q4[BT_ELECTRODES],
-                       const bt_solve_settings *settings, uint32_t quantities, bt_msg_frame *msg)
+static uint32_t by_map(const bt_round *round, const uint16_t counts[BT_ELECTRODES], const bt_tare *tare,
+                       const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
+                       uint32_t quantities, bt_msg_frame *msg)
 {
     bt_map_input input = {
-        .counts = round->electrode,
+        .counts = counts,
         .tare_q4 = tare->electrode_q4,
         .pdc_above_rest_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16)),
     };
     return BT_FRAME_FLAG_MAPPED
            | bt_solve_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
                              msg->torque_mnmm, &msg->torsion_mnmm);
+}
+
+void bt_point_signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES])
+{
+    uint16_t counts[BT_ELECTRODES];
+    bt_complete(round->electrode, tare->electrode_q4, tare->trigger.without, counts);
+    bt_signals_q4(counts, tare->electrode_q4, e_q4);
 }
 
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
@@ -140,9 +154,15 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         return;
     }
     int32_t e_q4[BT_ELECTRODES];
-    signal_shape shape = signals(round, tare, e_q4);
+    uint16_t completed[BT_ELECTRODES];
+    const uint16_t *counts = round->electrode;
+    if (tare->trigger.without != 0) {
+        bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
+        counts = completed;
+    }
+    signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
-        flags |= by_map(round, tare, e_q4, settings, quantities, msg);
+        flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg);
     } else if (settings->population) {
         const uint32_t both = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_SIGMA;
         uint16_t not_asked[3];
@@ -157,8 +177,8 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     flags |= bt_tare_touched(tare) && warmed_q8 > limit_q8 ? BT_FRAME_FLAG_TEMP : 0;
     flags |= shape.energy < POC_LOW * tare->threshold_count2 ? BT_FRAME_FLAG_POC_LOW : 0;
     flags |= shape.bulge > shape.energy - shape.bulge ? BT_FRAME_FLAG_SHEAR_MIX : 0;
-    bool complete = !(flags & (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL));
-    if (complete && faces_down(msg->poc_um) && shape.energy > tare->threshold_count2 && enough_active(e_q4)) {
+    if (!(flags & BT_FRAME_FLAG_ELECTRODE_OUT) && faces_down(msg->poc_um)
+        && shape.energy > tare->threshold_count2 && enough_active(e_q4)) {
         flags |= BT_FRAME_FLAG_TORSION_OK;
     }
     msg->flags = flags;

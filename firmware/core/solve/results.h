@@ -16,6 +16,9 @@
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg);
 
+// The signals of a POINT, from each electrode's latest word.
+void bt_point_signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES]);
+
 #ifndef BT_CDEF
 // NOT_ASKED or 0. Sigma does not count: few ask for it.
 static inline uint32_t bt_not_asked(uint32_t quantities)

@@ -44,7 +44,7 @@ static bool end_finger(bt_session *session, unsigned f)
         }
         return false;
     }
-    bt_faults_of_round(session, f, bt_channel_flags(&finger->round, &finger->tare));
+    bt_faults_of_round(session, f, bt_finger_flags(finger));
     return true;
 }
 

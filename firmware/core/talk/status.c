@@ -32,6 +32,17 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
     bt_session_send(session, BT_STATUS_ID, payload);
 }
 
+// Why the electrode that went out last did; of those that say so themselves, the first.
+static uint8_t electrode_fault(const bt_finger *finger)
+{
+    uint32_t without = finger->tare.trigger.without;
+    if (finger->health.out != 0 || without == 0) {
+        return finger->health.electrode_fault;
+    }
+    int first = __builtin_ctz(without);
+    return bt_count_railed(finger->round.electrode[first]) ? BT_SENSOR_FAULT_RAILED : BT_SENSOR_FAULT_MISSING;
+}
+
 void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t index, uint32_t now_us)
 {
     uint8_t payload[BT_SENSOR_STATUS_BYTES];
@@ -51,6 +62,9 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
         .words_error = finger->words.error,
         .words_parity = finger->words.parity,
         .last_error_word = finger->words.last_error_word,
+        .electrodes_out = finger->tare.trigger.without,
+        .electrode_fault = electrode_fault(finger),
+        .sensor_fault = finger->health.sensor_fault,
     };
     bt_msg_sensor_status_pack(&msg, payload);
     bt_session_send(session, BT_SENSOR_STATUS_ID, payload);

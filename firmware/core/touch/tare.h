@@ -50,11 +50,11 @@ void bt_tare_hold(bt_tare *tare);
 void bt_tare_release(bt_tare *tare);
 void bt_tare_lapse(bt_tare *tare);
 
-// More electrodes of this round were missing or railed than results can do without.
+// Results cannot do without all the electrodes whose words of this round are not used.
 #ifndef BT_CDEF
 static inline bool bt_tare_faulty(const bt_tare *tare)
 {
-    return tare->trigger.missing + tare->trigger.railed > BT_USABLE_WITHOUT;
+    return !bt_usable_without(tare->trigger.without);
 }
 #endif
 

@@ -359,6 +359,7 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     at = put(at, (uint32_t)msg->pressure_force_100un, 4);
     at = put(at, (uint32_t)msg->torsion_mnmm, 4);
     at = put(at, (uint32_t)msg->wrench_age_ms, 2);
+    at = put(at, (uint32_t)msg->electrodes_out, 4);
     (void)at;
 }
 
@@ -439,6 +440,8 @@ void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[BT_FRAME_BYTES
     out[70] = (uint16_t)msg->torsion_mnmm;
     out[71] = (uint16_t)((uint32_t)msg->torsion_mnmm >> 16);
     out[72] = (uint16_t)msg->wrench_age_ms;
+    out[73] = (uint16_t)msg->electrodes_out;
+    out[74] = (uint16_t)((uint32_t)msg->electrodes_out >> 16);
 }
 
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
@@ -497,6 +500,8 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->torsion_mnmm = (int32_t)value;
     at = get(at, &value, 2);
     msg->wrench_age_ms = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->electrodes_out = (uint32_t)value;
     (void)at;
 }
 
@@ -667,6 +672,9 @@ void bt_msg_sensor_status_pack(const bt_msg_sensor_status *msg, uint8_t out[BT_S
     at = put(at, (uint32_t)msg->words_error, 4);
     at = put(at, (uint32_t)msg->words_parity, 4);
     at = put(at, (uint32_t)msg->last_error_word, 2);
+    at = put(at, (uint32_t)msg->electrodes_out, 4);
+    at = put(at, (uint32_t)msg->electrode_fault, 1);
+    at = put(at, (uint32_t)msg->sensor_fault, 1);
     (void)at;
 }
 
@@ -702,6 +710,12 @@ void bt_msg_sensor_status_unpack(bt_msg_sensor_status *msg, const uint8_t in[BT_
     msg->words_parity = (uint32_t)value;
     at = get(at, &value, 2);
     msg->last_error_word = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->electrodes_out = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->electrode_fault = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->sensor_fault = (uint8_t)value;
     (void)at;
 }
 

@@ -74,6 +74,19 @@ def c_pointers(*arrays: NDArray[Any]) -> list[Any]:
     return [ffi.from_buffer(f"{kinds.get(a.dtype.kind, f'{a.dtype.name}_t')}[]", a) for a in arrays]
 
 
+def completed(messages: NDArray[Any]) -> NDArray[Any]:
+    """FRAME messages (n,), with the counts that the board estimates in place of those of electrodes that are out."""
+    without = np.flatnonzero(messages["electrodes_out"])
+    if len(without):
+        messages = messages.copy()
+    for k in without.tolist():
+        counts = np.empty(ELECTRODES, np.uint16)
+        given = [np.ascontiguousarray(messages[name][k], np.uint16) for name in ("counts", "tare_q4")]
+        lib.bt_complete(*c_pointers(*given), int(messages["electrodes_out"][k]), *c_pointers(counts))
+        messages["counts"][k] = counts
+    return messages
+
+
 def board_settings(settings: Settings) -> Any:
     """The C struct bt_settings with these values; settings left out have their defaults.
 

@@ -298,13 +298,29 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "channel_stuck": error(
         "A channel says one and the same count, round after round, while others move: its amplifier or a trace is "
-        "broken. The board cannot tell: it computes with the count it is given.",
+        "broken. The board does without such an electrode once the skin has moved, but not without PDC.",
         "Press the finger and look at the channel in `biotac view`. If it does not move, do not trust forces of this "
         "sensor, and have it repaired.",
     ),
+    "electrode_alone": error(
+        "An electrode moved while nothing touched the finger and the rest of the skin was still: it floats, drifts or "
+        "is loose. The board does without it, and estimates its signal from the others'.",
+        "Reseat the flex connector; look at the electrode in `biotac view`. It is used again, with a new tare, after "
+        "two calm seconds at rest.",
+    ),
+    "electrodes_shorted": error(
+        "Two electrodes moved, and said the same all the while: their traces touch. Each is a mean of both.",
+        "Reseat the flex connector. If it stays, do not trust forces of this sensor, and have it repaired.",
+    ),
+    "electrodes_shifted": error(
+        "All electrodes moved alike and faster than anything warms, without pressure: their supply or reference "
+        "dropped. Forces are off by it until the next tare.",
+        "Let go of the finger, so that the board takes a new tare. Measure V+ at the sensor.",
+    ),
     "channel_noisy": error(
-        "The count of an electrode jumps from round to round, far more than the others' and more than a press moves "
-        "it: a trace or a contact is loose, or something couples into it.",
+        "The count of an electrode jumps back and forth from round to round, as no press moves it: a trace or a "
+        "contact is loose, or something couples into it. The board does without one or two; with more it takes no "
+        "tare.",
         "Reseat the flex connector; keep motors' wires away from the sensor's. If it stays, do not trust forces of "
         "this sensor.",
     ),

@@ -1,14 +1,16 @@
-"""Checks tares, and what each channel says: no word, the end of the range, always the same, or mostly noise."""
+"""Checks tares, and what each channel says: no word, the end of the range, always the same, or what the board found."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..wire import messages_gen as wire
 from ..wire.native import lib
+from ..wire.sensor_gen import ELECTRODE_NAMES
 from .catalogue import Finding
 from .facts import BoardFacts
 
@@ -20,10 +22,18 @@ RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()
 STUCK_ROUNDS = 100
 STUCK_TDC_ROUNDS = 280
 
-# Noise is the median change of a count's slope from round to round: what presses and slides is smooth. No electrode of
-# the public recordings exceeds 22 counts, or 5.5 times the middle one of its finger.
-NOISE_COUNTS = 40.0
-NOISE_RATIO = 8.0
+# Two electrodes that moved by as much, and never differed by more than an eighth of it, are one: those of the public
+# recordings that came closest differed by half of it.
+SAME_MOVED_COUNTS = 40.0
+SAME_SHARE = 8.0
+
+# By what the board found (SENSOR_STATUS): the finding's code. What it calls RAILED or MISSING shows in the frames.
+ELECTRODE_FAULTS = {
+    wire.SensorFault.ALONE: "electrode_alone",
+    wire.SensorFault.STUCK: "channel_stuck",
+    wire.SensorFault.NOISY: "channel_noisy",
+}
+SENSOR_FAULTS = {wire.SensorFault.FROZEN: "sensor_frozen", wire.SensorFault.TOGETHER: "electrodes_shifted"}
 
 
 def check(board: BoardFacts) -> Iterator[Finding]:
@@ -31,9 +41,20 @@ def check(board: BoardFacts) -> Iterator[Finding]:
     for finger in board.present:
         yield from _tare(board, finger)
     for finger in board.present:
-        for code, names in _judge(_channels(board, finger)).items():
+        found = _judge(_channels(board, finger))
+        for code, names in _by_the_board(board.sensors_after[finger]):
+            found.setdefault(code, []).extend(name for name in names if name not in found.get(code, []))
+        for code, names in found.items():
             if names:
                 yield Finding(code, f"finger {finger}: {', '.join(names)}")
+
+
+def _by_the_board(state: wire.SensorStatus) -> Iterator[tuple[str, list[str]]]:
+    """What the board itself has found: the codes, and the electrodes they are about."""
+    if code := SENSOR_FAULTS.get(wire.SensorFault(state.sensor_fault)):
+        yield code, ["every channel"]
+    elif code := ELECTRODE_FAULTS.get(wire.SensorFault(state.electrode_fault)):
+        yield code, [f"E{k + 1}" for k in range(len(ELECTRODE_NAMES)) if state.electrodes_out >> k & 1]
 
 
 def _tare(board: BoardFacts, finger: int) -> Iterator[Finding]:
@@ -59,9 +80,9 @@ def _channels(board: BoardFacts, finger: int) -> dict[str, NDArray[np.integer]]:
 
 def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
     """By the finding's code, the names of the channels it is about. A channel has one finding."""
-    codes = ("sensor_frozen", "channel_missing", "channel_railed", "channel_stuck", "channel_noisy")
+    codes = ("sensor_frozen", "channel_missing", "channel_railed", "channel_stuck", "electrodes_shorted")
     found: dict[str, list[str]] = {code: [] for code in codes}
-    noise_counts = {}
+    moved: dict[str, NDArray[np.floating]] = {}
     for name, counts in channels.items():
         rounds = STUCK_TDC_ROUNDS if name == "TDC" else STUCK_ROUNDS
         good = counts[(counts != wire.INVALID_COUNT).all(axis=1)].astype(float)
@@ -71,11 +92,13 @@ def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
             found["channel_railed"].append(name)
         elif len(good) >= rounds and not np.ptp(good[-rounds:], axis=0).any():
             found["channel_stuck"].append(name)
-        elif name.startswith("E") and len(good) >= rounds:
-            noise_counts[name] = np.median(np.abs(np.diff(good, n=2, axis=0)))
-    if noise_counts:
-        limit_counts = max(NOISE_COUNTS, NOISE_RATIO * np.median(list(noise_counts.values())))
-        found["channel_noisy"] = [name for name, noise in noise_counts.items() if noise > limit_counts]
+        elif name.startswith("E") and len(good) == len(counts) and np.ptp(good) >= SAME_MOVED_COUNTS:
+            moved[name] = good[:, 0]
+    found["electrodes_shorted"] = [
+        f"{one} and {two}"
+        for one, two in combinations(moved, 2)
+        if np.abs(moved[one] - moved[two]).max() * SAME_SHARE <= np.ptp(moved[one])
+    ]
     if channels and len(found["channel_stuck"]) == len(channels):
         found["sensor_frozen"], found["channel_stuck"] = ["every channel"], []
     return found

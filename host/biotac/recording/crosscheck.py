@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, reference_q4
+from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, completed, reference_q4
 from ..map import population
 from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
 from ..map.bound import bound_of, error_bound
@@ -103,7 +103,7 @@ class CrossCheck:
         """
         own, maps = own or {}, maps or {}
         # A repeated wrench belongs to an earlier FRAME, and is judged there.
-        messages = messages[(messages["flags"] & wire.FrameFlags.REPEATED) == 0]
+        messages = completed(messages[(messages["flags"] & wire.FrameFlags.REPEATED) == 0])
         mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
         for finger in np.unique(messages["finger"][mapped]).tolist():
             rows = messages[mapped & (messages["finger"] == finger)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
-from ..core.compiled import on_board_q4, pressure_force_100un
+from ..core.compiled import completed, on_board_q4, pressure_force_100un
 from ..errors import InputError
 from ..keep.calibration import own_settings
 from ..map import board_map
@@ -110,11 +110,12 @@ def _with_kept_tares(
 
 
 def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | None) -> StructArray:
+    used = completed(frames)
     if own_map is None:
-        poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
+        poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(used["counts"], used["tare_q4"], settings)
         frames["torsion_mnmm"] = wire.INVALID_I32
     else:
-        poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(frames, settings, own_map)
+        poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(used, settings, own_map)
         frames["torsion_mnmm"] = torsion_mnmm
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
     frames["pressure_force_100un"] = pressure_force_100un(
@@ -134,7 +135,7 @@ def _torsion_ok(frames: StructArray, poc_um: NDArray[np.int16]) -> NDArray[np.bo
     missing = (frames["counts"] == wire.INVALID_COUNT) | (frames["tare_q4"] == wire.INVALID_COUNT)
     moved = np.abs(frames["counts"].astype(np.int32) * 16 - frames["tare_q4"]) >= _ACTIVE_Q4
     active = (moved & ~missing).sum(axis=1) >= _ACTIVE_FOR_TORSION
-    trouble = (frames["flags"] & (wire.FrameFlags.ELECTRODE_MISSING | wire.FrameFlags.RAIL)) != 0
+    trouble = (frames["flags"] & wire.FrameFlags.ELECTRODE_OUT) != 0
     had = (frames["flags"] & wire.FrameFlags.TORSION_OK) != 0
     strong = (frames["flags"] & wire.FrameFlags.POC_LOW) == 0
     return np.asarray(down & active & ~trouble & (had | strong))

@@ -17,8 +17,8 @@ from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray
 
-#: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing. ``map_um``: the point of contact on the
-#: unrolled skin, across and along, in um; null where it is invalid.
+#: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing or not used. ``map_um``: the point of
+#: contact on the unrolled skin, across and along, in um; null where it is invalid.
 FRAME_ROW = (
     "finger", "seq", "t_us", "flags", "tare_state", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un",
     "torque_mnmm", "map_um",
@@ -57,9 +57,10 @@ def pac_rows(batch: Batch) -> list[str]:
 
 
 def signal_q4(messages: StructArray) -> NDArray[np.int32]:
-    """Signals of FRAME messages in 1/16 count, (n, 19); INVALID_I32 where count or tare is missing."""
+    """Signals of FRAME messages in 1/16 count, (n, 19); INVALID_I32 where count or tare is missing, or not used."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
     missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
+    missing |= (messages["electrodes_out"][:, None] >> np.arange(counts.shape[1], dtype=np.uint32) & 1) != 0
     signals: NDArray[np.int32] = counts.astype(np.int32) * Q4_PER_COUNT - tare_q4
     signals[missing] = wire.INVALID_I32
     return signals
@@ -108,6 +109,7 @@ def facts() -> dict[str, Any]:
             for flag in wire.FrameFlags
         ],
         "tare_states": {int(s): {"name": s.name, "words": wire.TARE_STATE_DOC[s]} for s in wire.TareState},
+        "sensor_faults": {int(f): wire.SENSOR_FAULT_DOC[f] for f in wire.SensorFault},
         "tare_reasons": {int(r): {"name": r.name, "words": wire.TARE_REASON_DOC[r]} for r in wire.TareReason},
     }
 

@@ -120,6 +120,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("pressure_force_100un", "<i4"),
             ("torsion_mnmm", "<i4"),
             ("wrench_age_ms", "<u2"),
+            ("electrodes_out", "<u4"),
         ]
     ),
     wire.Pac.ID: np.dtype(
@@ -183,6 +184,9 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("words_error", "<u4"),
             ("words_parity", "<u4"),
             ("last_error_word", "<u2"),
+            ("electrodes_out", "<u4"),
+            ("electrode_fault", "u1"),
+            ("sensor_fault", "u1"),
         ]
     ),
     wire.Idle.ID: np.dtype(

@@ -83,6 +83,7 @@ def _real(name: str, what: str, sent: str, per_unit: int, parts: tuple[str, ...]
 _PRESSURE_FORCE = "magnitude of the force from static pressure, negative below rest; NaN unless calibrated"
 _TORSION = "torque about the outward normal at the contact; NaN unless a wrench map gives it"
 _AGE = "how much older force, torque and torsion are than the row; 0 unless REPEATED"
+_OUT = "bit mask, bit i for electrode i + 1: results do without it"
 _TARE_STATE = Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state")
 
 #: One row per finger and round of slots (10 ms).
@@ -105,6 +106,7 @@ FRAME_FIELDS = (
     _real("pressure_force_n", _PRESSURE_FORCE, "pressure_force_100un", FORCE_LSB_PER_N),
     _real("torsion_nmm", _TORSION, "torsion_mnmm", MNMM_PER_NMM),
     Field("wrench_age_ms", "<u2", "ms", _AGE, (), "wrench_age_ms"),
+    Field("electrodes_out", "<u4", "1", _OUT, (), "electrodes_out"),
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),
 )
 

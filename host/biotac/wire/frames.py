@@ -77,6 +77,7 @@ class Frame:
     pressure_force_n: float = math.nan
     torsion_nmm: float = math.nan
     wrench_age_ms: int = 0
+    electrodes_out: int = 0
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frame):

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x63FFA723
+SCHEMA_HASH = 0x51DE3159
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -54,6 +54,19 @@ class TareState(IntEnum):
     CONTACT = 2  # touched; the tare follows only temperature and drift common to all electrodes
     FAULT = 3  # more than two electrodes railed or missing; the tare is frozen, and no new one is taken
     DOUBT = 4  # still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
+
+
+class SensorFault(IntEnum):
+    """What shows that an electrode, or a whole sensor, is broken."""
+
+    NONE = 0  # nothing
+    RAILED = 1  # it reads 0 or at least 4090: shorted or open
+    MISSING = 2  # no good word comes from it
+    ALONE = 3  # it moved while the rest of the skin did not: it floats, drifts or is loose
+    STUCK = 4  # it repeats one count while the skin moves
+    FROZEN = 5  # every electrode has repeated its word for ten rounds
+    TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
+    NOISY = 7  # at least five electrodes jump from round to round, too much for a tare to be taken
 
 
 class TareReason(IntEnum):
@@ -140,7 +153,7 @@ class FrameFlags(IntFlag):
     UNTARED = 1 << 1  # no tare: point of contact (PoC), force, torque and torsion are invalid
     POC_INVALID = 1 << 2  # all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
     POC_LOW = 1 << 3  # the signal energy is below four times the contact threshold: the PoC is noisy
-    ELECTRODE_MISSING = 1 << 4  # an electrode had no good word in this frame; its signal counts as 0
+    ELECTRODE_MISSING = 1 << 4  # an electrode had no good word in this frame
     RAIL = 1 << 5  # an electrode reads 0 or at least 4090
     PDC_MISSING = 1 << 6  # no good static pressure word; contact is judged by the electrodes alone
     TAC_MISSING = 1 << 7  # no good thermal flux word
@@ -165,6 +178,9 @@ class FrameFlags(IntFlag):
     OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
     TARE_UNSURE = 1 << 27  # the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
+    ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
+    SENSOR_FAULT = 1 << 30  # the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
+    ELECTRODE_ALONE = 1 << 31  # in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
 
 
 class FaultFlags(IntFlag):
@@ -230,6 +246,18 @@ TARE_STATE_DOC: dict[int, str] = {
     2: "touched; the tare follows only temperature and drift common to all electrodes",
     3: "more than two electrodes railed or missing; the tare is frozen, and no new one is taken",
     4: "still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected",
+}
+
+
+SENSOR_FAULT_DOC: dict[int, str] = {
+    0: "nothing",
+    1: "it reads 0 or at least 4090: shorted or open",
+    2: "no good word comes from it",
+    3: "it moved while the rest of the skin did not: it floats, drifts or is loose",
+    4: "it repeats one count while the skin moves",
+    5: "every electrode has repeated its word for ten rounds",
+    6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
+    7: "at least five electrodes jump from round to round, too much for a tare to be taken",
 }
 
 
@@ -308,7 +336,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     2: "no tare: point of contact (PoC), force, torque and torsion are invalid",
     4: "all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it",
     8: "the signal energy is below four times the contact threshold: the PoC is noisy",
-    16: "an electrode had no good word in this frame; its signal counts as 0",
+    16: "an electrode had no good word in this frame",
     32: "an electrode reads 0 or at least 4090",
     64: "no good static pressure word; contact is judged by the electrodes alone",
     128: "no good thermal flux word",
@@ -333,6 +361,9 @@ FRAME_FLAG_DOC: dict[int, str] = {
     67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma",
     134217728: "the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then",
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
+    536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",
+    1073741824: "the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results",
+    2147483648: "in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault",
 }
 
 
@@ -836,12 +867,13 @@ class Frame:
     pressure_force_100un: int
     torsion_mnmm: int
     wrench_age_ms: int
+    electrodes_out: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiHI")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 146 bytes."""
+        """Payload without id and CRC, 150 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -863,6 +895,7 @@ class Frame:
             self.pressure_force_100un,
             self.torsion_mnmm,
             self.wrench_age_ms,
+            self.electrodes_out,
         )
 
     @classmethod
@@ -890,6 +923,7 @@ class Frame:
             v[61],
             v[62],
             v[63],
+            v[64],
         )
 
 
@@ -1073,12 +1107,15 @@ class SensorStatus:
     words_error: int
     words_parity: int
     last_error_word: int
+    electrodes_out: int
+    electrode_fault: int
+    sensor_fault: int
 
     ID: ClassVar[int] = 0x14
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBBBBIIIIIIH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBBBBIIIIIIHIBB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 37 bytes."""
+        """Payload without id and CRC, 43 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -1094,6 +1131,9 @@ class SensorStatus:
             self.words_error,
             self.words_parity,
             self.last_error_word,
+            self.electrodes_out,
+            self.electrode_fault,
+            self.sensor_fault,
         )
 
     @classmethod
@@ -1115,6 +1155,9 @@ class SensorStatus:
             v[11],
             v[12],
             v[13],
+            v[14],
+            v[15],
+            v[16],
         )
 
 

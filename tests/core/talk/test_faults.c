@@ -62,7 +62,7 @@ static void a_round_that_lacks_a_word_is_told_until_it_is_cleared(void **state)
         one_round_without_an_electrode();
         rounds(100);
         uint32_t told = status().finger_faults[FINGER];
-        assert_int_equal(told, BT_FRAME_FLAG_ELECTRODE_MISSING);
+        assert_int_equal(told, BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_ELECTRODE_OUT);
         clear(0, BT_FRAME_FLAG_RAIL); // another
         assert_int_equal(status().finger_faults[FINGER], told);
         clear(0, told);
@@ -78,7 +78,8 @@ static void what_came_after_the_host_looked_stays(void **state)
     uint32_t before = status().finger_faults[FINGER];
     one_round_without_an_electrode();
     clear(UINT16_MAX, before);
-    assert_int_equal(status().finger_faults[FINGER], BT_FRAME_FLAG_ELECTRODE_MISSING);
+    assert_int_equal(status().finger_faults[FINGER],
+                     BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_ELECTRODE_OUT);
 }
 
 static void what_goes_on_is_set_again(void **state)

@@ -136,8 +136,13 @@ def freeze(facts: Facts) -> Facts:
     return facts
 
 
-def noisy(rows: np.ndarray) -> None:
-    rows["counts"][:, 2] = 3000 + np.random.default_rng(9).normal(0, 60, len(rows))
+def out(electrode: int, fault: wire.SensorFault) -> Facts:
+    return state(electrodes_out=1 << electrode, electrode_fault=fault)
+
+
+def shorted(rows: np.ndarray) -> None:
+    rows["counts"][:, 1] = 3000 - np.arange(len(rows)) // 4
+    rows["counts"][:, 8] = rows["counts"][:, 1] + np.arange(len(rows)) % 3
 
 
 def mark(name: str, value: int, column: int | None = None) -> Callable[[np.ndarray], None]:
@@ -302,7 +307,11 @@ CASES: list[tuple[str, Facts, str]] = [
     *(("channel_stuck", frames(mark(name, 2100)), f"finger 1: {name.upper()}") for name in ("pdc", "tac", "tdc")),
     ("channel_stuck", frames(mark("counts", 2100, 6)), "finger 1: E7"),
     ("channel_stuck", vibration(mark("pac", 2100)), "finger 1: PAC"),
-    ("channel_noisy", frames(noisy), "finger 1: E3"),
+    ("channel_noisy", out(2, wire.SensorFault.NOISY), "finger 1: E3"),
+    ("channel_stuck", out(4, wire.SensorFault.STUCK), "finger 1: E5"),
+    ("electrode_alone", out(18, wire.SensorFault.ALONE), "finger 1: E19"),
+    ("electrodes_shifted", state(sensor_fault=wire.SensorFault.TOGETHER), "finger 1"),
+    ("electrodes_shorted", frames(shorted), "finger 1: E2 and E9"),
     ("channel_missing", frames(mark("counts", wire.INVALID_COUNT, 0)), "finger 1: E1"),
     ("channel_missing", frames(mark("tdc", wire.INVALID_COUNT)), "finger 1: TDC"),
 ]

@@ -94,6 +94,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "pressure_force_n": scaled("pressure_force_100un", 10_000, -(2**31)),
         "torsion_nmm": scaled("torsion_mnmm", 1000, -(2**31)),
         "wrench_age_ms": sent["wrench_age_ms"],
+        "electrodes_out": sent["electrodes_out"],
         "flags": sent["flags"],
         "gap_s": np.where(
             np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0

@@ -36,6 +36,7 @@ def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
         "pressure_force_100un": -1250,
         "torsion_mnmm": -4750,
         "wrench_age_ms": 0,
+        "electrodes_out": 0,
     }
     return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
 

@@ -110,6 +110,14 @@ export class Flags {
   }
 }
 
+// Which electrodes results do without and why, and what is wrong with the sensor.
+export function showFaults(about, facts) {
+  const out = about.electrodes.filter((_, k) => (facts?.electrodes_out >> k) & 1).map(({ name }) => name);
+  const words = out.length ? [`${out.join(", ")}: ${about.sensor_faults[facts.electrode_fault]}.`] : [];
+  if (facts?.sensor_fault) words.push(`Sensor: ${about.sensor_faults[facts.sensor_fault]}.`);
+  write(byId("fault-words"), words.join(" "));
+}
+
 export function showTare(about, facts) {
   const state = about.tare_states[facts?.tare_state];
   const reason = about.tare_reasons[facts?.tare_reason];

@@ -1,0 +1,153 @@
+// What a live sensor's words cannot be: here a sensor made of numbers, whose skin moves as real skin did.
+#include "emulated_finger.h"
+
+#include "signal/health.h"
+
+#define SIGMA 1.5
+
+static bt_health health;
+static bt_trigger trigger;
+static bt_round sampled;
+static bt_noise noise;
+static uint64_t seed;
+static bool touched;
+static uint16_t stuck; // what electrode 4 says, if not 0
+
+static int begin(void **state)
+{
+    (void)state;
+    bt_health_reset(&health);
+    bt_trigger_reset(&trigger);
+    memset(&sampled, 0, sizeof sampled);
+    noise = (bt_noise){.count2 = 43}; // of 19 electrodes with SIGMA
+    seed = 77;
+    touched = false;
+    stuck = 0;
+    return 0;
+}
+
+// A round of a skin that is moved by `moved` counts in all, a third of it one electrode's, as pressure shows;
+// `wrong` is added to electrode 4's word.
+static void one_round(double moved, double wrong)
+{
+    bt_trigger_begin(&trigger, BT_TRIGGER_NEVER);
+    health.same = 0;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        double count =
+            2500 + 20 * i + moved * load_shape((int)i) + SIGMA * gauss(&seed) + (i == 4 ? wrong : 0);
+        uint16_t word = i == 4 && stuck != 0 ? stuck : to_count(count);
+        uint16_t used = bt_health_word(&health, i, word, sampled.electrode[i]);
+        sampled.electrode[i] = word;
+        bt_trigger_follow(&trigger, i, used);
+    }
+    (void)bt_trigger_pressure(&trigger, to_count(1326 + moved / 4 + gauss(&seed)), INT32_MAX);
+    bt_health_round(&health, &sampled, &trigger, &noise, touched);
+}
+
+static void rounds(int n, double moved, double wrong)
+{
+    for (int k = 0; k < n; k++) {
+        one_round(moved, wrong);
+    }
+}
+
+static void expect_out(uint32_t out, uint8_t fault)
+{
+    assert_int_equal(health.out, out);
+    assert_int_equal(health.electrode_fault, fault);
+}
+
+static void skin_that_is_pressed_is_never_condemned(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 20000; k++) {
+        one_round(k / 500 % 2 ? 400 : 400.0 * (k % 500) / 500, 0); // slowly on, and at once
+        expect_out(0, BT_SENSOR_FAULT_NONE);
+        assert_int_equal(health.sensor_fault, BT_SENSOR_FAULT_NONE);
+    }
+}
+
+static void an_electrode_that_drifts_alone_is_condemned_unless_something_touches(void **state)
+{
+    (void)state;
+    for (int touches = 0; touches <= 1; touches++) {
+        begin(NULL);
+        rounds(200, 0, 0);
+        touched = touches;
+        for (int k = 0; k < 150; k++) {
+            one_round(0, -0.5 * k);
+        }
+        assert_int_equal(health.alone, touches ? 1u << 4 : 0);
+        expect_out(touches ? 0 : 1u << 4, touches ? BT_SENSOR_FAULT_NONE : BT_SENSOR_FAULT_ALONE);
+    }
+}
+
+static void what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second(void **state)
+{
+    (void)state;
+    touched = true;
+    rounds(200, 300, 0);
+    for (int k = 0; k < 10; k++) {
+        one_round(300 + 20 * k, k % 2 ? 200 : -200); // in the middle of a squeeze
+    }
+    expect_out(1u << 4, BT_SENSOR_FAULT_NOISY);
+}
+
+static void what_sticks_is_condemned_once_the_skin_moves(void **state)
+{
+    (void)state;
+    touched = true;
+    rounds(500, 0, 0);
+    stuck = sampled.electrode[4];
+    rounds(100, 0, 0);
+    expect_out(0, BT_SENSOR_FAULT_NONE); // at rest a quiet electrode may repeat its word
+    for (int k = 0; k < 20; k++) {
+        one_round(20 * k, 0);
+    }
+    expect_out(1u << 4, BT_SENSOR_FAULT_STUCK);
+}
+
+static void words_that_all_repeat_are_a_frozen_sensor_until_one_changes(void **state)
+{
+    (void)state;
+    rounds(200, 0, 0);
+    for (int k = 0; k < 30; k++) {
+        bt_trigger_begin(&trigger, BT_TRIGGER_NEVER);
+        health.same = 0;
+        for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+            bt_trigger_follow(&trigger, i,
+                              bt_health_word(&health, i, sampled.electrode[i], sampled.electrode[i]));
+        }
+        bt_health_round(&health, &sampled, &trigger, &noise, touched);
+        assert_int_equal(health.sensor_fault, k < 9 ? BT_SENSOR_FAULT_NONE : BT_SENSOR_FAULT_FROZEN);
+        assert_int_equal(bt_usable_without(trigger.without), k < 9);
+    }
+    one_round(0, 0);
+    assert_int_equal(health.sensor_fault, BT_SENSOR_FAULT_NONE);
+    assert_int_equal(trigger.without, 0);
+}
+
+static void a_condemned_electrode_comes_back_after_two_calm_seconds(void **state)
+{
+    (void)state;
+    rounds(200, 0, 0);
+    rounds(100, 0, -300);
+    expect_out(1u << 4, BT_SENSOR_FAULT_ALONE);
+    assert_int_equal(bt_health_back(&health), 0);
+    rounds(220, 0, -300);
+    assert_int_equal(bt_health_back(&health), 1u << 4);
+    expect_out(0, BT_SENSOR_FAULT_NONE);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(skin_that_is_pressed_is_never_condemned, begin),
+        cmocka_unit_test_setup(an_electrode_that_drifts_alone_is_condemned_unless_something_touches, begin),
+        cmocka_unit_test_setup(what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second, begin),
+        cmocka_unit_test_setup(what_sticks_is_condemned_once_the_skin_moves, begin),
+        cmocka_unit_test_setup(words_that_all_repeat_are_a_frozen_sensor_until_one_changes, begin),
+        cmocka_unit_test_setup(a_condemned_electrode_comes_back_after_two_calm_seconds, begin),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
