@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import random_courses
 import sensor_faults
+import wrong_by
 from sensor_faults import FAULTS, SILENT_ROUNDS, WHEN, outcome
 
 from biotac import Finger, FrameFlags
@@ -107,3 +108,43 @@ def test_an_estimate_is_the_sum_of_the_others() -> None:
         lib.bt_complete(before, rest_q4, sum(1 << k for k in out), after)
         assert np.abs(got[out] - 2500.0 - np.sign(want) * size).max() < 2  # turns, whole counts, and the knee
         assert (got[kept] == counts[kept]).all()
+
+
+LEFT_OUT = "widens its margins, and looks at `biotac doctor`"
+ROWS = {
+    "an electrode is open, shorted or stuck": ("electrode open", "electrode shorted", "electrode stuck"),
+    "an electrode floats": (
+        "electrode floating: walks 20 counts a round", "electrode floating: uniform noise",
+        "electrode with noise of 200 counts",
+    ),
+    "an electrode drifts by up to 200 counts/s": (
+        "electrode drifts 10 counts/s", "electrode drifts 50 counts/s", "electrode drifts 200 counts/s",
+    ),
+    "an electrode at half its gain": ("electrode at half gain",),
+    "the wires of two electrodes are exchanged in use": ("two electrodes' wires exchanged",),
+    "all electrodes drift by 5 counts/s, as warmth makes them": ("all electrodes drift 5 counts/s",),
+    "all electrodes drift by 20 counts/s, or jump by 50": (
+        "all electrodes drift 20 counts/s", "all electrodes jump by 50",
+    ),
+    "a sensor repeats its words for ever": ("the same words for ever", "electrodes frozen, pressure alive"),
+    "two fingers exchanged without a silence, or coupled": (
+        "two fingers exchanged", "cross-talk of 30 % between fingers", "cross-talk of 100 % between fingers",
+    ),
+}  # fmt: skip
+ANSWERS = {
+    "an electrode is open, shorted or stuck": ("ELECTRODE_OUT", LEFT_OUT),
+    "an electrode floats": ("ELECTRODE_OUT", LEFT_OUT),
+    "an electrode drifts by up to 200 counts/s": ("ELECTRODE_OUT, in a touch ELECTRODE_ALONE", LEFT_OUT),
+    "an electrode at half its gain": ("none", "calibrates again when a known load reads wrong"),
+    "the wires of two electrodes are exchanged in use": ("ELECTRODE_OUT, ELECTRODE_ALONE", LEFT_OUT),
+    "all electrodes drift by 5 counts/s, as warmth makes them": ("none", "lets go from time to time"),
+    "all electrodes drift by 20 counts/s, or jump by 50": ("SENSOR_FAULT; none in a squeeze", "lets go, to tare"),
+    "a sensor repeats its words for ever": ("FAULT, SENSOR_FAULT", "holds its actuators"),
+    "two fingers exchanged without a silence, or coupled": ("none", "keeps cables apart"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("cause", ROWS)
+def test_the_page_says_what_a_broken_sensor_makes_of_a_calibrated_force(cause: str) -> None:
+    worst = max(outcome(of, f, when, "fitted").worst_n for f in ROWS[cause] for when in WHEN for of in PRESSES)
+    wrong_by.row(cause, worst, *ANSWERS[cause])
