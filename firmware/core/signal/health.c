@@ -145,8 +145,8 @@ typedef struct {
 } moves;
 
 // A move of one electrode is the difference of two sums of noise, whose deviation here is `sd`. 18 of them
-// make 14.4 +- 2.6 of it. A sum that a real move adds to is hidden up to 5 of it: ALONE_TIMES 4, rounded
-// down.
+// make 14.4 +- 2.6 of it, so that a sum of real moves may hide up to 4 of it below NOISE_SDS; eight times
+// that is ALONE_SDS.
 #define NOISE_SDS 17
 #define ALONE_SDS 31
 
