@@ -112,11 +112,11 @@ def test_kill_9_loses_at_most_the_last_label(recorded: Path, tmp_path: Path) -> 
     path.write_bytes(recorded.read_bytes())
     with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True) as program:
         assert program.stdout is not None
-        told = [program.stdout.readline() for _ in range(200)]
+        printed = [program.stdout.readline() for _ in range(200)]
         program.send_signal(signal.SIGKILL)
-        told += program.stdout.read().splitlines()
+        printed += program.stdout.read().splitlines()
     texts = [label.text for label in biotac.Recording(path).labels if label.text.startswith("label")]
-    assert texts[: len(told)] == [f"label {k}" for k in range(len(told))] and len(texts) <= len(told) + 1
+    assert texts[: len(printed)] == [f"label {k}" for k in range(len(printed))] and len(texts) <= len(printed) + 1
 
 
 def test_a_torn_line_costs_itself_alone(recorded: Path, tmp_path: Path) -> None:
