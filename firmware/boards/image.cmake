@@ -74,5 +74,5 @@ function(qemu_executable name port_name cpu linker sources)
     ${port} ${boards}/m4f ${CMAKE_CURRENT_LIST_DIR})
   target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections -Wl,--fatal-warnings
     -T ${port}/${linker})
-  board_compile_options(${sources})
+  board_compile_options(${sources} ${shared})
 endfunction()

@@ -1,5 +1,6 @@
 // Everything the firmware needs from a board, on one page. Each folder beside this file has one
-// implementation. Times are us of device time in uint32_t, wrapping; differences are taken modulo 2^32.
+// implementation; README.md beside it says who calls what, and from where. Times are us of device time in
+// uint32_t, wrapping; differences are taken modulo 2^32.
 #ifndef BIOTAC_PORT_H
 #define BIOTAC_PORT_H
 

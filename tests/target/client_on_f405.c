@@ -28,13 +28,13 @@ bool bt_port_alarm(void)
 
 void uart_send(const uint8_t *data, size_t bytes)
 {
-    (void)port_link_write(ONLY_BOARD, data, bytes);
+    (void)port_link_write(ONLY_BOARD, 0, data, bytes);
 }
 
 int uart_next(void)
 {
     uint8_t byte;
-    return port_link_read(ONLY_BOARD, &byte, 1) == 1 ? byte : -1;
+    return port_link_read(ONLY_BOARD, 0, &byte, 1) == 1 ? byte : -1;
 }
 
 uint32_t now_ms(void)
@@ -56,7 +56,7 @@ void act_on(uint8_t finger, const int32_t force_100un[3])
 int main(int argc, char **argv)
 {
     bt_port *port = port_init(argc, argv);
-    port_link_uart(port, 0, 0);
+    port_link_uart(port, 0);
     for (;;) {
         hand_poll();
         port_idle(port);

@@ -51,7 +51,7 @@ void uart_watch(void)
     }
 }
 
-void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
+void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
     bits_per_s = bits_per_s == 0 ? DEFAULT_BITS_PER_S : bits_per_s;
     pin_function(PORT_UART, PIN_UART_TX, UART_FUNCTION, PULL_NONE);
@@ -62,21 +62,26 @@ void port_link_uart(bt_port *port, uint32_t bits_per_s, uint32_t pins)
     started = true;
 }
 
-bool port_link_up(bt_port *port)
+uint32_t port_link_turns(bt_port *port, unsigned link)
 {
-    return started;
+    return link == 0 && started; // open for good
 }
 
-bool port_link_write(bt_port *port, const uint8_t *data, size_t bytes)
+bool port_link_touched(bt_port *port)
 {
-    bool room = ring_put(&tx, data, bytes);
+    return false;
+}
+
+bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
+{
+    bool room = link == 0 && ring_put(&tx, data, bytes);
     uart_watch();
     return room;
 }
 
-size_t port_link_read(bt_port *port, uint8_t *data, size_t bytes)
+size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 {
-    return ring_take(&rx, data, bytes);
+    return link == 0 ? ring_take(&rx, data, bytes) : 0;
 }
 
 bool uart_all_sent(void)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..wire import map_gen as _map
+from ..wire import messages_gen as wire
 from ..wire.identity import board_text
 from ..wire.sensor_gen import MAX_SENSORS
 from .note import Note, find
@@ -38,7 +39,7 @@ BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
 
 @dataclass(frozen=True)
 class Image:
-    """A checked UF2 file."""
+    """A checked UF2 file, or for an STM32 a .bin in blocks of 256 bytes."""
 
     path: Path
     blocks: tuple[bytes, ...]
@@ -71,18 +72,28 @@ def find_image() -> Path:
 
 
 def read_image(path: Path) -> Image:
-    """Read and check a UF2 file. Raises InputError saying what is wrong with it."""
+    """Read and check an image. Raises InputError saying what is wrong with it."""
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); expected an image, .uf2") from error
     try:
+        if path.suffix.lower() == ".bin":
+            return read_bin(path, data)
         blocks = split(data)
         payload = join_payloads(blocks)
         check_boot2(payload)
         return Image(path, blocks, find(payload))
     except ValueError as error:
         raise InputError(f"{path} cannot be flashed: {error}") from error
+
+
+def read_bin(path: Path, data: bytes) -> Image:
+    """What an STM32's loader writes. Raises ValueError for another board's."""
+    note = find(data)
+    if note.board != wire.Board.STM32F405:
+        raise ValueError(f"it is for a {board_text(note.board)}, which is flashed otherwise: use the build's .uf2")
+    return Image(path, tuple(data[at : at + PAGE_BYTES] for at in range(0, len(data), PAGE_BYTES)), note)
 
 
 def split(data: bytes) -> tuple[bytes, ...]:

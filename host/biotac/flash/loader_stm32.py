@@ -1,0 +1,123 @@
+"""The STM32's boot loader in ROM, over the UART that is the board's link (AN3155), by the package stm32loader.
+
+Its flash is erased in sectors: the first has but where to begin, the next two the settings, which nothing here touches.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import Any
+
+from ..errors import BiotacError, DeviceLostError, FlashError
+from ..hand.hand import Hand
+from ..link.ports import open_link
+from .image import Image
+from .interfaces import Loader, Show, Target
+from .waiting import wait_for
+
+LOADER_BAUD = 115_200  # it finds the rate by the first byte; the chip's own oscillator is good for this one
+BACK_S = 10.0
+BOOT_AT, IMAGE_AT = 0x0800_0000, 0x0800_C000  # firmware/port/stm32f405/stm32f405.ld
+#: Where each sector of an STM32F405 begins, and where the last one ends.
+SECTORS = (0, 0x4000, 0x8000, 0xC000, 0x1_0000, *range(0x2_0000, 0x10_0001, 0x2_0000))
+FIRST_WORDS = 8  # stack and reset, the first of the image, again at BOOT_AT
+
+
+class UartTarget(Target):
+    """A board on a serial port without USB: ``uart:DEVICE?baud=N``."""
+
+    def __init__(self, port: str) -> None:
+        self.port = port
+
+    def there(self) -> bool:
+        """False: whether it runs or is in its loader, the port is there."""
+        return False
+
+    def open(self) -> Hand:
+        return Hand(open_link(self.port))
+
+    def touch(self) -> None:
+        raise FlashError(f"{self.port} does not enter its loader: hold BOOT0 high, reset it, and flash again")
+
+    def reopen(self) -> Hand:
+        hand = wait_for(self._try, BACK_S)
+        if hand is None:
+            raise DeviceLostError(f"{self.port} does not answer after {BACK_S:.0f} s; reset it with BOOT0 low")
+        return hand
+
+    def _try(self) -> Hand | None:
+        try:
+            return self.open()
+        except BiotacError:
+            return None
+
+
+class Stm32Loader(Loader):
+    """The loader at the other end of ``device``."""
+
+    def __init__(self, device: str) -> None:
+        self.name = f"STM32's loader on {device}"
+        self._device = device
+        self._board: Any = None
+
+    def ready(self) -> bool:
+        try:
+            from stm32loader import bootloader, uart
+        except ImportError as error:
+            raise FlashError(
+                "an STM32 is flashed by the package stm32loader: pip install 'biotac-gateway[stm32]'"
+            ) from error
+        self.close()
+        connection = uart.SerialConnection(self._device, LOADER_BAUD, "E")
+        connection.connect()
+        connection.timeout = 0.5
+        board = bootloader.Stm32Bootloader(connection, device_family="F4", verbosity=0)
+        self._board = board
+        board.write(board.Command.SYNCHRONIZE)
+        # One that was asked before says that it did not understand.
+        if bytes(connection.read()) in (bytes([board.Reply.ACK]), bytes([board.Reply.NACK])):
+            connection.timeout = 5
+            return True
+        self.close()
+        return False
+
+    def cure(self) -> str:
+        return f"connect {self._device} to the board's loader UART, hold BOOT0 high and reset it"
+
+    def write(self, image: Image, show: Show) -> None:
+        """Write and read back; where the chip begins comes last, so that half an image never starts."""
+        data = b"".join(image.blocks)
+        data += b"\xff" * (-len(data) % 4)
+        end = IMAGE_AT - BOOT_AT + len(data)
+        sectors = [0, *(k for k in range(3, len(SECTORS) - 1) if SECTORS[k] < end)]
+        try:
+            self._board.get()
+            with contextlib.redirect_stderr(io.StringIO()):  # the package says there that it takes ten seconds
+                self._board.erase_memory(sectors)
+            for k, block in enumerate(image.blocks):
+                self._put(IMAGE_AT + k * len(image.blocks[0]), block)
+                show(k + 1, len(image.blocks))
+            self._put(BOOT_AT, data[:FIRST_WORDS])
+            self._board.go(BOOT_AT)
+        except (OSError, ValueError, IndexError, self._error()) as error:
+            cure = "reset the board with BOOT0 high, and flash again"
+            raise FlashError(f"{self.name} stopped: {error}; {cure}") from error
+        finally:
+            self.close()
+
+    def _error(self) -> type[Exception]:
+        from stm32loader.bootloader import Stm32LoaderError
+
+        return Stm32LoaderError  # type: ignore[no-any-return]
+
+    def _put(self, address: int, data: bytes) -> None:
+        self._board.write_memory_data(address, data)
+        if bytes(self._board.read_memory_data(address, len(data))) != data:
+            raise FlashError(f"{self.name} reads back other bytes at 0x{address:08X} than were written; flash again")
+
+    def close(self) -> None:
+        """Let go of the port. Safe to call twice."""
+        if self._board is not None:
+            self._board.connection.disconnect()
+            self._board = None

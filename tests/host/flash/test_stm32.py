@@ -1,0 +1,184 @@
+"""Flashing an STM32F405 through its ROM's loader: the package stm32loader against a model of the loader (AN3155)."""
+
+from __future__ import annotations
+
+import os
+import struct
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import serial
+
+from biotac.errors import FlashError, InputError
+from biotac.flash.image import read_image
+from biotac.flash.loader_stm32 import BOOT_AT, IMAGE_AT, SECTORS, Stm32Loader
+from biotac.flash.note import seal
+from biotac.wire import messages_gen as wire
+
+pytest.importorskip("stm32loader")
+
+ACK, NACK = b"\x79", b"\x1f"
+FLASH_BYTES = SECTORS[-1]
+
+
+class Rom:
+    """The loader: 1 MiB of flash, erased in sectors, and what was done to it."""
+
+    def __init__(self) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.device = os.ttyname(self._slave)
+        self.flash = bytearray(os.urandom(FLASH_BYTES))
+        self.events: list[tuple[str, int]] = []
+        self.writes_left = 1 << 30  # then its supply is gone
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _read(self, count: int) -> bytes:
+        got = b""
+        while len(got) < count:
+            got += os.read(self._master, count - len(got))
+        return got
+
+    def _say(self, data: bytes) -> None:
+        os.write(self._master, data)
+
+    def _run(self) -> None:
+        synchronized = False
+        try:
+            while True:
+                byte = self._read(1)
+                if byte == b"\x7f" and not synchronized:
+                    synchronized = True
+                    self._say(ACK)
+                    continue
+                command = byte[0]
+                good = synchronized and self._read(1)[0] == command ^ 0xFF
+                do = {0x00: self._get, 0x11: self._read_memory, 0x21: self._go, 0x31: self._write, 0x44: self._erase}
+                if not good or command not in do:
+                    self._say(NACK)
+                    continue
+                self._say(ACK)
+                do[command]()
+        except OSError:
+            return
+
+    def _address(self) -> int:
+        *data, checksum = self._read(5)
+        assert data[0] ^ data[1] ^ data[2] ^ data[3] == checksum
+        self._say(ACK)
+        return int(struct.unpack(">I", bytes(data))[0]) - BOOT_AT
+
+    def _get(self) -> None:
+        commands = bytes([0x00, 0x11, 0x21, 0x31, 0x44])
+        self._say(bytes([len(commands), 0x31]) + commands + ACK)
+
+    def _read_memory(self) -> None:
+        at = self._address()
+        count, checksum = self._read(2)
+        assert count ^ 0xFF == checksum
+        self._say(ACK + bytes(self.flash[at : at + count + 1]))
+
+    def _go(self) -> None:
+        self.events.append(("go", self._address()))
+
+    def _write(self) -> None:
+        at = self._address()
+        (count,) = self._read(1)
+        *data, _ = self._read(count + 2)
+        if self.writes_left == 0:
+            os.close(self._master)
+            raise OSError("no supply")
+        self.writes_left -= 1
+        for k, byte in enumerate(data):
+            self.flash[at + k] &= byte  # programming only clears bits
+        self.events.append(("write", at))
+        self._say(ACK)
+
+    def _erase(self) -> None:
+        (count,) = struct.unpack(">H", self._read(2))
+        for sector in struct.unpack(f">{count + 1}H", self._read(2 * (count + 1))):
+            self.flash[SECTORS[sector] : SECTORS[sector + 1]] = b"\xff" * (SECTORS[sector + 1] - SECTORS[sector])
+            self.events.append(("erase", sector))
+        self._read(1)
+        self._say(ACK)
+
+
+@pytest.fixture(autouse=True)
+def a_pty_has_no_parity(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = serial.Serial
+
+    def without(**words: Any) -> serial.Serial:
+        assert (words["baudrate"], words["parity"]) == (115_200, "E")  # AN3155
+        return real(**words | {"parity": "N"})
+
+    monkeypatch.setattr("stm32loader.uart.serial.Serial", without)
+
+
+@pytest.fixture
+def rom() -> Iterator[Rom]:
+    yield Rom()
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> Callable[[int], Path]:
+    """An image of so many bytes."""
+
+    def make(size: int) -> Path:
+        note = b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, wire.Board.STM32F405, 1, 0, 0, wire.WIRE_MAJOR, 0)
+        body = bytes(range(1, 251)) * (size // 250 + 1)
+        path = tmp_path / "biotac-f405.bin"
+        path.write_bytes(seal(b"stackres" + bytes(4 * 18) + note + body[: size - 80 - len(note)]))
+        return path
+
+    return make
+
+
+def test_the_image_is_written_the_settings_stay_and_where_to_begin_comes_last(rom: Rom, image) -> None:
+    settings = bytes(rom.flash[SECTORS[1] : SECTORS[3]])
+    path = image(70_001)
+    loader = Stm32Loader(rom.device)
+    assert loader.ready()
+    shown: list[tuple[int, int]] = []
+    loader.write(read_image(path), lambda done, of: shown.append((done, of)))
+    data = path.read_bytes()
+    at = IMAGE_AT - BOOT_AT
+    assert rom.flash[at : at + len(data)] == data
+    assert rom.flash[:8] == data[:8]
+    assert bytes(rom.flash[SECTORS[1] : SECTORS[3]]) == settings
+    assert [sector for what, sector in rom.events if what == "erase"] == [0, 3, 4]  # 16 and 64 KiB from 0xC000 on
+    assert rom.events[-2:] == [("write", 0), ("go", 0)]
+    assert shown[-1][0] == shown[-1][1] == -(-len(data) // 256)
+
+
+def test_a_supply_that_fails_leaves_nothing_to_begin_with(rom: Rom, image) -> None:
+    rom.writes_left = 100
+    loader = Stm32Loader(rom.device)
+    assert loader.ready()
+    with pytest.raises(FlashError, match="reset the board with BOOT0 high, and flash again"):
+        loader.write(read_image(image(70_000)), lambda done, of: None)
+    assert rom.flash[:8] == b"\xff" * 8
+
+
+def test_nobody_there_is_not_ready(tmp_path: Path) -> None:
+    master, slave = os.openpty()
+    loader = Stm32Loader(os.ttyname(slave))
+    assert not loader.ready()
+    assert "hold BOOT0 high" in loader.cure()
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_bin_of_another_board_or_none_is_refused(tmp_path: Path, image) -> None:
+    path = image(1000)
+    data = bytearray(path.read_bytes())
+    data[200] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="get the file again"):
+        read_image(path)
+    path.write_bytes(seal(path.read_bytes().replace(struct.pack("<HH", 2, 5), struct.pack("<HH", 2, 2))))
+    with pytest.raises(InputError, match=r"a PICO.*use the build's \.uf2"):
+        read_image(path)
