@@ -207,8 +207,11 @@ class Recording:
             spans = [(max(start_s, a), b if stop_s is None else min(stop_s, b)) for a, b in times_s]
         rows = np.concatenate([part_of(self.path, self._index, chosen, fingers, *span)[0] for span in spans])
         by_number = {finger: name for name, finger in self.names.items()}
-        label = labels_module.of_rows(self.labels, rows["t_us"], rows["finger"])
-        return Selection(rows, tuple(chosen), by_number, label, self.stamp_ns)
+
+        def label_of(rows: StructArray) -> NDArray[np.str_]:
+            return labels_module.of_rows(self.labels, rows["t_us"], rows["finger"])
+
+        return Selection(rows, tuple(chosen), by_number, label_of, self.stamp_ns)
 
     @cached_property
     def labels(self) -> list[Label]:

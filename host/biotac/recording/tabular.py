@@ -32,13 +32,13 @@ class Selection:
     """Rows of a recording, made by ``Recording.select``.
 
     ``rows`` is a structured array (n,) in order of arrival, with ``finger``, ``seq``, ``t_us`` and the ``fields`` asked
-    for. ``names`` has the fingers' names by number. ``label`` (n,) says which labels hold at each row, joined by "; ".
+    for. ``names`` has the fingers' names by number.
     """
 
     rows: StructArray
     fields: tuple[Field, ...]
     names: dict[int, str]
-    label: NDArray[np.str_]
+    label_of: Callable[[StructArray], NDArray[np.str_]]
     stamp_ns: Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
     def __len__(self) -> int:
@@ -48,6 +48,11 @@ class Selection:
         there = ", ".join(self.names.get(f, str(f)) for f in np.unique(self.rows["finger"]).tolist())
         what = ", ".join(f"{field.name} ({field.unit})" for field in self.fields if field.name not in _OF_ROW)
         return f"<biotac.Selection: {len(self)} rows of {there or 'no finger'}: {what}>"
+
+    @property
+    def label(self) -> NDArray[np.str_]:
+        """Which labels hold at each row (n,); the first use looks for them in the whole recording."""
+        return self.label_of(self.rows)
 
     def to_numpy(self) -> StructArray:
         """The rows."""
@@ -87,8 +92,9 @@ class Selection:
         t_us, round_of = np.unique(self.rows["t_us"], return_inverse=True)
         numbers, finger_of = np.unique(self.rows["finger"], return_inverse=True)
         shape = len(t_us), len(numbers)
-        label = np.full(shape, "", self.label.dtype)
-        label[round_of, finger_of] = self.label
+        texts = self.label
+        label = np.full(shape, "", texts.dtype)
+        label[round_of, finger_of] = texts
         coordinates: dict[str, Any] = {
             "time": self.stamp_ns(t_us).astype("datetime64[ns]"),
             "finger": [self.names.get(finger, str(finger)) for finger in numbers.tolist()],
@@ -117,7 +123,7 @@ class Selection:
         """The means of each finger's rows over steps of 1 / ``rate_hz``, above 0 and at most the board's 100.
 
         ``t_us`` is the middle of a step. All means are float64, NaN where no row has a value; ``flags`` are those that
-        any of the rows has, other integers and the label those of the first row. Steps without a row are left out.
+        any of the rows has, other integers those of the first row. Steps without a row are left out.
         """
         if not 0 < rate_hz <= FRAME_HZ:
             raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ}")
@@ -143,7 +149,7 @@ class Selection:
                 total = np.add.reduceat(np.where(known, values, 0.0), first)
                 out[field.name] = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
         out["t_us"] = np.round((step[first] + 0.5) * step_us)
-        return replace(self, rows=out, fields=fields, label=self.label[order][first])
+        return replace(self, rows=out, fields=fields)
 
     def align(self, signal: npt.ArrayLike, t_s: npt.ArrayLike) -> tuple[NDArray[np.float64], Alignment]:
         """Another sensor's ``signal``, (m,) or (m, k) at ``t_s`` (m,) in s of its own clock, at this selection's rows.
