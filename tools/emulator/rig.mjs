@@ -82,7 +82,7 @@ export class Rig {
       'erase in (\\d+) ms': (ms) => (this.board.eraseNanos = Number(ms) * 1e6),
       'flash chip (\\w{6})': (id) => (this.board.flashId = [...Buffer.from(id, 'hex')]),
       'supply at (\\d+) mV': (mv) => (this.board.supplyMv = Number(mv)),
-      'clock ([0-9.]+) times as fast': (times) => (this.board.frameNanos = 1e6 * Number(times)),
+      'clock ([0-9.]+) times as fast': (times) => (this.board.frameNanos = Math.round(1e6 * Number(times))),
       'lose a start of frame in (\\d+)': (n) => (this.board.lostFrames = Number(n)),
       'hang ([0-9.]+) of late armings': (share) => (this.usb.bus.lateHangs = Number(share)),
       'hang as if asleep': () => (this.usb.bus.hungAsleep = true),
