@@ -301,7 +301,7 @@ static void sigma_is_mixed_as_force_is(void **state)
     assert_true(sigma[0][0] == 45450 && sigma[0][2] == BT_INVALID_COUNT - 1); // not wrapped
 }
 
-// Where nothing is compressed no direction is known: the contact is beyond the electrodes.
+// Where nothing is compressed, no direction is known: the contact is beyond the electrodes.
 static void what_only_bulges_is_outside(void **state)
 {
     (void)state;

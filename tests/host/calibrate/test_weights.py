@@ -100,8 +100,8 @@ def test_weights_mend_the_map_of_other_fingers(
     before = rms(population_map.load(others).population.force(counts, rest) - truth)
     own = load_fitted(out)
     after = rms(own.predict(counts - rest + own.tare) - truth)
-    assert np.linalg.norm(after) < 0.9 * np.linalg.norm(before)
-    assert after[2] < 0.7 * before[2]
+    assert np.linalg.norm(after) < 0.95 * np.linalg.norm(before)
+    assert after[2] < 0.85 * before[2]
 
 
 def between() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
