@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write everything that is derived from protocol/sensor.toml, link.toml and map.toml, and the population map.
+"""Write everything that is derived from protocol/sensor.toml, link.toml, map.toml and touch.toml, and the population map.
 
 tools/gen_protocol.py           write the generated files
 tools/gen_protocol.py --check   exit 1, naming the files, when any of them has drifted
@@ -24,12 +24,14 @@ from protogen import (
     docs,
     python_code,
     schema,
+    touch,
 )
 
 
 def outputs(root: Path) -> dict[Path, str]:
     """Every generated path, with the text it must have."""
     contract = schema.load(root / "protocol")
+    verdicts = touch.load(root)
     return {
         root / "firmware/core/wire/sensor_gen.h": c_sensor.header(contract),
         root / "firmware/core/wire/sensor_gen.c": c_sensor.source(contract),
@@ -43,6 +45,8 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/map/estimates_gen.h": c_estimates.header(root),
         root / "firmware/client/biotac_client_gen.h": c_client.header(contract),
         root / "firmware/core/wire/messages_gen.h": c_wire.header(contract),
+        root / "firmware/core/wire/touch_gen.h": touch.header(verdicts),
+        root / "protocol/SPEC.md": touch.spec(root, verdicts),
         root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),
         root / "host/biotac/wire/sensor_gen.py": python_code.sensor(contract),
         root / "host/biotac/wire/messages_gen.py": python_code.wire(contract),

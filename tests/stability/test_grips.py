@@ -25,7 +25,7 @@ from biotac.wire.messages_gen import ForceModel
 NIGHTLY = bool(os.environ.get("BIOTAC_NIGHTLY"))
 GRIPS = 300 if NIGHTLY else 60
 WRONG_N, WRONG_SHARE = 0.5, 0.25
-ENDINGS = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason.UNDONE, TareReason.INVERTED)
+ENDINGS = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason.INVERTED)
 WARNINGS = FrameFlags.UNTARED | FrameFlags.FAULT | FrameFlags.DOUBT | FrameFlags.TEMP | FrameFlags.TARE_UNSURE
 
 

@@ -31,7 +31,7 @@ CASES = [
 LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}  # which the emulated finger's physics follow
 MEAN_ROWS = 100  # a second: a worn sensor's noise is 0.03 N a round
 INVERTED_N, INVERTED_ROWS = 0.15, 10
-RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason.UNDONE, TareReason.INVERTED)
+RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason.INVERTED)
 
 
 @dataclass(frozen=True)

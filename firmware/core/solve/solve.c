@@ -31,20 +31,20 @@ static bool wants_population(const bt_settings *settings)
     return wanted;
 }
 
-// The tare follows temperature by about half a count for each of TDC; half of that may be wrong, on all
-// electrodes alike. The maps hardly feel it.
+// The tare follows temperature by about half a count for each of TDC; of that, 1/BT_WRONG_SHARE may be wrong,
+// on all electrodes alike. The maps hardly feel it.
 static uint32_t warmed_max_q8(const bt_gains *gains, bool population)
 {
     int32_t e_q4[BT_ELECTRODES], force_100un[3];
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        e_q4[i] = 16; // from four counts of TDC
+        e_q4[i] = 16; // a count of error
     }
     bt_force(e_q4, gains, force_100un);
     uint32_t most = 1;
     for (int d = 0; d < 3; d++) {
         most = bt_abs32(force_100un[d]) > most ? bt_abs32(force_100un[d]) : most;
     }
-    uint32_t limit_q8 = 4 * 256 * WARMED_100UN / most;
+    uint32_t limit_q8 = 2 * BT_WRONG_SHARE * 256 * WARMED_100UN / most;
     return population || limit_q8 > BT_DEGREE_Q8 ? BT_DEGREE_Q8 : limit_q8;
 }
 

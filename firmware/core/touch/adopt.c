@@ -61,12 +61,6 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     tare->partial = true;
 }
 
-void bt_adopt_in_place(bt_tare *tare, const bt_baseline *base, uint8_t reason)
-{
-    bt_inverted_note(&tare->last, &tare->base, base);
-    bt_adopt(tare, base, BT_TARE_STATE_REST, reason);
-}
-
 static uint32_t present_q16(const bt_tare *tare, unsigned lane)
 {
     bool unknown = tare->trigger.unknown >> lane & 1;
@@ -80,7 +74,7 @@ void bt_adopt_present(bt_tare *tare, uint8_t reason)
         base.electrode_q16[i] = present_q16(tare, i);
     }
     base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
-    bt_adopt_in_place(tare, &base, reason);
+    bt_adopt(tare, &base, BT_TARE_STATE_REST, reason);
 }
 
 void bt_adopt_after_press(bt_tare *tare, uint8_t reason)
@@ -107,7 +101,7 @@ void bt_adopt_shift(bt_tare *tare)
         base.electrode_q16[i] = bt_baseline_moved(base.electrode_q16[i], shift_q16);
     }
     base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
-    bt_adopt_in_place(tare, &base, BT_TARE_REASON_SHIFT);
+    bt_adopt(tare, &base, BT_TARE_STATE_REST, BT_TARE_REASON_SHIFT);
 }
 
 void bt_adopt_doubt(bt_tare *tare)
@@ -174,7 +168,7 @@ void bt_adopt_none(bt_tare *tare)
     bt_adopt_tell(tare, BT_TARE_REASON_INVERTED);
     tare->state = BT_TARE_STATE_INIT;
     tare->tared = false;
-    tare->last.known = false;
+    tare->inverted_rounds = 0;
     tare->hits = 0;
     tare->partial = true;
     bt_sweep_restart(&tare->sweep);

@@ -36,9 +36,6 @@ void bt_adopt_tell(bt_tare *tare, uint8_t reason);
 
 void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t reason);
 
-// Adopt in place of the present tare, noting the change in case the new one proves wrong.
-void bt_adopt_in_place(bt_tare *tare, const bt_baseline *base, uint8_t reason);
-
 // Adopt the means of the latest sweep.
 void bt_adopt_present(bt_tare *tare, uint8_t reason);
 

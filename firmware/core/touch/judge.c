@@ -1,6 +1,7 @@
 #include "touch/judge.h"
 
 #include "touch/adopt.h"
+#include "touch/inverted.h"
 
 #include "fixed_point.h"
 
@@ -15,15 +16,10 @@ _Static_assert(BT_ELECTRODES == 19, "220753 / 2^22 is 1/19");
 
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
-    bt_tare_doubt doubt =
-        bt_inverted_judge(&tare->last, &tare->trigger.smooth, &tare->base, tare->release.pdc_peak,
-                          bt_thermal_warmed_q8(&tare->thermal) < -BT_WARMER_Q8);
-    if (doubt == BT_TARE_UNDO) {
-        bt_baseline before = tare->base;
-        bt_inverted_undo(&tare->last, &before);
-        tare->last.known = false;
-        bt_adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_UNDONE);
-    } else if (doubt == BT_TARE_LOSE) {
+    bool colder = bt_thermal_warmed_q8(&tare->thermal) < -BT_WARMER_Q8;
+    bool inverted = bt_inverted(&tare->trigger.smooth, &tare->base, tare->release.pdc_peak, colder);
+    tare->inverted_rounds = inverted ? (uint8_t)(tare->inverted_rounds + 1) : 0;
+    if (tare->inverted_rounds == BT_INVERTED_ROUNDS) {
         bt_adopt_none(tare);
     }
 }
@@ -37,7 +33,8 @@ static uint32_t forgiven_count2(const bt_tare *tare)
     uint32_t drift_count2 = BT_DIVIDE_U32(rounds * rounds, DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
     uint32_t warm_count = bt_abs32(tare->thermal.applied_q16) >> 16;
     return BT_ELECTRODES
-           * ((tare->pressure_seen && tare->witness.moves ? drift_count2 : 0) + warm_count * warm_count / 4);
+           * ((tare->pressure_seen && tare->witness.moves ? drift_count2 : 0)
+              + warm_count * warm_count / (BT_WRONG_SHARE * BT_WRONG_SHARE));
 }
 
 // The energy without what all electrodes have moved by. The division by 19 is a product and a shift, off by

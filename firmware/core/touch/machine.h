@@ -11,7 +11,6 @@
 #include "signal/trigger.h"
 #include "touch/baseline.h"
 #include "touch/drift.h"
-#include "touch/inverted.h"
 #include "touch/release.h"
 #include "touch/thermal.h"
 #include "touch/watch.h"
@@ -41,7 +40,7 @@ typedef struct {
 
     bt_silence silence;
     bt_watch watch;
-    bt_tare_change last; // what the latest new tare changed
+    uint8_t inverted_rounds; // consecutive rounds that spoke against the tare
     bt_rollback rollback;
     bt_noise noise;
     bt_drift drift;

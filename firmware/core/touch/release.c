@@ -4,30 +4,6 @@
 
 #include <string.h>
 
-// Pressure above the last tare, from 27 presses of two recordings: a press left at most 5.6 (median 1), and a
-// hold at a tenth of the press's peak at least 11 (median 56). Pressure undershoots at a release, so only
-// pressure that is too high is evidence.
-#define QUIET_PDC_COUNT       4
-#define REST_PDC_COUNT_MAX    10
-#define REST_PDC_SHARE        40 // of the peak
-// Electrodes: a press left at most .053 of its signal, a 356th of its energy.
-#define CALM_COUNT2           400
-#define EVEN_COUNT2           200  // seven sigmas of a worn sensor's means: nothing but noise
-#define RESIDUE_SHARE         64   // of the peak energy
-#define SETTLED_COUNT2        6000 // skin that settled, if pressure never showed a touch
-// A press's energy against its pressure's square: 1 to 14 in whole presses of a real finger, but up to 200 in
-// the first second of one. At 5 counts/N the sensor model has 400 and more, at 2 counts/N 2500.
-#define MOVES_COUNT2_PER_PDC2 64
-#define FLAT_COUNT2_PER_PDC2  1024
-#define FIRM_COUNT2           36000 // 2 N
-#define FALLEN_SHARE          4     // what has fallen to a quarter is no longer the press it was
-#define ENDED_STILL_SWEEPS    5     // 400 ms
-#define QUIET_SWEEPS          12    // 960 ms
-#define SHIFT_LEVEL_SWEEPS    18    // 1.4 s
-#define STUCK_SWEEPS          25    // 2 s
-#define EVEN_SWEEPS           100   // 8 s
-#define LOADING_PDC_COUNT     2     // rise of pressure that a slow load makes in a second
-
 void bt_release_begin(bt_release *release)
 {
     memset(release, 0, sizeof *release);
@@ -55,27 +31,27 @@ static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
 // move it. Without that witness only electrodes that are back at rest say that nothing touches.
 static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 {
-    uint32_t left = sweep->witness ? release->energy_peak / RESIDUE_SHARE : 0;
+    uint32_t left = sweep->witness ? release->energy_peak / BT_RESIDUE_SHARE : 0;
     uint32_t forgiven = sweep->witness ? sweep->forgiven_count2 : 0;
-    left = (left > CALM_COUNT2 ? left : CALM_COUNT2) + forgiven;
-    int32_t rest = bt_clamp(release->pdc_peak / REST_PDC_SHARE, QUIET_PDC_COUNT, REST_PDC_COUNT_MAX);
-    bool back = sweep->witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
-    bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_COUNT2 + forgiven;
-    return back && gone && sweep->still_sweeps >= ENDED_STILL_SWEEPS;
+    left = (left > BT_CALM_COUNT2 ? left : BT_CALM_COUNT2) + forgiven;
+    int32_t rest = bt_clamp(release->pdc_peak / BT_REST_PDC_SHARE, BT_QUIET_PDC, BT_REST_PDC_MAX);
+    bool back = sweep->witness ? sweep->above < rest : release->quiet_sweeps >= BT_QUIET_SWEEPS;
+    bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < BT_EVEN_COUNT2 + forgiven;
+    return back && gone && sweep->still_sweeps >= BT_ENDED_SWEEPS;
 }
 
 static bool is_untouched(const bt_release *release, const bt_release_sweep *sweep)
 {
-    return sweep->witness && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= QUIET_SWEEPS
-           && sweep->still_sweeps >= QUIET_SWEEPS
-           && sweep->energy_count2 < SETTLED_COUNT2 + sweep->forgiven_count2;
+    return sweep->witness && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= BT_QUIET_SWEEPS
+           && sweep->still_sweeps >= BT_QUIET_SWEEPS
+           && sweep->energy_count2 < BT_SETTLED_COUNT2 + sweep->forgiven_count2;
 }
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
 {
     bool low = !sweep->pressure || sweep->above < BT_PDC_PRESSED;
-    bool even = low && sweep->uneven_count2 < EVEN_COUNT2;
-    bool rose = sweep->pressure && sweep->above > release->even_above + LOADING_PDC_COUNT;
+    bool even = low && sweep->uneven_count2 < BT_EVEN_COUNT2;
+    bool rose = sweep->pressure && sweep->above > release->even_above + BT_LOADING_PDC;
     if (!even || release->even_sweeps == 0 || rose) {
         release->even_above = sweep->above;
         release->even_sweeps = even;
@@ -90,27 +66,27 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
 static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool pressed = !sweep->pressure || release->pdc_peak >= BT_PDC_PRESSED;
-    bool level = pressed ? release->even_sweeps >= EVEN_SWEEPS
-                         : sweep->level_sweeps >= SHIFT_LEVEL_SWEEPS && release->even_sweeps >= QUIET_SWEEPS;
-    return level && sweep->still_sweeps >= QUIET_SWEEPS;
+    bool level = pressed ? release->even_sweeps >= BT_EVEN_SWEEPS
+                         : sweep->level_sweeps >= BT_LEVEL_SWEEPS && release->even_sweeps >= BT_QUIET_SWEEPS;
+    return level && sweep->still_sweeps >= BT_QUIET_SWEEPS;
 }
 
 // A press has fallen to a quarter by its pressure; by its energy where pressure is no witness, or may have
 // risen with the temperature.
 static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
 {
-    bool pressed = sweep->witness && release->pdc_peak >= BT_PDC_PRESSED && !sweep->warmer;
-    bool fallen = pressed
-                      ? sweep->above < release->pdc_peak / FALLEN_SHARE
-                      : sweep->energy_count2 < release->energy_peak / FALLEN_SHARE + sweep->forgiven_count2;
-    bool stuck = sweep->witness && release->quiet_sweeps >= STUCK_SWEEPS;
-    return sweep->still_sweeps >= ENDED_STILL_SWEEPS && (fallen || stuck);
+    int32_t quarter = release->pdc_peak / BT_FALLEN_SHARE;
+    bool fallen =
+        sweep->witness && !sweep->warmer
+            ? sweep->above < (quarter > BT_QUIET_PDC ? quarter : BT_QUIET_PDC)
+            : sweep->energy_count2 < release->energy_peak / BT_FALLEN_SHARE + sweep->forgiven_count2;
+    return sweep->still_sweeps >= BT_ENDED_SWEEPS && fallen;
 }
 
 static bt_release_verdict verdict(const bt_release *release, const bt_release_sweep *sweep, bool low)
 {
     // What only passes by the tare is no rest: a finger that was tared in a grip passes by it when it opens.
-    if (sweep->energy_count2 < CALM_COUNT2 && low && sweep->still_sweeps > 0) {
+    if (sweep->energy_count2 < BT_CALM_COUNT2 && low && sweep->still_sweeps > 0) {
         return BT_RELEASE_CLEAN;
     }
     if (is_residue(release, sweep) || is_untouched(release, sweep)) {
@@ -127,22 +103,21 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     uint32_t energy = sweep->energy_count2, uneven = sweep->uneven_count2;
     release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
     release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
-    bool unmoved = release->uneven_peak >= FIRM_COUNT2 && !moved_for(release, FLAT_COUNT2_PER_PDC2);
-    if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED
-        && moved_for(release, MOVES_COUNT2_PER_PDC2)) {
+    bool unmoved = release->uneven_peak >= BT_FIRM_COUNT2 && !moved_for(release, BT_FLAT_SHARE);
+    if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED && moved_for(release, BT_MOVES_SHARE)) {
         *witness = (bt_witness){.moves = true};
     }
     sweep->witness = sweep->pressure && witness->moves && !unmoved;
-    bool low = !sweep->pressure || sweep->above < QUIET_PDC_COUNT;
+    bool low = !sweep->pressure || sweep->above < BT_QUIET_PDC;
     // Without a witness the energy itself must have fallen, or the first second of a slow load would pass for
     // a residue.
-    bool quiet = low && (sweep->witness || energy < release->energy_peak / FALLEN_SHARE);
+    bool quiet = low && (sweep->witness || energy < release->energy_peak / BT_FALLEN_SHARE);
     release->quiet_sweeps =
         quiet ? (uint8_t)(release->quiet_sweeps + (release->quiet_sweeps < UINT8_MAX)) : 0;
     count_even(release, sweep);
     bt_release_verdict now = verdict(release, sweep, low);
     // Electrodes feel a real press up to a second before pressure does, so what it lacks counts only later.
-    if (sweep->pressure && unmoved && (now != BT_RELEASE_NO || sweep->still_sweeps >= ENDED_STILL_SWEEPS)) {
+    if (sweep->pressure && unmoved && (now != BT_RELEASE_NO || sweep->still_sweeps >= BT_ENDED_SWEEPS)) {
         *witness = (bt_witness){.flat = true};
     }
     return now;

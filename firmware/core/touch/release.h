@@ -8,11 +8,10 @@
 #ifndef BIOTAC_RELEASE_H
 #define BIOTAC_RELEASE_H
 
+#include "wire/touch_gen.h"
+
 #include <stdbool.h>
 #include <stdint.h>
-
-#define BT_PDC_HIT     6                // pressure above rest that is a contact
-#define BT_PDC_PRESSED (4 * BT_PDC_HIT) // and that makes a press
 
 typedef enum {
     BT_RELEASE_NO,      // the contact goes on
@@ -60,11 +59,11 @@ void bt_release_pressure(bt_release *release, int32_t above);
 
 bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt_release_sweep *sweep);
 
-// The most that real skin leaves the pressure low by after a press: 9 counts, and after a minute more.
+// The most that real skin leaves the pressure low by after a press.
 #ifndef BT_CDEF
 static inline int32_t bt_pdc_missing_max(int32_t pdc_peak)
 {
-    return 12 + pdc_peak / 16;
+    return BT_MISSING_PDC + pdc_peak / BT_MISSING_SHARE;
 }
 #endif
 

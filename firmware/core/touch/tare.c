@@ -8,8 +8,7 @@
 
 #include <string.h>
 
-#define CONTACT_ROUNDS 3        // rounds over the threshold that make a contact
-#define NOW_SPAN_Q3    (32 * 8) // from a still signal's latest filtered count to its mean: ten sigmas
+#define NOW_SPAN_Q3 (32 * 8) // from a still signal's latest filtered count to its mean: ten sigmas
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
 {
@@ -31,7 +30,7 @@ void bt_tare_temperature(bt_tare *tare, uint16_t tdc)
 static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *settings)
 {
     tare->partial = true;
-    if (++tare->hits < CONTACT_ROUNDS) {
+    if (++tare->hits < BT_CONTACT_ROUNDS) {
         return;
     }
     tare->let_go = false;
@@ -179,8 +178,7 @@ uint8_t bt_tare_now(bt_tare *tare)
 
 static void set(bt_tare *tare, const bt_baseline *base, uint8_t reason)
 {
-    bt_adopt_in_place(tare, base, reason);
-    tare->last.known = false; // never undone: who sets it knows better
+    bt_adopt(tare, base, BT_TARE_STATE_REST, reason);
     tare->unsure = false;
 }
 

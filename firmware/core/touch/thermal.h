@@ -8,11 +8,13 @@
 #ifndef BIOTAC_THERMAL_H
 #define BIOTAC_THERMAL_H
 
+#include "wire/touch_gen.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BT_DEGREE_Q8 (33 << 8)          // 30 degrees read about 1000 counts, 31 about 1033
-#define BT_WARMER_Q8 (BT_DEGREE_Q8 / 2) // what pressure may rise by then is a quarter of the lightest press
+#define BT_DEGREE_Q8 (BT_DEGREE_TDC << 8)
+#define BT_WARMER_Q8 (BT_DEGREE_Q8 / 2) // pressure may have risen by a quarter of the lightest press
 
 typedef struct {
     uint32_t tdc_q8;      // low-passed over 16 rounds; 0 until read

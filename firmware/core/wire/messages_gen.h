@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x51DE3159u
+#define BT_SCHEMA_HASH 0xA94381FEu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -74,8 +74,7 @@ enum bt_tare_reason {
     BT_TARE_REASON_HOST_NOW = 5, // TARE_NOW command
     BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
     BT_TARE_REASON_SHIFT = 7, // not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
-    BT_TARE_REASON_UNDONE = 8, // inverted signals showed that the tare was wrong: the previous one is restored
-    BT_TARE_REASON_INVERTED = 9, // inverted signals showed that the tare was wrong, with no previous one to restore: untared until still
+    BT_TARE_REASON_INVERTED = 9, // pressure far below showed that the tare was taken of a hold: untared until still
     BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is unchanged, and kept
     BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is unchanged until the signals are still
     BT_TARE_REASON_HOLD_LAPSED = 12, // HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged

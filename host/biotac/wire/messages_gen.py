@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x51DE3159
+SCHEMA_HASH = 0xA94381FE
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -80,8 +80,7 @@ class TareReason(IntEnum):
     HOST_NOW = 5  # TARE_NOW command
     HOST_SET = 6  # TARE_SET command
     SHIFT = 7  # not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
-    UNDONE = 8  # inverted signals showed that the tare was wrong: the previous one is restored
-    INVERTED = 9  # inverted signals showed that the tare was wrong, with no previous one to restore: untared until still
+    INVERTED = 9  # pressure far below showed that the tare was taken of a hold: untared until still
     HOST_HOLD = 10  # HOLD command: the tare is unchanged, and kept
     HOST_RELEASE = 11  # RELEASE command: the tare is unchanged until the signals are still
     HOLD_LAPSED = 12  # HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
@@ -270,8 +269,7 @@ TARE_REASON_DOC: dict[int, str] = {
     5: "TARE_NOW command",
     6: "TARE_SET command",
     7: "not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much",
-    8: "inverted signals showed that the tare was wrong: the previous one is restored",
-    9: "inverted signals showed that the tare was wrong, with no previous one to restore: untared until still",
+    9: "pressure far below showed that the tare was taken of a hold: untared until still",
     10: "HOLD command: the tare is unchanged, and kept",
     11: "RELEASE command: the tare is unchanged until the signals are still",
     12: "HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged",

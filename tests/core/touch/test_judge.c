@@ -68,7 +68,7 @@ static emulated_finger used(void)
     tare->thermal.tdc_q8 = 5000;
     tare->watch.wait_sweeps = 0;
     tare->watch.creeps = 100;
-    tare->last.known = true;
+    tare->inverted_rounds = 2;
     return finger;
 }
 
@@ -113,7 +113,7 @@ static void every_change_of_state_waits_for_three_hits_again(void **state)
     bt_adopt_none(&finger.tare);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
     assert_int_equal(finger.tare.hits, 0);
-    assert_false(finger.tare.tared || finger.tare.last.known || finger.tare.sweep.begun);
+    assert_false(finger.tare.tared || finger.tare.inverted_rounds != 0 || finger.tare.sweep.begun);
     assert_true(finger.tare.partial);
     finger = used();
     bt_round faulty = frame_without(&finger, 2, 3, 0);

@@ -298,9 +298,8 @@ static void pressure_that_moves_is_no_reason_to_refuse_tare_now(void **state)
     assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
 }
 
-// The pattern of a load upside down, with less pressure than at rest: of the machine's own tare that was the
-// last change, and undone.
-static void what_the_host_has_set_is_lost_rather_than_undone(void **state)
+// The pattern of a load upside down, with less pressure than at rest.
+static void what_the_host_has_set_is_lost_if_it_was_wrong(void **state)
 {
     (void)state;
     emulated_finger finger = resting_finger();
@@ -358,7 +357,7 @@ int main(void)
         cmocka_unit_test(a_held_load_is_kept_while_the_pressure_undershoots),
         cmocka_unit_test(an_electrode_that_was_railed_is_never_tared_at_its_end),
         cmocka_unit_test(pressure_that_moves_is_no_reason_to_refuse_tare_now),
-        cmocka_unit_test(what_the_host_has_set_is_lost_rather_than_undone),
+        cmocka_unit_test(what_the_host_has_set_is_lost_if_it_was_wrong),
         cmocka_unit_test(an_electrode_that_came_late_is_rolled_back_too),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,31 @@
+"""The tare machine's thresholds: a header in C, and the table of verdicts in SPEC.md."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from .schema import c_header
+
+BEGIN, END = "<!-- verdicts: generated from touch.toml -->\n", "<!-- end of verdicts -->\n"
+
+
+def load(root: Path) -> dict[str, Any]:
+    """protocol/touch.toml, parsed."""
+    return tomllib.loads((root / "protocol/touch.toml").read_text(encoding="utf-8"))
+
+
+def header(table: dict[str, Any]) -> str:
+    """Every threshold as a constant, with its reason."""
+    about = ["The thresholds of the tare machine's verdicts: protocol/touch.toml."]
+    body = [f"#define BT_{name.upper()} {entry['value']} // {entry['doc']}" for name, entry in table["limit"].items()]
+    return c_header("TOUCH", about, body)
+
+
+def spec(root: Path, table: dict[str, Any]) -> str:
+    """SPEC.md with its table of verdicts as the thresholds say it."""
+    limits = {name: entry["value"] for name, entry in table["limit"].items()}
+    rows = [f"| {v['to']} | {v['reason']} | {v['when'].format(**limits)} |\n" for v in table["verdict"]]
+    head, rest = (root / "protocol/SPEC.md").read_text(encoding="utf-8").split(BEGIN)
+    return head + BEGIN + "| to | reason | when |\n|---|---|---|\n" + "".join(rows) + END + rest.split(END)[1]
