@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write everything that is derived from protocol/sensor.toml, link.toml, map.toml and touch.toml, and the population map.
+"""Write everything that is derived from protocol/*.toml, and the population map.
 
 tools/gen_protocol.py           write the generated files
 tools/gen_protocol.py --check   exit 1, naming the files, when any of them has drifted

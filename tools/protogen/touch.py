@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
-from .schema import c_header
+from .schema import c_header, tomllib
 
 BEGIN, END = "<!-- verdicts: generated from touch.toml -->\n", "<!-- end of verdicts -->\n"
 

@@ -317,6 +317,13 @@ CATALOGUE: dict[str, Entry] = {
         "dropped. Forces are off by it until the next tare.",
         "Let go of the finger, so that the board takes a new tare. Measure V+ at the sensor.",
     ),
+    "pressure_flat": warning(
+        "Static pressure hardly moves when the finger is pressed: fluid has leaked, there is a bubble in it, or the "
+        "pressure element is cracked. A healthy finger gives 50 to 120 counts a newton. The board then judges contact "
+        "by the electrodes alone, and stays in doubt for longer after a press.",
+        "Press the finger firmly for some seconds while the doctor listens: it gives the counts per newton. Check the "
+        "inflation and refill the finger as its manual says; until then tell the board when you grasp and let go.",
+    ),
     "channel_noisy": error(
         "The count of an electrode jumps back and forth from round to round, as no press moves it: a trace or a "
         "contact is loose, or something couples into it. The board does without one or two; with more it takes no "

@@ -35,11 +35,16 @@ ELECTRODE_FAULTS = {
 }
 SENSOR_FAULTS = {wire.SensorFault.FROZEN: "sensor_frozen", wire.SensorFault.TOGETHER: "electrodes_shifted"}
 
+# Presses of real fingers move the static pressure by 50 to 120 counts a newton; without a calibration the newtons may
+# be off by half.
+PRESSED_N, PRESSED_ROUNDS, LOW_PDC_PER_N = 1.0, 50, 35.0
+
 
 def check(board: BoardFacts) -> Iterator[Finding]:
     """The tares; then electrodes, PDC, TDC, TAC and PAC of the fingers that sent frames."""
     for finger in board.present:
         yield from _tare(board, finger)
+        yield from _pressure(board, finger)
     for finger in board.present:
         found = _judge(_channels(board, finger))
         for code, names in _by_the_board(board.sensors_after[finger]):
@@ -67,6 +72,19 @@ def _tare(board: BoardFacts, finger: int) -> Iterator[Finding]:
     last = [rows["flags"][rows["finger"] == finger][-1:] for rows in (board.frames, board.idle)]
     if any((flags & wire.FrameFlags.BASE_OLD).any() for flags in last):
         yield Finding("base_old", f"finger {finger} has been touched for over a minute; its tare is {age}")
+
+
+def _pressure(board: BoardFacts, finger: int) -> Iterator[Finding]:
+    """How far presses moved the pressure, by the force that the board computed; and whether it flagged that."""
+    rows = board.frames[board.frames["finger"] == finger]
+    force_n = np.linalg.norm(rows["force_n"], axis=1)
+    pressed = (force_n >= PRESSED_N) & (rows["pdc"] != wire.INVALID_COUNT)
+    per_n = (rows["pdc"] - rows["pdc_tare"])[pressed] / force_n[pressed]
+    if pressed.sum() >= PRESSED_ROUNDS and np.median(per_n) < LOW_PDC_PER_N:
+        seen = f"moves by {np.median(per_n):.0f} counts per newton, of a press of {np.median(force_n[pressed]):.1f} N"
+        yield Finding("pressure_flat", f"finger {finger}: static pressure {seen}")
+    elif (rows["flags"][-1:] & wire.FrameFlags.PDC_FLAT).any():
+        yield Finding("pressure_flat", f"finger {finger}: static pressure did not follow a press (PDC_FLAT)")
 
 
 def _channels(board: BoardFacts, finger: int) -> dict[str, NDArray[np.integer]]:

@@ -121,6 +121,16 @@ def frames(change: Callable[[np.ndarray], None]) -> Facts:
     return board(frames=rows)
 
 
+def pressed(pdc_per_n: float) -> Facts:
+    """3 N on finger 1."""
+
+    def press(rows: np.ndarray) -> None:
+        rows["force_n"][:, 2], rows["pdc_tare"] = 3.0, 2000
+        rows["pdc"] += round(3 * pdc_per_n)
+
+    return frames(press)
+
+
 def vibration(change: Callable[[np.ndarray], None]) -> Facts:
     rows = dynamic_pressure()
     change(rows[1::2])
@@ -312,9 +322,15 @@ CASES: list[tuple[str, Facts, str]] = [
     ("electrode_alone", out(18, wire.SensorFault.ALONE), "finger 1: E19"),
     ("electrodes_shifted", state(sensor_fault=wire.SensorFault.TOGETHER), "finger 1"),
     ("electrodes_shorted", frames(shorted), "finger 1: E2 and E9"),
+    ("pressure_flat", pressed(20), "finger 1: static pressure moves by 20 counts per newton"),
+    ("pressure_flat", frames(mark("flags", int(wire.FrameFlags.PDC_FLAT))), "finger 1: static pressure did not follow"),
     ("channel_missing", frames(mark("counts", wire.INVALID_COUNT, 0)), "finger 1: E1"),
     ("channel_missing", frames(mark("tdc", wire.INVALID_COUNT)), "finger 1: TDC"),
 ]
+
+
+def test_pressure_of_a_healthy_finger_is_no_finding() -> None:
+    assert not [f for f in judge(pressed(100)) if f.code == "pressure_flat"]
 
 
 @pytest.mark.parametrize(("code", "facts", "words"), CASES, ids=[f"{c[0]}-{k}" for k, c in enumerate(CASES)])
