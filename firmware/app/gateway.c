@@ -21,6 +21,8 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
 
 _Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES && PORT_NAME_BYTES == BT_BOARD_NAME_BYTES,
                "the board's serial number and name go to the host whole");
+_Static_assert(sizeof(bt_kept_tares) <= PORT_KEPT_BYTES, "there is room for what outlives a hang");
+
 _Static_assert(PORT_LINKS == BT_LINKS, "the session has a deframer for every link");
 
 // The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If
@@ -212,7 +214,12 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     };
     memcpy(identity.board_serial, board.serial, sizeof identity.board_serial);
     memcpy(identity.board_name, can.name, sizeof identity.board_name);
-    port_delay_us(port, BT_POWER_ON_MS * 1000);
+    const bool resumed =
+        board.kept != NULL && board.started_by & (BT_FAULT_FLAG_HUNG | BT_FAULT_FLAG_CRASHED);
+    gateway->kept = board.kept;
+    if (!resumed) { // the sensors have had power all along
+        port_delay_us(port, BT_POWER_ON_MS * 1000);
+    }
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.faults |= board.started_by;
@@ -224,6 +231,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         }
     }
     load_settings(gateway); // only now is it known which sensors a calibration can be for
+    if (resumed && bt_kept_tares_restore(gateway->kept, &gateway->session)) {
+        gateway->session.faults |= BT_FAULT_FLAG_TARE_RESTORED;
+    }
     start_uart(gateway);
     gateway->round_open = false;
     for (unsigned link = 0; link < PORT_LINKS; link++) {
@@ -268,6 +278,9 @@ static void close_round(bt_gateway *gateway)
     bt_session *session = &gateway->session;
     uint8_t serial[BT_SERIAL_BYTES];
     bt_session_end_round(session);
+    if (gateway->kept != NULL) {
+        bt_kept_tares_note(gateway->kept, session);
+    }
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         if (session->asked >> f & 1) {
             bool answered = bt_serial_query_answer(&gateway->sampler.query[f], serial);

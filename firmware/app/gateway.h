@@ -2,6 +2,7 @@
 #ifndef BIOTAC_GATEWAY_H
 #define BIOTAC_GATEWAY_H
 
+#include "kept_tares.h"
 #include "port.h"
 #include "sampler.h"
 #include "talk/session.h"
@@ -15,6 +16,7 @@ typedef struct {
     uint32_t round; // being assembled
     bool round_open;
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
+    bt_kept_tares *kept;             // NULL: the board has no memory for them
 } bt_gateway;
 
 // Wait for the sensors to power up, identify them, start sampling.

@@ -105,12 +105,16 @@ void port_spi_rate(bt_port *port, uint32_t khz);
 
 // ---- identity -------------------------------------------------------------------------------
 #define PORT_SERIAL_BYTES 12
+#define PORT_KEPT_BYTES   1056
 typedef struct {
     uint16_t board; // enum bt_board, or a private id from BT_BOARD_PRIVATE on
     uint8_t serial[PORT_SERIAL_BYTES];
     uint32_t boot_id;     // random at each boot
     uint16_t started_by;  // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
     uint32_t image_crc32; // of the image that runs, read where it is stored; 0xFFFFFFFF where there is none
+    // PORT_KEPT_BYTES, aligned to 4, which a hang or a crash leaves as they are; NULL: none. After power-on
+    // they hold anything.
+    void *kept;
 } port_identity;
 port_identity port_identify(bt_port *port);
 

@@ -9,6 +9,8 @@
 #define TRANSFER_NS (16u * 1000000000u / BT_SPI_HZ)
 
 fake_port fake;
+uint16_t fake_started_by = BT_FAULT_FLAG_STARTED;
+uint32_t fake_kept[PORT_KEPT_BYTES / 4];
 uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
 
@@ -193,8 +195,12 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 
 port_identity port_identify(bt_port *port)
 {
-    return (port_identity){
-        .board = BT_BOARD_POSIX_SIM, .serial = "fake-board-1", .boot_id = 42, .image_crc32 = UINT32_MAX};
+    return (port_identity){.board = BT_BOARD_POSIX_SIM,
+                           .serial = "fake-board-1",
+                           .boot_id = 42,
+                           .image_crc32 = UINT32_MAX,
+                           .started_by = fake_started_by,
+                           .kept = fake_kept};
 }
 
 port_abilities port_describe(bt_port *port)

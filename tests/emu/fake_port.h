@@ -44,6 +44,10 @@ typedef struct {
 } fake_port;
 
 extern fake_port fake;
+
+// What outlives a reset: the memory, and how the board started.
+extern uint32_t fake_kept[PORT_KEPT_BYTES / 4];
+extern uint16_t fake_started_by;
 extern _Alignas(4) uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // the maps in force
 
 // Sensors all present, their counts from source, the clock at start_ns.

@@ -149,6 +149,47 @@ static void a_closed_port_ends_the_stream(void **state)
     assert_int_equal(host.frames[0], before);
 }
 
+// The board hangs while finger 2 is held.
+static void a_hang_forgets_no_tare_and_no_hold(void **state)
+{
+    (void)state;
+    for (int damaged = 0; damaged <= 2; damaged++) { // so many of the two copies
+        bt_baseline before[BT_MAX_FINGERS];
+        boot(START_NS);
+        run_rounds(100);
+        bt_tare_hold(&gateway.session.finger[2].tare);
+        run_rounds(60); // so that both copies know
+        for (int f = 0; f < BT_MAX_FINGERS; f++) {
+            assert_true(gateway.session.finger[f].tare.tared);
+            before[f] = gateway.session.finger[f].tare.base;
+        }
+        gateway.kept->copy[0].finger[3].base.pdc_q16 ^= damaged > 0;
+        gateway.kept->copy[1].finger[3].base.pdc_q16 ^= damaged > 1;
+        fake_started_by = BT_FAULT_FLAG_HUNG;
+        boot(START_NS);
+        fake_started_by = BT_FAULT_FLAG_STARTED;
+        const uint16_t told = gateway.session.faults & BT_FAULT_FLAG_TARE_RESTORED;
+        assert_int_equal(told != 0, damaged < 2);
+        for (int f = 0; f < BT_MAX_FINGERS; f++) {
+            const bt_tare *tare = &gateway.session.finger[f].tare;
+            assert_int_equal(tare->tared, damaged < 2);
+            assert_int_equal(tare->held, damaged < 2 && f == 2);
+            if (damaged < 2) {
+                assert_int_equal(tare->reason, BT_TARE_REASON_RESTORED);
+                // As of the latest whole copy, a second ago at most: a tare follows no more than 0.5 count/s.
+                for (int i = 0; i < BT_ELECTRODES; i++) {
+                    int32_t moved_q16 = (int32_t)(tare->base.electrode_q16[i] - before[f].electrode_q16[i]);
+                    assert_in_range(moved_q16 + 32768, 0, 65536);
+                }
+            }
+        }
+        run_rounds(1);
+        boot(START_NS); // power-on: what memory holds then means nothing
+        assert_false(gateway.session.finger[0].tare.tared);
+        assert_int_equal(gateway.session.faults & BT_FAULT_FLAG_TARE_RESTORED, 0);
+    }
+}
+
 #define T(name) cmocka_unit_test_setup(name, no_trouble)
 int main(void)
 {
@@ -157,6 +198,7 @@ int main(void)
         T(rounds_lost_whole_leave_a_gap_in_time),
         T(t_us_is_that_of_slot_0_even_when_it_was_lost),
         T(a_held_off_interrupt_loses_slots_and_never_the_time_base),
+        T(a_hang_forgets_no_tare_and_no_hold),
         T(sensors_are_known_by_name_and_absent_ones_stay_blank),
         T(a_closed_port_ends_the_stream),
     };

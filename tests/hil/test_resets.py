@@ -1,4 +1,4 @@
-"""Power lost, and the watchdog's reset, whatever the board was about: it says so, and nothing of before goes on."""
+"""Power lost, and the watchdog's reset, whatever the board was about: it says so, and only a grip goes on."""
 
 from __future__ import annotations
 
@@ -96,12 +96,17 @@ def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: st
     its.hand.board.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
     before = its.hand.info
     state(its)
+    pressed_n = of(its.hand.read(0.1), PRESSED)["force_n"][-1] if state in (touched, held) else None
     getattr(its, how)()
     hand, after = its.hand, its.hand.info
     assert after.boot_id != before.boot_id
     assert after.board_serial == before.board_serial
     status, faults = hand.status(), hand.board.faults()
-    assert faults.board == said and not faults.fingers
+    # A tare outlives the watchdog's reset, if there was one.
+    kept = bool(faults.board & FaultFlags.TARE_RESTORED)
+    assert faults.board == said | (FaultFlags.TARE_RESTORED if kept else 0) and not faults.fingers
+    assert not kept or how == "hang"
+    assert kept or how != "hang" or state not in (touched, held, streaming)
     assert status.streams == 0 and status.rx_errors == 0
     found = hand.board.setting(Setting.IDLE_PERIOD_MS), hand.board.setting(Setting.HOLD_TIMEOUT_MS)
     assert found == (250, at_first_ms) or (state is storing and found == (260, 60_000))
@@ -110,10 +115,16 @@ def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: st
     flags = frames["flags"]
     tared = flags & FrameFlags.UNTARED == 0
     assert np.isnan(frames["force_n"][~tared]).all()
-    assert not (flags & (FrameFlags.HELD | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER)).any()
+    assert not (flags & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER)).any()
+    goes_on = kept and state in (touched, held)
+    assert (flags[frames["finger"] == PRESSED] & FrameFlags.HELD != 0).all() == (goes_on and state is held)
+    if goes_on:
+        again = of(frames, PRESSED)[10:]
+        assert (again["flags"] & FrameFlags.CONTACT).all()
+        assert np.abs(again["force_n"] - pressed_n).max() < 0.01 * np.abs(pressed_n).max() + 0.05
     for finger in set(range(FINGERS)) - {PRESSED}:  # which has no tare while the force grows
         assert tared[frames["finger"] == finger][-1]
-        assert hand.sensor_status(finger).tare_reason == TareReason.START
+        assert hand.sensor_status(finger).tare_reason == (TareReason.RESTORED if kept else TareReason.START)
     others = frames[tared & (frames["finger"] != PRESSED) & (frames["finger"] != AT_REST)]
     assert not (others["flags"] & FrameFlags.CONTACT).any() and np.abs(others["force_n"]).max() < 0.1
 

@@ -170,7 +170,7 @@ enum bt_event_kind {
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
-#define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware hung for a second, and the watchdog restarted it
+#define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware hung for two seconds, and the watchdog restarted it
 #define BT_FAULT_FLAG_CRASHED (1u << 2) // the firmware restarted itself after an exception
 #define BT_FAULT_FLAG_STORAGE (1u << 3) // stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults
 #define BT_FAULT_FLAG_SLOTS_LATE (1u << 4) // the main loop fell behind and slots were lost

@@ -121,11 +121,13 @@ bool port_reboot(bt_port *port, bool into_bootloader)
 
 port_identity port_identify(bt_port *port)
 {
+    static uint32_t kept[PORT_KEPT_BYTES / 4] __attribute__((section(".kept"))); // neither zeroed nor copied
     port_identity identity = {
         .board = IMAGE_BOARD,
         .boot_id = boot_id,
         .started_by = started_by,
         .image_crc32 = image_crc32(),
+        .kept = kept,
     };
     memcpy(identity.serial, has_id ? (const void *)unique_id : no_id,
            has_id ? FLASH_ID_BYTES : sizeof no_id - 1);

@@ -186,7 +186,7 @@ class FaultFlags(IntFlag):
     """What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS."""
 
     STARTED = 1 << 0  # it was switched on, lost power briefly, or was reset externally
-    HUNG = 1 << 1  # the firmware hung for a second, and the watchdog restarted it
+    HUNG = 1 << 1  # the firmware hung for two seconds, and the watchdog restarted it
     CRASHED = 1 << 2  # the firmware restarted itself after an exception
     STORAGE = 1 << 3  # stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults
     SLOTS_LATE = 1 << 4  # the main loop fell behind and slots were lost
@@ -367,7 +367,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
 
 FAULT_FLAG_DOC: dict[int, str] = {
     1: "it was switched on, lost power briefly, or was reset externally",
-    2: "the firmware hung for a second, and the watchdog restarted it",
+    2: "the firmware hung for two seconds, and the watchdog restarted it",
     4: "the firmware restarted itself after an exception",
     8: "stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults",
     16: "the main loop fell behind and slots were lost",

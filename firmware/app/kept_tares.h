@@ -1,0 +1,31 @@
+// Each finger's tare and HOLD in memory that outlives a hang or a crash, so that a grip goes on after it.
+// There are two copies, of which the older is written: a reset in the middle leaves the other.
+#ifndef BIOTAC_KEPT_TARES_H
+#define BIOTAC_KEPT_TARES_H
+
+#include "talk/session.h"
+
+typedef struct {
+    uint8_t serial[BT_SERIAL_BYTES]; // the sensor's; zeros: nothing is kept
+    bt_baseline base;
+    uint32_t held;
+} bt_kept_tare;
+
+typedef struct {
+    uint32_t count; // of copies written so far
+    bt_kept_tare finger[BT_MAX_FINGERS];
+    uint32_t crc32; // of all before
+} bt_kept_copy;
+
+typedef struct {
+    bt_kept_copy copy[2];
+} bt_kept_tares;
+
+// After a round, if something changed or half a second has passed.
+void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session);
+
+// Once, after a hang or a crash: give each finger, if it has the sensor that it had, its tare and HOLD. True
+// when any was given.
+bool bt_kept_tares_restore(const bt_kept_tares *kept, bt_session *session);
+
+#endif
