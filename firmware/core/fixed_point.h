@@ -5,12 +5,6 @@
 
 #include <stdint.h>
 
-// 32-bit unsigned division. The build of a board with a hardware divider overrides it; every definition gives
-// the same quotient.
-#ifndef BT_DIVIDE_U32
-#define BT_DIVIDE_U32(num, den) ((num) / (den))
-#endif
-
 // For functions that are cheaper to call than to inline.
 #define BT_NOINLINE __attribute__((noinline))
 
@@ -38,7 +32,7 @@ static inline int64_t bt_div_round(int64_t num, int64_t den)
 // The same for num below 2^32 - den / 2, in one 32-bit division.
 static inline uint32_t bt_div_round_u32(uint32_t num, uint32_t den)
 {
-    return BT_DIVIDE_U32(num + den / 2, den);
+    return (num + den / 2) / den;
 }
 
 static inline uint64_t bt_abs(int64_t value)

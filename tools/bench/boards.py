@@ -79,8 +79,6 @@ REFERENCE = FIRMWARE / "boards" / "m4f"  # the M4F's reset code and memory map a
 QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
 BOARDS = (
     Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld"),
-    Board("m0plus_divider", "Cortex-M0+ with RP2040 divider", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld",
-          ("-include", str(FIRMWARE / "port" / "rp2040" / "divider.h"))),
     Board("m4f", "Cortex-M4F", QEMU, M4F, (REFERENCE / "startup.c", HERE / "m4f.c"), REFERENCE / "m4f.ld",
           (f"-I{REFERENCE}",)),
 )  # fmt: skip

@@ -90,7 +90,7 @@ static void along_normals(const touch *of, uint32_t strength_100un, int32_t forc
     }
     uint32_t length = bt_root_u32(square);
     for (int d = 0; d < 3; d++) {
-        uint32_t unit = BT_DIVIDE_U32(size[d] << UNIT_BITS, length);
+        uint32_t unit = (size[d] << UNIT_BITS) / length;
         force_100un[d] = bt_with_sign(unit * strength_100un >> UNIT_BITS, to[d]);
     }
 }
@@ -132,8 +132,8 @@ bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force
     bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
     uint32_t off = furthest(force_100un, its.otherwise_100un), far = FAR_8 * its.strength_100un;
     if (off < far / 8) {
-        its.share = at_most((int32_t)BT_DIVIDE_U32((far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)),
-                                                   its.strength_100un));
+        uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / its.strength_100un;
+        its.share = at_most((int32_t)share);
         uint32_t firm = at_most(bt_shift_down((int32_t)of.sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
         its.share = its.share < firm ? its.share : firm;
     }

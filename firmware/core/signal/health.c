@@ -249,7 +249,7 @@ static void judge_slow(bt_health *health, uint32_t without)
 
 static BT_NOINLINE void make_limits(bt_health *health, uint32_t noise_count2)
 {
-    uint32_t count2_q8 = BT_DIVIDE_U32(noise_count2 << 8, BT_ELECTRODES);
+    uint32_t count2_q8 = (noise_count2 << 8) / BT_ELECTRODES;
     uint32_t sigma_q4 = noise_count2 == 0 ? 5 * 16 : bt_root_u32(count2_q8);
     health->noise_count2 = noise_count2;
     health->fast_sd = (uint16_t)((sigma_q4 * 45 + (1 << 7)) >> 8); // sqrt(2 * 4) sigma

@@ -13,7 +13,7 @@ _Static_assert(BT_SILENCE_ROUNDS *BT_TRIGGER_UNREAD <= UINT16_MAX, "a sum must f
 
 static BT_NOINLINE void begin(bt_silence *silence, uint32_t gap_us)
 {
-    uint32_t sweeps = BT_DIVIDE_U32(gap_us - ROUND_US, SWEEP_US);
+    uint32_t sweeps = (gap_us - ROUND_US) / SWEEP_US;
     // A second silence before the first was dealt with adds to it.
     sweeps += silence->rounds < BT_SILENCE_ROUNDS ? silence->sweeps : 0;
     silence->sweeps = (uint16_t)(sweeps < UINT16_MAX ? sweeps : UINT16_MAX);

@@ -27,7 +27,7 @@ static uint32_t root(uint64_t n)
     uint32_t s = bt_root_u32(high);         // 2^15 <= s < 2^16
     uint32_t rest = high - s * s;           // at most 2 s
     uint32_t half = rest << 15 | low >> 17; // half of (rest << 16 | low >> 16), which itself takes 33 bits
-    uint32_t q = BT_DIVIDE_U32(half, s);
+    uint32_t q = half / s;
     uint32_t left = (half - q * s) << 1 | (low >> 16 & 1);
     uint64_t r = ((uint64_t)s << 16) + q;
     int64_t remainder = (int64_t)(((uint64_t)left << 16 | (low & 0xFFFF))) - (int64_t)((uint64_t)q * q);
@@ -74,7 +74,7 @@ static scaled product(scaled a, scaled b)
 
 static scaled ratio(scaled a, scaled b)
 {
-    return scaled_of(BT_DIVIDE_U32(a.m << 16, b.m), a.e - b.e - 16);
+    return scaled_of((a.m << 16) / b.m, a.e - b.e - 16);
 }
 
 static scaled root_of(uint32_t value)

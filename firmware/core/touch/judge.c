@@ -30,7 +30,7 @@ BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 static uint32_t forgiven_count2(const bt_tare *tare)
 {
     uint32_t rounds = tare->contact_rounds < DRIFT_LIMIT ? tare->contact_rounds : DRIFT_LIMIT;
-    uint32_t drift_count2 = BT_DIVIDE_U32(rounds * rounds, DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
+    uint32_t drift_count2 = rounds * rounds / (DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
     uint32_t warm_count = bt_abs32(tare->thermal.applied_q16) >> 16;
     return BT_ELECTRODES
            * ((tare->pressure_seen && tare->witness.moves ? drift_count2 : 0)

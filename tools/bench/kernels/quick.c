@@ -39,9 +39,9 @@ static bool point_of_contact(const int32_t e_q4[BT_ELECTRODES], const kernel_set
         component[d] = down > 0 ? size[d] >> down : size[d] << -down;
     }
     const uint32_t length = length_of(length_of(component[1], component[2]), component[0]);
-    const uint32_t scale = BT_DIVIDE_U32((uint32_t)BT_CORE_RADIUS_UM << COMPONENT_BITS, length);
+    const uint32_t scale = ((uint32_t)BT_CORE_RADIUS_UM << COMPONENT_BITS) / length;
     poc_um[0] = (int16_t)(tip ? (int32_t)(component[0] * scale >> COMPONENT_BITS)
-                              : -(int32_t)(4 * BT_DIVIDE_U32(bt_abs32(x), sums.total)));
+                              : -(int32_t)(4 * (bt_abs32(x) / sums.total)));
     poc_um[1] = (int16_t)bt_with_sign(component[1] * scale >> COMPONENT_BITS, sums.y);
     poc_um[2] = (int16_t)-(int32_t)(component[2] * scale >> COMPONENT_BITS);
     return true;

@@ -40,7 +40,7 @@ OWN_MODELS = (
     ("joined", "joined, 3 axes", "joined map"),
     ("pooled", "pooled, 3 axes", "large map"),
 )
-PANELS = (("Cortex-M0+", "m0plus_divider", "with the RP2040's divider"), ("Cortex-M4F", "m4f", ""))
+PANELS = (("Cortex-M0+", "m0plus"), ("Cortex-M4F", "m4f"))
 #: By what is known about the finger.
 COLORS = {"nothing": "#c2410c", OWN: "#1d4ed8"}
 LITTLE = "#15803d"
@@ -222,9 +222,9 @@ def draw(outcome: Outcome, path: Path) -> None:
         files = ", ".join(outcome.noise_n)
         figure.suptitle(f"Force on real fingers: cycles against held-out error ({files})")
         axes = figure.subplots(1, 2, sharey=True)
-        for panel, (title, core, words) in zip(axes, PANELS, strict=True):
+        for panel, (title, core) in zip(axes, PANELS, strict=True):
             _panel(panel, outcome, core)
-            panel.set(title=title, xlabel=f"cycles per force{', ' if words else ''}{words}")
+            panel.set(title=title, xlabel="cycles per force")
         axes[0].set_ylabel("RMS length of the force error [N]")
         figure.legend(*axes[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3)
 
