@@ -56,11 +56,15 @@ def check(lake: str, item: tuple[str, dict[str, str]]) -> Checked:
         row = tables[RECORDINGS].to_pylist()[0]
         try:
             facts = Facts.read(dict(row["metadata"]))
-        except ValueError as error:  # of another version: the checksums say that it is as it was exported
-            checked.wrong.append(f"{recording} ({row['source']}): its metadata cannot be used ({error})")
+            frames = frames_to_wire(frames_of(tables["frames"]))
+        except (KeyError, ValueError) as error:  # another version's: the checksums say that it is as it was exported
+            checked.wrong.append(
+                f"{recording} ({row['source']}): another version of biotac-gateway wrote it ({error}); "
+                "export it again with --force"
+            )
             return checked
         own = own_settings(facts.settings, facts.calibrations)
-        checked.outcome.add(frames_to_wire(frames_of(tables["frames"])), facts.settings, own, facts.maps)
+        checked.outcome.add(frames, facts.settings, own, facts.maps)
         checked.wrong.extend(f"{recording} ({row['source']}): {finding}" for finding in checked.outcome.findings)
     return checked
 
