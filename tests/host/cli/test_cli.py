@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import importlib
 import json
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -72,7 +71,7 @@ def test_list_shows_simulated_boards_that_run(capsys) -> None:
         assert board.stdout is not None
         port = board.stdout.readline().split()[0]
         assert main(["list", "--json"]) == 0
-        board.send_signal(signal.SIGINT)
+        board.terminate()
     assert json.loads(capsys.readouterr().out)["simulated"][port] == "biotac sim press.toml"
 
 
