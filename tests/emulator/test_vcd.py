@@ -35,12 +35,14 @@ def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> Non
     for finger in range(2):
         spi = f"spi:clk=SCK:miso=MISO:mosi=MOSI:cs=SS{finger}:wordsize=16"
         words = sigrok(path, "-P", spi, "-B", "spi=miso")
-        # A slot has the command, whose answer means nothing, then the read: 7 + 5 bits of count beside parity.
-        read = np.frombuffer(words[: len(words) // 4 * 4], ">u2").reshape(-1, 2)[:, 1]
-        counts = ((read >> 9) * 32 + (read >> 3 & 31)).astype(np.uint16)
+        # A word has 7 + 5 bits of count beside parity.
+        word = np.frombuffer(words[: len(words) // 2 * 2], ">u2")
+        counts = ((word >> 9) * 32 + (word >> 3 & 31)).astype(np.uint16)
         told = frames[frames["finger"] == finger]
         rounds = [np.uint16([row["pdc"], row["tac"], row["tdc"], *row["counts"]]) for row in told]
-        others = [counts[first::2] for first in (0, 1)]  # every second sample is PAC
+        # A slot has the command, whose answer means nothing, and the read; every second sample is PAC. The recording
+        # may begin between any of them.
+        others = [counts[first::4] for first in range(4)]
         seen = [one for one in rounds if any(one.tobytes() in some.tobytes() for some in others)]
         assert len(seen) > 3
     sent = sigrok(path, "-P", f"uart:rx=TX:baudrate={BITS_PER_S}", "-B", "uart=rx")

@@ -47,7 +47,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
     with shake_hands(UartLink(board.uart_path, BAUD)) as hand:
         told = hand.read_batch(0.3)
         assert len(told.wire) == FRAMES and len(told.pac) == 0  # PAC is for who asks for it
-        too_much = "carries 400000 bit/s, but FRAME and PAC of 2 fingers take 423820; stream at most 1 "
+        too_much = "carries 400000 bit/s, but FRAME and PAC of 2 fingers take [0-9]+; stream at most 1 "
         with pytest.raises(InputError, match=too_much):
             hand.stream("results", "pac")
         with biotac.open(board.path) as other:

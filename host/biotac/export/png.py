@@ -21,7 +21,10 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
     with picture(place) as page:
         page.set_size_inches(12, 6)
         force, pressure = axes = page.subplots(2, 1, sharex=True)
-        for table in (table for table in made if table.kind == "frames"):
+        for k, table in enumerate(made):
+            show(k / len(made))
+            if table.kind != "frames":
+                continue
             t_s = (table.arrays["t_us"] - begin_us) / 1e6
             finger = table.finger or 0
             name = name_of.get(finger, str(finger))
@@ -44,4 +47,3 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
         force.set(ylabel="force on the finger, N")
         force.legend(loc="upper right")
         pressure.set(xlabel="time, s", ylabel="pressure above rest, count")
-        show(1.0)

@@ -73,7 +73,7 @@ static void a_board_tells_what_it_can_and_refuses_the_rest(void **state)
     bt_session_use_board(&session, &no_maps);
     bt_msg_hello_unpack(&hello, host_ask(&session, BT_HELLO_REQUEST_ID, payload, sizeof payload)->payload);
     assert_true(hello.fingers == 2 && hello.map_bytes == 0);
-    assert_string_equal((const char *)hello.board_name, "little one");
+    assert_memory_equal(hello.board_name, "little one", sizeof "little one");
     for (uint8_t finger = 0; finger < BT_MAX_FINGERS; finger++) {
         uint8_t one[2] = {3, finger};
         bt_msg_begin_map map = {.req_id = 3, .finger = finger, .size_bytes = 100};

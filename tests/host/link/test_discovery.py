@@ -37,7 +37,8 @@ TWO = [entry("COM10", "E6605838831F5B2C"), entry("COM3", "E660583883200000")]
 
 @pytest.fixture
 def plugged(monkeypatch):
-    """Makes this computer have these ports."""
+    """Makes this computer have these ports, and no simulated board of another test's."""
+    monkeypatch.setattr("biotac.cli.boards.list_ports.simulated", dict)
 
     def plug(entries: list[ListPortInfo]) -> None:
         monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: entries)
