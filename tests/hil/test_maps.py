@@ -171,7 +171,7 @@ def test_a_mapped_fingers_frames_come_from_its_map_and_the_others_from_the_gains
 
 
 def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) -> None:
-    hand = board("press.toml")
+    hand = board("press.toml?seconds=60")
     hand.board.set_map(0, make_map(1))
     before = hand.read_batch(0.5).wire
     hand.stop()

@@ -20,7 +20,7 @@ from biotac.sim.two_picos import TwoPicos
 from biotac.wire import messages_gen as wire
 
 RIG = "two_picos"
-DAY_S, NIGHT_S = 3.0, 60.0
+DAY_S, NIGHT_S = 1.0, 60.0
 
 Open = Callable[[float], tuple[biotac.Hand, TwoPicos]]
 

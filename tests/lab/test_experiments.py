@@ -122,6 +122,7 @@ def test_a_frame_without_a_point_counts_against_the_weights() -> None:
     assert its.over(50.0).tolist() == []
 
 
+@pytest.mark.nightly
 def test_a_recorded_plate_has_the_figures_of_the_emulated_one(tmp_path: Path) -> None:
     trial = plate_normal.emulated(4, "new")
     lin = surface.normals_at(np.where(np.isfinite(trial.at_mm), trial.at_mm, [0.0, 0.0, -1.0]))
@@ -279,7 +280,7 @@ def test_every_name_has_a_module() -> None:
         assert callable(module.run)
 
 
-@pytest.mark.parametrize("name", ["poke", "shear", "torsion"])
+@pytest.mark.parametrize("name", [pytest.param("poke", marks=pytest.mark.nightly), "shear", "torsion"])
 def test_page_and_json_hold_the_same_figures(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert main(["experiment", name, "--out", str(tmp_path / "out"), "--seed", "7", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)

@@ -33,6 +33,7 @@ def played(hands: list[navarro.Hands], monkeypatch: pytest.MonkeyPatch) -> navar
     return navarro.run(Options(seed=21))
 
 
+@pytest.mark.nightly
 def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, monkeypatch, tmp_path: Path) -> None:
     report = played(hands, monkeypatch)
     assert len(report.checks) == 4 and all(check["met"] for check in report.checks)
@@ -42,6 +43,7 @@ def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, 
     assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.nightly
 def test_a_board_that_is_off_is_seen(hands, monkeypatch) -> None:
     first, second = hands
     report = played([replace(first, frames_checked=0), replace(second, violations=1)], monkeypatch)

@@ -14,6 +14,7 @@ from biotac_lab.experiments import shear_torsion
 from biotac_lab.report import Options, write
 
 FRAMES = 4000
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")

@@ -135,7 +135,7 @@ def test_a_full_disk_is_told_and_neither_reading_nor_the_board_wait_for_it(tmp_p
 def test_a_recording_is_whole_while_callbacks_hang(live: Live, tmp_path) -> None:
     go_on = threading.Event()
     live.firmware.facts["fingers_present"] = live.hand._reader.hello.fingers_present
-    with biotac.open("sim:press.toml?fingers=2&seconds=3", pace=50) as hand:
+    with biotac.open("sim:press.toml?fingers=2&seconds=3", pace=1) as hand:
         hand.record(tmp_path / "a.mcap")
         hand.on_batch(lambda batch: go_on.wait(WAIT_S))
         hand.stream()

@@ -315,7 +315,7 @@ def fit(run: Run, lam: float) -> WrenchMap:
 
 
 # Less ridge than 1e-4 makes coefficients there that no board holds at full scale: refused in words, see below.
-@pytest.mark.parametrize("lam", [1e-4, 1e-2])
+@pytest.mark.parametrize("lam", [1e-4, pytest.param(1e-2, marks=pytest.mark.nightly)])
 def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Path, lam: float) -> None:
     path = wrench_run.save(tmp_path / "run.npz", wrench_run.fields(6000, 3, moment=True, pdc=True))
     run = load_run(path)
@@ -326,7 +326,7 @@ def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Pa
     assert "on all 6000 rows" in bound.summary_text(facts)
 
 
-@pytest.mark.parametrize("lam", [1e-5, 1e-2])
+@pytest.mark.parametrize("lam", [1e-5, pytest.param(1e-2, marks=pytest.mark.nightly)])
 def test_on_a_real_finger_every_row_is_right(lam: float, shared_data: Path) -> None:
     run = load_run(shared_data / "syntouchcontact" / "F1.npz")
     facts = bound.summary(fit(run, lam), run.counts, run.pdc)
