@@ -28,6 +28,7 @@ Answer = Callable[[int, bytes], bytes]
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Here and not in tests/hil: pytest asks only the outermost conftest files for options."""
     parser.addoption("--rig", action="append", help="run tests/hil against this rig only; may be repeated")
+    parser.addoption("--image", help="a Pico image, for tests/emulator/test_hazards.py")
     parser.addoption("--port", help="a real board's port, for the rigs 'real' and 'bench' of tests/hil")
     parser.addoption("--sensor-port", help="port of the sensor board that is wired to it, for the rig 'bench'")
     parser.addoption("--image-command", default="", help="what starts a simulated board, for the rig 'image'")

@@ -14,7 +14,6 @@ from rig import Rig
 import biotac
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
-from biotac.wire.framing import encode
 
 BOARDS = {"posix": wire.Board.POSIX_SIM, "pico": wire.Board.PICO, "two_picos": wire.Board.PICO}
 # What a test of silicon would not forgive, and the emulator counts.
@@ -210,34 +209,6 @@ def test_windows_takes_it_for_a_device_of_several_interfaces(rig) -> None:
     rig.need("counters")
     hand = rig.open()
     assert hand.link.board.counters()["usb"]["device"]["class"] == [0xEF, 0x02, 0x01]
-
-
-def test_a_setup_is_answered_whenever_it_comes_after_another_one(rig) -> None:
-    rig.need("counters")
-    board = rig.open("press.toml?fingers=1&seconds=1").link.board
-    gaps_ns = [*range(100, 12_000, 100), *range(12_000, 60_000, 1000)]
-    for gap_ns in gaps_ns:
-        board.say(f"two setups {gap_ns}")
-    usb = board.until(2, usb={"hurried": {"asked": len(gaps_ns)}})["usb"]
-    assert usb["hurried"] == {"asked": len(gaps_ns), "wrong": 0}
-    assert usb["failed"] == []
-    assert {key: usb[key] for key in BREACHES} == dict.fromkeys(BREACHES, 0)
-
-
-def test_a_hung_usb_controller_is_reset_and_the_host_served_again(rig) -> None:
-    # RP2040-E15: after a corrupt handshake of a bulk IN the controller hears nothing, not even a bus reset.
-    rig.need("cable")
-    board = rig.on_a_pty("press.toml", pace=0)
-    with biotac.open(board.path) as hand:
-        before = board.counters()["usb"]["resets"]
-        board.do("corrupt a handshake")
-        hand.link.write(encode(wire.Ping.ID, wire.Ping(req_id=1).pack()))  # the reply is that bulk IN
-        # Silent for 100 ms, off the bus for 20, and found again by its host.
-        usb = board.until(1, usb={"hangs": 1, "resets": before + 1, "state": "configured"})["usb"]
-        assert usb["failed"] == []
-    with biotac.open(board.path) as hand:
-        assert hand.status().streams == 0
-        assert len(hand.read(0.1)) > 0
 
 
 def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:

@@ -170,18 +170,3 @@ def test_picotool_finds_name_version_and_pins_in_the_image(rig: Rig) -> None:
         1 << 19: "SPI MOSI",
         **{1 << pin: f"chip select of finger {f}" for f, pin in enumerate((17, 20, 21, 22, 26))},
     }
-
-
-@pytest.mark.parametrize("verb", ["switch off quad reads", "silence the flash"])
-def test_a_flash_without_quad_reads_is_read_by_its_plain_command(pico: Pico, verb: str) -> None:
-    """Slower to boot, and nothing else: status register 2 says that the lines are off, or nobody answers."""
-    quick = pico.counters()
-    pico.board.do(verb)
-    pico.board.say("cut power")
-    pico.up(boots=2)
-    assert pico.counters()["flash"]["misses"] > quick["flash"]["misses"]  # it was read once more
-    pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    pico.hand.board.save_settings()
-    pico.board.say("cut power")
-    pico.up(boots=3)
-    assert pico.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250

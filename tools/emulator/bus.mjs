@@ -43,6 +43,7 @@ export class UsbBus {
     this.written = new Map()
     this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0, armed_late: 0 }
     this.lateHangs = 0 // chance that RP2040-E15 strikes when one is armed late
+    this.holdsOff = true
     this.hungAsleep = false // a hung controller says that the bus is suspended
     this.draw = Math.random
     this.onArmed = () => {}
@@ -78,10 +79,10 @@ export class UsbBus {
   goOn() {
     this.idleFrames = 0
     this.frames.cancel()
-    if (this.silentAt === null && this.usb.intEnable & INT_SOF) this.frames.schedule(this.board.frameNanos - this.#inFrame)
+    if (this.silentAt === null && this.usb.intEnable & INT_SOF) this.frames.schedule(this.board.frameNanos - this.inFrame)
   }
 
-  get #inFrame() {
+  get inFrame() {
     return this.mcu.clock.nanos % this.board.frameNanos
   }
 
@@ -136,9 +137,9 @@ export class UsbBus {
   }
 
   armed(endpoint, out) {
-    // Judged, not documented: endpoint 0 says NAK until the program has seen the SETUP. Were it not so, no program
-    // could keep a stale answer from the host.
-    if (this.hung || (endpoint === 0 && this.usb.sieStatus & SETUP_REC)) return false
+    // Judged, not documented: endpoint 0 says NAK until the program has seen the SETUP. Without holdsOff it does not,
+    // and what was armed before answers a host that asks sooner than the program has taken it away.
+    if (this.hung || (endpoint === 0 && this.holdsOff && this.usb.sieStatus & SETUP_REC)) return false
     return !!(this.control(endpoint, out) & AVAILABLE) && (endpoint === 0 || this.#enabled(endpoint, out))
   }
 
@@ -233,7 +234,7 @@ export class UsbBus {
     }
     if ((before & ~AVAILABLE) !== (value & ~AVAILABLE)) this.counters.available_not_last++
     const isBulkIn = offset >= CONTROLS + 8 && offset % 8 === 0
-    if (isBulkIn && this.silentAt === null && !this.held() && this.#inFrame >= E15_NS) {
+    if (isBulkIn && this.silentAt === null && !this.held() && this.inFrame >= E15_NS) {
       this.counters.armed_late++
       if (this.draw() < this.lateHangs) this.hang()
     }

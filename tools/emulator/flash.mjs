@@ -3,7 +3,8 @@
 // fills: 16 KiB, two ways, lines of 8 bytes of which a miss fetches the half that was asked for.
 //
 // A miss costs what the interface's registers say: clocks for command, address, waiting and 32 bits of data, times its
-// divider. That is 256 cycles for 03h at clk_sys / 4, and 40 for EBh without its command at clk_sys / 2.
+// divider. That is 256 cycles for 03h at clk_sys / 4. Reads on four lines are not modelled. For 35h the chip is one of
+// those (ISSI IS25LP, Macronix MX25) for which it is no question for a status, but the way into a mode without 03h.
 
 export const SECTOR = 4096
 export const PAGE = 256
@@ -29,7 +30,6 @@ const SPI_CTRLR0 = 0xf4
 const SR_TFNF = 2
 const SR_TFE = 4
 const SR_RFNE = 8
-const FORMAT_QUAD = 2
 const SERIAL_BYTES = 7 << 16
 const IO_QSPI = 0x40018
 const IO_QSPI_SS_CTRL = 0x0c
@@ -37,12 +37,10 @@ const OUTOVER_LOW = 2 << 8
 const OUTOVER = 3 << 8
 
 const READ = 0x03
-const READ_STATUS_2 = 0x35
+const ENTER_QPI = 0x35
 const READ_UNIQUE_ID = 0x4b
 const READ_JEDEC_ID = 0x9f
-const READ_QUAD = 0xeb
 const UNIQUE_ID_DUMMIES = 4
-const QUAD_ENABLE = 2 // in status register 2
 const NOTHING = 0xff // a line that nobody drives
 
 /** Two ways of 1024 lines of two words, the less recently used way replaced. */
@@ -90,7 +88,7 @@ export class Flash {
     this.cache = new Cache()
     this.readable = true
     this.missCycles = 0 // boot2's first instructions are in SRAM: it sets up the interface before anything is read
-    this.continuous = false // the chip takes an address for a quad read, without a command
+    this.mute = false // the chip takes no serial command any more
     this.registers = { [CTRLR0]: 0, [BAUDR]: 0, [SPI_CTRLR0]: 0 }
     this.answer = []
     this.sent = [] // since chip select went low
@@ -108,7 +106,6 @@ export class Flash {
     this.answer = []
     this.sent = []
     this.readable = false
-    this.continuous = false
   }
 
   #memory() {
@@ -133,17 +130,13 @@ export class Flash {
     mcu.readUint32 = (address) => {
       const at = address >>> 0
       spend(at)
-      return at >= XIP && at < XIP_END && !this.#answers() ? 0xffffffff : read32(at)
+      if (at < XIP || at >= XIP_END) return read32(at)
+      return this.mute ? 0xffffffff : read32(at) ^ this.board.misread(at)
     }
     mcu.readUint8 = (address) => {
       spend(address)
       return read8(address)
     }
-  }
-
-  /** Reads come out right: a quad read of a chip that has its four lines switched off gives ones. */
-  #answers() {
-    return this.quad !== true || this.continuous
   }
 
   #interface() {
@@ -184,36 +177,16 @@ export class Flash {
   #setUp() {
     const control = this.registers[SPI_CTRLR0]
     const instruction = [0, 4, 8, 16][(control >>> 8) & 3]
-    const transfer = control & 3 // 0: all serial; 1: address wide; 2: command, too
-    this.quad = this.#isQuad
-    const wide = this.quad ? 4 : 1
-    const clocks =
-      instruction / (transfer === 2 ? wide : 1) +
-      (4 * ((control >>> 2) & 15)) / (transfer >= 1 ? wide : 1) +
-      ((control >>> 11) & 31) +
-      32 / wide
+    const clocks = instruction + 4 * ((control >>> 2) & 15) + ((control >>> 11) & 31) + 32
     this.missCycles = clocks * this.registers[BAUDR]
-    const command = control >>> 24
-    this.readable = this.quad ? instruction === 0 : instruction === 8 && command === READ && !this.continuous
-  }
-
-  get #isQuad() {
-    return ((this.registers[CTRLR0] >>> 21) & 3) === FORMAT_QUAD
+    this.readable = instruction === 8 && control >>> 24 === READ
   }
 
   /** selected: chip select is held low, by hand. */
   #send(value, selected) {
     this.sent.push(value)
-    if (this.#isQuad) {
-      // Command, then address and mode in one: only a chip that has its four lines on takes it.
-      const [command, mode] = this.sent
-      if (this.sent.length < 2) return
-      if (command === READ_QUAD && (mode & 0x30) === 0x20 && this.board.quad) this.continuous = true
-      this.answer.push(0xffffffff)
-      return
-    }
-    if (this.continuous && (value & 0xff) === 0xff) this.continuous = false // its mode bits: go back to commands
-    const listens = this.readable || selected || !this.continuous
+    this.mute = this.mute || this.sent[0] === ENTER_QPI
+    const listens = !this.mute && (this.readable || selected)
     this.answer.push(listens ? this.#byte() : NOTHING)
   }
 
@@ -221,7 +194,6 @@ export class Flash {
     const at = this.sent.length - 2
     if (at < 0) return NOTHING
     const command = this.sent[0] & 0xff
-    if (command === READ_STATUS_2) return this.board.quad === null ? NOTHING : this.board.quad ? QUAD_ENABLE : 0
     if (command === READ_UNIQUE_ID && at >= UNIQUE_ID_DUMMIES) return this.board.uniqueId[at - UNIQUE_ID_DUMMIES] ?? NOTHING
     if (command === READ_JEDEC_ID) return this.board.flashId[at] ?? NOTHING
     return NOTHING

@@ -77,7 +77,7 @@ export class Rig {
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
       'stretch a word': () => (this.sensors.stretched = true),
-      'corrupt a handshake': () => (this.usb.corrupting = true),
+      'corrupt a (bulk|control) handshake': (kind) => (this.usb.corrupting = kind),
       'wear the flash out': () => Object.assign(this.board, { eraseNanos: 400e6, programNanos: 3e6 }), // data sheet
       'erase in (\\d+) ms': (ms) => (this.board.eraseNanos = Number(ms) * 1e6),
       'flash chip (\\w{6})': (id) => (this.board.flashId = [...Buffer.from(id, 'hex')]),
@@ -89,12 +89,14 @@ export class Rig {
       'tell of a suspend (late|falsely)': (how) => this.usb.bus.tellSuspended(how === 'late'),
       'open and close (\\d+) times': (times) => this.usb.flap(Number(times)),
       'flip a written bit': () => (this.machine.mcu.flash[this.board.writtenAt + 40] ^= 1),
-      'switch off quad reads': () => (this.board.quad = false),
-      'silence the flash': () => (this.board.quad = null),
+      'misread the image in (\\d+) starts': (n) => (this.board.misreads = Number(n)),
+      'fault before main in (\\d+) starts': (n) => (this.board.faultyStarts = Number(n)),
       unplug: () => this.#cable(false),
       plug: () => this.#cable(true),
       suspend: () => this.usb.setAsleep(true),
       resume: () => this.usb.setAsleep(false),
+      'sleep for (\\d+) ms while it erases': (ms) => (this.board.atErase = () => this.usb.nap(Number(ms))),
+      'answer setups with what is armed': () => (this.usb.bus.holdsOff = false),
       'cut power': () => {
         this.sensors.powerCycle()
         this.machine.powerCycle()

@@ -14,6 +14,9 @@ const BX_LR = 0x4770
 const WFI_FOREVER = [0xbf30, 0xe7fd] // wfi; b back to it
 const THUMB = 1
 const CYCLE_NS = 8
+const MISREAD_AT = 0x10004000
+const HARD_FAULT = 3
+const FAULT_AFTER_NS = 1e6 // the image is being copied then
 
 const ROSC = 0x40060
 const ROSC_RANDOMBIT = 0x1c
@@ -31,7 +34,9 @@ export class Board {
     this.lostFrames = Infinity // one start of frame in so many does not come
     this.supplyMv = 4750 // VBUS less a diode
     this.celsius = 27
-    this.quad = true // its flash has all four lines switched on; null: it does not even say
+    this.atErase = null // what happens beside the next one
+    this.misreads = 0 // starts in which a word of the image is read wrongly from flash
+    this.faultyStarts = 0 // starts that an exception ends before the program runs
     this.writtenAt = null // where it was programmed last
     this.counters = { erases: 0, programs: 0, bytes: 0, misses: 0, wrong: [] }
   }
@@ -41,6 +46,11 @@ export class Board {
     this.random ^= this.random >>> 17
     this.random ^= this.random << 5
     return this.random & 1
+  }
+
+  /** What is flipped in a word of the image as it is copied. */
+  misread(address) {
+    return address === MISREAD_AT && this.misreads-- > 0 ? 1 << 17 : 0
   }
 
   /** Bytes of flash one by one, so that power can fail after any of them. False when it did. */
@@ -70,6 +80,7 @@ export class BootRom {
     this.#install()
     this.#randomBit()
     this.#measures()
+    mcu.clock.createAlarm(() => board.faultyStarts-- > 0 && mcu.core.exceptionEntry(HARD_FAULT)).schedule(FAULT_AFTER_NS)
   }
 
   #install() {
@@ -128,6 +139,8 @@ export class BootRom {
   #erase() {
     const [at, bytes] = this.#r
     if (!this.#allowed(at, bytes, SECTOR, 'erase')) return
+    this.board.atErase?.()
+    this.board.atErase = null
     this.board.counters.erases++
     this.#spend((this.board.eraseNanos * bytes) / SECTOR)
     this.#change(at, bytes, () => 0xff)

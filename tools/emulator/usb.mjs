@@ -29,6 +29,7 @@ const VBUS_SENSE = 24 // the Pico's pin
 const PULLUP_GONE_NS = 20 * MS // a board that can sense VBUS has let D+ go by then
 const DEBOUNCE_NS = 10 * MS // a real host waits ten times as long before it resets and after
 const SUSPEND_NS = 3 * MS
+const TOKEN_NS = 3000 // behind the acknowledged SETUP: 3 bytes, sync and gap, at 12 Mbit/s
 const ANSWER_NS = 500 * MS // a control transfer that takes longer has failed
 
 const u16 = (value) => [value & 0xff, value >> 8]
@@ -60,7 +61,8 @@ export class UsbHost {
     this.later = () => {}
     this.bus.onArmed = this.bus.onSetupSeen = () => this.poke()
     this.bus.onReset = () => this.#lose()
-    this.corrupting = false // the next handshake to the device
+    this.corrupting = null // bulk or control: the next handshake to the device
+    this.waking = mcu.clock.createAlarm(() => this.setAsleep(false))
     this.hurried = { asked: 0, wrong: 0 } // requests that came before the one before was answered
     this.second = mcu.clock.createAlarm(() => this.#secondSetup())
     this.#watchPullup()
@@ -137,6 +139,18 @@ export class UsbHost {
     this.poke()
   }
 
+  nap(ms) {
+    this.setAsleep(true)
+    this.waking.schedule(ms * MS)
+  }
+
+  #corrupts(kind) {
+    if (this.corrupting !== kind) return false
+    this.corrupting = null
+    this.bus.hang()
+    return true
+  }
+
   /** The device is gone. */
   #lose() {
     this.deadline.cancel()
@@ -168,10 +182,7 @@ export class UsbHost {
     if (this.open && bus.armed(device.in, false) && this.canTake()) {
       const packet = bus.beginIn(device.in)
       bus.transact(packet.data.length, () => {
-        if (this.corrupting) {
-          this.corrupting = false
-          return bus.hang()
-        }
+        if (this.#corrupts('bulk')) return
         const data = bus.takeIn(device.in, packet)
         if (data !== null && data.length > 0) this.onData(data)
         this.poke()
@@ -195,6 +206,8 @@ export class UsbHost {
     if (t.stage === 'between') return
     if (t.stage === 'setup') {
       this.deadline.schedule(ANSWER_NS)
+      // Clear of the interrupt at a frame's start, which without a hold-off may take the time that there is.
+      if (t.abandoned && bus.inFrame > 0.8 * MS) return this.#after(0.3 * MS, () => this.poke())
       return bus.transact(8, () => {
         if (t.abandoned) {
           bus.setup(t.abandoned)
@@ -213,6 +226,7 @@ export class UsbHost {
     if (!bus.armed(0, out)) return
     const packet = out ? { data: this.#nextOut(t) } : bus.beginIn(0)
     bus.transact(packet.data.length, () => {
+      if (!out && this.#corrupts('control')) return
       if (out) bus.putOut(0, packet.data)
       else this.#gotIn(t, bus.takeIn(0, packet))
       this.#nextStage(t, out)
@@ -223,8 +237,10 @@ export class UsbHost {
   #secondSetup() {
     const t = this.transfers[0]
     this.bus.setup(Uint8Array.from(t.packet))
-    t.stage = 'data'
-    this.poke()
+    this.#after(TOKEN_NS, () => {
+      t.stage = 'data'
+      this.poke()
+    })
   }
 
   #nextOut(t) {

@@ -13,7 +13,7 @@ from pathlib import Path
 HELPERS = "wait.h"
 SHARED = "cortex_m.h"
 REGISTERS = "*_regs.h"
-AFTER_RESET = "system_reset"
+AFTER_RESET = re.compile(r"void (system|early)_reset\(void\)")
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
 LOOP = re.compile(r"\b(while|for)\b\s*\(")
 DEFINED = re.compile(r"^#define (\w+)(?:\(\w+\))?\s+(?:REG32|\(\*)", re.M)
@@ -39,7 +39,7 @@ def loops(text: str, registers: set[str]) -> list[tuple[int, str]]:
             found.append((line, f"while loop: waits must go through {HELPERS}"))
             continue
         condition = parenthesis(text, match.end() - 1).split(";")[1]
-        if not condition.strip() and f"void {AFTER_RESET}(void)" not in text[: match.start()].rsplit("\n}", 1)[-1]:
+        if not condition.strip() and not AFTER_RESET.search(text[: match.start()].rsplit("\n}", 1)[-1]):
             found.append((line, "endless for loop"))
         elif used := registers & set(re.findall(r"\w+", condition)):
             found.append((line, f"for loop waits for {min(used)}: waits must go through {HELPERS}"))

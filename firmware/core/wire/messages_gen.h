@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0xA94381FEu
+#define BT_SCHEMA_HASH 0xE9E11A08u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -180,7 +180,8 @@ enum bt_event_kind {
 #define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host sent nothing for hold_timeout_ms
 #define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its streams
 #define BT_FAULT_FLAG_TARE_RESTORED (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
-#define BT_FAULT_FLAGS 0x7FFu // all there are
+#define BT_FAULT_FLAG_EARLY_FAULT (1u << 11) // one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
+#define BT_FAULT_FLAGS 0xFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed

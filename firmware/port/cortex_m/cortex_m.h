@@ -46,8 +46,11 @@ static inline void interrupt_let_go(uint32_t number)
 // interrupt interrupts those of a larger number. It is let go at once.
 void use_interrupt(int number, uint32_t priority, void (*handler)(void));
 
-// ---- image_note.c: of the image that is stored; see port.h
-uint32_t image_crc32(void);
+// ---- image_note.c
+// What is stored and what of it was copied to RAM have the CRC-32 that the build found. True of an image that
+// no build has sealed, as in QEMU. Before anything of it runs.
+bool image_is_whole(void);
+uint32_t image_crc32(void); // which it then is; see port.h
 
 // ---- what the port defines for startup.c
 // Clocks, and the clock of port_now_us. Runs before there are any variables, from where the image is stored:
@@ -56,6 +59,7 @@ bool clocks_start(void);
 
 // Also after a fault, or an interrupt that nobody asked for.
 void system_reset(void) __attribute__((noreturn));
+void early_reset(void) __attribute__((noreturn)); // AT_BOOT: nothing of RAM can be relied on
 
 // noinline, or it would end up in its caller, or what it calls in it.
 #define AT_BOOT __attribute__((section(".boot_code"), noinline))

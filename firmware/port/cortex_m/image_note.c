@@ -1,4 +1,4 @@
-// This image's note; the linker script keeps it. And whether flash holds the image that the note was made
+// This image's note; the linker script keeps it. And whether what runs is the image that the note was made
 // for.
 #include "image_note.h"
 
@@ -11,17 +11,28 @@
 __attribute__((section(".image_note"), used)) static const volatile bt_image_note note =
     BT_IMAGE_NOTE(IMAGE_BOARD);
 
-#define IMAGE_MAX_BYTES (2u * 1024 * 1024)
+#define POLYNOMIAL 0xEDB88320u // crc32.h's
 
-extern const uint8_t image_stored[]; // the linker script's: where the image begins
+// The linker script's: where the image begins, and what of it lies in RAM, copied from where.
+extern const uint8_t image_stored[], image_ram_from[], image_ram_start[];
+
+// Bit by bit, some 20 ms: neither a table nor other code has been proven yet.
+AT_BOOT bool image_is_whole(void)
+{
+    const uint8_t *at = image_stored;
+    uint32_t crc = BT_CRC32_START;
+    for (uint32_t left = note.image_bytes; left != 0; left--, at++) {
+        at = at == image_ram_from ? image_ram_start : at;
+        const bool zeroed = (uintptr_t)at - (uintptr_t)&note.crc32 < sizeof note.crc32;
+        crc ^= zeroed ? 0 : *at;
+        for (int bit = 0; bit < 8; bit++) {
+            crc = crc >> 1 ^ (crc & 1 ? POLYNOMIAL : 0);
+        }
+    }
+    return note.image_bytes == 0 || ~crc == note.crc32;
+}
 
 uint32_t image_crc32(void)
 {
-    const uint32_t crc_at = (uint32_t)((uintptr_t)&note.crc32 - (uintptr_t)image_stored);
-    const uint32_t bytes = note.image_bytes < IMAGE_MAX_BYTES ? note.image_bytes : 0;
-    uint32_t crc = BT_CRC32_START;
-    for (uint32_t k = 0; k < bytes; k++) {
-        crc = bt_crc32_step(crc, k - crc_at < sizeof note.crc32 ? 0 : image_stored[k]);
-    }
-    return bt_crc32_end(crc);
+    return note.crc32;
 }

@@ -2,7 +2,6 @@
 #include "cortex_m.h"
 
 #include <stddef.h>
-#include <string.h>
 
 #define EXCEPTIONS 16 // the core's own; the first is the stack's top
 #ifdef __ARM_ARCH_6M__
@@ -27,18 +26,17 @@ static void start_again(void)
 
 typedef void (*vector)(void);
 
-// Where the chip looks at first.
+// Where the chip looks at first, and while the rest is copied.
 __attribute__((section(".vectors"), used)) static const vector first_vectors[EXCEPTIONS] = {
-    (vector)image_stack_top, image_reset, [2 ... EXCEPTIONS - 1] = start_again};
+    (vector)image_stack_top, image_reset, [2 ... EXCEPTIONS - 1] = early_reset};
 
 // The table that is used: it may be read while the flash may not. Aligned to its size, rounded up.
 static vector vectors[EXCEPTIONS + INTERRUPTS] __attribute__((aligned(INTERRUPTS > 48 ? 512 : 256)));
 
 static void use_vectors(void)
 {
-    memcpy(vectors, first_vectors, sizeof first_vectors);
-    for (int k = 0; k < INTERRUPTS; k++) {
-        vectors[EXCEPTIONS + k] = start_again;
+    for (int k = 0; k < EXCEPTIONS + INTERRUPTS; k++) {
+        vectors[k] = start_again;
     }
     VTOR = (uint32_t)(uintptr_t)vectors;
 }
@@ -74,8 +72,8 @@ AT_BOOT void image_reset(void)
     for (volatile uint32_t *to = image_bss_start; to < image_bss_end; to++) {
         *to = 0;
     }
-    if (!ticking) {
-        system_reset(); // without its crystal the board can neither keep time nor speak to a host
+    if (!ticking || !image_is_whole()) {
+        early_reset(); // without its crystal the board can neither keep time nor speak to a host
     }
     use_vectors();
     (void)main(0, NULL);

@@ -116,9 +116,9 @@ const uint8_t *flash_maps(void)
 }
 
 // Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the
-// serial interface stopped in the middle. boot2 has left the interface in quad reads (4.10.3 of the data
-// sheet); the ROM's exit_xip, which leave_xip() calls, makes it serial with a byte a frame both ways
-// (2.8.3.1.3; its flash_init_spi sets CTRLR0, BAUDR and SER), and leaves nothing to be read.
+// serial interface stopped in the middle. The ROM's exit_xip, which leave_xip() calls, makes it serial with a
+// byte a frame both ways (2.8.3.1.3; its flash_init_spi sets CTRLR0, BAUDR and SER), and leaves nothing to be
+// read.
 static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;

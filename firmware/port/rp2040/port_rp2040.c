@@ -73,6 +73,7 @@ static void note_start(void)
         started_by = reason & WATCHDOG_TIMED_OUT ? BT_FAULT_FLAG_HUNG : BT_FAULT_FLAG_CRASHED;
     }
     WATCHDOG_SCRATCH1 = RUNNING;
+    started_by |= early_faults() != 0 ? BT_FAULT_FLAG_EARLY_FAULT : 0;
 }
 
 bt_port *port_init(int argc, char **argv)
@@ -80,7 +81,7 @@ bt_port *port_init(int argc, char **argv)
     note_start();
     flash_start();
     has_id = flash_identify(unique_id);
-    watchdog_start();
+    watchdog_feed();
     make_serial_text();
     make_boot_id();
     bus_start();

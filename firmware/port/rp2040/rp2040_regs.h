@@ -64,10 +64,6 @@
 #define DMA_CHAN_ABORT                    REG32(0x50000444u)
 
 // ---- 2.13 power-on state machine
-#define PSM_WDSEL      REG32(0x40010008u)
-#define PSM_WDSEL_ROSC (1u << 0)
-#define PSM_WDSEL_XOSC (1u << 1)
-#define PSM_WDSEL_ALL  0x1FFFFu
 
 // ---- 2.14 resets
 #define RESETS_RESET      REG32(0x4000C000u)
@@ -271,17 +267,14 @@
 #define TIMER_ALARM0_BIT 1u
 
 // ---- 4.7 watchdog
-#define WATCHDOG_CTRL        REG32(0x40058000u)
-#define WATCHDOG_LOAD        REG32(0x40058004u)
-#define WATCHDOG_REASON      REG32(0x40058008u)
-#define WATCHDOG_SCRATCH0    REG32(0x4005800Cu) // these keep their values over every reset but power-on
-#define WATCHDOG_SCRATCH1    REG32(0x40058010u)
-#define WATCHDOG_TICK        REG32(0x4005802Cu)
-#define WATCHDOG_TIMED_OUT   (1u << 0)
-#define WATCHDOG_TRIGGER     (1u << 31)
-#define WATCHDOG_ENABLE      (1u << 30)
-#define WATCHDOG_PAUSE       (7u << 24) // while a debugger holds a core
-#define WATCHDOG_TICK_ENABLE (1u << 9)
+#define WATCHDOG_CTRL      REG32(0x40058000u)
+#define WATCHDOG_LOAD      REG32(0x40058004u)
+#define WATCHDOG_REASON    REG32(0x40058008u)
+#define WATCHDOG_SCRATCH0  REG32(0x4005800Cu) // these keep their values over every reset but power-on
+#define WATCHDOG_SCRATCH1  REG32(0x40058010u)
+#define WATCHDOG_SCRATCH2  REG32(0x40058014u)
+#define WATCHDOG_TIMED_OUT (1u << 0)
+#define WATCHDOG_TRIGGER   (1u << 31)
 
 // ---- 4.10 SSI: the flash's serial interface
 #define SSI_SR      REG32(0x18000028u)

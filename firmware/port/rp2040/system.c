@@ -10,7 +10,7 @@
 #define XOSC_STARTUP_DELAY ((CRYSTAL_MHZ * 1000u + 128u) / 256u)
 
 #define WATCHDOG_US                                                                                          \
-    2000000u // longer than a flash sector's erase: 0.4 s at most on a Pico, a second on some chips
+    2000000u // as in boot2.S; longer than an erase: 0.4 s at most on a Pico, a second on some chips
 
 AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
 {
@@ -25,8 +25,19 @@ AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, 
     return true;
 }
 
+// In scratch 2: starts in a row that have not got as far as port_init.
+#define STARTS 0x42540000u
+
+uint32_t early_faults(void)
+{
+    const uint32_t before = WATCHDOG_SCRATCH2 - STARTS - 1;
+    WATCHDOG_SCRATCH2 = STARTS;
+    return before;
+}
+
 AT_BOOT bool clocks_start(void)
 {
+    WATCHDOG_SCRATCH2 = (WATCHDOG_SCRATCH2 >> 16 == STARTS >> 16 ? WATCHDOG_SCRATCH2 : STARTS) + 1;
     CLK_SYS_RESUS_CTRL = 0;
     XOSC_STARTUP = XOSC_STARTUP_DELAY;
     XOSC_CTRL = XOSC_CTRL_1_15MHZ | XOSC_CTRL_ENABLE;
@@ -52,18 +63,8 @@ AT_BOOT bool clocks_start(void)
     }
     CLK_PERI_CTRL = CLK_ENABLE; // from clk_sys
     CLK_USB_CTRL = CLK_ENABLE;  // from PLL_USB
-    WATCHDOG_TICK = CRYSTAL_MHZ | WATCHDOG_TICK_ENABLE;
     return take_out_of_reset(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
                              | RESETS_USBCTRL);
-}
-
-void watchdog_start(void)
-{
-    WATCHDOG_CTRL = 0;
-    // Everything but the oscillators, so that the chip comes up as after power-on.
-    PSM_WDSEL = PSM_WDSEL_ALL & ~(PSM_WDSEL_ROSC | PSM_WDSEL_XOSC);
-    watchdog_feed();
-    WATCHDOG_CTRL = WATCHDOG_PAUSE | WATCHDOG_ENABLE;
 }
 
 void watchdog_feed(void)
@@ -71,9 +72,15 @@ void watchdog_feed(void)
     WATCHDOG_LOAD = 2 * WATCHDOG_US; // RP2040-E1: it counts down twice a tick
 }
 
+AT_BOOT void early_reset(void)
+{
+    WATCHDOG_CTRL = WATCHDOG_TRIGGER;
+    for (;;) { // some cycles at most: the reset is on its way
+    }
+}
+
 void system_reset(void)
 {
-    PSM_WDSEL = PSM_WDSEL_ALL & ~(PSM_WDSEL_ROSC | PSM_WDSEL_XOSC);
     WATCHDOG_CTRL = WATCHDOG_TRIGGER;
     for (;;) { // some cycles at most: the reset is on its way
     }

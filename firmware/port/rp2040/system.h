@@ -9,8 +9,9 @@
 #include <stdint.h>
 
 // ---- system.c
-void watchdog_start(void);
-void watchdog_feed(void);
+void watchdog_feed(void); // boot2.S has started it
+// Starts that ended before port_init, since power-on or the last one that did not. Call once.
+uint32_t early_faults(void);
 
 // ---- timer.c
 void timer_start(void);

@@ -76,6 +76,11 @@ void watchdog_feed(void)
     IWDG_KR = IWDG_KR_FEED;
 }
 
+AT_BOOT void early_reset(void)
+{
+    system_reset();
+}
+
 void system_reset(void)
 {
     SCB_AIRCR = SCB_AIRCR_RESET;

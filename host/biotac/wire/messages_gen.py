@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0xA94381FE
+SCHEMA_HASH = 0xE9E11A08
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -196,6 +196,7 @@ class FaultFlags(IntFlag):
     HOLD_LAPSED = 1 << 8  # a HOLD ended because the host sent nothing for hold_timeout_ms
     LINK_TAKEN = 1 << 9  # the host at one of the board's ports took over from the one at the other, and ended its streams
     TARE_RESTORED = 1 << 10  # after a hang or a crash, a finger has the tare and HOLD of before
+    EARLY_FAULT = 1 << 11  # one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
 
 
 class StreamFlags(IntFlag):
@@ -377,6 +378,7 @@ FAULT_FLAG_DOC: dict[int, str] = {
     256: "a HOLD ended because the host sent nothing for hold_timeout_ms",
     512: "the host at one of the board's ports took over from the one at the other, and ended its streams",
     1024: "after a hang or a crash, a finger has the tare and HOLD of before",
+    2048: "one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came",
 }
 
 

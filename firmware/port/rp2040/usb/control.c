@@ -73,9 +73,6 @@ static bool superseded(void)
 
 static void send_packet(void)
 {
-    if (superseded()) {
-        return;
-    }
     uint32_t bytes = sending_bytes < USB_PACKET_BYTES ? sending_bytes : USB_PACKET_BYTES;
     volatile uint8_t *out = usb_memory(USB_EP0_BUFFER);
     for (uint32_t k = 0; k < bytes; k++) {
@@ -84,6 +81,9 @@ static void send_packet(void)
     sending += bytes;
     sending_bytes -= bytes;
     empty_packet_due = empty_packet_due && bytes == USB_PACKET_BYTES;
+    if (superseded()) { // asked last: the copy takes as long as a host may between two requests
+        return;
+    }
     usb_hand_over(&USB_BUFFER_IN(0), bytes | USB_BUFFER_FULL | toggle_in);
     toggle_in ^= USB_BUFFER_DATA1;
 }

@@ -1,0 +1,231 @@
+"""What data sheets, errata and field reports say of the chip, played to the image.
+
+Each test is a row of the board's page, which `python tests/emulator/test_hazards.py` writes. With --image FILE pytest
+plays them to another image.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "hil"))
+
+from rig import all_rigs, in_ci, prepare
+
+import biotac
+from biotac import FaultFlags
+from biotac.wire import messages_gen as wire
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "firmware/boards/pico/README.md"
+BEGIN, END = "<!-- hazards -->\n", "<!-- end of hazards -->\n"
+SOURCES: dict[str, str] = {}
+Test = Callable[..., None]
+
+
+def known_from(source: str) -> Callable[[Test], Test]:
+    def note(test: Test) -> Test:
+        SOURCES[test.__name__] = source
+        return test
+
+    return note
+
+
+class Board:
+    """The image, emulated, as fast as it goes."""
+
+    def __init__(self, image: str | None) -> None:
+        self.image = f"&image={image}" if image else ""
+        self.hands: list[biotac.Hand] = []
+
+    def open(self, *verbs: str, fingers: int = 1) -> tuple[biotac.Hand, Any]:
+        """A hand, and its board."""
+        do = f"&do={';'.join(verbs)}" if verbs else ""
+        hand = biotac.open(f"emu:pico?source=press.toml&fingers={fingers}&seconds=60&pace=fast{self.image}{do}")
+        self.hands.append(hand)
+        return hand, hand.link.board  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def board(request: pytest.FixtureRequest) -> Iterator[Board]:
+    image = request.config.getoption("--image")
+    why = None if image else prepare(all_rigs()["pico_emulated"])
+    if why is not None:
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+    made = Board(image)
+    yield made
+    for hand in made.hands:
+        hand.close()
+
+
+def streams_on(hand: biotac.Hand, board: Any, *verbs: str) -> dict[str, Any]:
+    """The verbs, a tenth of a second apart, do not end or dent a stream; what the emulator has counted then."""
+    hand.stream()
+    hand.read(0.2)
+    resets = board.counters()["usb"]["resets"]
+    for verb in verbs:
+        board.do(verb)
+        hand.read(0.1)
+    hand.read(0.5)
+    hand.stop()
+    seen: dict[str, Any] = board.counters()
+    assert (seen["boots"], seen["usb"]["resets"], hand.stats.frames_lost) == (1, resets, 0)
+    return seen
+
+
+def comes_back(hand: biotac.Hand, board: Any, verb: str, within_s: float = 0.3) -> dict[str, Any]:
+    """The verb hangs the controller: within this time its host has found the board again, and nothing is left of it."""
+    hand.link.release()  # type: ignore[attr-defined]
+    before = board.counters()["usb"]
+    board.do(verb)
+    if "control" in verb:
+        board.say("open and close 1 times")
+    else:
+        hand._board.send(wire.Ping(req_id=1))
+    wanted = {"hangs": before["hangs"] + 1, "resets": before["resets"] + 1, "state": "configured"}
+    seen = board.until(within_s, usb=wanted)
+    assert seen["boots"] == 1 and seen["usb"]["failed"] == []
+    hand.ping()
+    return dict(seen)
+
+
+# ---- USB ---------------------------------------------------------------------------------------------------------
+
+
+@known_from("RP2040-E15; pico-sdk 1.5.0")
+def test_a_packet_armed_late_in_a_frame_hangs_the_controller(board: Board) -> None:
+    """none is armed in a frame's last 200 us"""
+    hand, emulated = board.open("hang 1 of late armings", fingers=5)
+    assert streams_on(hand, emulated)["usb"]["armed_late"] == 0
+
+
+@known_from("RP2040-E15")
+@pytest.mark.parametrize("verb", ["corrupt a bulk handshake", "corrupt a control handshake"])
+def test_a_corrupt_handshake_hangs_the_controller(board: Board, verb: str) -> None:
+    """a controller that hears no frame for 100 ms is reset, and its host finds it again"""
+    comes_back(*board.open(), verb)
+
+
+@known_from("RP2040-E15; data sheet 4.1.4, SIE_STATUS")
+def test_a_hung_controller_takes_the_bus_for_suspended(board: Board) -> None:
+    """it is reset all the same, as the lines move"""
+    comes_back(*board.open("hang as if asleep"), "corrupt a bulk handshake")
+
+
+@known_from("data sheet 4.1.4, INTS; rp-hal #492")
+@pytest.mark.parametrize("verbs", [["falsely"], ["late"], ["late", "falsely", "late"]], ids="-".join)
+def test_a_suspend_is_told_that_is_none(board: Board, verbs: list[str]) -> None:
+    """the stream goes on: only a bus without frames is suspended"""
+    hand, emulated = board.open()
+    streams_on(hand, emulated, *(f"tell of a suspend {how}" for how in verbs))
+
+
+@known_from("USB 2.0, 7.1.7.6; data sheet 4.1.4")
+def test_the_bus_sleeps_and_wakes_while_the_flash_is_erased(board: Board) -> None:
+    """the link is open afterwards"""
+    hand, emulated = board.open("erase in 400 ms", "sleep for 200 ms while it erases")
+    hand.board.save_settings()
+    assert emulated.counters()["flash"]["erases"] == 1
+    streams_on(hand, emulated)
+
+
+@known_from("USB 2.0, 8.4.6.4; pico-feedback #385, tinyusb #2492")
+@pytest.mark.parametrize("verbs", [[], ["answer setups with what is armed"]], ids=["held off", "not held off"])
+def test_a_request_comes_before_the_one_before_is_answered(board: Board, verbs: list[str]) -> None:
+    """only the second is answered; if the chip does not hold the host off, unless another interrupt runs"""
+    _, emulated = board.open(*verbs)
+    gaps_ns = [*range(100, 12_000, 100), *range(12_000, 60_000, 1000)]
+    for gap_ns in gaps_ns:
+        emulated.say(f"two setups {gap_ns}")
+    usb = emulated.until(2, usb={"hurried": {"asked": len(gaps_ns)}})["usb"]
+    assert usb["hurried"] == {"asked": len(gaps_ns), "wrong": 0}
+    assert usb["failed"] == [] and usb["toggle_errors"] == usb["available_not_last"] == 0
+
+
+@known_from("circuitpython #8824")
+def test_a_port_is_opened_and_closed_a_thousand_times_in_a_row(board: Board) -> None:
+    """no request fails, and the board answers the last host"""
+    hand, emulated = board.open()
+    hand.link.release()  # type: ignore[attr-defined]
+    emulated.do("open and close 1000 times")
+    with pytest.raises(biotac.DeviceLostError):  # it never comes to this: time goes by
+        emulated.until(1, boots=-1)
+    assert emulated.counters()["usb"]["failed"] == []
+    hand.ping()
+
+
+@known_from("USB 2.0, 7.1.5")
+def test_a_host_without_power_is_at_the_other_end(board: Board) -> None:
+    """where the board can sense VBUS, D+ is let go"""
+    hand, emulated = board.open()
+    hand.link.release()  # type: ignore[attr-defined]
+    emulated.do("unplug")
+    assert emulated.until(1, usb={"state": "detached"})["boots"] == 1
+    emulated.do("plug")
+    assert emulated.until(1, usb={"state": "configured"})["usb"]["driven_unpowered"] == 0
+
+
+# ---- boot and flash ----------------------------------------------------------------------------------------------
+
+
+@known_from("data sheets of IS25LP and MX25: 35h")
+def test_a_flash_chip_takes_35h_for_the_way_into_another_mode(board: Board) -> None:
+    """boot reads by 03h and asks the chip nothing"""
+    assert board.open()[1].counters()["flash"]["wrong"] == []
+
+
+@known_from("flash read at its limit")
+@pytest.mark.parametrize("starts", [1, 5])
+def test_the_image_is_misread_as_it_is_copied(board: Board, starts: int) -> None:
+    """the copy's CRC-32 is checked before it runs; the board starts again and tells EARLY_FAULT"""
+    begun_anew(board, f"misread the image in {starts} starts", starts)
+
+
+@known_from("data sheet 2.8.1")
+@pytest.mark.parametrize("starts", [1, 5])
+def test_an_exception_comes_before_the_program_is_in_sram(board: Board, starts: int) -> None:
+    """the board starts again and tells EARLY_FAULT"""
+    begun_anew(board, f"fault before main in {starts} starts", starts)
+
+
+def begun_anew(board: Board, verb: str, starts: int) -> None:
+    hand, emulated = board.open(verb)
+    assert emulated.counters()["watchdog_resets"] == starts
+    assert hand.board.clear_faults().board == FaultFlags.STARTED | FaultFlags.EARLY_FAULT
+
+
+@known_from("W25Q16JV 0.4 s; other chips 1 s")
+def test_the_flash_takes_a_second_to_erase(board: Board) -> None:
+    """the watchdog, which runs from boot2 on, waits for two"""
+    hand, emulated = board.open("erase in 1000 ms")
+    hand.board.save_settings()
+    seen = emulated.counters()
+    assert (seen["flash"]["erases"], seen["watchdog_resets"]) == (1, 0)
+
+
+# ---- the board's page ----------------------------------------------------------------------------------------------
+
+
+def rows() -> str:
+    """A row for each test of this file that plays a hazard."""
+    lines = ["| What may happen | Known from | What the image does |", "|---|---|---|"]
+    for name, source in SOURCES.items():
+        what, does = name.removeprefix("test_").replace("_", " "), inspect.getdoc(globals()[name])
+        lines.append(f"| {what.replace('crc', 'CRC').replace('sram', 'SRAM')} | {source} | {does} |")
+    return "\n".join(lines) + "\n"
+
+
+def test_the_boards_page_lists_them_all() -> None:
+    listed = PAGE.read_text().partition(BEGIN)[2].partition(END)[0]
+    assert listed == rows(), "run python tests/emulator/test_hazards.py"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(re.sub(f"{BEGIN}.*{END}", lambda _: BEGIN + rows() + END, PAGE.read_text(), flags=re.DOTALL))
