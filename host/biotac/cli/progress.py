@@ -9,8 +9,8 @@ import time
 class Progress:
     """Call ``show`` as often as you like: it prints a few times a second. As a context manager it clears the line."""
 
-    def __init__(self, *, enabled: bool = True) -> None:
-        self._enabled = enabled and sys.stderr.isatty()
+    def __init__(self) -> None:
+        self._enabled = sys.stderr.isatty()
         self._next = time.monotonic() + 1.0
         self._width = 0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ from .. import values
 from ..outputs import note, say
 from ..progress import Progress
 from .stream import batches
-from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
 
@@ -30,20 +29,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the source ends or Ctrl-C, and keep what has arrived."""
-    progress = Progress(enabled=not is_possible())
+    progress = Progress()
     recorded_s = 0.0
     with biotac.open(args.port) as hand:
         earlier = faults_told(hand)
         recorder = hand.record(args.out, overwrite=args.force, note=args.note)
-        table = None
-        with ExitStack() as shown, suppress(KeyboardInterrupt):  # the usual way to stop a recording
-            if not args.json and is_possible():
-                table = shown.enter_context(LiveTable(hand, f"{hand.port} to {args.out}"))
+        with suppress(KeyboardInterrupt):  # the usual way to stop a recording
             for _, recorded_s in batches(hand, args.seconds):
-                words = f"{recorded_s:.1f} s, {hand.stats.frames} frames"
-                progress.show(f"{words}, Ctrl-C stops")
-                if table is not None:
-                    table.show(f"{words}, {recorder.path.stat().st_size / 1e6:.1f} MB, Ctrl-C stops")
+                size_mb = recorder.path.stat().st_size / 1e6
+                lost = hand.stats.frames_lost
+                progress.show(
+                    f"{recorded_s:.1f} s, {recorder.frames} frames, {lost} lost, {size_mb:.1f} MB, Ctrl-C stops"
+                )
         progress.done()
         recorder.close()
         stats = hand.stats

@@ -16,7 +16,6 @@ from ...wire.frames import Frame
 from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
 from .. import values
 from ..outputs import note
-from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
@@ -40,10 +39,7 @@ def run(args: argparse.Namespace) -> int:
         for warning in hand.warnings:
             note(warning.text)
         hand.stream("results", *(["events"] if args.events else []), rest=not args.touched)
-        if not args.json and not args.events and is_possible():
-            watch(hand, seconds=args.seconds)
-        else:
-            show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
+        show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
         tell_lost(hand)
     return 0
 
@@ -66,15 +62,6 @@ def tell_lost(hand: biotac.Hand) -> None:
     """Say on stderr how many frames were lost, if any."""
     if hand.stats.frames_lost:
         note(f"{hand.stats.frames_lost} frame(s) lost; close other programs, or use a faster computer")
-
-
-def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
-    words = "nothing yet"
-    with LiveTable(hand, hand.port) as table:
-        for _, passed_s in batches(hand, seconds):
-            words = f"{passed_s:.1f} s, {hand.stats.frames} frames, Ctrl-C stops"
-            table.show(words)
-        table.show(words, now=True)
 
 
 def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_json: bool = False) -> None:
