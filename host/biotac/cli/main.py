@@ -27,7 +27,6 @@ VERBS = {
     "share": ("live.share", "Share a board with other programs and computers, by Zenoh or LSL."),
     "record": ("live.record", "Record everything a board sends to an MCAP file."),
     "check": ("recordings.check", "Check every on-board result of a recording against the float64 reference."),
-    "replay": ("recordings.replay", "Play a recording as the board that made it, here or on a pty."),
     "file": ("recordings.file", "Label a recording, cut some seconds out of it, or recover a damaged one."),
     "export": (
         "recordings.export",
@@ -39,7 +38,10 @@ VERBS = {
         "Fit a finger's wrench or pressure to a reference, test it on held-out data, and upload.",
     ),
     "calibration": ("boards.calibration", "Show, get, put or clear a finger's calibration or wrench map."),
-    "sim": ("live.sim", "Run a simulated or emulated board on a pty, or let a Pico play a gateway's sensors."),
+    "sim": (
+        "live.sim",
+        "Run a simulated, emulated or recorded board on a pty, or let a Pico play a gateway's sensors.",
+    ),
     "flash": ("boards.flash", "Write a firmware image to a board, and give it its settings back."),
 }
 

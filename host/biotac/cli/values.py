@@ -28,6 +28,14 @@ def seconds(text: str) -> float:
     return value
 
 
+def moment(text: str) -> float:
+    """Seconds since the first row, 0 or more."""
+    value = number(text)
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds, 0 or more")
+    return value
+
+
 def rate(text: str) -> float:
     """Lines per second: 0 for all, or at least one a day."""
     value = number(text)

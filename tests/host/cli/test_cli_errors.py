@@ -170,11 +170,12 @@ CASES: list[tuple[int, str, str]] = [
         "use this sensor's own",
         "calibrate wrench --live sim:press.toml --finger 0 --out +o --reference nano17 --serial BTX",
     ),
-    (2, "check the path", "replay +no.mcap"),
-    (2, "expected 0 <= from", "replay @rec.mcap --from 99"),
-    (2, "expected 0 <= from", "replay @rec.mcap --from 0.5 --to 0.2"),
-    (2, "add --pty", "replay @rec.mcap --link +link"),
-    (3, "choose another path", "replay @rec.mcap --pty --link @dir"),
+    (2, "check the path", "stream replay:+no.mcap"),
+    (2, "expected 0 <= from", "stream replay:@rec.mcap?from=99"),
+    (2, "expected 0 <= from", "stream replay:@rec.mcap?from=0.5&to=0.2"),
+    (2, "check the path", "sim +no.mcap"),
+    (2, "drop it", "sim @rec.mcap --fingers 2"),
+    (3, "choose another path", "sim @rec.mcap --link @dir"),
     (2, "check the path", "export --recompute +no.mcap +out.mcap"),
     (2, "nothing to recompute", "export --recompute @empty.mcap +out.mcap"),
     (2, "overwrite it (--force", "export --recompute @rec.mcap @text.mcap"),
@@ -394,7 +395,7 @@ def test_a_recording_on_a_pty_needs_ptys(capsys, files, monkeypatch) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.openpty", none_left)
-    assert "use replay:" in line_of(capsys, 3, ["replay", str(files["rec.mcap"]), "--pty"])
+    assert "use replay:" in line_of(capsys, 3, ["sim", str(files["rec.mcap"])])
 
 
 def test_a_package_without_its_simulator(capsys, monkeypatch, tmp_path) -> None:

@@ -203,7 +203,7 @@ def test_a_damaged_frame_is_damaged_in_the_replay_too(recorded, tmp_path) -> Non
 def test_on_a_pty_it_is_a_board_for_any_serial_program(recorded, tmp_path) -> None:
     path, recording = recorded
     link = tmp_path / "board"
-    program = [sys.executable, "-m", "biotac", "replay", str(path), "--pty", "--pace", "fast", "--link", str(link)]
+    program = [sys.executable, "-m", "biotac", "sim", str(path), "--pace", "50", "--link", str(link)]
     with subprocess.Popen([*program, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None and process.stderr is not None
         port = json.loads(process.stdout.readline())["port"]
@@ -225,8 +225,7 @@ def test_on_a_pty_it_is_a_board_for_any_serial_program(recorded, tmp_path) -> No
 
 def test_the_command_prints_the_part_asked_for(recorded, capsys) -> None:
     path, recording = recorded
-    words = ["replay", str(path), "--from", "1", "--to", "1.5", "--pace", "fast", "--rate", "0", "--json"]
-    assert main(words) == 0
+    assert main(["stream", f"replay:{path}?from=1&to=1.5&pace=fast", "--rate", "0", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     mine = recording.frames[(recording.frames["seq"] >= 100) & (recording.frames["seq"] < 150)]
     assert [row["seq"] for row in rows] == mine["seq"].tolist()

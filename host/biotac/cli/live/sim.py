@@ -10,11 +10,13 @@ from ...documents import write_new
 from ...errors import InputError
 from ...hand.opening import shake_hands
 from ...link.serial_port import SerialLink
+from ...recording.replay.playback import Playback
 from ...sim.loading import bundled_scenario, load_source
 from ...sim.ports import start_board
 from ...sim.process import SimBoard
 from .. import values
 from ..outputs import say
+from ..recordings.loading import load
 from . import sensor_board
 from .board_on_pty import tell, tell_over, until_ctrl_c
 
@@ -23,7 +25,12 @@ SCENARIO_S = 600.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("source", metavar="SOURCE", nargs="?", help="scenario (.toml) or recorded counts (.npz, .btd)")
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        nargs="?",
+        help="scenario (.toml), recorded counts (.npz, .btd), or a recording (.mcap), which answers as its board did",
+    )
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
     parser.add_argument(
         "--seconds",
@@ -59,6 +66,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "--pace is 0, expected above 0 for a board on a pty; only biotac.open and biotac demo run unpaced"
         )
+    if args.source.endswith(".mcap"):
+        values.refuse(args, ("fingers", "seconds", "board", "image"), "is for a simulated board; drop it")
+        return play_recording(args)
     if args.image is not None and args.board != "pico":
         raise InputError("--image needs a board that has a flash image; add --board pico")
     name = args.source.removeprefix("sim:")
@@ -73,6 +83,20 @@ def run(args: argparse.Namespace) -> int:
         tell_over(source.name)
         signal.pause()
     return 0
+
+
+def play_recording(args: argparse.Namespace) -> int:
+    """Act as the recorded board until Ctrl-C; playing begins when somebody starts its stream."""
+    from ...recording.replay.pty import ReplayPty
+
+    board = ReplayPty(Playback(load(Path(args.source))), args.pace or 1.0)
+    with until_ctrl_c(board, args.link):
+        tell(board, args, args.source, {"source": args.source})
+        while not board.over:
+            board.turn(1.0)
+        tell_over(args.source)
+        while True:
+            board.turn(1.0)
 
 
 def prepare(board: SimBoard) -> None:

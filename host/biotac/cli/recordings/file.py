@@ -8,9 +8,9 @@ from pathlib import Path
 from ...errors import InputError, printable
 from ...partial_file import whole
 from ...recording.cut import cut
+from .. import values
 from ..outputs import say
 from .loading import load
-from .replay import moment
 
 EXAMPLE = "biotac file label grasp.mcap slip --at 12.5 --fact trial=3"
 
@@ -25,16 +25,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         verb.add_argument("recording", metavar="REC", type=Path)
         verb.add_argument("out", metavar="OUT", type=Path)
         if name == "cut":
-            verb.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first row")
-            verb.add_argument("--to", dest="to_s", type=moment, help="seconds since its first row")
+            verb.add_argument(
+                "--from", dest="from_s", type=values.moment, default=0.0, help="seconds since its first row"
+            )
+            verb.add_argument("--to", dest="to_s", type=values.moment, help="seconds since its first row")
         verb.add_argument("--force", action="store_true", help="overwrite OUT")
         verb.set_defaults(run=run_cut, from_s=0.0, to_s=None)
     text = "add a label to REC, in a file beside it; biotac info lists them"
     verb = verbs.add_parser("label", help=text, description=text)
     verb.add_argument("recording", metavar="REC", type=Path)
     verb.add_argument("text", metavar="TEXT")
-    verb.add_argument("--at", dest="at_s", type=moment, help="seconds since its first row (default: about all of it)")
-    verb.add_argument("--until", dest="until_s", type=moment, help="the end of a span")
+    verb.add_argument(
+        "--at", dest="at_s", type=values.moment, help="seconds since its first row (default: about all of it)"
+    )
+    verb.add_argument("--until", dest="until_s", type=values.moment, help="the end of a span")
     verb.add_argument("--finger", help="name or number (default: all)")
     verb.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
     verb.set_defaults(run=run_label)
