@@ -1,4 +1,4 @@
-"""An emulated ATI Nano17 force sensor that measures what a scenario applies to a finger, in the sensor's own counts.
+"""An emulated ATI Nano17 force sensor that measures what a scenario applies to a finger.
 
 It has the real sensor's resolution and range (SI-12-0.12: 1/320 N, 1/64 N mm; 12 and 17 N, 120 N mm), noise, a zero
 offset, axes and an origin of its own, and a clock that is offset from the board's and drifts against it.
@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from ..calibrate.reference.mounting import Mounting
-from ..calibrate.reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, RdtDecoder, Scale
-from ..calibrate.reference.samples import ReaderStats, Samples
+from ..calibrate.reference.samples import Samples
 from ..core.geometry import Floats
 from ..errors import InputError
 from ..wire.slots import FRAME_S
@@ -21,9 +19,7 @@ from .source import Source
 
 RESOLUTION: Floats = np.array([1 / 320] * 3 + [1 / 64] * 3)  # N, N mm
 RANGE: Floats = np.array([12.0, 12.0, 17.0, 120.0, 120.0, 120.0])
-COUNTS_PER_UNIT = 1_000_000.0  # N or N m
 NOISE_STEPS = 0.7  # standard deviation, in steps of the resolution
-_DATAGRAM_RECORDS = 20
 
 #: The sensor carries the finger from above, rotated so that none of its axes is one of Lin's. If it were behind the
 #: finger, a firm press on the tip would exceed its 120 N mm.
@@ -41,56 +37,40 @@ class Nano17:
     zero: Floats = field(default_factory=lambda: np.array([0.4, -1.1, 0.7, 12.0, -7.0, 3.0]))
     seed: int = 17
 
-    @property
-    def scale(self) -> Scale:
-        """Scale factors as configured in its box."""
-        return Scale(COUNTS_PER_UNIT, COUNTS_PER_UNIT / NMM_PER_NM, self.rate_hz)
+    def measured(self, source: Source, finger: int) -> tuple[Floats, Samples]:
+        """Board times (m,) in s, and the samples while ``source`` plays; NaN beyond the range.
 
-    def records(self, source: Source, finger: int) -> tuple[Floats, npt.NDArray[np.void]]:
-        """Board times (m,) in s and RDT records (m,) while ``source`` plays. Raises InputError if it has no truth."""
+        Raises InputError if it has no truth.
+        """
         if source.truth is None:
             raise InputError(f"{source.name} has no true forces: expected a scenario (.toml)")
         lin = np.column_stack([source.truth.force_n[:, finger], source.truth.torque_nmm[:, finger]])
         at_s = (np.arange(len(lin)) + 0.5) * FRAME_S
         first = int(np.ceil(self.offset_s * self.rate_hz))
         last = int((self.offset_s + len(lin) * FRAME_S * (1.0 + 1e-6 * self.drift_ppm)) * self.rate_hz)
-        number = np.arange(first, last)
-        board_s = (number / self.rate_hz - self.offset_s) / (1.0 + 1e-6 * self.drift_ppm)
+        own_s = np.arange(first, last) / self.rate_hz
+        board_s = (own_s - self.offset_s) / (1.0 + 1e-6 * self.drift_ppm)
         own = self.mounting.to_sensor(lin)
         wrench = np.column_stack([np.interp(board_s, at_s, column) for column in own.T]) + self.zero
         wrench += np.random.default_rng(self.seed).normal(0.0, NOISE_STEPS, wrench.shape) * RESOLUTION
         beyond = (np.abs(wrench) > RANGE).any(axis=1)
-        wrench = np.clip(np.rint(wrench / RESOLUTION) * RESOLUTION, -RANGE, RANGE)
-        records = np.zeros(len(number), RECORD_DTYPE)
-        records["rdt_sequence"] = number % 2**32
-        records["ft_sequence"] = number * 7 % 2**32  # the box samples faster than it sends
-        records["status"] = np.where(beyond, ERROR_BIT, 0)
-        per_unit = np.array([self.scale.counts_per_n] * 3 + [self.scale.counts_per_nmm] * 3)
-        records["counts"] = np.rint(wrench * per_unit).astype(np.int32)
-        return board_s, records
+        wrench = np.rint(wrench / RESOLUTION) * RESOLUTION
+        wrench[beyond] = np.nan
+        return board_s, Samples(own_s, wrench)
 
 
 class Nano17Reader:
-    """A Reader of what the sensor measures of ``source``, on the simulated board's time: no socket, no wall clock."""
+    """A Reader of what the sensor measures of ``source``, on the simulated board's time: no wall clock."""
 
     sensor = "emulated Nano17"
 
     def __init__(self, source: Source, finger: int, nano17: Nano17 | None = None) -> None:
         self.nano17 = nano17 or Nano17()
-        self._at_s, self._records = self.nano17.records(source, finger)
-        self._decoder = RdtDecoder(self.nano17.scale)
+        self._at_s, self._samples = self.nano17.measured(source, finger)
         self._next = 0
-
-    @property
-    def stats(self) -> ReaderStats:
-        """Counters of records lost, late and bad; nothing is lost here."""
-        decoder = self._decoder
-        return ReaderStats(decoder.lost, decoder.late, decoder.bad + decoder.refused)
 
     def read(self, board_s: float) -> Samples:
         """Samples measured since the last call, up to board time ``board_s``."""
-        end = int(self._at_s.searchsorted(board_s))
-        for begin in range(self._next, end, _DATAGRAM_RECORDS):
-            self._decoder.feed(self._records[begin : min(begin + _DATAGRAM_RECORDS, end)].tobytes())
-        self._next = max(self._next, end)
-        return self._decoder.take()
+        new = slice(self._next, max(self._next, int(self._at_s.searchsorted(board_s))))
+        self._next = new.stop
+        return Samples(self._samples.t_s[new], self._samples.wrench[new])

@@ -13,7 +13,6 @@ import pytest
 
 import biotac
 from biotac.calibrate.reference.mounting import Mounting
-from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
 from biotac.calibrate.wrench.run import load_run
@@ -52,10 +51,9 @@ def board(recorded: tuple[Recording, Source]) -> Board:
 @pytest.fixture(scope="module")
 def reference(recorded: tuple[Recording, Source]) -> Reference:
     nano17 = Nano17()
-    decoder = RdtDecoder(nano17.scale)
-    at_s, records = nano17.records(recorded[1], 0)
-    decoder.feed(records[at_s < TO_S + 5.0].tobytes())
-    return Reference("nano17.csv", decoder.take(all_of_them=True), nano17.mounting)
+    at_s, samples = nano17.measured(recorded[1], 0)
+    until = at_s < TO_S + 5.0
+    return Reference("nano17.csv", Samples(samples.t_s[until], samples.wrench[until]), nano17.mounting)
 
 
 def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:

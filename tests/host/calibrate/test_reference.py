@@ -1,4 +1,4 @@
-"""Force/torque references: what a file must say, what a mounting does, and what a Net F/T box sends."""
+"""Force/torque references: what a file must say, what a mounting does, and files that grow."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from biotac.calibrate.reference.csv_file import CsvWriter
+from biotac.calibrate.reference.csv_file import CsvWriter, GrowingCsv
 from biotac.calibrate.reference.mounting import LIN, Mounting, read_mounting
-from biotac.calibrate.reference.net_ft import parse_address, read_configuration
-from biotac.calibrate.reference.rdt import HOLD_RECORDS, RdtDecoder, Scale, request
 from biotac.calibrate.reference.samples import Samples
 from biotac.calibrate.wrench.sources import read_reference
 from biotac.errors import DeviceLostError, InputError, RecordingError
@@ -265,102 +263,56 @@ def test_wrenches_of_a_ros_2_bag(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.t_s, 7.0 + np.arange(200) * 0.002)
 
 
-# ---- RDT ---------------------------------------------------------------------------------------
+# ---- a file that grows, and the emulated Nano17 ------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def sent() -> np.ndarray:
-    """The records of some seconds of an emulated Nano17."""
-    return Nano17().records(load_source("press.toml", seconds=4.0), 0)[1]
+def timed() -> np.ndarray:
+    return np.column_stack([5.0 + np.arange(N) * 0.002, wrench()])
 
 
-def test_requests_are_the_manuals_bytes() -> None:
-    assert request(0x0002).hex() == "1234000200000000"
-    assert request(0x0003, 5).hex() == "1234000300000005"
-    assert request(0x0000).hex() == "1234000000000000"
+def test_a_file_that_grows_is_read_row_by_row(tmp_path: Path) -> None:
+    """What was there before is left out; a row that is cut by a write comes with the next."""
+    now_s = 0.0
+    path = written(tmp_path, "Time [s],Fx [N],Fy [N],Fz [N],Tx [N m],Ty [N m],Tz [N m]", timed())
+    reader = GrowingCsv(path, LIN, steady_s=lambda: now_s)
+    assert len(reader.read()) == 0
+    with path.open("a", buffering=1) as file:
+        file.write("90.01,1,2,3,4,5,6\n90.02,1,2,3,4,5,6\n90.03,1,2,")
+        file.flush()
+        found = reader.read()
+        assert found.t_s.tolist() == [90.01, 90.02]
+        assert found.wrench[0].tolist() == [1, 2, 3, 4000, 5000, 6000]
+        now_s = 4.0
+        assert len(reader.read()) == 0
+        file.write("9,4,5,6\n")
+        file.flush()
+        assert reader.read().wrench[:, 2].tolist() == [9]
+        now_s = 9.1
+        with pytest.raises(DeviceLostError, match=r"has not grown for 5\.1 s"):
+            reader.read()
+        file.write("90.04,a,2,3,4,5,6\n")
+        file.flush()
+        with pytest.raises(RecordingError, match="expected a number in every column"):
+            reader.read()
+    reader.close()
 
 
-def test_a_record_by_hand() -> None:
-    decoder = RdtDecoder(Scale(1_000_000.0, 1000.0, 1000.0))
-    words = [2500, 17500, 0, 1_500_000, -2_000_000, 3_250_000, 4_000, -5_500, 6_000]
-    decoder.feed(b"".join((w % 2**32).to_bytes(4, "big") for w in words))
-    taken = decoder.take(all_of_them=True)
-    assert taken.t_s.tolist() == [2.5]
-    assert taken.wrench.tolist() == [[1.5, -2.0, 3.25, 4.0, -5.5, 6.0]]
+def test_a_growing_file_says_its_mounting_or_is_told(tmp_path: Path) -> None:
+    path = written(tmp_path, GOOD, timed(), f"# mounting: {json.dumps(MOUNTING.facts())}")
+    reader = GrowingCsv(path)
+    assert reader.mounting.facts() == MOUNTING.facts()
+    reader.close()
+    with pytest.raises(RecordingError, match="expected --mounting"):
+        GrowingCsv(written(tmp_path, GOOD, timed()))
 
 
-def test_lost_doubled_and_reordered_datagrams(sent: np.ndarray) -> None:
-    rng = np.random.default_rng(3)
-    lost = set(rng.choice(np.arange(1, len(sent) - 1), 40, replace=False).tolist())
-    kept = [k for k in range(len(sent)) if k not in lost]
-    # up to twenty places out of order, and every hundredth twice
-    order = np.argsort(np.array(kept) + rng.uniform(0.0, 20.0, len(kept)), kind="stable")
-    decoder = RdtDecoder(Nano17().scale)
-    parts = []
-    for count, at in enumerate(order):
-        for _ in range(2 if count % 100 == 0 else 1):
-            decoder.feed(sent[kept[at]].tobytes())
-        if count % 37 == 0:
-            parts.append(decoder.take())
-    parts.append(decoder.take(all_of_them=True))
-    t_s = np.concatenate([part.t_s for part in parts])
-    force = np.concatenate([part.force_n for part in parts])
-    np.testing.assert_allclose(t_s, sent["rdt_sequence"][kept] / 500.0)
-    np.testing.assert_allclose(force, sent["counts"][kept, :3] / 1e6)
-    assert (decoder.lost, decoder.late) == (40, -(-len(order) // 100))
-
-
-def test_what_comes_after_its_turn_is_late_and_lost(sent: np.ndarray) -> None:
-    decoder = RdtDecoder(Nano17().scale)
-    for k in range(200):
-        if k != 50:
-            decoder.feed(sent[k].tobytes())
-    assert len(decoder.take()) == 200 - HOLD_RECORDS - 1
-    decoder.feed(sent[50].tobytes())
-    assert len(decoder.take(all_of_them=True)) == HOLD_RECORDS
-    assert (decoder.lost, decoder.late) == (1, 1)
-
-
-def test_the_sequence_wraps_and_a_restart_is_noticed(sent: np.ndarray) -> None:
-    decoder = RdtDecoder(Scale(1e6, 1e3, 100.0))
-    records = sent[:300].copy()
-    records["rdt_sequence"] = (2**32 - 150 + np.arange(300)) % 2**32
-    decoder.feed(records.tobytes())
-    taken = decoder.take(all_of_them=True)
-    np.testing.assert_allclose(np.diff(taken.t_s), 0.01, rtol=1e-4)
-    assert decoder.lost == 0
-    decoder = RdtDecoder(Nano17().scale)
-    decoder.feed(sent[:300].tobytes())
-    records["rdt_sequence"] = 1 + np.arange(300)
-    with pytest.raises(DeviceLostError, match="record number went from"):
-        decoder.feed(records.tobytes())
-
-
-def test_a_reading_with_the_error_bit_is_nan_and_a_strange_datagram_is_counted(sent: np.ndarray) -> None:
-    records = sent[:100].copy()
-    records["status"][10:13] = 0x8000_0004
-    records["status"][20] = 0x0000_0004  # a word without the summary bit
-    decoder = RdtDecoder(Nano17().scale)
-    decoder.feed(records.tobytes())
-    decoder.feed(b"")
-    decoder.feed(b"x" * 35)
-    taken = decoder.take(all_of_them=True)
-    assert np.flatnonzero(np.isnan(taken.force_n).any(axis=1)).tolist() == [10, 11, 12]
-    assert (decoder.bad, decoder.refused) == (3, 2)
-
-
-# ---- the emulated Nano17 and the box's configuration -------------------------------------------
-
-
-def test_the_nano17_reads_the_scenario_in_its_own_steps(sent: np.ndarray) -> None:
+def test_the_nano17_reads_the_scenario_in_its_own_steps() -> None:
     source = load_source("press.toml", seconds=4.0)
     nano17 = Nano17()
-    board_s, records = nano17.records(source, 0)
+    board_s, samples = nano17.measured(source, 0)
     assert source.truth is not None
-    reading = records["counts"] / np.array([1e6] * 3 + [1e3] * 3)
-    steps = reading / RESOLUTION
-    # a step of torque is 15.625 counts of the box
-    np.testing.assert_allclose(steps, np.rint(steps), atol=0.5 / 15.625 + 1e-9)
+    reading = samples.wrench
+    np.testing.assert_allclose(reading / RESOLUTION, np.rint(reading / RESOLUTION), atol=1e-9)
     lin = nano17.mounting.to_finger(reading - nano17.zero)
     truth = np.column_stack([source.truth.force_n[:, 0], source.truth.torque_nmm[:, 0]])
     at_s = (np.arange(len(truth)) + 0.5) / 100.0
@@ -372,47 +324,3 @@ def test_the_nano17_reads_the_scenario_in_its_own_steps(sent: np.ndarray) -> Non
     assert np.abs(error.mean(axis=0)).max() < 0.01
     # its own clock: 60 ppm more samples than the board's time would give
     assert np.diff(board_s).mean() == pytest.approx(1.0 / 500.0 / (1.0 + 60e-6), rel=1e-9)
-
-
-CONFIGURATION = (
-    "<netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000000</cfgcpt><scfgfu>N</scfgfu><scfgtu>{unit}</scfgtu>"
-    "<comrdte>{rdt}</comrdte><comrdtrate>1000</comrdtrate><cfgcalsn>FT12345</cfgcalsn></netft>"
-)
-
-
-@pytest.mark.parametrize(("unit", "per_nmm"), [("N-m", 1000.0), ("Nm", 1000.0), ("N-mm", 1e6), ("Nmm", 1e6)])
-def test_a_boxs_configuration(unit: str, per_nmm: float) -> None:
-    scale, number = read_configuration(CONFIGURATION.format(unit=unit, rdt="Enabled").encode(), "box")
-    assert (scale.counts_per_n, scale.counts_per_nmm, scale.rate_hz) == (1e6, per_nmm, 1000.0)
-    assert number == "FT12345"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (CONFIGURATION.format(unit="lbf-in", rdt="Enabled"), "unit is 'lbf-in': expected N"),
-        (CONFIGURATION.format(unit="N-m", rdt="Disabled"), "RDT is Disabled"),
-        ("<netft></netft>", "no <comrdte>"),
-        ("<html>", "expected the XML of a Net F/T box"),
-        (CONFIGURATION.format(unit="N-m", rdt="Enabled").replace("1000000", "0"), "expected a number above 0"),
-    ],
-)
-def test_a_configuration_that_cannot_be_used(text: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        read_configuration(text.encode(), "box")
-
-
-def test_addresses() -> None:
-    address = parse_address("netft:192.168.1.1")
-    assert (address.host, address.port, address.scale) == ("192.168.1.1", 49152, None)
-    address = parse_address("netft:box:5000?cpf=2000&cpt=5000&rate=7000")
-    assert address.port == 5000
-    assert address.scale == Scale(2000.0, 5.0, 7000.0)
-    for text, words in (
-        ("netft:", "is not valid: expected netft:HOST"),
-        ("netft:a?speed=1", "option 'speed' is not valid"),
-        ("netft:a?cpf=1", "only cpf given: expected cpf, cpt and rate, or none"),
-        ("netft:a?cpf=x&cpt=1&rate=1", "an option is not a number"),
-    ):
-        with pytest.raises(InputError, match=words):
-            parse_address(text)

@@ -13,13 +13,14 @@ from __future__ import annotations
 import io
 import json
 import re
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
-from ...errors import InputError, RecordingError, taken
+from ...errors import DeviceLostError, InputError, RecordingError, taken
 from .mounting import Mounting, from_json
 from .samples import Floats, Reference, Samples, check
 
@@ -28,18 +29,14 @@ COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
 _NAMES = ("t", "fx", "fy", "fz", "mx", "my", "mz")
 _UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
 _COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]([^\])]*)[\])]|_(.+))?$", re.IGNORECASE)
+SILENCE_S = 5.0  # programs write in pieces
 _WANTED = "t in s, forces in N, torques in N mm or N m"
 
 
 def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
     """The reference in ``path``; ``mounting`` replaces the file's own."""
     own, head, read = open_table(path)
-    if mounting is None and "mounting" not in own:
-        raise RecordingError(
-            f"{path}: does not say how the sensor is mounted on the finger: expected --mounting FILE.toml, or "
-            "--mounting lin if axes and origin are already Lin's"
-        )
-    chosen = mounting or from_json(own["mounting"], f"{path}: line '# mounting:'")
+    chosen = mounting or _mounting_in(path, own)
     use, scale = columns(path, head)
     table = read(use)
     samples = Samples(table[:, 0], table[:, 1:] * scale)
@@ -47,11 +44,21 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
     return Reference(path.name, samples, chosen, own.get("sensor", ""))
 
 
-def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequence[int]], Floats]]:
+def _mounting_in(path: Path, own: dict[str, str]) -> Mounting:
+    if "mounting" not in own:
+        raise RecordingError(
+            f"{path}: does not say how the sensor is mounted on the finger: expected --mounting FILE.toml, or "
+            "--mounting lin if axes and origin are already Lin's"
+        )
+    return from_json(own["mounting"], f"{path}: line '# mounting:'")
+
+
+def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[..., Floats]]:
     """The values of '# key: value' lines, the header's names, and a function from column indices to numbers (n, k).
 
-    Columns are separated by comma, semicolon or tab. Raises RecordingError for a file without text or header; the
-    function raises it for a cell that is not a number.
+    Columns are separated by comma, semicolon or tab. The function reads the rows of the file, or those in a text that
+    it is given. Raises RecordingError for a file without text or header; the function raises it for a cell that is not
+    a number.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -71,11 +78,11 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
         raise RecordingError(f"{path}: no header line: expected one that names every column")
     separator = max(",;\t", key=head.count)
 
-    def read(indices: Sequence[int]) -> Floats:
-        if not body.strip():
+    def read(indices: Sequence[int], rows: str = body) -> Floats:
+        if not rows.strip():
             return np.empty((0, len(indices)))
         try:
-            return np.loadtxt(io.StringIO(body), delimiter=separator, usecols=indices, ndmin=2, dtype=np.float64)
+            return np.loadtxt(io.StringIO(rows), delimiter=separator, usecols=indices, ndmin=2, dtype=np.float64)
         except ValueError as error:
             raise RecordingError(
                 f"{path}: {error}: expected a number in every column; save it with decimal points"
@@ -114,6 +121,43 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
             f"{path}: no column {missing[0]}: expected {','.join(COLUMNS)}, or the same without torque"
         )
     return [found[name][0] for name in wanted], np.array([found[name][1] for name in wanted[1:]])
+
+
+class GrowingCsv:
+    """A Reader of a file that the sensor's program keeps appending rows to, from those after this call on.
+
+    ``steady_s`` is the clock by which silence is judged. Raises RecordingError for a header that cannot be used.
+    """
+
+    def __init__(
+        self, path: Path, mounting: Mounting | None = None, *, steady_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        own, head, self._parse = open_table(path)
+        self.mounting = mounting or _mounting_in(path, own)
+        self.sensor = own.get("sensor", path.name)
+        self._path, self._steady_s = path, steady_s
+        self._use, self._scale = columns(path, head)
+        self._file = path.open("rb")
+        self._begun = self._file.read().rpartition(b"\n")[2]  # a row that is being written
+        self._grew_s = steady_s()
+
+    def read(self, board_s: float = 0.0) -> Samples:
+        """The rows that are new and whole. Raises DeviceLostError when none came for SILENCE_S."""
+        whole, end, self._begun = (self._begun + self._file.read()).rpartition(b"\n")
+        table = self._parse(self._use, (whole + end).decode(errors="replace"))
+        now_s = self._steady_s()
+        if len(table):
+            self._grew_s = now_s
+        elif now_s - self._grew_s > SILENCE_S:
+            raise DeviceLostError(
+                f"{self._path} has not grown for {now_s - self._grew_s:.1f} s: expected the force sensor's program to "
+                "append rows; check that it records, and does not keep them to itself"
+            )
+        return Samples(table[:, 0], table[:, 1:] * self._scale)
+
+    def close(self) -> None:
+        """Close the file. Safe to call twice."""
+        self._file.close()
 
 
 class CsvWriter:

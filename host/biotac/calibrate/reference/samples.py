@@ -89,23 +89,11 @@ def check(where: str, samples: Samples) -> None:
         )
 
 
-@dataclass(frozen=True)
-class ReaderStats:
-    """How many samples never came, came too late or twice, or were marked as bad by the sensor."""
-
-    lost: int
-    late: int
-    bad: int
-
-
 class Reader(Protocol):
     """A force/torque sensor that is read live."""
 
     @property
     def sensor(self) -> str: ...  # its name and number as far as known, for people and for provenance
-
-    @property
-    def stats(self) -> ReaderStats: ...
 
     def read(self, board_s: float) -> Samples:
         """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor is gone.

@@ -13,8 +13,8 @@ from typing import Any
 import biotac
 
 from ...calibrate import population
+from ...calibrate.reference.csv_file import GrowingCsv
 from ...calibrate.reference.mounting import Mounting, read_mounting
-from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
 from ...calibrate.reference.samples import Reader
 from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="report (.md, .png) and map (.wrench.json) go here")
     parser.add_argument(
         "--reference", metavar="REF", action="append", default=[],
-        help="force of the .mcap at the same place: .csv, or .mcap with WrenchStamped (:TOPIC if many); with --live "
-        "netft:HOST (ATI Net F/T), or nano17 (emulated, beside sim:)",
+        help="force of the .mcap at the same place: .csv, or .mcap with WrenchStamped (:TOPIC if many); with --live a "
+        ".csv that the sensor's program is writing, or nano17 (emulated, beside sim:)",
     )  # fmt: skip
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
     values.add_finger(parser, required=False, text="of a recording with several: name or chip select")
@@ -194,9 +194,6 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
             raise
         finally:
             progress.done()
-        lost = reader.stats
-    if lost.lost or lost.late or lost.bad:
-        outputs.note(f"reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad")
     if procedure.zero is None:
         raise KeyboardInterrupt(f"ended while {procedure.last_step.value.partition(':')[0]}; {recorded}")
     return path, procedure.coverage.missing()
@@ -205,23 +202,17 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
 @contextlib.contextmanager
 def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[Reader, Mounting]]:
     if len(args.reference) != 1:
-        raise InputError(f"{len(args.reference)} --reference with --live: expected one, {PREFIX}HOST or {EMULATED}")
+        raise InputError(f"{len(args.reference)} --reference with --live: expected one, a .csv or {EMULATED}")
     (text,) = args.reference
-    if text == EMULATED:
-        if not isinstance(hand.link.source, Source):
-            raise InputError(
-                f"{EMULATED} is emulated and works only with a simulated finger: expected --live sim:SCENARIO"
-            )
-        nano17 = Nano17() if args.mounting is None else Nano17(read_mounting(args.mounting))
+    mounting = None if args.mounting is None else read_mounting(args.mounting)
+    if text != EMULATED:
+        with contextlib.closing(GrowingCsv(Path(text), mounting)) as reader:
+            yield reader, reader.mounting
+    elif isinstance(hand.link.source, Source):
+        nano17 = Nano17() if mounting is None else Nano17(mounting)
         yield Nano17Reader(hand.link.source, finger, nano17), nano17.mounting
-        return
-    if not text.startswith(PREFIX):
-        raise InputError(f"{text}: expected {PREFIX}HOST (a Net F/T box) or {EMULATED} (emulated)")
-    if args.mounting is None:
-        raise InputError(f"the mounting of {text} on the finger is unknown: expected --mounting FILE.toml")
-    mounting = read_mounting(args.mounting)
-    with contextlib.closing(NetFtReader(parse_address(text))) as reader:
-        yield reader, mounting
+    else:
+        raise InputError(f"{EMULATED} is emulated and works only with a simulated finger: expected --live sim:SCENARIO")
 
 
 # ---- files and text ----------------------------------------------------------------------------

@@ -97,6 +97,7 @@ def play_recording(args: argparse.Namespace) -> int:
         tell_over(args.source)
         while True:
             board.turn(1.0)
+    return 0
 
 
 def prepare(board: SimBoard) -> None:
