@@ -21,7 +21,7 @@ class Failed(Exception):
     """One sentence for the user."""
 
 
-def words(elf: Path) -> list[str]:
+def argv(elf: Path) -> list[str]:
     """QEMU's command line."""
     return ["qemu-system-arm", "-M", "mps2-an386", "-kernel", str(elf), "-display", "none", "-monitor", "none",
             "-serial", "none", "-semihosting-config", "enable=on,target=native"]  # fmt: skip
@@ -32,13 +32,13 @@ def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
     if not elf.is_file():
         raise Failed(f"{elf} is missing; build it: cmake -S firmware --preset m4f && cmake --build build/m4f")
     try:
-        done = subprocess.run(words(elf), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        done = subprocess.run(argv(elf), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               timeout=seconds, check=False)  # fmt: skip
     except FileNotFoundError:
         raise Failed("qemu-system-arm is missing; install it: apt-get install qemu-system-arm") from None
     except subprocess.TimeoutExpired as late:
-        said = (late.stdout or b"").decode(errors="replace").splitlines()
-        last = f"it printed {len(said)} lines, the last: {said[-1]}" if said else "it printed nothing"
+        output = (late.stdout or b"").decode(errors="replace").splitlines()
+        last = f"it printed {len(output)} lines, the last: {output[-1]}" if output else "it printed nothing"
         raise Failed(f"{elf.name} did not end within {seconds:g} s; {last}") from None
     return done.returncode, done.stdout.decode(errors="replace")
 
@@ -48,8 +48,8 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="kill it after this long (default %(default)g)")
     parser.add_argument("image", type=Path, help="an .elf built from firmware/boards/m4f")
     args = parser.parse_args()
-    code, said = run(args.image, args.seconds)
-    sys.stdout.write(said)
+    code, output = run(args.image, args.seconds)
+    sys.stdout.write(output)
     return code
 
 

@@ -27,8 +27,12 @@ def test_a_full_disk_ends_an_export_in_a_line_and_leaves_nothing(tmp_path: Path,
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert len(lines) == 2 * len(LIMITS)
-    for limit, said, left in zip(LIMITS, lines[::2], lines[1::2], strict=True):
-        assert said.startswith(f"{limit} InputError") and "cannot be written (" in said and "File too large" in said
+    for limit, message, left in zip(LIMITS, lines[::2], lines[1::2], strict=True):
+        assert (
+            message.startswith(f"{limit} InputError")
+            and "cannot be written (" in message
+            and "File too large" in message
+        )
         assert left == f"{limit} left []"
 
 
@@ -38,4 +42,4 @@ def test_an_export_of_two_files_writes_both_or_none(tmp_path: Path, recorded: Pa
     second.write_text("precious")
     with pytest.raises(biotac.InputError, match=r"out\.pac.* exists"):
         export(recording, tmp_path / f"out{suffix}")
-    assert [its.name for its in tmp_path.iterdir()] == [second.name] and second.read_text() == "precious"
+    assert [path.name for path in tmp_path.iterdir()] == [second.name] and second.read_text() == "precious"

@@ -183,7 +183,7 @@ def test_a_flipped_bit_in_an_npz_drops_no_channel(tmp_path: Path) -> None:
     data = npz(E=draw.integers(2000, 3000, (20, 19)), PDC=draw.integers(2000, 3000, 20), TDC=np.arange(900, 920))
     path.write_bytes(data)
     good = load_source(path).samples
-    told = 0
+    reported = 0
     for bit in range(8 * data.index(b"PK\x01\x02"), 8 * len(data)):  # the directory, at the end
         spoilt = bytearray(data)
         spoilt[bit // 8] ^= 1 << bit % 8
@@ -191,8 +191,8 @@ def test_a_flipped_bit_in_an_npz_drops_no_channel(tmp_path: Path) -> None:
         try:
             np.testing.assert_array_equal(load_source(path).samples, good)
         except BiotacError:
-            told += 1
-    assert told
+            reported += 1
+    assert reported
 
 
 def binaries() -> Iterator[tuple[str, str, Callable[[Path], Any], bytes]]:
@@ -211,7 +211,7 @@ def binaries() -> Iterator[tuple[str, str, Callable[[Path], Any], bytes]]:
     yield "mounting", ".toml", lambda path: read_mounting(str(path)), mounting
 
 
-@pytest.mark.parametrize(("suffix", "read", "good"), [pytest.param(*its, id=name) for name, *its in binaries()])
+@pytest.mark.parametrize(("suffix", "read", "good"), [pytest.param(*parts, id=name) for name, *parts in binaries()])
 def test_a_damaged_file_is_refused_in_a_line_or_read(
     tmp_path: Path, suffix: str, read: Callable[[Path], Any], good: bytes
 ) -> None:
@@ -268,9 +268,9 @@ def test_toml_made_to_hurt_is_refused_in_little_time_and_memory(tmp_path: Path, 
     path = tmp_path / "bomb.toml"
     path.write_text(line)
     assert path.stat().st_size < 1 << 20
-    told = used_by_another(f"load_source({str(path)!r})")
-    assert told.isprintable() and told != "read"
-    assert refused_or_read(lambda its: read_mounting(str(its)), path)
+    reported = used_by_another(f"load_source({str(path)!r})")
+    assert reported.isprintable() and reported != "read"
+    assert refused_or_read(lambda parts: read_mounting(str(parts)), path)
 
 
 def test_what_is_dotted_but_no_key_is_read() -> None:
@@ -352,10 +352,10 @@ used = resource.getrusage(resource.RUSAGE_SELF)
 most = next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM"))  # not its parent's
 print(used.ru_utime + used.ru_stime, int(most) * 1024, told)
 """
-    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
-    seconds, size, told = said.split(maxsplit=2)
+    output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    seconds, size, reported = output.split(maxsplit=2)
     assert float(seconds) < CPU_S and int(size) < MORE_BYTES
-    return told.strip()
+    return reported.strip()
 
 
 @pytest.mark.parametrize(
@@ -376,10 +376,10 @@ def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatc
     """Work in rows, not seconds: states of a timeline, and of those the ones with a load of their own."""
     states, loads = [0], [0]
 
-    def deform(its: physics.States) -> tuple[np.ndarray, np.ndarray]:
-        states[0] += len(its)
-        loads[0] += len(np.unique(its.force_n))
-        return np.zeros((len(its), 19)), np.zeros((len(its), 19))
+    def deform(parts: physics.States) -> tuple[np.ndarray, np.ndarray]:
+        states[0] += len(parts)
+        loads[0] += len(np.unique(parts.force_n))
+        return np.zeros((len(parts), 19)), np.zeros((len(parts), 19))
 
     monkeypatch.setattr(physics, "deform", deform)
     path = tmp_path / "long.toml"

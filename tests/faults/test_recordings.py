@@ -26,9 +26,9 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
         return record_all("sim:press.toml?seconds=0.6", tmp_path_factory.mktemp("recorded") / "rec.mcap").read_bytes()
 
 
-def said(path: Path) -> tuple[dict[str, Any], list[str]]:
+def content(path: Path) -> tuple[dict[str, Any], list[str]]:
     """All that a Recording gives, and its problems."""
-    its = biotac.Recording(path)
+    found = biotac.Recording(path)
     names = [
         "settings",
         "calibrations",
@@ -42,10 +42,10 @@ def said(path: Path) -> tuple[dict[str, Any], list[str]]:
         "counts",
         "frames_lost",
     ]
-    facts = {name: getattr(its, name) for name in names} | {
-        name: getattr(its, name).tobytes() for name in ("frames", "pac", "idle", "wire")
+    facts = {name: getattr(found, name) for name in names} | {
+        name: getattr(found, name).tobytes() for name in ("frames", "pac", "idle", "wire")
     }
-    return facts | {"blocks": its.blocks, "gaps": its.gaps, "arrivals": list(its._arrivals())}, its.problems
+    return facts | {"blocks": found.blocks, "gaps": found.gaps, "arrivals": list(found._arrivals())}, found.problems
 
 
 def loaded(path: Path) -> tuple[bytes, bool]:
@@ -68,7 +68,7 @@ def records(data: bytes) -> list[tuple[int, int, int]]:
 def outcome(path: Path, good: tuple[dict[str, Any], bytes]) -> str:
     """``told`` or ``silent`` where something is another, else ``harmless``."""
     try:
-        facts, problems = said(path)
+        facts, problems = content(path)
         rows, warned = loaded(path)
     except biotac.RecordingError:
         return "told"
@@ -80,7 +80,7 @@ def outcome(path: Path, good: tuple[dict[str, Any], bytes]) -> str:
 def tried(tmp_path: Path, recorded: bytes, bits: list[int]) -> Counter[str]:
     path = tmp_path / "rec.mcap"
     path.write_bytes(recorded)
-    facts, problems = said(path)
+    facts, problems = content(path)
     rows, warned = loaded(path)
     assert not problems and not warned
     counts: Counter[str] = Counter()
@@ -88,9 +88,9 @@ def tried(tmp_path: Path, recorded: bytes, bits: list[int]) -> Counter[str]:
         spoilt = bytearray(recorded)
         spoilt[bit // 8] ^= 1 << bit % 8
         path.write_bytes(spoilt)
-        its = outcome(path, (facts, rows))
-        assert its != "silent", f"bit {bit % 8} of byte {bit // 8}"
-        counts[its] += 1
+        found = outcome(path, (facts, rows))
+        assert found != "silent", f"bit {bit % 8} of byte {bit // 8}"
+        counts[found] += 1
     return counts
 
 
@@ -122,7 +122,7 @@ def test_a_block_that_is_cut_out_is_told(tmp_path: Path, recorded: bytes) -> Non
     """Whole records gone, lengths right: only the checksums and statistics know."""
     path = tmp_path / "rec.mcap"
     path.write_bytes(recorded)
-    good = said(path)[0], loaded(path)[0]
+    good = content(path)[0], loaded(path)[0]
     until = next(begin for opcode, begin, _ in records(recorded) if opcode == DATA_END)
     for _, begin, end in records(recorded):
         if begin < until:
@@ -134,11 +134,11 @@ def test_records_that_changed_places_or_came_twice_are_told(tmp_path: Path, reco
     """Every one of them whole: its own checksum knows nothing, and who loads a part does not look at the file's."""
     path, draw = tmp_path / "rec.mcap", random.Random(19)
     path.write_bytes(recorded)
-    good = said(path)[0], loaded(path)[0]
-    its = [recorded[begin:end] for _, begin, end in records(recorded)]
+    good = content(path)[0], loaded(path)[0]
+    found = [recorded[begin:end] for _, begin, end in records(recorded)]
     until = next(k for k, (opcode, *_) in enumerate(records(recorded)) if opcode == DATA_END)
     for _ in range(60):
-        order, one, other = list(its), draw.randrange(until), draw.randrange(until)
+        order, one, other = list(found), draw.randrange(until), draw.randrange(until)
         if draw.random() < 0.5:
             order[one], order[other] = order[other], order[one]
         else:

@@ -78,8 +78,8 @@ def test_a_poke_s_frames_are_those_above_one_newton() -> None:
     rows = poke.contacts(trial)
     firm = trial.states.force_n > 1.0
     assert (np.sum(rows, axis=0) == firm).all()
-    for k, mine in enumerate(rows):
-        assert trial.at_mm[mine] == pytest.approx(np.tile(poke.TRUE_MM[k], (mine.sum(), 1)))
+    for k, own in enumerate(rows):
+        assert trial.at_mm[own] == pytest.approx(np.tile(poke.TRUE_MM[k], (own.sum(), 1)))
     band = poke.contacts(trial, 1.5, 2.0)
     assert (np.sum(band, axis=0) == (trial.states.force_n > 1.5) & (trial.states.force_n <= 2.0)).all()
 
@@ -117,9 +117,9 @@ def test_angles_that_are_known() -> None:
 
 def test_a_frame_without_a_point_counts_against_the_weights() -> None:
     touched, pressure = np.array([True, True, False]), np.array([50.0, 50.0, 50.0])
-    its = plate_normal.Angles("new", poke.SHIPPED, np.array([5.0, np.nan, 90.0]), touched, pressure)
-    assert its.over(40.0).tolist() == [5.0, 180.0]
-    assert its.over(50.0).tolist() == []
+    result = plate_normal.Angles("new", poke.SHIPPED, np.array([5.0, np.nan, 90.0]), touched, pressure)
+    assert result.over(40.0).tolist() == [5.0, 180.0]
+    assert result.over(50.0).tolist() == []
 
 
 @pytest.mark.nightly
@@ -173,9 +173,9 @@ def test_a_finger_that_is_as_the_paper_says_is_measured_by_its_scales(figure10: 
         wire.Setting.TORQUE_GAIN_Y_NN: 700_000,
         wire.Setting.TORQUE_GAIN_Z_NN: 300_000,
     }
-    its = estimates.by_paper(trial, scales)
-    assert np.abs(its.force_n - force)[known].max() < 2e-4  # the wire's last digit is 0.0001 N
-    assert np.abs(its.torque_nmm - torque)[known][:, 1:].max() < 2e-3
+    result = estimates.by_paper(trial, scales)
+    assert np.abs(result.force_n - force)[known].max() < 2e-4  # the wire's last digit is 0.0001 N
+    assert np.abs(result.torque_nmm - torque)[known][:, 1:].max() < 2e-3
 
 
 def test_the_truth_has_the_right_signs_and_leaks_nothing(figure10: Trial) -> None:
@@ -211,17 +211,17 @@ def test_a_map_is_given_the_board_s_tare_and_pressure(figure10: Trial) -> None:
     axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
     rows = columns.columns(Signals(figure10.signal, figure10.tare, figure10.pressure))
     coefficients = np.random.default_rng(1).normal(0.0, 1.0, (rows.shape[1] + 1, 6))
-    its = WrenchMap("any", axes, np.full(19, 123.0), 1, (0,) * len(axes), coefficients)
-    found = estimates.by_map(figure10, its, "any")
+    result = WrenchMap("any", axes, np.full(19, 123.0), 1, (0,) * len(axes), coefficients)
+    found = estimates.by_map(figure10, result, "any")
     expected = rows @ coefficients[:-1] + coefficients[-1]
     known = np.isfinite(expected).all(axis=1)
     assert known.sum() > 5000
     assert np.column_stack([found.force_n, found.torque_nmm])[known] == pytest.approx(expected[known])
-    turned = replace(its, axes=("torsion", *axes[:5]))
+    turned = replace(result, axes=("torsion", *axes[:5]))
     assert estimates.by_map(figure10, turned, "any").own_torsion_nmm[known] == pytest.approx(expected[known, 0])
     without_pressure = replace(figure10, pdc=np.full_like(figure10.pdc, wire.INVALID_COUNT))
     with pytest.raises(InputError, match="needs PDC"):
-        estimates.by_map(without_pressure, its, "any")
+        estimates.by_map(without_pressure, result, "any")
 
 
 def test_a_recorded_trial_has_the_figures_of_the_emulated_one(tmp_path: Path, figure10: Trial) -> None:
@@ -314,8 +314,8 @@ def test_check_fails_with_its_own_code_when_a_figure_is_missed(monkeypatch, caps
     monkeypatch.setattr(plate_normal, "LIMIT_MEDIAN_DEG", 0.1)
     assert main(["experiment", "plate-normal"]) == 0
     assert main(["experiment", "plate-normal", "--check"]) == 1
-    said = capsys.readouterr().out
-    assert "* NOT met: median" in said and "* met: 90th percentile" in said
+    output = capsys.readouterr().out
+    assert "* NOT met: median" in output and "* met: 90th percentile" in output
 
 
 # ---- wettels2011 ---------------------------------------------------------------------------------
@@ -327,10 +327,10 @@ def test_wettels2011_has_a_row_for_every_table_and_figure(tmp_path: Path, capsys
     facts = json.loads(capsys.readouterr().out)
     page = (tmp_path / "wettels2011.md").read_text(encoding="utf-8")
     first = [row.split("|")[1] for row in page.split("## Table 3, PAF")[0].splitlines() if row.startswith("| ")]
-    said = " ".join(first)
+    output = " ".join(first)
     for kind, last in (("Table", 4), ("Fig", 13)):
         for k in range(1, last + 1):
-            assert re.search(rf"{kind} (\d+, )*{k}\b", said), (kind, k)
+            assert re.search(rf"{kind} (\d+, )*{k}\b", output), (kind, k)
     assert all(row.count("|") == 6 for row in page.split("## Table 3, PAF")[0].splitlines() if row.startswith("| "))
     assert [one["correct"] for one in facts["roc"]] and facts["bars"]["test"] == 30
     assert (tmp_path / "wettels2011.png").stat().st_size > 10_000

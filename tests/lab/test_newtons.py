@@ -23,7 +23,7 @@ def outcome() -> newtons.Outcome:
     scenes = [scene for *_, scene in newtons.UNTRAINED] + [scene for _, scene, _ in newtons.OWN_MODELS]
     points = [
         newtons.Point(
-            scene, newtons.OWN, {core: its["cycles"][scene] for core, its in kept().items()}, {"a": [3, 0, 4]}
+            scene, newtons.OWN, {core: found["cycles"][scene] for core, found in kept().items()}, {"a": [3, 0, 4]}
         )
         for scene in scenes
     ]
@@ -32,11 +32,11 @@ def outcome() -> newtons.Outcome:
 
 def test_every_point_has_cycles_on_every_core() -> None:
     """The file is what `tools/bench/run --keep` writes; a scene with another name would be missing here."""
-    its = outcome()
+    found = outcome()
     assert {"m0plus", "m4f"} == set(kept())
-    for point in its.points:
+    for point in found.points:
         assert all(100 < cycles < 1_000_000 for cycles in point.cycles.values())
-    assert its.points[0].error_n == pytest.approx(5.0)
+    assert found.points[0].error_n == pytest.approx(5.0)
 
 
 def test_the_picture_is_drawn(tmp_path: Path) -> None:
@@ -65,6 +65,6 @@ def test_the_nearest_row_is_none_of_the_same_press() -> None:
         (["newtons", "/nonexistent/F1.npz"], "F1.npz"),
     ],
 )
-def test_what_cannot_be_measured_is_refused(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_measured_is_refused(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", *words]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err

@@ -29,31 +29,31 @@ def looks(contacts: int = 12, frames: int = 20) -> normal.Looks:
 
 
 def test_what_the_electrodes_say_of_the_error_is_mended_on_contacts_that_were_not_trained_on() -> None:
-    its = looks()
-    before = np.median(normal.angles_deg(surface.normals_at(its.points_mm), its.normals))
-    after = np.median(normal.angles_deg(normal.held_out(its), its.normals))
+    looked = looks()
+    before = np.median(normal.angles_deg(surface.normals_at(looked.points_mm), looked.normals))
+    after = np.median(normal.angles_deg(normal.held_out(looked), looked.normals))
     assert after < 0.25 * before
-    turned = normal.fit(its).point_mm(its.points_mm, its.e)
-    truth = np.column_stack([its.points_mm[:, 0], surface.RADIUS_MM * its.normals[:, 1:]])
-    was, left = (np.median(np.linalg.norm(points - truth, axis=1)) for points in (its.points_mm, turned))
+    turned = normal.fit(looked).point_mm(looked.points_mm, looked.e)
+    truth = np.column_stack([looked.points_mm[:, 0], surface.RADIUS_MM * looked.normals[:, 1:]])
+    was, left = (np.median(np.linalg.norm(points - truth, axis=1)) for points in (looked.points_mm, turned))
     assert left < 0.25 * was
     assert turned[:, 0] == pytest.approx(-5.0)  # a plate says nothing of where along the cylinder
 
 
 def test_nothing_of_a_contact_reaches_its_own_prediction() -> None:
-    its = looks()
-    spoilt = its.normals.copy()
-    spoilt[its.contact == 3] = [1.0, 0.0, 0.0]
-    one, other = normal.held_out(its), normal.held_out(replace(its, normals=spoilt))
-    assert np.array_equal(one[its.contact == 3], other[its.contact == 3])
-    assert not np.allclose(one[its.contact == 4], other[its.contact == 4])
+    looked = looks()
+    spoilt = looked.normals.copy()
+    spoilt[looked.contact == 3] = [1.0, 0.0, 0.0]
+    one, other = normal.held_out(looked), normal.held_out(replace(looked, normals=spoilt))
+    assert np.array_equal(one[looked.contact == 3], other[looked.contact == 3])
+    assert not np.allclose(one[looked.contact == 4], other[looked.contact == 4])
 
 
 def test_a_frame_without_a_point_has_no_normal() -> None:
-    its = looks()
-    points = its.points_mm.copy()
+    looked = looks()
+    points = looked.points_mm.copy()
     points[5] = np.nan
-    found = normal.fit(its).corrected(points, its.e)
+    found = normal.fit(looked).corrected(points, looked.e)
     assert np.isnan(found[5]).all() and np.isfinite(found[6]).all()
 
 

@@ -47,7 +47,7 @@ def fingers(runs: list[Run]) -> list[training.FingerSums]:
 
 
 @pytest.fixture(scope="module")
-def its(fingers: list[training.FingerSums]) -> Population:
+def prior(fingers: list[training.FingerSums]) -> Population:
     return training.train(fingers[:2])
 
 
@@ -57,72 +57,74 @@ def test_an_electrodes_mirror_image_lies_across_and_is_mirrored_back() -> None:
     assert np.array_equal(training.MIRROR[training.MIRROR], np.arange(19))
 
 
-def test_rest_is_no_force_on_any_finger(its: Population, runs: list[Run]) -> None:
+def test_rest_is_no_force_on_any_finger(prior: Population, runs: list[Run]) -> None:
     for run in runs:
-        assert np.array_equal(its.force(run.tare[None], run.tare), np.zeros((1, 3)))
+        assert np.array_equal(prior.force(run.tare[None], run.tare), np.zeros((1, 3)))
 
 
 def test_a_symmetric_map_says_the_mirrored_force_of_a_mirrored_finger(
     fingers: list[training.FingerSums], runs: list[Run]
 ) -> None:
-    its = training.train(fingers[:2], symmetric=True)
+    prior = training.train(fingers[:2], symmetric=True)
     other = training.mirrored(runs[2])
-    there = its.force(other.counts, other.tare)
-    assert np.allclose(there, its.force(runs[2].counts, runs[2].tare) * [1.0, -1.0, 1.0], atol=1e-6)
+    there = prior.force(other.counts, other.tare)
+    assert np.allclose(there, prior.force(runs[2].counts, runs[2].tare) * [1.0, -1.0, 1.0], atol=1e-6)
 
 
-def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(its: Population, runs: list[Run]) -> None:
+def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(prior: Population, runs: list[Run]) -> None:
     def lin(run: Run) -> np.ndarray:
         return (run.counts - run.tare) @ surface.ELECTRODE_NORMAL
 
-    said = np.concatenate([lin(run) for run in runs[:2]])
+    felt_n = np.concatenate([lin(run) for run in runs[:2]])
     truth = np.concatenate([run.truth for run in runs[:2]])
-    scales = (said * truth).sum(axis=0) / (said**2).sum(axis=0)
+    scales = (felt_n * truth).sum(axis=0) / (felt_n**2).sum(axis=0)
     new = runs[2]
     lins = np.sqrt(((lin(new) * scales - new.truth) ** 2).mean(axis=0))
-    found = np.sqrt(((its.force(new.counts, new.tare) - new.truth) ** 2).mean(axis=0))
+    found = np.sqrt(((prior.force(new.counts, new.tare) - new.truth) ** 2).mean(axis=0))
     assert (found < 0.75 * lins).all()
 
 
-def test_the_map_is_one_for_a_board(its: Population, runs: list[Run]) -> None:
+def test_the_map_is_one_for_a_board(prior: Population, runs: list[Run]) -> None:
     new = runs[2]
-    of_board = its.wrench_map(new.tare)
-    assert np.allclose(of_board.predict(new.counts), its.force(new.counts, new.tare), atol=1e-9)
+    of_board = prior.wrench_map(new.tare)
+    assert np.allclose(of_board.predict(new.counts), prior.force(new.counts, new.tare), atol=1e-9)
     assert summary(of_board, new.counts)["outside"] == 0
 
 
 def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
-    said = np.column_stack([np.zeros(20), np.zeros(20), np.full(20, 40.0)])
-    said[:, 0] = 0.1 * said[:, 2]
-    found = scale_of(said, 1.2 * said[:, 2])
+    felt_n = np.column_stack([np.zeros(20), np.zeros(20), np.full(20, 40.0)])
+    felt_n[:, 0] = 0.1 * felt_n[:, 2]
+    found = scale_of(felt_n, 1.2 * felt_n[:, 2])
     assert found.gain == pytest.approx(1.2, abs=0.001)
     assert found.balance == pytest.approx(0.1, abs=0.001)
     # light ones say less than what is known of fingers
-    light = scale_of(0.01 * said, 0.012 * said[:, 2])
+    light = scale_of(0.01 * felt_n, 0.012 * felt_n[:, 2])
     assert 1.0 < light.gain < 1.02
     assert 0.0 < light.balance < 0.05
-    assert np.allclose(Scale(1.2, 0.1).applied(said), np.column_stack([np.zeros(20), np.zeros(20), np.full(20, 48.0)]))
+    assert np.allclose(
+        Scale(1.2, 0.1).applied(felt_n), np.column_stack([np.zeros(20), np.zeros(20), np.full(20, 48.0)])
+    )
 
 
-def test_a_scale_on_the_map_is_the_scale_on_its_forces(its: Population, runs: list[Run]) -> None:
+def test_a_scale_on_the_map_is_the_scale_on_its_forces(prior: Population, runs: list[Run]) -> None:
     scale, new = Scale(1.1, -0.07), runs[2]
-    there = scale.on(its).force(new.counts, new.tare)
-    assert np.allclose(there, scale.applied(its.force(new.counts, new.tare)), atol=1e-9)
+    there = scale.on(prior).force(new.counts, new.tare)
+    assert np.allclose(there, scale.applied(prior.force(new.counts, new.tare)), atol=1e-9)
 
 
 @pytest.mark.parametrize(("said_z", "shown"), [([1.0, -2.0, 3.0], [1.0, 2.0, 3.0]), ([1.0, 2.0, 3.0], [0, 2, 3])])
 def test_presses_that_say_nothing_are_refused(said_z: list[float], shown: list[float]) -> None:
-    said = np.column_stack([np.zeros(len(said_z)), np.zeros(len(said_z)), said_z])
+    felt_n = np.column_stack([np.zeros(len(said_z)), np.zeros(len(said_z)), said_z])
     with pytest.raises(InputError, match="presses"):
-        scale_of(said, np.array(shown, dtype=np.float64))
+        scale_of(felt_n, np.array(shown, dtype=np.float64))
 
 
-def test_a_minute_moves_the_map_and_no_time_does_not(its: Population, runs: list[Run]) -> None:
+def test_a_minute_moves_the_map_and_no_time_does_not(prior: Population, runs: list[Run]) -> None:
     new = runs[2]
     sums = training.sums(new)
-    assert np.array_equal(pulled(its, sums, 0.0).coefficients, its.coefficients)
+    assert np.array_equal(pulled(prior, sums, 0.0).coefficients, prior.coefficients)
     rmse = [
-        float(((pulled(its, sums, seconds).force(new.counts, new.tare) - new.truth) ** 2).sum())
+        float(((pulled(prior, sums, seconds).force(new.counts, new.tare) - new.truth) ** 2).sum())
         for seconds in (0.0, 60.0, 6000.0)
     ]
     assert rmse[0] > rmse[1] > rmse[2]
@@ -133,7 +135,7 @@ def test_what_goes_with_f_z_in_a_recording_is_its_mounting(runs: list[Run]) -> N
     run = runs[0]
     tilted = run.truth.copy()
     tilted[:, 0] += 0.1 * tilted[:, 2]
-    level, other = (training.train([training.sums_of(its)]) for its in (run, replace(run, truth=tilted)))
+    level, other = (training.train([training.sums_of(one)]) for one in (run, replace(run, truth=tilted)))
     assert np.allclose(level.coefficients, other.coefficients, atol=1e-6)
 
 
@@ -166,9 +168,9 @@ def test_the_command_trains_judges_and_keeps(
         ("COMPRESSION", "BULGE"),
     ],
 )
-def test_a_damaged_file_is_refused_in_words(its: Population, damage: tuple[str, str], tmp_path: Path) -> None:
+def test_a_damaged_file_is_refused_in_words(prior: Population, damage: tuple[str, str], tmp_path: Path) -> None:
     path = tmp_path / "x.json"
-    path.write_text(population_map.dumps(Trained(its, np.ones(3), np.ones(3), {})).replace(*damage))
+    path.write_text(population_map.dumps(Trained(prior, np.ones(3), np.ones(3), {})).replace(*damage))
     with pytest.raises(InputError, match="biotac-lab population --out"):
         population_map.load(path)
 
@@ -180,13 +182,13 @@ def test_the_packages_own_names_what_it_is_made_of() -> None:
     assert all(len(sha256) == 64 for sha256 in trained.provenance["files"].values())
 
 
-def test_a_finger_is_pulled_to_others_and_not_to_itself(its: Population, runs: list[Run], files: list[Path]) -> None:
-    trained = Trained(its, np.ones(3), np.ones(3), population_map.provenance_of(files[:2], "", symmetric=False))
+def test_a_finger_is_pulled_to_others_and_not_to_itself(prior: Population, runs: list[Run], files: list[Path]) -> None:
+    trained = Trained(prior, np.ones(3), np.ones(3), population_map.provenance_of(files[:2], "", symmetric=False))
     others, note = trained.others_than([files[2]])
     assert others is not None and note == "regularized towards the population map of 1.npz, 2.npz"
     e = runs[2].counts[:50] - runs[2].tare
     z = columns.with_one(columns.columns(Signals(e, runs[2].tare)))
-    assert z @ others == pytest.approx(its.force(runs[2].counts[:50], runs[2].tare), abs=1e-9)
+    assert z @ others == pytest.approx(prior.force(runs[2].counts[:50], runs[2].tare), abs=1e-9)
     others, note = trained.others_than([files[0]])
     assert others is None and note.startswith(
         "not regularized towards the population map of 1.npz, 2.npz, which was made"
@@ -194,10 +196,10 @@ def test_a_finger_is_pulled_to_others_and_not_to_itself(its: Population, runs: l
 
 
 def test_fingers_of_the_training_agree_with_the_normals_and_a_poke_does_not(
-    its: training.Population, runs: list[Run]
+    prior: training.Population, runs: list[Run]
 ) -> None:
     def share(counts: np.ndarray, tare: np.ndarray) -> np.ndarray:
-        force_100un = np.rint(1e4 * its.force(counts, tare)).astype(np.int64)
+        force_100un = np.rint(1e4 * prior.force(counts, tare)).astype(np.int64)
         return likeness(counts - tare, force_100un).share
 
     poke = runs[0].tare - 900.0 * np.eye(19)

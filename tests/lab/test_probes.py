@@ -29,12 +29,12 @@ def radius_mm(sigma_mm: float) -> float:
 @pytest.mark.parametrize("probe", PROBES[:2], ids=lambda probe: probe.name)
 def test_a_ball_on_the_tip_is_hertz_s(probe: probes.Probe) -> None:
     cap = surface.on_surface(np.array([[2.0, 1.0]]))
-    its = footprints(probe, cap, np.array([4.0]))
+    touch = footprints(probe, cap, np.array([4.0]))
     both = 1.0 / (1.0 / probe.radius_mm + 1.0 / (surface.RADIUS_MM + 2.0))  # Johnson 4.22: a^3 = 3 F R / 4 E*
     expected = (3.0 * 4.0 * both / (4.0 * 1.3)) ** (1.0 / 3.0)
-    assert radius_mm(its.short_mm[0]) == pytest.approx(expected, rel=1e-9)
+    assert radius_mm(touch.short_mm[0]) == pytest.approx(expected, rel=1e-9)
     ended = 1.0 / np.hypot(1.0 / expected, 1.0 / probe.half_length_mm)
-    assert radius_mm(its.long_mm[0]) == pytest.approx(ended, rel=1e-9)
+    assert radius_mm(touch.long_mm[0]) == pytest.approx(ended, rel=1e-9)
 
 
 def test_slenderness_is_near_hertz_s_own_integrals() -> None:
@@ -49,17 +49,17 @@ def test_slenderness_is_near_hertz_s_own_integrals() -> None:
 def test_a_flat_lies_along_the_cylinder_and_a_sharper_tip_is_smaller() -> None:
     prints = [footprints(probe, VENTER, np.array([5.0])) for probe in PROBES]
     assert np.abs(prints[-1].along[0]) == pytest.approx([1.0, 0.0, 0.0])
-    areas = [its.long_mm[0] * its.short_mm[0] for its in prints]
+    areas = [touch.long_mm[0] * touch.short_mm[0] for touch in prints]
     assert areas == sorted(areas)
 
 
 def test_a_bar_lies_as_it_is_turned() -> None:
     for degrees in (0.0, 20.0, 75.0, 90.0, 140.0):
-        its = footprints(BAR, VENTER, np.array([5.0]), np.radians([degrees]))
-        x, y = its.along[0, :2]
+        touch = footprints(BAR, VENTER, np.array([5.0]), np.radians([degrees]))
+        x, y = touch.along[0, :2]
         assert np.degrees(np.arctan2(y, x)) % 180.0 == pytest.approx(degrees % 180.0, abs=4.0)  # the finger's own bend
         again = footprints(BAR, VENTER, np.array([5.0]), np.radians([degrees + 180.0]))
-        assert again.long_mm == pytest.approx(its.long_mm)
+        assert again.long_mm == pytest.approx(touch.long_mm)
     mirror = [np.radians([30.0]), np.radians([-30.0])]
     counts = []
     for turned in mirror:
@@ -96,14 +96,14 @@ def test_two_contacts_add_squeeze_and_volume_and_nothing_adds_nothing() -> None:
 
 def test_the_data_set_is_what_the_paper_describes() -> None:
     finger = Finger(3)
-    its = stimulate(finger, (4, 3, 2, 1), seed=5, frames=8)
-    assert len(its) == (4 + 3 + 2 + 1) * 5 * 8
-    assert np.bincount(its.probe).tolist() == [n * 40 for n in (4, 3, 2, 1)]
-    assert [len(np.unique(its.probe[its.contact == k])) for k in range(10)] == [1] * 10
-    size = np.linalg.norm(its.force_n, axis=1)
-    peaks = [its.normal_n[its.stimulation == k].max() for k in range(50)]
+    touch = stimulate(finger, (4, 3, 2, 1), seed=5, frames=8)
+    assert len(touch) == (4 + 3 + 2 + 1) * 5 * 8
+    assert np.bincount(touch.probe).tolist() == [n * 40 for n in (4, 3, 2, 1)]
+    assert [len(np.unique(touch.probe[touch.contact == k])) for k in range(10)] == [1] * 10
+    size = np.linalg.norm(touch.force_n, axis=1)
+    peaks = [touch.normal_n[touch.stimulation == k].max() for k in range(50)]
     assert min(peaks) > 28.0 and max(peaks) <= 40.0
-    tilt = np.degrees(np.arccos(its.normal_n / size)).reshape(10, len(TILTS_DEG), 8)
+    tilt = np.degrees(np.arccos(touch.normal_n / size)).reshape(10, len(TILTS_DEG), 8)
     assert tilt[:, 0].max() < 15.0 < 20.0 < tilt[:, 1:].min()
-    np.testing.assert_array_equal(its.counts, stimulate(Finger(3), (4, 3, 2, 1), seed=5, frames=8).counts)
-    assert (its.where(its.probe == 2).contact == its.contact[its.probe == 2]).all()
+    np.testing.assert_array_equal(touch.counts, stimulate(Finger(3), (4, 3, 2, 1), seed=5, frames=8).counts)
+    assert (touch.where(touch.probe == 2).contact == touch.contact[touch.probe == 2]).all()

@@ -60,6 +60,6 @@ def test_what_is_held_is_told_by_real_taps() -> None:
     from sklearn.model_selection import cross_val_score
 
     signals = {what: data[f"handover_{what}_signals"] for what in ("rod", "box", "plate")}
-    rows = texture.describe_all(pac for its in signals.values() for pac in its)
-    labels = np.repeat(list(signals), [len(its) for its in signals.values()])
+    rows = texture.describe_all(pac for blocks in signals.values() for pac in blocks)
+    labels = np.repeat(list(signals), [len(blocks) for blocks in signals.values()])
     assert cross_val_score(texture.classifier(), rows, labels, cv=5).mean() > 0.9

@@ -70,22 +70,22 @@ class Program:
         self._process = subprocess.Popen(
             [sys.executable, str(PROGRAM), *words], stdin=pipe, stdout=pipe, text=True, env=env
         )
-        self.said: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            self.said.append(json.loads(line))
+            self.events.append(json.loads(line))
 
     def of(self, what: str) -> list[dict[str, Any]]:
-        return [one for one in list(self.said) if what in one]
+        return [one for one in list(self.events) if what in one]
 
     def wait_for_rows(self) -> None:
         """Until it has said as many new values as make its clock settle."""
-        end_s, before = time.monotonic() + 300, len(self.said)
-        while sum(bool(one.get("shown") or one.get("t_us")) for one in self.said[before:]) < STEADY_FRAMES:
+        end_s, before = time.monotonic() + 300, len(self.events)
+        while sum(bool(one.get("shown") or one.get("t_us")) for one in self.events[before:]) < STEADY_FRAMES:
             assert time.monotonic() < end_s
             time.sleep(0.01)
 
@@ -128,18 +128,18 @@ def running(program: Program, board: BoardBehindProxy) -> int:
     if board.kind == "posix":
         return 0
     program.wait_for_rows()
-    return len(program.said)
+    return len(program.events)
 
 
 def offset_s(program: Program) -> float:
     """This computer's time at the board's time 0, by the quickest row that was ever seen."""
-    rows = [(one["at_s"], one.get("t_us", one.get("shown"))) for one in program.said]
+    rows = [(one["at_s"], one.get("t_us", one.get("shown"))) for one in program.events]
     return min(at_s - t_us * 1e-6 for at_s, t_us in rows if t_us)
 
 
 def no_old_value_was_shown_as_new(program: Program, first_s: float, begin: int = 0) -> None:
     """A view shows nothing older than it may; batches tell their true age."""
-    for one in program.said[begin:]:
+    for one in program.events[begin:]:
         if one.get("shown") is not None:
             assert one["at_s"] - first_s - one["shown"] * 1e-6 <= MAX_AGE_S + TOLERANCE_S, one
         if one.get("age_s") is not None:
@@ -276,7 +276,7 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
     before = len(board.passed)
     board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
     if way == "views":
-        board.wait_for(lambda: program.said[-1].get("shown") is not None)
+        board.wait_for(lambda: program.events[-1].get("shown") is not None)
     program.end()
     assert not program.of("lost")
     if way == "views":
@@ -308,7 +308,7 @@ def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path,
     if way != "record":
         no_old_value_was_shown_as_new(program, offset_s(program))
     if way == "views":
-        assert program.of("counted") and program.said[-1]["shown"] is not None
+        assert program.of("counted") and program.events[-1]["shown"] is not None
         return
     if way == "record":
         (gap,) = biotac.Recording(program.of("paths")[0]["paths"][0]).gaps
@@ -374,7 +374,7 @@ def test_a_reader_of_a_shared_board_that_was_stopped(served: Served, tmp_path: P
     program.pause(pause_s)
     resumed_s = time.monotonic()
     program.wait_for_rows()
-    rows = [one for one in program.said if (one.get("shown") or one.get("t_us")) and one["at_s"] > resumed_s]
+    rows = [one for one in program.events if (one.get("shown") or one.get("t_us")) and one["at_s"] > resumed_s]
     program.end()
     no_old_value_was_shown_as_new(program, first_s)
     assert not program.of("lost") and rows

@@ -31,8 +31,8 @@ def test_it_is_small_and_needs_nothing(tmp_path: Path, speed: str) -> None:
     target = ["-std=c11", "-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", speed, *WARNINGS]
     made = tmp_path / "client.o"
     subprocess.run(["arm-none-eabi-gcc", *target, "-c", str(CLIENT / "biotac_client.c"), "-o", str(made)], check=True)
-    told = subprocess.run(["arm-none-eabi-size", str(made)], capture_output=True, text=True, check=True).stdout
-    text, data, bss = map(int, told.splitlines()[1].split()[:3])
+    output = subprocess.run(["arm-none-eabi-size", str(made)], capture_output=True, text=True, check=True).stdout
+    text, data, bss = map(int, output.splitlines()[1].split()[:3])
     assert text < MOST_BYTES and data == bss == 0  # no state but the caller's
     needed = subprocess.run(["arm-none-eabi-nm", "-u", str(made)], capture_output=True, text=True, check=True).stdout
     assert needed.split() == []  # no heap, no libc
@@ -51,22 +51,22 @@ def test_the_example_prints_the_frames_that_python_reads(tmp_path: Path) -> None
         done = subprocess.run([str(program), board.path, str(FRAMES)], capture_output=True, text=True, check=True)
     finally:
         board.close()
-    told = [
+    output = [
         tuple(int(word, 16 if k == 5 else 10) for k, word in enumerate(line.split()))
         for line in done.stdout.splitlines()
     ]
-    assert len(told) == FRAMES
+    assert len(output) == FRAMES
     with biotac.open("sim:press.toml?fingers=2&seconds=30") as hand:
         hand.stream()
         wire = {}
         for batch in hand.batches():
             wire |= {(int(m["finger"]), int(m["t_us"])): m for m in batch.wire}
-            if wire and max(t_us for _, t_us in wire) > max(t_us for _, t_us, *_ in told) + 20_000:
+            if wire and max(t_us for _, t_us in wire) > max(t_us for _, t_us, *_ in output) + 20_000:
                 break
-    for finger, t_us, x, y, z, flags in told:
+    for finger, t_us, x, y, z, flags in output:
         message = wire[finger, t_us]
         assert (message["force_100un"].tolist(), int(message["flags"])) == ([x, y, z], flags)
-    assert any(abs(z) < 2**31 - 1 for *_, z, _ in told)
+    assert any(abs(z) < 2**31 - 1 for *_, z, _ in output)
 
 
 @pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)
@@ -122,8 +122,8 @@ def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -
     assert len(forces) == 100 and last == "00000000 lost"
     assert {finger for finger, *_ in forces} == {0, 1}
     with biotac.open("sim:press.toml?fingers=2&seconds=60") as hand:
-        told = hand.read_batch(4000).wire
-    published = {(int(m["finger"]), *(int(f) & 0xFFFFFFFF for f in m["force_100un"])) for m in told}
+        output = hand.read_batch(4000).wire
+    published = {(int(m["finger"]), *(int(f) & 0xFFFFFFFF for f in m["force_100un"])) for m in output}
     assert set(forces) <= published
 
 

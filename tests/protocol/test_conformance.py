@@ -32,9 +32,9 @@ def test_the_firmwares_wire_conforms(tmp_path: Path) -> None:
     sources = sorted(map(str, (ROOT / "firmware/core/wire").glob("*.c")))
     build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{ROOT / 'firmware/core'}", str(CONFORMING / "core.c")]
     subprocess.run([*build, *sources, "-o", str(program)], check=True)
-    told = passes(str(program))
+    report = passes(str(program))
     # It encodes in place and frames only: what `frame` asks covers that.
-    assert told.count("not offered") == 1 and "cobs     not offered" in told
+    assert report.count("not offered") == 1 and "cobs     not offered" in report
 
 
 def test_the_c_clients_wire_conforms(tmp_path: Path) -> None:
@@ -43,8 +43,8 @@ def test_the_c_clients_wire_conforms(tmp_path: Path) -> None:
     program = tmp_path / "client"
     sources = [str(CONFORMING / "core.c"), str(client / "biotac_client.c")]
     subprocess.run([*build, *sources, "-o", str(program)], check=True)
-    told = passes(str(program))
-    assert told.count("not offered") == 1 and "cobs     not offered" in told
+    report = passes(str(program))
+    assert report.count("not offered") == 1 and "cobs     not offered" in report
 
 
 def test_the_librarys_wire_conforms() -> None:
@@ -96,10 +96,10 @@ def test_the_schemas_hash_is_what_the_spec_says() -> None:
 
     def without_doc(node: Any) -> Any:
         if isinstance(node, dict):
-            return {key: without_doc(its) for key, its in node.items() if key != "doc"}
-        return [without_doc(its) for its in node] if isinstance(node, list) else node
+            return {key: without_doc(value) for key, value in node.items() if key != "doc"}
+        return [without_doc(value) for value in node] if isinstance(node, list) else node
 
     schema = json.loads((ROOT / "protocol/schema.json").read_text())
-    told = schema.pop("schema_hash")
+    report = schema.pop("schema_hash")
     del schema["link"]["enum"]["board"]
-    assert zlib.crc32(json.dumps(without_doc(schema), sort_keys=True, separators=(",", ":")).encode()) == told
+    assert zlib.crc32(json.dumps(without_doc(schema), sort_keys=True, separators=(",", ":")).encode()) == report

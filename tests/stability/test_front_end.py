@@ -236,7 +236,7 @@ def test_a_jump_of_temperature_is_no_touch_five_seconds_after_it_began(profile: 
 @pytest.mark.parametrize("profile", ["new", "worn"])
 @pytest.mark.parametrize(("pdc", "electrodes", "seconds"), [(8, 0, 2.0), (0, 20, 5.0), (5, 20, 5.0)])
 def test_a_shift_is_no_touch(profile: str, pdc: int, electrodes: int, seconds: float) -> None:
-    words = {name: its.copy() for name, its in script(5, profile).rest(20).make().words.items()}
+    words = {name: channel.copy() for name, channel in script(5, profile).rest(20).make().words.items()}
     words["pdc"][1500:] += pdc
     words["counts"][1500:] += electrodes
     state = Finger().feed(**words)["tare_state"][1500:]

@@ -100,7 +100,7 @@ def test_a_hold_keeps_its_force(profile: str, place: int, squeeze_n: float, shar
     ):
         if held and say is not None:
             say()
-        parts.append(finger.feed(**{name: its[first:end] for name, its in case.course.words.items()}))
+        parts.append(finger.feed(**{name: channel[first:end] for name, channel in case.course.words.items()}))
     rows = np.concatenate(parts)
 
     force = rows["force_100un"] / 1e4

@@ -11,7 +11,7 @@ from biotac.recording.mcap_file import RecordingFile
 
 def copies(recording: biotac.Recording, folder: Path, count: int, apart_s: float) -> list[Path]:
     """``count`` recordings in ``folder``, the k-th ``k * apart_s`` later than ``recording``."""
-    metadata = {key: its for key, its in recording.metadata.items() if key != CHECKSUM}
+    metadata = {key: value for key, value in recording.metadata.items() if key != CHECKSUM}
     paths = [folder / f"{k:05}.mcap" for k in range(count)]
     for k, path in enumerate(paths):
         later_ns = round(k * apart_s * 1e9)

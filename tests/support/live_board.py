@@ -67,7 +67,7 @@ class Firmware:
         self.before: dict[type, bytes] = {}  # what it sends before its answer to a kind, once
         self.after: dict[type, bytes] = {}  # and with it
         self.settings: dict[int, int] = {}
-        self.told: list[Any] = []
+        self.commands: list[Any] = []
         self.heard = threading.Condition()
 
     def now_us(self) -> int:
@@ -82,7 +82,7 @@ class Firmware:
         elif kind is wire.Stop:
             self.streams = 0
         with self.heard:
-            self.told.append(message)
+            self.commands.append(message)
             self.heard.notify_all()
         answer = b"" if kind in self.mute else self._answer(message, payload)
         return self.before.pop(kind, b"") + answer + self.after.pop(kind, b"")
@@ -111,12 +111,12 @@ class Firmware:
 
     def of(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:
         """What it was told of a kind."""
-        return [m for m in self.told if isinstance(m, kind)]
+        return [m for m in self.commands if isinstance(m, kind)]
 
     def wait_for(self, kind: type[Any] | tuple[type[Any], ...], count: int = 1) -> None:
         """Until it was told so many of a kind."""
         with self.heard:
-            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, WAIT_S), f"no {kind}: {self.told}"
+            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, WAIT_S), f"no {kind}: {self.commands}"
 
     def wait_for_looks(self, count: int = 2) -> None:
         """Until the host has looked so often, from now on; the first may have been under way."""

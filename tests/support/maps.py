@@ -24,9 +24,9 @@ def make_map(number: int, *, serial: str = "", blocks: int = 3, axes: int = AXES
     for kind, _ in kinds:
         spec = _map.KINDS[kind]
         for width in (3, axes - 3):
-            its = [numbers.randrange(-2000, 2001) for _ in range(width * spec.columns)]
-            its += [0] * (width * (spec.halves - spec.columns))
-            parts.append(struct.pack(f"<{len(its)}h", *its))
+            coefficients = [numbers.randrange(-2000, 2001) for _ in range(width * spec.columns)]
+            coefficients += [0] * (width * (spec.halves - spec.columns))
+            parts.append(struct.pack(f"<{len(coefficients)}h", *coefficients))
     return b"".join(parts)
 
 

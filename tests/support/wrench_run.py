@@ -52,9 +52,9 @@ def fields(
     """The arrays of one recording; counts come ``late_rows`` after the force."""
     rng = np.random.default_rng([seed, 8])
     finger = Finger(seed)
-    its = states(rows, seed, rests=rests)
-    force, torque = its.wrench()
-    clean = finger.counts(its)
+    moved = states(rows, seed, rests=rests)
+    force, torque = moved.wrench()
+    clean = finger.counts(moved)
     clean = np.concatenate([np.repeat(clean[:1], late_rows, axis=0), clean[: rows - late_rows]])
     at_rest = finger.rest_counts(np.zeros(1))
 
@@ -70,7 +70,7 @@ def fields(
     if moment:
         result["M"] = recorded(torque)
     if pdc:
-        result["PDC"] = np.rint(1326.0 + 100.0 * its.force_n).astype(np.uint16)
+        result["PDC"] = np.rint(1326.0 + 100.0 * moved.force_n).astype(np.uint16)
     return result
 
 

@@ -95,10 +95,10 @@ def need() -> None:
         command("npm", "ci", "--silent", "--prefix", HERE.parent)
 
 
-def command(*words: object) -> str:
-    done = subprocess.run([str(w) for w in words], cwd=HERE, capture_output=True, text=True)
+def command(*arguments: object) -> str:
+    done = subprocess.run([str(w) for w in arguments], cwd=HERE, capture_output=True, text=True)
     if done.returncode:
-        raise Failed(f"{words[0]} failed: {(done.stderr or done.stdout).strip()}")
+        raise Failed(f"{arguments[0]} failed: {(done.stderr or done.stdout).strip()}")
     return done.stdout
 
 
@@ -137,10 +137,10 @@ def run_rp2040(elf: Path) -> tuple[list[Row], list[int]]:
 
 def qemu_says(elf: Path) -> list[str]:
     """The lines that the image printed."""
-    code, said = qemu.run(elf)
+    code, output = qemu.run(elf)
     if code:
-        raise Failed(f"{elf.name} exited with code {code} in QEMU: {said.strip()[-200:]}")
-    return said.splitlines()
+        raise Failed(f"{elf.name} exited with code {code} in QEMU: {output.strip()[-200:]}")
+    return output.splitlines()
 
 
 def run_m4f(elf: Path) -> list[Row]:
@@ -165,8 +165,8 @@ def run_m4f(elf: Path) -> list[Row]:
 def _log(elf: Path) -> Iterator[bytes]:
     """QEMU's log, one line per instruction, through a pipe, because it would take a gigabyte on disk."""
     reader, writer = os.pipe()
-    words = [*qemu.words(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
-    process = subprocess.Popen(words, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    arguments = [*qemu.argv(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
+    process = subprocess.Popen(arguments, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(writer)
     try:
         with open(reader, "rb") as log:
@@ -233,8 +233,8 @@ def bits_here() -> int:
 def float_symbols() -> list[str]:
     """Floating-point helpers in an M0+ image of the shipped files alone, with the port's functions undefined."""
     elf = BUILD / "shipped.elf"
-    words = ["-std=c11", "-mthumb", *M0PLUS, "-O2", *INCLUDE, *SHIPPED, "-nostartfiles", "--specs=nano.specs"]
+    arguments = ["-std=c11", "-mthumb", *M0PLUS, "-O2", *INCLUDE, *SHIPPED, "-nostartfiles", "--specs=nano.specs"]
     link = ["--specs=nosys.specs", "-Wl,-e,main", "-Wl,--unresolved-symbols=ignore-all", "-Wl,--no-warn-mismatch"]
-    command("arm-none-eabi-gcc", *words, *link, "-o", elf)
+    command("arm-none-eabi-gcc", *arguments, *link, "-o", elf)
     names = {line.split()[-1] for line in command("arm-none-eabi-nm", elf).splitlines()}
     return sorted(name for name in names if FLOAT_SYMBOL.match(name))

@@ -64,11 +64,11 @@ class Limits:
 
 
 def read_limits(path: Path) -> Limits:
-    told = json.loads(path.read_text(encoding="utf-8"))
+    facts = json.loads(path.read_text(encoding="utf-8"))
     return Limits(
-        int(told["flash"]["at"], 0), told["flash"]["bytes"], told["ram"]["bytes"], told.get("runs_from_ram", False),
-        tuple(told["interrupts"]), told.get("rom_stack_bytes", 0),
-        {call: tuple(names) for call, names in told.get("pointers", {}).items()},
+        int(facts["flash"]["at"], 0), facts["flash"]["bytes"], facts["ram"]["bytes"], facts.get("runs_from_ram", False),
+        tuple(facts["interrupts"]), facts.get("rom_stack_bytes", 0),
+        {call: tuple(names) for call, names in facts.get("pointers", {}).items()},
     )  # fmt: skip
 
 

@@ -70,7 +70,7 @@ class MirroredLines:
             "z": [(line.width, -line.z) for line, _ in members],
         }
         mask = (1 << bits) - 1
-        return {name: sum(width * (c & mask) for width, c in its) for name, its in coordinates.items()}
+        return {name: sum(width * (c & mask) for width, c in weighted) for name, weighted in coordinates.items()}
 
 
 def add(name: str, factor: int, term: str) -> list[str]:

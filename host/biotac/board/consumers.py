@@ -272,6 +272,6 @@ class Callbacks:
     def _failed(self, fn: Callable[[Any], Any], error: BaseException) -> None:
         name = getattr(fn, "__qualname__", repr(fn))
         logging.getLogger("biotac").error("callback %s failed", name, exc_info=error)
-        told = CallbackError(f"callback {name} raised {type(error).__name__}: {error}")
-        told.__cause__ = error
-        self._troubles.keep(told)
+        raised = CallbackError(f"callback {name} raised {type(error).__name__}: {error}")
+        raised.__cause__ = error
+        self._troubles.keep(raised)

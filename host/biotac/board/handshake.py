@@ -34,8 +34,8 @@ def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
 
 def describe_mismatch(hello: wire.Hello) -> str:
     """Both wire versions, and the command that makes them the same."""
-    mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
-    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+    library = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
+    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {library}; {cure(hello)}"
 
 
 def cure(hello: wire.Hello) -> str:
@@ -73,12 +73,12 @@ def handshake(link: Link, send: Callable[[Any], None], *, timeout_s: float) -> w
                         raise WireVersionError(f"the firmware on {link.port} speaks {describe_mismatch(message)}")
                     return message
     if seen == 0:
-        words = "nothing answers"
+        found = "nothing answers"
     elif decoder.counts.good:
-        words = f"{decoder.counts.good} frames of this protocol arrived, but no HELLO"
+        found = f"{decoder.counts.good} frames of this protocol arrived, but no HELLO"
     else:
-        words = f"{seen} bytes arrived that are not frames of this protocol"
+        found = f"{seen} bytes arrived that are not frames of this protocol"
     raise NotAGatewayError(
-        f"no gateway on {link.port}: {words}; expected a HELLO within {timeout_s * TRIES:.0f} s; check that this is "
+        f"no gateway on {link.port}: {found}; expected a HELLO within {timeout_s * TRIES:.0f} s; check that this is "
         "the board's port and that it runs our firmware"
     )

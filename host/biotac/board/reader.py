@@ -72,7 +72,7 @@ class Reader:
         self.closing = threading.Event()
         #: The error that ended everything: every call from now on raises it; and whether one did.
         self.failure: BaseException | None = None
-        self.told = False
+        self.reported = False
         #: Why reading stopped, while it is stopped.
         self.lost: Reason | None = None
         self.reconnects = False
@@ -156,7 +156,7 @@ class Reader:
                 "boards in the process that reads them"
             )
         if self.failure is not None:
-            self.told = self.told or not self.is_own()
+            self.reported = self.reported or not self.is_own()
             raise self.failure
 
     def raise_closed(self) -> NoReturn:

@@ -96,11 +96,11 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
         "--version", action=Version, nargs=0, help="print the release, the wire version and the schema hash"
     )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for name, (place, text) in VERBS.items():
+    for name, (module_name, text) in VERBS.items():
         verb = verbs.add_parser(name, help=text, description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")
         if name in called:
-            module = importlib.import_module(f"biotac.cli.{place}")
+            module = importlib.import_module(f"biotac.cli.{module_name}")
             verb.epilog = f"example: {module.EXAMPLE}"
             if hasattr(module, "run"):
                 verb.set_defaults(run=module.run)
@@ -111,8 +111,8 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
     _make_streams_usable()
-    words = sys.argv[1:] if argv is None else argv
-    args = parser(words[:1]).parse_args(words)
+    arguments = sys.argv[1:] if argv is None else argv
+    args = parser(arguments[:1]).parse_args(arguments)
     if threading.current_thread() is threading.main_thread():
         # SIGTERM must not leave a simulator or a temporary file behind either.
         signal.signal(signal.SIGTERM, signal.default_int_handler)

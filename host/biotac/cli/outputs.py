@@ -22,22 +22,22 @@ def note(text: str) -> None:
     print(f"biotac: {text}", file=sys.stderr)
 
 
-def check_file(place: Path | None, *, overwrite: bool) -> None:
+def check_file(path: Path | None, *, overwrite: bool) -> None:
     """Raises InputError if the file, where one is named, exists and may not be overwritten."""
-    if place is not None and place.exists() and not overwrite:
-        raise taken(place)
+    if path is not None and path.exists() and not overwrite:
+        raise taken(path)
 
 
-def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
+def check(folder: Path, paths: Sequence[Path], *, overwrite: bool) -> None:
     """Raises InputError if a place in ``folder`` is named twice, or exists and may not be overwritten."""
-    for place in places:
-        if places.count(place) > 1:
+    for path in paths:
+        if paths.count(path) > 1:
             raise InputError(
-                f"{place} would be written twice; name each finger once, and calibrate files of the same name with "
+                f"{path} would be written twice; name each finger once, and calibrate files of the same name with "
                 "separate --out folders"
             )
-        if place.exists() and not overwrite:
-            raise taken(place)
+        if path.exists() and not overwrite:
+            raise taken(path)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is not a folder; choose another name")
 

@@ -117,9 +117,9 @@ def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
     of_states = np.array([np.nanquantile(values[labels == state], at, axis=0) for state in GripState])
     edges = np.sort(of_states.reshape(-1, values.shape[1]).T, axis=1)
     tables = np.ones((len(edges), edges.shape[1] + 1, STATES))
-    for table, its, column in zip(tables, edges, values.T, strict=True):
+    for table, bounds, column in zip(tables, edges, values.T, strict=True):
         known = np.isfinite(column)
-        np.add.at(table, (np.searchsorted(its, column[known]), labels[known]), 1.0)
+        np.add.at(table, (np.searchsorted(bounds, column[known]), labels[known]), 1.0)
         table /= table.sum(axis=0)
     moves = np.ones((STATES, STATES))
     np.add.at(moves, (labels[:-1], labels[1:]), 1.0)

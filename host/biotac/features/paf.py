@@ -54,6 +54,6 @@ def paf(rows: npt.NDArray[Any], *, as_printed: bool = False, threshold_n: float 
     total = weight.sum(axis=1)
     result["force_n"] = np.where(np.isnan(force).any(axis=1), np.nan, total)
     result["valid"] = valid = (result["force_n"] > 0.0) & (result["force_n"] >= threshold_n)
-    place = (ELECTRODE_DR_MM[best] * weight[:, :, None]).sum(axis=1)
-    result["dr_mm"] = np.where(valid[:, None], place / np.where(valid, total, 1.0)[:, None], np.nan)
+    weighted_dr_mm = (ELECTRODE_DR_MM[best] * weight[:, :, None]).sum(axis=1)
+    result["dr_mm"] = np.where(valid[:, None], weighted_dr_mm / np.where(valid, total, 1.0)[:, None], np.nan)
     return result

@@ -57,11 +57,11 @@ def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
     groups = [np.flatnonzero(pressed & (summit == top)) for top in _merged(force, pressed, summit)]
     part = [float((force[group] ** SHARE_POWER).sum()) for group in groups]
     found = []
-    for group, its in zip(groups, part, strict=True):
+    for group, part_share in zip(groups, part, strict=True):
         weight = force[group]
         middle = (surface.ELECTRODE_MM[group] * weight[:, None]).sum(axis=0) / weight.sum()
         order = group[np.argsort(-weight)]
-        found.append(Contact(surface.project(middle[None])[0], its / sum(part), tuple(order.tolist())))
+        found.append(Contact(surface.project(middle[None])[0], part_share / sum(part), tuple(order.tolist())))
     return sorted(found, key=lambda one: -one.share)
 
 
@@ -82,17 +82,17 @@ def _merged(force: Floats, pressed: npt.NDArray[np.bool_], summit: npt.NDArray[n
     tops = sorted(set(summit[pressed].tolist()), key=lambda k: -force[k])
     kept: list[int] = []
     for top in tops:
-        mine = np.flatnonzero(pressed & (summit == top))
+        basin = np.flatnonzero(pressed & (summit == top))
         best, into = 0.0, top
         for other in kept:
-            theirs = np.flatnonzero(pressed & (summit == other))
-            touching = NEIGHBOURS[np.ix_(mine, theirs)]
+            other_basin = np.flatnonzero(pressed & (summit == other))
+            touching = NEIGHBOURS[np.ix_(basin, other_basin)]
             if touching.any():
-                passes = np.minimum(force[mine][:, None], force[theirs][None, :])[touching]
+                passes = np.minimum(force[basin][:, None], force[other_basin][None, :])[touching]
                 if passes.max() > best:
                     best, into = float(passes.max()), other
         if best > PASS_SHARE * force[top]:
-            summit[mine] = into
+            summit[basin] = into
         else:
             kept.append(top)
     return kept

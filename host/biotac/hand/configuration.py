@@ -34,9 +34,9 @@ class Configuration:
 
     def clear_faults(self) -> Faults:
         """Like ``faults``, and clears those on the board. A fault that is new meanwhile stays for the next call."""
-        told = self.faults()
-        self._commands.tell(wire.ClearFaults(0, int(told.board), told.by_index))
-        return told
+        latched = self.faults()
+        self._commands.tell(wire.ClearFaults(0, int(latched.board), latched.by_index))
+        return latched
 
     def setting(self, setting: wire.Setting | int) -> int:
         """The value of a setting, in the unit that wire.SETTINGS names."""
@@ -99,8 +99,8 @@ class Configuration:
 
     def calibration(self, finger: Finger) -> Calibration | None:
         """The finger's calibration, its own values in place of the settings; None without. See calibration_state."""
-        told = self._calibration(finger)
-        return None if told.state == wire.CalibrationState.NONE else _known(told)
+        answer = self._calibration(finger)
+        return None if answer.state == wire.CalibrationState.NONE else _known(answer)
 
     def calibration_state(self, finger: Finger) -> wire.CalibrationState:
         """Whether the finger has a calibration, and whether it is in force or belongs to another sensor."""
@@ -176,11 +176,11 @@ class Configuration:
         return self._commands.ask(wire.GetCalibration(0, self._commands.index(finger)), wire.Calibration)
 
 
-def _known(told: wire.Calibration) -> Calibration:
+def _known(answer: wire.Calibration) -> Calibration:
     try:
-        return Calibration.from_wire(told.serial, told.made_s, told.value)
+        return Calibration.from_wire(answer.serial, answer.made_s, answer.value)
     except ValueError as error:
         raise WireVersionError(
-            f"this library does not know the board's calibration of finger {told.finger} ({error}); install the "
+            f"this library does not know the board's calibration of finger {answer.finger} ({error}); install the "
             "biotac-gateway of the firmware's release"
         ) from error

@@ -21,9 +21,9 @@ class Faults:
         return bool(self.board or self.fingers)
 
     def __str__(self) -> str:
-        lines = [f"board: {name}, {words}" for name, words in _named(self.board, wire.FAULT_FLAG_DOC)]
+        lines = [f"board: {name}, {text}" for name, text in _named(self.board, wire.FAULT_FLAG_DOC)]
         for finger, flags in self.fingers.items():
-            lines += [f"{finger}: {name}, {words}" for name, words in _named(flags, wire.FRAME_FLAG_DOC)]
+            lines += [f"{finger}: {name}, {text}" for name, text in _named(flags, wire.FRAME_FLAG_DOC)]
         return "\n".join(lines)
 
 
@@ -36,4 +36,4 @@ def faults_of(status: wire.Status, names: Mapping[str, int]) -> Faults:
 
 def _named(flags: wire.FaultFlags | wire.FrameFlags, doc: Mapping[int, str]) -> list[tuple[str, str]]:
     kind = type(flags)
-    return [(str(kind(bit).name), words) for bit, words in doc.items() if flags & bit]
+    return [(str(kind(bit).name), text) for bit, text in doc.items() if flags & bit]

@@ -210,7 +210,7 @@ class Hand:
         _end(self._board, self._stream, self._keeper, self._callbacks, self._recorders)
 
     def _report_at_end(self) -> None:
-        if not self._reader.told:
+        if not self._reader.reported:
             self._reader.check()
         self._troubles.report()
 
@@ -366,8 +366,8 @@ class Hand:
             self._pulled.put_back(later)
             return join([*taken, now])
         if self._stream.ended:
-            told = f"the source of {self.port} ended before {seconds:g} s were read"
-            python_warnings.warn(told, ReadWarning, stacklevel=3)
+            text = f"the source of {self.port} ended before {seconds:g} s were read"
+            python_warnings.warn(text, ReadWarning, stacklevel=3)
         return join(taken)
 
     # ---- callbacks (consumers.py) --------------------------------------------------------------

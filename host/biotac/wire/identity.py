@@ -39,11 +39,11 @@ def setting_text(setting: wire.Setting, value: int) -> str:
     """A setting as "name = value unit", or "name = NAME (number)" if its values have names."""
     unit = wire.SETTINGS[setting].unit
     kind, _, name = unit.partition(" ")
-    words = f"{value} {unit}"
+    shown = f"{value} {unit}"
     if kind == "enum":
         names: Any = getattr(wire, name.title().replace("_", ""))
-        words = f"{names(value).name} ({value})" if value in list(names) else str(value)
-    return f"{setting.name.lower()} = {words}"
+        shown = f"{names(value).name} ({value})" if value in list(names) else str(value)
+    return f"{setting.name.lower()} = {shown}"
 
 
 def version_text(hello: wire.Hello) -> str:

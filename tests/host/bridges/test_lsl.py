@@ -116,9 +116,9 @@ def test_events_are_markers_by_name(inlet) -> None:
         stream = inlet(outlet.infos[2])
         batch = hand.read_batch(3.0)
         outlet.push(batch)
-        told = [biotac.EventKind(m.kind).name for m in batch.messages if isinstance(m, biotac.Event)]
-        assert "TOUCH" in told
-        assert [stream.pull_sample(timeout=PATIENCE_S)[0] for _ in told] == [[name] for name in told]
+        event_names = [biotac.EventKind(m.kind).name for m in batch.messages if isinstance(m, biotac.Event)]
+        assert "TOUCH" in event_names
+        assert [stream.pull_sample(timeout=PATIENCE_S)[0] for _ in event_names] == [[name] for name in event_names]
 
 
 def test_a_simulated_boards_frames_are_stamped_by_arrival_and_counted(inlet) -> None:
@@ -138,17 +138,17 @@ def test_a_simulated_boards_frames_are_stamped_by_arrival_and_counted(inlet) -> 
 
 def test_the_verb_ends_with_its_source_and_says_how_it_stamped(capsys) -> None:
     assert main(["share", "sim:press.toml?seconds=0.3&pace=fast", "--lsl", "--json"]) == 0
-    said = capsys.readouterr()
-    assert '{"name": "BioTac finger0", "rate_hz": 100.0}' in said.out
-    assert "stamped by arrival" in said.err
+    output = capsys.readouterr()
+    assert '{"name": "BioTac finger0", "rate_hz": 100.0}' in output.out
+    assert "stamped by arrival" in output.err
 
 
 def test_the_verb_tells_rates(capsys) -> None:
     assert main(["share", "sim:press.toml?seconds=0.3&pace=fast", "--lsl", "--seconds", "0.1"]) == 0
-    said = capsys.readouterr()
-    assert said.out.splitlines()[0] == "BioTac finger0, 100 samples per second"
-    assert "BioTac finger0 events, irregular" in said.out.splitlines()
-    assert "Ctrl-C" not in said.err  # it ends by itself
+    output = capsys.readouterr()
+    assert output.out.splitlines()[0] == "BioTac finger0, 100 samples per second"
+    assert "BioTac finger0 events, irregular" in output.out.splitlines()
+    assert "Ctrl-C" not in output.err  # it ends by itself
 
 
 def test_without_pylsl_the_extra_is_named(capsys, monkeypatch) -> None:

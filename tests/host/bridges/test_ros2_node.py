@@ -64,10 +64,10 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
     topics = {topic for topic, _ in ros.published if not topic.endswith("event")}
     assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in ("wrench", "poc", "flags")}
     for topic in topics:
-        mine = [values(message) for name, message in ros.published if name == topic]
-        assert len(mine) == 300
+        sent = [values(message) for name, message in ros.published if name == topic]
+        assert len(sent) == 300
         # The bag's numbers come from um and mN, these from mm: each is rounded once more or less, in the last bit.
-        np.testing.assert_allclose(mine, [values(message) for message in bag[topic]], rtol=4e-16)
+        np.testing.assert_allclose(sent, [values(message) for message in bag[topic]], rtol=4e-16)
     forces = np.array([values(m) for t, m in ros.published if t == "biotac/finger0/wrench"])
     assert np.nanmax(forces[:, 2]) > 1.0
     assert not ros.up

@@ -39,12 +39,12 @@ def fit_again(calibrated: Path, *words: str) -> list[str]:
 def test_it_leaves_recording_reference_report_picture_and_map(calibrated: Path) -> None:
     names = sorted(path.name for path in calibrated.iterdir())
     assert names == [f"{SERIAL}.{end}" for end in ("csv", "mcap", "md", "png", "wrench.json")]
-    its = json.loads((calibrated / f"{SERIAL}.wrench.json").read_text())["provenance"]
-    assert (its["serial"], its["files"]) == (SERIAL, [f"{SERIAL}.mcap", f"{SERIAL}.csv"])
-    assert its["software"].startswith("biotac-gateway ")
-    assert its["alignment"]["clear"] > 5.0
+    fitted = json.loads((calibrated / f"{SERIAL}.wrench.json").read_text())["provenance"]
+    assert (fitted["serial"], fitted["files"]) == (SERIAL, [f"{SERIAL}.mcap", f"{SERIAL}.csv"])
+    assert fitted["software"].startswith("biotac-gateway ")
+    assert fitted["alignment"]["clear"] > 5.0
     page = (calibrated / f"{SERIAL}.md").read_text(encoding="utf-8")
-    assert its["data_sha256"] in page and SERIAL in page
+    assert fitted["data_sha256"] in page and SERIAL in page
     assert load_fitted(calibrated / f"{SERIAL}.wrench.json").axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 
 
@@ -76,7 +76,7 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
 
     reference = calibrated / f"{SERIAL}.csv"
     loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))
-    its = load_fitted(calibrated / f"{SERIAL}.wrench.json")
+    fitted = load_fitted(calibrated / f"{SERIAL}.wrench.json")
     with biotac.open("sim:calibrate.toml") as hand:
         real = hand.board.get_map
 
@@ -89,4 +89,4 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
 
         monkeypatch.setattr(hand.board, "get_map", spoilt)
         with pytest.raises(PortError, match=r"the board accepted the map of \d+ bytes, but has another of \d+ bytes"):
-            upload.upload(hand, 0, its, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)
+            upload.upload(hand, 0, fitted, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)

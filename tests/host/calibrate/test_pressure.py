@@ -90,12 +90,12 @@ def test_k_is_the_pseudo_inverse() -> None:
 @pytest.mark.parametrize("noise", [0.0, 1.0, 3.0])
 @pytest.mark.parametrize("k", [0.009, 0.016])
 def test_three_presses_give_k(noise: float, k: float) -> None:
-    its = its_fit(course(presses(2, 3.5, 5), k=k, noise=noise))
+    fitted = its_fit(course(presses(2, 3.5, 5), k=k, noise=noise))
     # A mean of n noisy counts: 3 sigma of 3 * 50 rows of filtered noise, against the rms of what was pressed.
-    allowed = 3 * noise / np.sqrt(its.rows) / (3.7 / k) + 1e-9
-    assert its.gain_n == pytest.approx(k, rel=allowed)
-    assert its.rows == 3 * HOLD_ROWS
-    assert its.rest.counts == pytest.approx(REST, abs=3 * noise / np.sqrt(50) + 1e-9)
+    allowed = 3 * noise / np.sqrt(fitted.rows) / (3.7 / k) + 1e-9
+    assert fitted.gain_n == pytest.approx(k, rel=allowed)
+    assert fitted.rows == 3 * HOLD_ROWS
+    assert fitted.rest.counts == pytest.approx(REST, abs=3 * noise / np.sqrt(50) + 1e-9)
 
 
 def test_ramps_are_left_out_and_would_bias_k() -> None:
@@ -219,8 +219,8 @@ def test_the_steps_name_finger_press_and_force_in_turn() -> None:
 
 def test_another_fingers_press_is_not_taken_for_this_ones() -> None:
     procedure = Procedure([0], [2.0, 3.5, 5.0])
-    mine, other = course([0.0] * 2000), course(presses(2, 3.5, 5), finger=1)
-    procedure.feed(np.concatenate([mine, other]))
+    own, other = course([0.0] * 2000), course(presses(2, 3.5, 5), finger=1)
+    procedure.feed(np.concatenate([own, other]))
     assert procedure.step is not None and procedure.step.press == 1
     with pytest.raises(InputError, match=r"finger 0, \d+ rows: press 1 of 3 never came"):
         procedure.finish()
@@ -301,29 +301,29 @@ def test_a_fit_that_would_be_wrong_is_refused_with_a_number(given: list[Press], 
 
 
 def test_presses_that_disagree_a_little_are_noted() -> None:
-    its = fit(STILL, [held(2.0, 200), held(3.3, 300), held(4.8, 400)])
-    assert len(its.notes) == 1 and "spreads by 18%" in its.notes[0]
+    fitted = fit(STILL, [held(2.0, 200), held(3.3, 300), held(4.8, 400)])
+    assert len(fitted.notes) == 1 and "spreads by 18%" in fitted.notes[0]
     assert not fit(STILL, [held(2.0, 200), held(3.0, 300), held(4.1, 400)]).notes
 
 
 def test_the_verification_counts_scatter_as_well_as_offset() -> None:
-    its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
-    assert (its.gain_n, its.gain_nn) == (pytest.approx(0.01), 10_000_000)
-    wrong = with_board_force(held(3.0, 330), its.gain_nn)
-    seen = verify(its, wrong)
+    fitted = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
+    assert (fitted.gain_n, fitted.gain_nn) == (pytest.approx(0.01), 10_000_000)
+    wrong = with_board_force(held(3.0, 330), fitted.gain_nn)
+    seen = verify(fitted, wrong)
     assert (seen.board_error, seen.float_error) == (pytest.approx(0.1), pytest.approx(0.1))
     rows = wrong.rows.copy()
     rows["board_n"] = np.tile([2.7, 3.3], HOLD_ROWS // 2)  # right in the mean
-    assert verify(its, Press(0, 1, rows)).board_error == pytest.approx(0.1)
+    assert verify(fitted, Press(0, 1, rows)).board_error == pytest.approx(0.1)
     with pytest.raises(InputError, match="the board gave no force from pressure in 50 of 50 held rows"):
-        verify(its, held(3.0, 300))
+        verify(fitted, held(3.0, 300))
 
 
 def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:
-    its = its_fit(course(presses(2, 3.5, 5), noise=1.0))
+    fitted = its_fit(course(presses(2, 3.5, 5), noise=1.0))
     rows = course([4.0] * HOLD_ROWS, noise=1.0, seed=9)
     rows["pressure"] = np.rint(rows["pressure"] * 16) / 16  # as published
-    seen = verify(its, with_board_force(Press(0, 4, rows), its.gain_nn))
+    seen = verify(fitted, with_board_force(Press(0, 4, rows), fitted.gain_nn))
     assert 0 < seen.apart_n <= 0.5e-4 + 1e-9
     assert abs(seen.board_error - seen.float_error) < 1e-4
 
@@ -371,11 +371,11 @@ def test_forces_of_another_run_or_clock_are_refused_with_their_lag_or_correlatio
 
 
 def test_the_table_has_k_and_p0_and_the_errors() -> None:
-    its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
+    fitted = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
     from biotac import Calibration
 
-    verified = verify(its, with_board_force(held(3.0, 303), its.gain_nn))
-    outcome = pressure.Outcome({0: its}, {0: Calibration(serial="BTX")}, verified={0: verified})
+    verified = verify(fitted, with_board_force(held(3.0, 303), fitted.gain_nn))
+    outcome = pressure.Outcome({0: fitted}, {0: Calibration(serial="BTX")}, verified={0: verified})
     head, line = pressure.lines(outcome)
     assert head.split() == ["finger", "sensor", "K", "N/count", "P0", "count", "fit", "force", "N", "board", "N",
                             "error", "float64"]  # fmt: skip

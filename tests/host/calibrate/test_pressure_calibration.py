@@ -70,20 +70,20 @@ def test_the_bundled_scenario_is_the_experiments() -> None:
 
 def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     assert main(["calibrate", "press", "sim:fingers.toml", "--pressure", "--json", "--out", str(tmp_path)]) == 0
-    said = capsys.readouterr()
-    facts = json.loads(said.out)
+    output = capsys.readouterr()
+    facts = json.loads(output.out)
     assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
     for one in facts["fingers"]:
         assert -K_LOW <= one["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
         assert one["rest_counts"] == pytest.approx(1326, abs=1)
         assert one["verification"]["board_error"] <= 0.059
         assert one["verification"]["board_error"] == pytest.approx(one["verification"]["float_error"], abs=1e-4)
-        its = file.load(tmp_path / f"finger{one['finger']}.json")
-        assert (its.pressure_gain_nn, its.serial) == (one["pressure_gain_nn"], one["serial"])
-        assert its.serial == f"BTSIM{one['finger'] + 1:011d}"
+        own = file.load(tmp_path / f"finger{one['finger']}.json")
+        assert (own.pressure_gain_nn, own.serial) == (one["pressure_gain_nn"], one["serial"])
+        assert own.serial == f"BTSIM{one['finger'] + 1:011d}"
         provenance = json.loads((tmp_path / f"finger{one['finger']}.json").read_text())["provenance"]
         assert provenance["from"] == "sim:fingers.toml" and provenance["rows"] == 150
-    assert said.err.splitlines()[:3] == [
+    assert output.err.splitlines()[:3] == [
         "let go of finger 0, and do not touch it",
         "1 of 3: press finger 0 with about 2 N, and hold still",
         "held: let go of finger 0",
@@ -115,8 +115,8 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) 
         hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         outcome = calibrate(hand, Silent(), fingers=(0,), made_s=77)
         assert hand.board.calibration(0) == outcome.calibrations[0]
-    its = outcome.calibrations[0]
-    assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
+    own = outcome.calibrations[0]
+    assert (own.thermal_gain_milli, own.made_s, own.serial) == (321, 77, "BTSIM00000000001")
     assert outcome.verified[0].board_error <= 0.059
 
 
@@ -144,8 +144,8 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
     monkeypatch.setattr("biotac.hand.configuration.Configuration.save_settings", refuse)
     port = "sim:fingers.toml?fingers=1"
     assert main(["calibrate", "press", port, "--pressure", "--save", "--out", str(tmp_path)]) == 7
-    said = capsys.readouterr()
-    assert "NOT_STORED" in said.err and "in force until the next reboot" in said.out
+    output = capsys.readouterr()
+    assert "NOT_STORED" in output.err and "in force until the next reboot" in output.out
     assert file.load(tmp_path / "finger0.json").pressure_gain_nn > 10_000_000
 
 

@@ -20,35 +20,35 @@ from biotac.map.file import load_fitted
 TARE = np.full(19, 2800.0)
 
 
-def held(its: Population, gain: float, balance: float) -> tuple[Held, Population]:
+def held(prior: Population, gain: float, balance: float) -> tuple[Held, Population]:
     """Presses on a finger that is softer than the map by ``gain``, its plate tilted by ``balance``."""
     rng = np.random.default_rng(5)
     patterns = -np.abs(rng.normal(300.0, 80.0, (6, 19)))
-    said = its.force(TARE + patterns, TARE)
+    felt_n = prior.force(TARE + patterns, TARE)
     # the tilt is in what the map says, so that it is taken out of presses that were straight
-    tilted = replace(its, coefficients=its.coefficients.copy())
-    tilted.coefficients[:, 0] = balance * its.coefficients[:, 2]
-    return Held(TARE + patterns, TARE, np.arange(6), gain * said[:, 2:] * [0.0, 0.0, 1.0]), tilted
+    tilted = replace(prior, coefficients=prior.coefficients.copy())
+    tilted.coefficients[:, 0] = balance * prior.coefficients[:, 2]
+    return Held(TARE + patterns, TARE, np.arange(6), gain * felt_n[:, 2:] * [0.0, 0.0, 1.0]), tilted
 
 
 @pytest.fixture
 def firm() -> Population:
     """A map that says 10 to 100 N to such patterns, so that a press says more than what is known of fingers."""
-    its = population_map.load(None).population
-    coefficients = np.zeros_like(its.coefficients)
+    prior = population_map.load(None).population
+    coefficients = np.zeros_like(prior.coefficients)
     coefficients[:38, 2] = -5.0  # compressions and bulges
-    return replace(its, coefficients=coefficients)
+    return replace(prior, coefficients=coefficients)
 
 
 def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
     presses, tilted = held(firm, 1.3, 0.08)
-    its = found(tilted, presses, scaled)
-    x, _, z = its.own.coefficients[:38].T
+    judged = found(tilted, presses, scaled)
+    x, _, z = judged.own.coefficients[:38].T
     assert z == pytest.approx(np.full(38, 1.3 * -5.0), rel=0.02)
     assert x == pytest.approx(np.zeros(38), abs=0.005 * 5.0)
-    assert (its.held_out_n[[0, 2]] < 0.1 * its.before_n[[0, 2]]).all()
-    assert its.why_not(np.full(3, 100.0)) == ""
-    assert "unlike those of the population map" in its.why_not(np.full(3, 1e-3))
+    assert (judged.held_out_n[[0, 2]] < 0.1 * judged.before_n[[0, 2]]).all()
+    assert judged.why_not(np.full(3, 100.0)) == ""
+    assert "unlike those of the population map" in judged.why_not(np.full(3, 1e-3))
 
 
 def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
@@ -65,9 +65,9 @@ def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFi
         *("sim:fingers.toml?fingers=1&seconds=2400", "--scale", "--finger", "index", "--presses", "3", "--json"),
     ]
     assert main([*words, "--out", str(out)]) == 1  # nothing was uploaded
-    said = capsys.readouterr()
-    assert "1 of 3: push the pad" in said.err and "biotac: " not in said.err  # prompts are no errors
-    facts = json.loads(said.out)
+    output = capsys.readouterr()
+    assert "1 of 3: push the pad" in output.err and "biotac: " not in output.err  # prompts are no errors
+    facts = json.loads(output.out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]
     assert load_fitted(out).axes == ("Fx", "Fy", "Fz")
     # the emulated finger is poked by a point and no flat: nothing for a map of flat plates

@@ -31,10 +31,10 @@ def others(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("others")
     runs = [load_run(wrench_run.save(folder / f"{k}.npz", wrench_run.fields(4000, seed=k))) for k in (1, 2)]
     some = [replace(run, counts=run.counts[::4], truth=run.truth[::4]) for run in runs]
-    its = training.train([training.sums_of(run) for run in some])
+    prior = training.train([training.sums_of(run) for run in some])
     place = folder / "population.json"
     place.write_text(
-        population_map.dumps(population_map.Trained(its, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8"
+        population_map.dumps(population_map.Trained(prior, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8"
     )
     return place
 
@@ -55,10 +55,10 @@ def test_a_block_turns_a_part_of_the_weight_to_the_side_that_is_down(down: str, 
 
 
 def test_the_plan_is_every_mass_on_every_block() -> None:
-    its = weights.plan((200.0, 500.0), (10.0, 20.0))
-    assert len(its) == len(set(its)) == 2 * (1 + 2 * 4)
-    assert str(its[0]) == "200 g on the pad, the block level"
-    assert str(its[-1]) == "500 g on the pad, the block tilted by 20 deg, E1's side down"
+    loads = weights.plan((200.0, 500.0), (10.0, 20.0))
+    assert len(loads) == len(set(loads)) == 2 * (1 + 2 * 4)
+    assert str(loads[0]) == "200 g on the pad, the block level"
+    assert str(loads[-1]) == "500 g on the pad, the block tilted by 20 deg, E1's side down"
 
 
 @pytest.mark.parametrize(
@@ -150,8 +150,8 @@ def test_a_plate_corrects_directions_from_all_sides_alone(tmp_path: Path, capsys
 
 def test_axes_that_are_mixed_are_told_apart() -> None:
     """What nine numbers can say: a finger that answers with its axes turned and stretched."""
-    its = population_map.load(None).population
-    firm = replace(its, coefficients=100.0 * its.coefficients)  # so that the prior says little
+    prior = population_map.load(None).population
+    firm = replace(prior, coefficients=100.0 * prior.coefficients)  # so that the prior says little
     rng = np.random.default_rng(7)
     counts = 2800.0 - np.abs(rng.normal(200.0, 80.0, (12, 19)))
     tare = np.full(19, 2800.0)

@@ -239,12 +239,12 @@ def test_a_synthetic_finger(validation: Validation) -> None:
 
 def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tmp_path: Path) -> None:
     run, final = validation.run, validation.final
-    its = validation.wrench_map
-    place = tmp_path / "map.json"
-    place.write_text(file.dumps_fitted(its), encoding="utf-8")
-    again = file.load_fitted(place)
+    fitted = validation.wrench_map
+    target = tmp_path / "map.json"
+    target.write_text(file.dumps_fitted(fitted), encoding="utf-8")
+    again = file.load_fitted(target)
     frames = again.predict(run.counts)
-    np.testing.assert_array_equal(frames, its.predict(run.counts))
+    np.testing.assert_array_equal(frames, fitted.predict(run.counts))
     # a map sees one frame; who reads takes the mean of the counts
     rows = np.arange(100, 200)
     window, lag = final.window_rows, final.lag_rows[0]
@@ -252,7 +252,7 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
     mean = again.predict(run.counts[around].mean(axis=1))
     np.testing.assert_allclose(mean[:, 0], predict(run, final, [final.best], rows)[0, :, 0, 0], atol=1e-9)
     assert np.isnan(again.predict(np.full((1, 19), np.nan))).all()
-    facts = json.loads(place.read_text())
+    facts = json.loads(target.read_text())
     for change in (
         {"tare_counts": [1.0]},
         {"coefficients": [[1.0, 2.0, 3.0]]},
@@ -261,9 +261,9 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
         {"lag_rows": [1]},
         {"lag_rows": 1},
     ):
-        place.write_text(json.dumps(facts | {"fit": facts["fit"] | change, "crc32": "edited"}))
+        target.write_text(json.dumps(facts | {"fit": facts["fit"] | change, "crc32": "edited"}))
         with pytest.raises(InputError, match=r"map.json is not usable: "):
-            file.load_fitted(place)
+            file.load_fitted(target)
 
 
 @pytest.mark.nightly
@@ -279,11 +279,11 @@ def test_torque_and_pressure_are_used_where_recorded(tmp_path: Path) -> None:
     assert "Mx cannot be measured" in facts["notes"][-1]
     # pressure follows the normal force: the quadratic model has it, the affine one has not
     assert facts["models"]["quadratic"][2] < 0.7 * facts["models"]["affine"][2]
-    its = validation.wrench_map
-    assert its.with_pdc
+    fitted = validation.wrench_map
+    assert fitted.with_pdc
     with pytest.raises(InputError, match="trained with PDC"):
-        its.predict(run.counts)
-    assert its.predict(run.counts, run.pdc).shape == (4000, 7)
+        fitted.predict(run.counts)
+    assert fitted.predict(run.counts, run.pdc).shape == (4000, 7)
 
 
 def test_the_real_finger(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -447,7 +447,7 @@ def test_calibrate_writes_report_picture_and_map(
 @pytest.mark.nightly
 def test_calibrate_in_words_and_as_recorded(finger: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(finger), "--as-recorded"]) == 0
-    said = capsys.readouterr().out
-    assert "counts lag the force by 3 rows, [0, 0, 0] corrected; mean of 1 rows" in said
+    output = capsys.readouterr().out
+    assert "counts lag the force by 3 rows, [0, 0, 0] corrected; mean of 1 rows" in output
     for counts in SHIFTS_COUNTS[1:]:
-        assert f"drifted {counts:+.0f} counts" in said
+        assert f"drifted {counts:+.0f} counts" in output

@@ -171,8 +171,8 @@ def test_ridge_shrinks_toward_lins_geometry(model: models.Model, run: Run, monke
         assert (likeness if axis < 3 else abs(likeness)) > 0.9999, f"axis {axis}"
     # pressure says nothing until a run says so
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
-    said = columns.with_one(columns.columns(pressed)) @ found
-    np.testing.assert_allclose(said[1], said[0], atol=1e-6)
+    wrenches = columns.with_one(columns.columns(pressed)) @ found
+    np.testing.assert_allclose(wrenches[1], wrenches[0], atol=1e-6)
 
 
 def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(
@@ -181,8 +181,8 @@ def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(
     still = replace(run, pdc=np.full(FRAMES, 1e-9))
     found = pulled_only(still, models.JOINED, monkeypatch, models.LAMBDAS[0])
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
-    said = columns.with_one(columns.columns(pressed)) @ found
-    assert np.abs(said[1] - said[0]).max() < 1e-3
+    wrenches = columns.with_one(columns.columns(pressed)) @ found
+    assert np.abs(wrenches[1] - wrenches[0]).max() < 1e-3
 
 
 # ---- blocks of columns -------------------------------------------------------------------------

@@ -20,13 +20,13 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.identity import setting_text
 
 
-def run(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "biotac", *words], capture_output=True, text=True, check=False)
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "biotac", *arguments], capture_output=True, text=True, check=False)
 
 
-def fails(capsys, code: int, *words: str) -> str:
+def fails(capsys, code: int, *arguments: str) -> str:
     """Run in this process; the verb must fail with this code and one line, which is returned."""
-    assert main(words) == code
+    assert main(arguments) == code
     error = capsys.readouterr().err
     assert error.startswith("biotac: ")
     assert error.count("\n") == 1
@@ -40,8 +40,8 @@ def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
         example = importlib.import_module(f"biotac.cli.{place}").EXAMPLE
         with pytest.raises(SystemExit):
             main([name, "--help"])
-        said = capsys.readouterr().out
-        assert text[:40] in said and said.rstrip().endswith(f"example: {example}")
+        output = capsys.readouterr().out
+        assert text[:40] in output and output.rstrip().endswith(f"example: {example}")
 
 
 def test_no_help_text_is_a_request_of_troff() -> None:
@@ -165,12 +165,12 @@ def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
         ("name = 'x'\n[[step]]\ndo = 'jump'\nseconds = 1\n", ":3: step 1: key 'do'"),
     ],
 )
-def test_a_malformed_scenario_exits_2_with_line_and_key(capsys, tmp_path: Path, text: str, words: str) -> None:
+def test_a_malformed_scenario_exits_2_with_line_and_key(capsys, tmp_path: Path, text: str, arguments: str) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(text)
     error = fails(capsys, 2, "demo", str(path), "--out", str(tmp_path / "out"))
     assert "bad.toml" in error
-    assert words in error
+    assert arguments in error
 
 
 @pytest.mark.parametrize(
@@ -223,8 +223,8 @@ def test_demo_takes_the_ports_that_list_prints(capsys, tmp_path: Path) -> None:
 @contextlib.contextmanager
 def simulated(link: Path, *options: str) -> Iterator[str]:
     """A board on a pty that ``link`` leads to; gives what the command prints of it."""
-    words = [sys.executable, "-m", "biotac", "sim", "press.toml", "--link", str(link), *options]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+    arguments = [sys.executable, "-m", "biotac", "sim", "press.toml", "--link", str(link), *options]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
             yield process.stdout.readline()
@@ -243,8 +243,8 @@ def test_a_simulated_board_has_its_fingers_own_gains(tmp_path: Path) -> None:
 
 def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
     link = tmp_path / "board"
-    with simulated(link, "--fingers", "2", "--json") as said:
-        port = json.loads(said)["port"]
+    with simulated(link, "--fingers", "2", "--json") as output:
+        port = json.loads(output)["port"]
         assert link.resolve() == Path(port)
         with biotac.open(str(link)) as hand:
             frames = hand.read(0.2)
@@ -266,9 +266,9 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
 def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> None:
     with pytest.raises(SystemExit) as refused:
         main(command.split())
-    told = capsys.readouterr().err
+    notes = capsys.readouterr().err
     assert refused.value.code == 2
-    assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in told
+    assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in notes
 
 
 @pytest.mark.parametrize(
@@ -284,8 +284,8 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
         ("calibrate press PORT --scale --forces 2,,3", "--forces: seen ''; expected newtons above 0 and below 100"),
     ],
 )
-def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, words: str, capsys) -> None:
+def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, arguments: str, capsys) -> None:
     with pytest.raises(SystemExit) as refused:
         main(command.split())
     assert refused.value.code == 2
-    assert words in capsys.readouterr().err
+    assert arguments in capsys.readouterr().err

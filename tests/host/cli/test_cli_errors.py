@@ -227,9 +227,9 @@ CASES: list[tuple[int, str, str]] = [
 ]
 
 
-def line_of(capsys: pytest.CaptureFixture[str], code: int, words: list[str]) -> str:
+def line_of(capsys: pytest.CaptureFixture[str], code: int, arguments: list[str]) -> str:
     """Run a command that has to fail with this code and say so in one line."""
-    assert main(words) == code
+    assert main(arguments) == code
     lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("\r")]
     assert len(lines) == 1
     assert lines[0].startswith("biotac: ")
@@ -238,16 +238,16 @@ def line_of(capsys: pytest.CaptureFixture[str], code: int, words: list[str]) -> 
 
 def placed(command: str, files: dict[str, Path], folder: Path) -> list[str]:
     """The words of a case with its files in place."""
-    words = []
+    arguments = []
     for word in command.split():
         for mark in ("@", "+"):
             head, found, rest = word.partition(mark)
             if found:
                 name, question, query = rest.partition("?")
-                place = files.get(name, folder / name) if mark == "@" else folder / name
-                word = f"{head}{place}{question}{query}"
-        words.append(word)
-    return words
+                target = files.get(name, folder / name) if mark == "@" else folder / name
+                word = f"{head}{target}{question}{query}"
+        arguments.append(word)
+    return arguments
 
 
 @pytest.mark.parametrize(("code", "cure", "command"), CASES, ids=[command for _, _, command in CASES])
@@ -364,8 +364,8 @@ def test_a_refusal_is_7(capsys, scripted_board, hello, files, tmp_path, monkeypa
             return hello(payload)
         return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_COMMAND).pack())
 
-    said = line_of(capsys, 7, opened(command, scripted_board(answer).path, files))
-    assert "update it" in said
+    message = line_of(capsys, 7, opened(command, scripted_board(answer).path, files))
+    assert "update it" in message
 
 
 # ---- what takes another computer -----------------------------------------------------------------

@@ -14,9 +14,9 @@ HEAVY = {"numpy", "serial", "mcap", "matplotlib", "cffi", "biotac._core", "async
 
 def imported(code: str) -> set[str]:
     """All modules there are when a fresh interpreter has run ``code``."""
-    words = [sys.executable, "-c", f"import sys\n{code}\nprint(chr(10), *sys.modules)"]
-    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    return set(said.splitlines()[-1].split())
+    arguments = [sys.executable, "-c", f"import sys\n{code}\nprint(chr(10), *sys.modules)"]
+    output = subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
+    return set(output.splitlines()[-1].split())
 
 
 @pytest.mark.parametrize("verb", ["--help", "--version"])

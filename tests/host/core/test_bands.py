@@ -24,7 +24,7 @@ def test_a_band_has_half_its_power_at_its_ends() -> None:
     for band, (low_hz, high_hz) in enumerate(BANDS_HZ):
         power = {hz: pac_bands(sine(hz, 1500, 200))[50:, band].mean() for hz in (*range(low_hz - 3, 1100, 5), high_hz)}
         half = max(power.values()) / 2
-        inside = [hz for hz, its in power.items() if its > half * 1.03]
+        inside = [hz for hz, share in power.items() if share > half * 1.03]
         assert low_hz - 3 <= min(inside) <= low_hz + 5 and high_hz - 5 <= max(inside) <= max(high_hz + 3, 1100)
 
 
@@ -36,13 +36,13 @@ def test_what_the_board_tells_is_what_is_computed_of_its_pac(tmp_path: Path) -> 
             hand.stream("force", *names)
             hand.read(250)
             recorder.close()
-    told, computed = biotac.Recording(path), biotac.Recording(without)
-    assert any(isinstance(m, wire.Bands) for m in told.messages)
+    recorded, computed = biotac.Recording(path), biotac.Recording(without)
+    assert any(isinstance(m, wire.Bands) for m in recorded.messages)
     assert not any(isinstance(m, wire.Bands) for m in computed.messages)
-    for finger in told.fingers:
-        mine, pac = told.bands[told.bands["finger"] == finger], told.pac[told.pac["finger"] == finger]
-        again = bands_of(pac[np.isin(pac["seq"], mine["seq"])])
-        assert len(mine) > 200 and again.tobytes() == mine.tobytes()
+    for finger in recorded.fingers:
+        own, pac = recorded.bands[recorded.bands["finger"] == finger], recorded.pac[recorded.pac["finger"] == finger]
+        again = bands_of(pac[np.isin(pac["seq"], own["seq"])])
+        assert len(own) > 200 and again.tobytes() == own.tobytes()
         assert computed.bands[computed.bands["finger"] == finger]["seq"].tolist() == (
             computed.pac["seq"][computed.pac["finger"] == finger].tolist()
         )

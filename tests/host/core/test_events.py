@@ -24,7 +24,7 @@ def shared(name: str) -> Any:
     return np.load(path)
 
 
-def told(events: Any, kind: EventKind) -> Any:
+def of_kind(events: Any, kind: EventKind) -> Any:
     return events[events["kind"] == kind]
 
 
@@ -39,7 +39,7 @@ def test_real_slides_slip_and_begin_to_when_the_robot_moves() -> None:
         called.append(slips[np.interp(t_s, at_s, speed_m_s) > SLIDING_M_S].mean())
         begins_s = at_s[speed_m_s > SLIDING_M_S][0]
         if begins_s > 0.03:  # else it slides as the recording begins
-            first = told(events, EventKind.SLIP)[0]
+            first = of_kind(events, EventKind.SLIP)[0]
             late_s.append(t_s[0] + first["t_us"] / 1e6 - begins_s)
     assert min(called) >= 0.95
     assert len(late_s) == 30
@@ -55,7 +55,7 @@ def test_real_taps_are_jolts() -> None:
     found, early = [], []
     for signal in signals:
         events, _ = pac_events(np.clip(2038 + signal[:594].reshape(-1, 22), 0, 4095))
-        sample = told(events, EventKind.JOLT)["t_us"].astype(int) * PER_S // 1_000_000
+        sample = of_kind(events, EventKind.JOLT)["t_us"].astype(int) * PER_S // 1_000_000
         early.append((sample < 95).any())
         found.append(((sample >= 95) & (sample < 250)).any())
     assert visible.sum() > 200
@@ -82,6 +82,6 @@ def test_a_finger_tells_its_events_in_order() -> None:
     kinds = [EventKind(kind) for kind in events["kind"]]
     assert kinds == [EventKind.TOUCH, EventKind.JOLT, EventKind.SLIP, EventKind.STUCK, EventKind.LIFT]
     assert (events["finger"] == 2).all() and (np.diff(events["t_us"].astype(int)) >= 0).all()
-    slip = told(events, EventKind.SLIP)[0]
+    slip = of_kind(events, EventKind.SLIP)[0]
     assert 0 <= int(slip["onset_us"]) - 3_200_000 <= 5000 and slip["peak_count"] > 60
-    assert told(events, EventKind.TOUCH)["seq"][0] in (300, 301)
+    assert of_kind(events, EventKind.TOUCH)["seq"][0] in (300, 301)

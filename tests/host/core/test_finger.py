@@ -45,14 +45,17 @@ def test_every_bit_is_the_one_that_the_simulated_board_sends(name: str) -> None:
         words = words_of(name, int(index))
         assert len(board) > 500
         # Both count 10 ms rounds; only where the board's clock stood at the first one is its own affair.
-        good = np.any([(its != wire.INVALID_COUNT).reshape(len(its), -1).any(axis=1) for its in words.values()], axis=0)
+        good = np.any(
+            [(channel != wire.INVALID_COUNT).reshape(len(channel), -1).any(axis=1) for channel in words.values()],
+            axis=0,
+        )
         start_us = int(board["t_us"][0]) - ROUND_US * int(np.argmax(good))
         sent_rounds = (board["t_us"] - np.uint32(start_us)) // ROUND_US
         # A sensor that comes back is asked who it is, and not sampled in that round.
         asked = np.setdiff1d(np.flatnonzero(good[: sent_rounds[-1] + 1]), sent_rounds)
         assert len(asked) == (3 if (name, index) == ("faults.toml", 1) else 0)
-        for its in words.values():
-            its[asked] = wire.INVALID_COUNT
+        for channel in words.values():
+            channel[asked] = wire.INVALID_COUNT
         rows = Finger(settings, index=int(index), quantities=ALL_ROUNDS).feed(**words)
         rows = rows[rows["present"] != 0][: len(board)]
         rows["t_us"] += np.uint32(start_us)
@@ -61,8 +64,8 @@ def test_every_bit_is_the_one_that_the_simulated_board_sends(name: str) -> None:
             np.testing.assert_array_equal(rows[field], board[field], err_msg=f"{name} finger {index} {field}")
         # The reasons travel in TARE messages.
         changed = rows[(rows["flags"] & FrameFlags.TARE_CHANGED) != 0]
-        told = {(m.seq, m.reason, m.noise_count2) for m in tares if m.finger == index}
-        assert told >= {(int(r["seq"]), int(r["tare_reason"]), int(r["noise_count2"])) for r in changed}
+        tares_sent = {(m.seq, m.reason, m.noise_count2) for m in tares if m.finger == index}
+        assert tares_sent >= {(int(r["seq"]), int(r["tare_reason"]), int(r["noise_count2"])) for r in changed}
         assert len(changed) >= 2
 
 

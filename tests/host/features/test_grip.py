@@ -59,13 +59,13 @@ def test_a_slip_is_seen_within_30_ms_and_a_hold_is_none(trained: Trained) -> Non
     late, held_rounds = [], 0
     for seed in range(200, 230):
         rows, pac, states = grasp(seed)
-        said = GripFilter(trained, seed=seed).feed(observations(rows, pac)).argmax(axis=1)
+        guessed = GripFilter(trained, seed=seed).feed(observations(rows, pac)).argmax(axis=1)
         onset = int(np.argmax(states == GripState.SLIPPING))
-        late.append(int(np.argmax(said[onset:] == GripState.SLIPPING)))
-        held = said[:onset][states[:onset] == GripState.STABLE]
+        late.append(int(np.argmax(guessed[onset:] == GripState.SLIPPING)))
+        held = guessed[:onset][states[:onset] == GripState.STABLE]
         assert (held != GripState.SLIPPING).all()
         held_rounds += len(held)
-        assert (said[onset - 5 : onset] == GripState.INCIPIENT).any()
+        assert (guessed[onset - 5 : onset] == GripState.INCIPIENT).any()
     assert np.mean(np.array(late) <= 3) >= 0.95
     assert held_rounds > 5000
 

@@ -9,11 +9,11 @@ EXAMPLE = Path(__file__).resolve().parents[3] / "host/docs/guides/examples/tight
 
 
 def test_what_is_held_is_lost_and_what_is_tightened_is_not() -> None:
-    its = runpy.run_path(str(EXAMPLE))
-    trained = its["learn"](range(3))
-    held, tightened = its["Thing"](0.25, 2.0), its["Thing"](0.25, 2.0)
-    its["grasp"](held, 100, None)
-    its["grasp"](tightened, 100, trained)
-    assert held.slid_mm >= its["LOST_MM"]
+    example = runpy.run_path(str(EXAMPLE))
+    trained = example["learn"](range(3))
+    held, tightened = example["Thing"](0.25, 2.0), example["Thing"](0.25, 2.0)
+    example["grasp"](held, 100, None)
+    example["grasp"](tightened, 100, trained)
+    assert held.slid_mm >= example["LOST_MM"]
     assert tightened.slid_mm < 1.0
-    assert tightened.rounds[-1][0] < its["MOST_N"]  # it does not squeeze for ever
+    assert tightened.rounds[-1][0] < example["MOST_N"]  # it does not squeeze for ever

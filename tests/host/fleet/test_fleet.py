@@ -56,9 +56,9 @@ class Shared:
 
 @pytest.fixture(scope="module")
 def shared() -> Iterator[Shared]:
-    its = Shared()
-    with its.stack:
-        yield its
+    sharing = Shared()
+    with sharing.stack:
+        yield sharing
 
 
 def until(hand: biotac.Hand, frames: int) -> int:
@@ -100,15 +100,15 @@ def test_readers_have_the_same_frames_and_no_answers_of_others(shared) -> None:
     """One asks all the time; the other's stream has no reply in it but its own."""
     with biotac.open(shared.port()) as asking, biotac.open(shared.port()) as reading:
         reading.stream()
-        told: list[Any] = []
+        messages: list[Any] = []
         seen = 0
         for batch in reading.batches():
             asking.status()
-            told += batch.messages
+            messages += batch.messages
             seen += len(batch.wire)
             if seen > 100:
                 break
-        answers = [m for m in told if getattr(m, "req_id", 0)]
+        answers = [m for m in messages if getattr(m, "req_id", 0)]
         assert {m.command for m in answers} <= {wire.Start.ID, wire.Subscribe.ID}
         assert reading.stats.frames_lost <= shared.hand.stats.frames_lost
 
@@ -130,8 +130,8 @@ def test_who_may_command_is_said_and_kept_to(shared, capsys) -> None:
             ):
                 biotac.open(shared.port("&write=yes"))
             assert main(["list", "--zenoh", shared.endpoint, "--json"]) == 0
-            (told,) = json.loads(capsys.readouterr().out)["zenoh"]
-            assert told["port"] == "zenoh:left" and told["writer"] == shared.share.writer
+            (listed,) = json.loads(capsys.readouterr().out)["zenoh"]
+            assert listed["port"] == "zenoh:left" and listed["writer"] == shared.share.writer
             until(writer, 20)  # it streams again
     gone = threading.Event()
     for _ in range(1000):
@@ -313,10 +313,10 @@ def test_who_says_nonsense_of_himself_is_not_listed(shared, capsys) -> None:
         "wire": "1.0",
         "fingers": [0],
     }
-    said = [b"", b"\xff", b"[]", b"[" * 200_000, b"{}", b'{"name": "x"}', json.dumps(good | {"fingers": 5}).encode()]
-    said += [json.dumps(good | {"writer": 5}).encode(), json.dumps(good | {"name": "a\x1b[2J"}).encode()]
+    output = [b"", b"\xff", b"[]", b"[" * 200_000, b"{}", b'{"name": "x"}', json.dumps(good | {"fingers": 5}).encode()]
+    output += [json.dumps(good | {"writer": 5}).encode(), json.dumps(good | {"name": "a\x1b[2J"}).encode()]
     with shared.client() as session:
-        for data in said:
+        for data in output:
             here = session.declare_queryable(network.key("x", "info"), lambda q, d=data: q.reply(q.key_expr, d))
             assert [facts["name"] for facts in network.shared(session)] == ["left"], data[:40]
             assert main(["list", "--zenoh", shared.endpoint]) == 0
@@ -368,29 +368,29 @@ def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
         (shared.port("&config=/no/such.json5"), 2, "Zenoh rejects its endpoint or configuration file such.json5"),
     ):
         assert main(["info", port]) == code
-        said = capsys.readouterr().err.splitlines(keepends=True)
-        assert len(said) == 1 and cure in said[0]
+        output = capsys.readouterr().err.splitlines(keepends=True)
+        assert len(output) == 1 and cure in output[0]
 
 
 def test_another_wire_version_is_5() -> None:
-    its = Shared("old")
-    with its.stack:
-        its.hand._board.reader.hello = replace(its.hand.info, wire_major=wire.WIRE_MAJOR + 1)
+    sharing = Shared("old")
+    with sharing.stack:
+        sharing.hand._board.reader.hello = replace(sharing.hand.info, wire_major=wire.WIRE_MAJOR + 1)
         with pytest.raises(WireVersionError) as error:
-            biotac.open(its.port())
+            biotac.open(sharing.port())
         assert error.value.exit_code == 5
 
 
 def test_a_board_that_is_taken_off_is_lost_and_found_again(tmp_path: Path) -> None:
-    its = Shared("coming")
-    with its.stack, biotac.open(its.port(), reconnect=True) as hand, biotac.open(its.port()) as without:
+    sharing = Shared("coming")
+    with sharing.stack, biotac.open(sharing.port(), reconnect=True) as hand, biotac.open(sharing.port()) as without:
         hand.record(tmp_path / "a.mcap")
         until(hand, 20)
         without.stream()
-        its.stack.close()
+        sharing.stack.close()
         with pytest.raises(DeviceLostError, match="is no longer shared"):
             until(without, 10_000)
-        its.start()
+        sharing.start()
         gaps: list[Any] = []
         for batch in hand.batches():
             gaps += [m for m in batch.messages if isinstance(m, biotac.Gap)]
@@ -451,8 +451,8 @@ def test_tls_keeps_others_out(tmp_path: Path) -> None:
         files = ["-keyout", str(tmp_path / f"{name}.key"), "-out", str(tmp_path / f"{name}.pem")]
         subprocess.run(["openssl", "req", *words, *files], check=True, capture_output=True)
     board, other = ({"link": {"tls": {"root_ca_certificate": str(tmp_path / f"{n}.pem")}}} for n in ("board", "other"))
-    its = {"listen_private_key": str(tmp_path / "board.key"), "listen_certificate": str(tmp_path / "board.pem")}
-    server = {"link": {"tls": its}}
+    keys = {"listen_private_key": str(tmp_path / "board.key"), "listen_certificate": str(tmp_path / "board.pem")}
+    server = {"link": {"tls": keys}}
     assert reached(tmp_path, f"tls/localhost:{free_port()}", server, [board, other, None]) == [True, False, False]
 
 
@@ -466,8 +466,8 @@ def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path
     def serve() -> subprocess.Popen[str]:
         process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
         assert process.stdout is not None
-        with process.stdout as said:
-            assert "is shared" in said.readline()
+        with process.stdout as output:
+            assert "is shared" in output.readline()
         return process
 
     away_s = 3.0
@@ -498,7 +498,7 @@ def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path
     for k in range(3):
         first, second = biotac.Recording(tmp_path / f"{k}.mcap"), biotac.Recording(tmp_path / f"{k}.2.mcap")
         assert len(first.frames) >= 200 <= len(second.frames)
-        (gap,) = {(its.lost_at_ns, its.back_at_ns) for its in first.gaps + second.gaps}
+        (gap,) = {(gap.lost_at_ns, gap.back_at_ns) for gap in first.gaps + second.gaps}
         assert killed_ns < gap[0] < gap[1] and gap[1] > back_ns  # by this computer's clock
         print(
             f"reader {k}: {(gap[0] - killed_ns) / 1e9:.2f} s after the kill, a gap of {(gap[1] - gap[0]) / 1e9:.2f} s"

@@ -37,8 +37,8 @@ def test_the_picos_page_has_the_table() -> None:
     page = (ROOT / "firmware/boards/pico/README.md").read_text()
     rows = [tuple(map(int, row)) for row in re.findall(r"^\| (\d+) \| (\d) \| (\d) \| (\d) \| (\d) \|$", page, re.M)]
     assert len(rows) == 7
-    for baud, *told in rows:
-        assert told == [bandwidth.most_fingers(streams | StreamFlags.STATUS, baud) for streams in COLUMNS]
+    for baud, *fits in rows:
+        assert fits == [bandwidth.most_fingers(streams | StreamFlags.STATUS, baud) for streams in COLUMNS]
 
 
 @pytest.mark.parametrize("fingers", range(6))

@@ -261,14 +261,14 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
     live.send(b"\x01half a fra")
     world.unplug(there)
     until(gaps)
-    (gap,), told = gaps(), back[0].firmware
+    (gap,), firmware = gaps(), back[0].firmware
     assert (gap.reason, gap.last_t_us, gap.next_t_us, gap.boot_id) == (reason, 110_000, 500_000, boot_id)
-    assert (gap.holds_lapsed, told.of(wire.Hold)) == (1, [])  # nothing renews a hold
+    assert (gap.holds_lapsed, firmware.of(wire.Hold)) == (1, [])  # nothing renews a hold
     assert gap.frames_missed == (None if boot_id == 2 else 38)
     assert world.clock.pauses == 3 and gap.back_at_ns >= gap.lost_at_ns
-    assert [(m.setting, m.value) for m in told.of(wire.SetSetting)] == [(2, 50), (1, 0)]
-    assert [m.quantities for m in told.of(wire.Subscribe)] == [wire.QuantityFlags.FORCE]
-    assert [(m.streams, m.keepalive_ms) for m in told.of(wire.Start)] == [(0b111, 1000)]
+    assert [(m.setting, m.value) for m in firmware.of(wire.SetSetting)] == [(2, 50), (1, 0)]
+    assert [m.quantities for m in firmware.of(wire.Subscribe)] == [wire.QuantityFlags.FORCE]
+    assert [(m.streams, m.keepalive_ms) for m in firmware.of(wire.Start)] == [(0b111, 1000)]
     assert hand.stats.gaps == 1 and hand.connected and hand[0].t_us == 500_000
 
 
@@ -284,9 +284,9 @@ def test_a_board_that_comes_back_and_refuses_what_it_had_ends_the_hand_in_words(
     world.unplug(there)
     with pytest.raises(
         biotac.CommandRefusedError, match=r"came back, but not with its setting 2: .*OUT_OF_RANGE"
-    ) as told:
+    ) as refused:
         live.hand.read(1000.0)
-    assert told.value.error == wire.Error.OUT_OF_RANGE and not live.hand.connected
+    assert refused.value.error == wire.Error.OUT_OF_RANGE and not live.hand.connected
 
 
 def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) -> None:
@@ -334,7 +334,7 @@ def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
     world.clock.while_away = others
     world.unplug(there)
     until(lambda: live.hand.connected and world.clock.pauses == 3)
-    assert {type(m) for m in strangers[0].firmware.told} == {wire.Stop, wire.HelloRequest}
+    assert {type(m) for m in strangers[0].firmware.commands} == {wire.Stop, wire.HelloRequest}
     assert refusals == ["the board is away and being looked for"]
     live.hand.ping()
 

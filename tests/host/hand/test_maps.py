@@ -42,10 +42,10 @@ from biotac.wire.framing import encode
 
 def test_the_header_is_read_as_the_boards_own_code_reads_it() -> None:
     blob = make_map(1_763_731_310, serial="BT123")
-    its = from_blob(blob)
-    assert (serial_of(blob), made_s_of(blob)) == (its.serial, its.made_s) == ("BT123", 1_763_731_310)
+    opened = from_blob(blob)
+    assert (serial_of(blob), made_s_of(blob)) == (opened.serial, opened.made_s) == ("BT123", 1_763_731_310)
     assert from_blob(for_any_sensor(blob)).serial == ""
-    assert from_blob(for_any_sensor(blob)).blob == replace(its, serial="").blob
+    assert from_blob(for_any_sensor(blob)).blob == replace(opened, serial="").blob
 
 
 @pytest.mark.parametrize("size", [0, _map.HEADER_BYTES - 1, _map.MAX_BYTES + 1])
@@ -57,10 +57,10 @@ def test_what_cannot_be_a_map_by_its_size_is_not_sent(size: int) -> None:
 
 
 def test_a_map_of_the_librarys_own_goes_as_it_is() -> None:
-    its = from_blob(make_map(3))
+    opened = from_blob(make_map(3))
     with biotac.open("sim:press.toml") as hand:
-        hand.board.set_map(0, its)
-        assert hand.board.get_map(0) == its.blob
+        hand.board.set_map(0, opened)
+        assert hand.board.get_map(0) == opened.blob
 
 
 def test_another_sensors_is_refused_in_words() -> None:
@@ -83,7 +83,7 @@ class Upload:
         self.kept = b""
         self.coming = bytearray()
         self.begun = False
-        self.told: list[type] = []
+        self.commands: list[type] = []
         self.silent: set[int] = set()  # of the commands for maps, by number: done, but not answered
         self.forgets: set[int] = set()  # restarts before this one
         self.reads_wrong = False
@@ -93,8 +93,8 @@ class Upload:
             return self._hello(payload)
         if wire.MESSAGES[message_id] in (wire.Stop, wire.Ping):
             return b""
-        number = len(self.told)
-        self.told.append(wire.MESSAGES[message_id])
+        number = len(self.commands)
+        self.commands.append(wire.MESSAGES[message_id])
         if number in self.forgets:
             self.begun = False
         answer = self._answer(wire.MESSAGES[message_id].unpack(payload))
@@ -136,12 +136,12 @@ def test_a_lost_reply_is_asked_for_again_at_every_step(board: tuple[Upload, biot
     blob = make_map(1, blocks=2)
     steps = 3 + -(-len(blob) // PART_BYTES)  # begin, parts, end, and the question what is there
     for step in range(steps):
-        upload.told.clear()
+        upload.commands.clear()
         upload.silent = {step}
         upload.kept = b""
         hand.board.set_map(0, blob)
         assert upload.kept == blob
-        assert upload.told[step] == upload.told[step + 1]
+        assert upload.commands[step] == upload.commands[step + 1]
 
 
 def test_a_board_that_restarts_in_the_middle_is_told_all_of_it_again(board: tuple[Upload, biotac.Hand]) -> None:
@@ -149,16 +149,16 @@ def test_a_board_that_restarts_in_the_middle_is_told_all_of_it_again(board: tupl
     blob = make_map(1, blocks=2)
     last = 1 + -(-len(blob) // PART_BYTES)
     for step in (1, 2, last):  # a part, another one, the end
-        upload.told.clear()
+        upload.commands.clear()
         upload.forgets = {step}
         upload.kept = b""
         hand.board.set_map(0, blob)
-        assert (upload.kept, upload.told.count(wire.BeginMap)) == (blob, 2)
-    upload.told.clear()
+        assert (upload.kept, upload.commands.count(wire.BeginMap)) == (blob, 2)
+    upload.commands.clear()
     upload.forgets = set(range(100))
     with pytest.raises(biotac.CommandRefusedError, match="NOT_BEGUN"):
         hand.board.set_map(0, blob)
-    assert upload.told.count(wire.BeginMap) == 3
+    assert upload.commands.count(wire.BeginMap) == 3
 
 
 def test_a_map_that_comes_back_otherwise_is_an_error(board: tuple[Upload, biotac.Hand]) -> None:
@@ -204,18 +204,18 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
 def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
-        mine, anyones = make_map(1, serial=port_serial(hand, 0), blocks=BIG), make_map(2)
-        hand.board.set_map(0, mine)
+        own, anyones = make_map(1, serial=port_serial(hand, 0), blocks=BIG), make_map(2)
+        hand.board.set_map(0, own)
         hand.board.set_map(1, anyones)
         hand.board.save_settings()
         hand.board.clear_map(1)  # not saved
     with boot(flash) as hand:
-        assert hand.board.maps() == {0: mine, 1: anyones}
+        assert hand.board.maps() == {0: own, 1: anyones}
         hand.board.clear_map(1)
         hand.board.save_settings()
     with boot(flash, ["BTOTHER", "BTANOTHER"]) as hand:
         assert hand.board.map_state(0) == CalibrationState.OTHER_SENSOR
-        assert hand.board.get_map(0) == mine
+        assert hand.board.get_map(0) == own
         assert (hand.board.get_map(1), hand.board.map_state(1)) == (None, CalibrationState.NONE)
         assert hand.board.maps() == {}
 
@@ -342,12 +342,12 @@ def port() -> Iterator[str]:
 
 
 def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) -> None:
-    mine, back = tmp_path / "mine.json", tmp_path / "back.json"
+    own, back = tmp_path / "mine.json", tmp_path / "back.json"
     blob = make_map(1_763_731_310)
-    mine.write_text(map_file.dumps(blob))
-    assert main(["calibration", "put", port, str(mine), "--finger", "1", "--save"]) == 0
-    said = capsys.readouterr().out
-    assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in said
+    own.write_text(map_file.dumps(blob))
+    assert main(["calibration", "put", port, str(own), "--finger", "1", "--save"]) == 0
+    output = capsys.readouterr().out
+    assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in output
     assert main(["calibration", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "finger 0: none, the board's settings apply"
@@ -376,9 +376,9 @@ def test_the_verb_shows_a_recordings_maps(recorded: Path, capsys) -> None:
 
 
 def test_info_tells_of_a_map_in_force(port: str, tmp_path: Path, capsys) -> None:
-    mine = tmp_path / "mine.json"
-    mine.write_text(map_file.dumps(make_map(1_763_731_310)))
-    assert main(["calibration", "put", port, str(mine), "--finger", "1"]) == 0
+    own = tmp_path / "mine.json"
+    own.write_text(map_file.dumps(make_map(1_763_731_310)))
+    assert main(["calibration", "put", port, str(own), "--finger", "1"]) == 0
     assert main(["info", port]) == 0
     assert "wrench map made 2025-11-21" in capsys.readouterr().out
     assert main(["info", port, "--json"]) == 0

@@ -67,14 +67,14 @@ def test_settings_that_there_are_not_are_refused(key) -> None:
 
 
 def test_names_of_fingers_work_in_every_command(live: Live) -> None:
-    hand, told = live.hand, live.firmware
+    hand, firmware = live.hand, live.firmware
     hand.tare("middle")
     hand.set_tare("ring", [2000.0] * 19)
     hand.board.clear_calibration("little")
     hand.board.clear_map("thumb")
     hand.tare(np.uint8(3))
     hand.hold("index", np.uint8(2))
-    assert [m.finger for m in told.of((wire.TareNow, wire.TareSet, wire.ClearCalibration, wire.ClearMap))] == [
+    assert [m.finger for m in firmware.of((wire.TareNow, wire.TareSet, wire.ClearCalibration, wire.ClearMap))] == [
         *(1, 2, 3, 4, 3)
     ]
     hand._reader.present = 0b1
@@ -82,7 +82,7 @@ def test_names_of_fingers_work_in_every_command(live: Live) -> None:
         for name in ("pinky", "thumb"):
             with pytest.raises(KeyError, match=name):
                 refused(name)
-    assert len(told.of(wire.Hold)) == 1
+    assert len(firmware.of(wire.Hold)) == 1
 
 
 def test_a_port_is_not_closed_in_the_middle_of_a_command(live: Live, monkeypatch) -> None:

@@ -231,17 +231,17 @@ def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:
 
 
 def test_what_callbacks_wait_for_is_added_to_what_was_chosen(live: Live) -> None:
-    touch, force, told = wire.QuantityFlags.TOUCH, wire.QuantityFlags.FORCE, live.firmware
+    touch, force, firmware = wire.QuantityFlags.TOUCH, wire.QuantityFlags.FORCE, live.firmware
     live.hand.on_touch(print)
     live.hand.stream("force", rest=False)
-    assert told.of(wire.Subscribe)[-1].quantities == force | touch
+    assert firmware.of(wire.Subscribe)[-1].quantities == force | touch
     live.hand.stream("pac")  # TOUCH comes with frames only
-    assert told.of(wire.Start)[-1].streams & wire.StreamFlags.FRAMES
+    assert firmware.of(wire.Start)[-1].streams & wire.StreamFlags.FRAMES
     live.hand.stream("force", rest=False)
     seen: list[wire.Bands] = []
     live.hand.on_bands(seen.append)  # a running stream is changed at once
-    assert told.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
-    assert told.of(wire.Subscribe)[-1].quantities == force | touch
+    assert firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
+    assert firmware.of(wire.Subscribe)[-1].quantities == force | touch
     bands = wire.Bands(3, 30_227, 2, 22, (1, 2, 3, 4, 5, 2**32 - 2))
     live.send(packed(bands), frame(0))
     until(lambda: seen)

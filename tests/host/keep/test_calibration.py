@@ -202,19 +202,19 @@ def test_no_byte_of_a_record_may_change(at: int) -> None:
 def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
-        mine = replace(ODD, serial=serial_of(hand, 0))
-        hand.board.set_calibration(0, mine)
+        given = replace(ODD, serial=serial_of(hand, 0))
+        hand.board.set_calibration(0, given)
         hand.board.set_calibration(1, replace(ODD, serial=""))
         hand.board.save_settings()
         hand.board.clear_calibration(1)  # not saved
-    assert eeprom.pack(mine) in flash.read_bytes()
+    assert eeprom.pack(given) in flash.read_bytes()
     with boot(flash) as hand:
-        assert hand.board.calibrations() == {0: mine, 1: replace(ODD, serial="")}
+        assert hand.board.calibrations() == {0: given, 1: replace(ODD, serial="")}
         hand.board.clear_calibration(1)
         hand.board.save_settings()
     with boot(flash, ["BTOTHER", "BTANOTHER"]) as hand:
         assert hand.board.calibration_state(0) == CalibrationState.OTHER_SENSOR
-        assert hand.board.calibration(0) == mine
+        assert hand.board.calibration(0) == given
         assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (None, CalibrationState.NONE)
         assert hand.board.calibrations() == {}
 
@@ -282,8 +282,8 @@ def port() -> Iterator[str]:
 def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp_path: Path) -> None:
     path, back = tmp_path / "thumb.json", tmp_path / "back.json"
     with biotac.open(port) as hand:
-        mine = replace(ODD, serial=serial_of(hand, 1))
-    path.write_text(file.dumps(mine))
+        given = replace(ODD, serial=serial_of(hand, 1))
+    path.write_text(file.dumps(given))
     verb = ["calibration"]
     assert main([*verb, "get", port, "--finger", "1", str(back)]) == 2
     assert "finger 1 on" in capsys.readouterr().err
@@ -294,11 +294,11 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     assert main([*verb, "put", port, str(path), "--finger", "1"]) == 0
     assert "until the next reboot" in capsys.readouterr().out
     assert main([*verb, "get", port, "--finger", "1", str(back)]) == 0
-    assert file.load(back) == mine
+    assert file.load(back) == given
     assert json.loads(back.read_text())["provenance"]["finger"] == 1
     assert main([*verb, "get", port, "--finger", "1", str(back)]) == 2
     assert main([*verb, "get", port, "--finger", "0", str(back), "--force"]) == 0
-    assert file.load(back) == replace(mine, serial="")
+    assert file.load(back) == replace(given, serial="")
     capsys.readouterr()
     assert main([*verb, "show", port]) == 0
     shown = capsys.readouterr().out

@@ -257,11 +257,11 @@ def test_what_the_harnesses_eeproms_hold_is_in_force_when_it_is_opened(board: Bo
     first.close()
     wires = fake_smbus.Wires({0x50: fake_smbus.Eeprom(256, 8, 1), 0x51: fake_smbus.Eeprom(4096, 32, 2)})
     monkeypatch.setitem(sys.modules, "smbus2", wires.module())
-    mine = biotac.Calibration(serial=serial, made_s=5, force_gain_nn=(7, 8, 9))
+    own = biotac.Calibration(serial=serial, made_s=5, force_gain_nn=(7, 8, 9))
     with Chip("1:0x51", "24c32") as chip:
-        eeprom.store(chip, mine)
+        eeprom.store(chip, own)
     with biotac.open("spidev:0.0,0.1?calibration=,1:0x51:24c32") as hand:
-        assert hand.board.calibrations() == {1: mine}
+        assert hand.board.calibrations() == {1: own}
     # On finger 0's harness it is another sensor's; and finger 0's own chip is blank.
     with pytest.raises(biotac.CommandRefusedError, match="OTHER_SENSOR"):
         biotac.open("spidev:0.0,0.1?calibration=1:0x51:24c32")

@@ -60,9 +60,9 @@ def frames_of(seed: int, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return counts.astype(np.uint16), tare_q4.astype(np.uint16), rng.integers(-65520, 65521, rows).astype(np.int32)
 
 
-def got(its: BoardMap, *frames: np.ndarray) -> np.ndarray:
-    force, torque, torsion = its.results(*frames)
-    return np.column_stack([force, torque, torsion])[:, : its.axes] / result_units(its.axes)
+def got(stored: BoardMap, *frames: np.ndarray) -> np.ndarray:
+    force, torque, torsion = stored.results(*frames)
+    return np.column_stack([force, torque, torsion])[:, : stored.axes] / result_units(stored.axes)
 
 
 # ---- bytes -------------------------------------------------------------------------------------
@@ -70,20 +70,22 @@ def got(its: BoardMap, *frames: np.ndarray) -> np.ndarray:
 
 def test_a_blob_comes_back_to_the_bit() -> None:
     for axes in (3, 6, 7):
-        its = random_map(1, axes).on_board(serial="BTEMU00000000042", made_s=1763731310)
-        back = from_blob(its.blob)
+        stored = random_map(1, axes).on_board(serial="BTEMU00000000042", made_s=1763731310)
+        back = from_blob(stored.blob)
         assert (back.axes, back.serial, back.made_s) == (axes, "BTEMU00000000042", 1763731310)
-        assert [(b.kind, b.gate, b.exponent) for b in back.blocks] == [(b.kind, b.gate, b.exponent) for b in its.blocks]
-        for one, other in zip(back.blocks, its.blocks, strict=True):
+        assert [(b.kind, b.gate, b.exponent) for b in back.blocks] == [
+            (b.kind, b.gate, b.exponent) for b in stored.blocks
+        ]
+        for one, other in zip(back.blocks, stored.blocks, strict=True):
             np.testing.assert_array_equal(one.coefficients, other.coefficients)
-        assert back.blob == its.blob
+        assert back.blob == stored.blob
 
 
 def test_the_layout_is_what_the_specification_says() -> None:
     coefficients = np.array([[1, -1, 0x7FFF, -0x7FFF, 0x1234, -0x1234]])
-    its = BoardMap(6, (BoardBlock(Kind.PRESSURE, Gate.YY, (1, 2, 3, 4, 5, 30), coefficients),), "A", 7)
+    stored = BoardMap(6, (BoardBlock(Kind.PRESSURE, Gate.YY, (1, 2, 3, 4, 5, 30), coefficients),), "A", 7)
     halves = [1, -1, 0x7FFF, 0, 0, 0, -0x7FFF, 0x1234, -0x1234, 0, 0, 0]
-    assert its.blob == (
+    assert stored.blob == (
         bytes([2, 6, 1, 0]) + b"A" + bytes(15) + struct.pack("<I", 7) + bytes([7, 5, 1, 2, 3, 4, 5, 30, 0, 0, 0, 0])
     ) + struct.pack("<12h", *halves)
 
@@ -91,23 +93,23 @@ def test_the_layout_is_what_the_specification_says() -> None:
 def test_torque_and_torsion_stand_behind_the_force_of_their_block() -> None:
     coefficients = np.arange(1, 134).reshape(19, 7)
     one = BoardBlock(Kind.BULGE, Gate.X, (1, 2, 3, 4, 5, 6, 7), coefficients)
-    its = BoardMap(7, (one, BoardBlock(Kind.OFFSET, Gate.ONE, (9,) * 7, np.arange(200, 207)[None])))
+    stored = BoardMap(7, (one, BoardBlock(Kind.OFFSET, Gate.ONE, (9,) * 7, np.arange(200, 207)[None])))
     halves = [*coefficients[:, :3].ravel(), 0, 0, 0, *coefficients[:, 3:].ravel(), 0, 0, 0, 0]
     halves += [200, 201, 202, 0, 0, 0, 203, 204, 205, 206, 0, 0, 0, 0]
     heads = bytes([3, 1, 1, 2, 3, 4, 5, 6, 7, 0, 0, 0]) + bytes([0, 0, *(9,) * 7, 0, 0, 0])
-    assert its.blob == bytes([2, 7, 2]) + bytes(21) + heads + struct.pack(f"<{len(halves)}h", *halves)
-    np.testing.assert_array_equal(from_blob(its.blob).blocks[0].coefficients, coefficients)
+    assert stored.blob == bytes([2, 7, 2]) + bytes(21) + heads + struct.pack(f"<{len(halves)}h", *halves)
+    np.testing.assert_array_equal(from_blob(stored.blob).blocks[0].coefficients, coefficients)
 
 
 def test_pairs_go_round_a_ring() -> None:
     first, second = np.triu_indices(19)
     coefficients = np.stack([19 * first + second] * 3, axis=1)
-    its = BoardMap(3, (BoardBlock(Kind.SIGNAL_PAIRS, Gate.ONE, (1, 1, 1), coefficients),))
-    laid = np.frombuffer(its.blob, "<i2", offset=36)[::3].reshape(19, 10)
+    stored = BoardMap(3, (BoardBlock(Kind.SIGNAL_PAIRS, Gate.ONE, (1, 1, 1), coefficients),))
+    laid = np.frombuffer(stored.blob, "<i2", offset=36)[::3].reshape(19, 10)
     for i, row in enumerate(laid):
         pairs = [sorted((i, (i + k) % 19)) for k in range(10)]
         assert row.tolist() == [19 * a + b for a, b in pairs]
-    np.testing.assert_array_equal(from_blob(its.blob).blocks[0].coefficients, coefficients)
+    np.testing.assert_array_equal(from_blob(stored.blob).blocks[0].coefficients, coefficients)
 
 
 def test_what_a_board_would_refuse_is_refused_in_words() -> None:
@@ -133,7 +135,7 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
 def test_what_would_wrap_in_a_blob_is_refused(change: dict, words: str) -> None:
     block = BoardBlock(Kind.OFFSET, Gate.ONE, (1, 1, 1), np.ones((1, 3), np.int64))
     assert BoardMap(3, (block,)).blob
-    change = {name: np.array(its) if name == "coefficients" else its for name, its in change.items()}
+    change = {name: np.array(stored) if name == "coefficients" else stored for name, stored in change.items()}
     with pytest.raises(InputError, match=words):
         _ = BoardMap(3, (dataclasses.replace(block, **change),)).blob
     for odd in ({"serial": "BT" * 9}, {"serial": "\xfc"}, {"made_s": -1}, {"made_s": 2**32}):
@@ -142,7 +144,7 @@ def test_what_would_wrap_in_a_blob_is_refused(change: dict, words: str) -> None:
 
 
 def test_c_is_given_what_it_expects_or_nothing() -> None:
-    its = random_map(4).on_board()
+    stored = random_map(4).on_board()
     good = frames_of(1, 5)
     for k, bad in [
         (0, good[0][:, :18]), (0, good[0][0]), (1, good[1][:4]), (2, good[2][:4]), (2, good[2][:, None]),
@@ -151,7 +153,7 @@ def test_c_is_given_what_it_expects_or_nothing() -> None:
         spoilt = list(good)
         spoilt[k] = bad
         with pytest.raises(ValueError, match="expected"):
-            its.results(*spoilt)
+            stored.results(*spoilt)
         if k < 2:
             with pytest.raises(ValueError, match="expected"):
                 on_board_q4(spoilt[0], spoilt[1], default_settings())
@@ -162,13 +164,13 @@ def test_c_is_given_what_it_expects_or_nothing() -> None:
 
 
 def test_a_map_beyond_the_formats_is_refused_by_name() -> None:
-    its = random_map(3)
-    huge = its.coefficients.copy()
+    stored = random_map(3)
+    huge = stored.coefficients.copy()
     huge[19:209, 1] = 1e6  # N for each pair of 500 counts
     with pytest.raises(InputError, match=r"coefficients of SIGNAL_PAIRS x ONE for Fy add up to .* larger lambda"):
-        dataclasses.replace(its, coefficients=huge).on_board()
+        dataclasses.replace(stored, coefficients=huge).on_board()
     with pytest.raises(InputError, match="every coefficient of the map is 0"):
-        dataclasses.replace(its, coefficients=0.0 * its.coefficients).on_board()
+        dataclasses.replace(stored, coefficients=0.0 * stored.coefficients).on_board()
 
 
 # ---- arithmetic --------------------------------------------------------------------------------
@@ -187,38 +189,38 @@ def test_blocks_that_are_all_zero_are_left_away_and_signals_go_into_the_split() 
 @pytest.mark.parametrize("seed", range(4))
 def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -> None:
     model = random_map(seed, axes)
-    its = model.on_board()
+    stored = model.on_board()
     frames = frames_of(seed, 3000)
-    meant, off = exact(its, *frames), bound.error_bound(its, None, *frames)
-    error = np.abs(got(its, *frames) - meant)
+    meant, off = exact(stored, *frames), bound.error_bound(stored, None, *frames)
+    error = np.abs(got(stored, *frames) - meant)
     assert (error <= off).all()
     assert error.max() > 0.02 * off.max()  # the bound is about something
 
 
 def test_the_integers_mean_the_fitted_map() -> None:
     model = random_map(5, 7)
-    its = model.on_board()
+    stored = model.on_board()
     counts, _, pdc_q4 = frames_of(5, 2000)
     counts = np.minimum(counts, 4095).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(TARE, counts.shape))
     truth = model.predict(counts.astype(float), pdc_q4 / 16)
-    limit = bound.error_bound(its, model.blocks(), counts, tare_q4, pdc_q4)
-    assert (np.abs(got(its, counts, tare_q4, pdc_q4) - truth) <= limit).all()
-    assert np.abs(exact(its, counts, tare_q4, pdc_q4) - truth).max() < 1e-3 * np.abs(truth).max()
+    limit = bound.error_bound(stored, model.blocks(), counts, tare_q4, pdc_q4)
+    assert (np.abs(got(stored, counts, tare_q4, pdc_q4) - truth) <= limit).all()
+    assert np.abs(exact(stored, counts, tare_q4, pdc_q4) - truth).max() < 1e-3 * np.abs(truth).max()
 
 
 def test_a_whole_model_of_seven_axes_has_room_on_a_board() -> None:
-    its = random_map(5, 7).on_board()
-    halves = sum(_map.KINDS[block.kind].halves for block in its.blocks)
-    assert len(its.blob) == 24 + 12 * len(its.blocks) + 14 * halves <= _map.MAX_BYTES
+    stored = random_map(5, 7).on_board()
+    halves = sum(_map.KINDS[block.kind].halves for block in stored.blocks)
+    assert len(stored.blob) == 24 + 12 * len(stored.blocks) + 14 * halves <= _map.MAX_BYTES
 
 
 def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    its = random_map(5, 7)
-    size = len(its.on_board().blob)
+    stored = random_map(5, 7)
+    size = len(stored.on_board().blob)
     monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
     with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, which fit a board"):
-        its.on_board()
+        stored.on_board()
 
 
 def test_a_row_of_torsion_changes_nothing_of_the_other_six() -> None:
@@ -254,9 +256,9 @@ def test_the_specification_written_once_more_gives_the_same_bits() -> None:
         for gate in list(Gate)[1:5]
         for k in kinds
     )
-    its = BoardMap(7, blocks)
+    stored = BoardMap(7, blocks)
     counts, tare_q4, pdc_q4 = frames_of(6, 60)
-    force, torque, torsion = its.results(counts, tare_q4, pdc_q4)
+    force, torque, torsion = stored.results(counts, tare_q4, pdc_q4)
     got_q = np.column_stack([force, torque, torsion])
     place = {pair: k for k, pair in enumerate(zip(*(i.tolist() for i in np.triu_indices(19)), strict=True))}
     for row in range(60):
@@ -345,12 +347,12 @@ def test_a_map_that_no_board_can_hold_is_told_and_not_raised(tmp_path: Path) -> 
 # ---- frames ------------------------------------------------------------------------------------
 
 
-def mapped_frames(its: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
+def mapped_frames(stored: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
     rng = np.random.default_rng(8)
     counts = np.rint(TARE + np.concatenate([np.zeros((60, 19)), rng.normal(-150.0, 90.0, (200, 19))])).astype(np.uint16)
     slow = np.full(len(counts), 2000, np.uint16)
     slow_pdc = np.where(np.arange(len(counts)) < 60, 2000, pdc).astype(np.uint16)
-    rounds = Rounds(3, counts, slow_pdc, slow, slow, np.arange(len(counts)) * 10_000, wrench_map=its)
+    rounds = Rounds(3, counts, slow_pdc, slow, slow, np.arange(len(counts)) * 10_000, wrench_map=stored)
     return frames_and_tares(rounds, default_settings())[0]
 
 
@@ -362,50 +364,50 @@ def checked(frames: np.ndarray, maps: Mapping[int, bytes | BoardMap]) -> CrossCh
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> None:
-    its = random_map(11, axes).on_board()
-    frames = mapped_frames(its, pdc=2120)
+    stored = random_map(11, axes).on_board()
+    frames = mapped_frames(stored, pdc=2120)
     plain = mapped_frames(None, pdc=2120)
     tared = (frames["flags"] & wire.FrameFlags.UNTARED) == 0
     mapped = (frames["flags"] & wire.FrameFlags.MAPPED) != 0
     np.testing.assert_array_equal(mapped, tared)
     assert not (plain["flags"] & wire.FrameFlags.MAPPED).any() and tared.sum() > 200
     pressure = board_map.pdc_above_rest_q4(frames)
-    force, torque, torsion = its.results(frames["counts"], frames["tare_q4"], pressure)
+    force, torque, torsion = stored.results(frames["counts"], frames["tare_q4"], pressure)
     np.testing.assert_array_equal(frames["force_100un"][mapped], force[mapped])
     published = torque if axes > 3 else plain["torque_mnmm"]
     np.testing.assert_array_equal(frames["torsion_mnmm"][mapped], torsion[mapped])
     np.testing.assert_array_equal(frames["torsion_mnmm"] != wire.INVALID_I32, mapped & (axes == 7))
     np.testing.assert_array_equal(frames["torque_mnmm"][mapped, 1:], published[mapped, 1:])
     np.testing.assert_array_equal(frames["poc_um"], plain["poc_um"])
-    outcome = checked(frames, {3: its.blob})
+    outcome = checked(frames, {3: stored.blob})
     assert outcome.violations == 0 and outcome.mapped == mapped.sum() and outcome.frames == len(frames)
     assert 0.0 < outcome.force_mn_max <= outcome.mapped_force_mn_bound
     assert outcome.as_dict()["force_mn_bound"] == outcome.mapped_force_mn_bound
 
 
 def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
-    its = random_map(12).on_board()
-    frames = mapped_frames(its)
+    stored = random_map(12).on_board()
+    frames = mapped_frames(stored)
     wrong = frames.copy()
     wrong["force_100un"][100, 1] += 4000  # 0.4 N
-    outcome = checked(wrong, {3: its})
+    outcome = checked(wrong, {3: stored})
     assert outcome.violations >= 1 and "finger 3 frame" in outcome.findings[0] and "force y" in outcome.findings[0]
     assert checked(frames, {3: random_map(13).on_board()}).violations > 200
-    none = checked(frames, {2: its})
+    none = checked(frames, {2: stored})
     assert none.violations == (frames["flags"] & wire.FrameFlags.MAPPED).astype(bool).sum()
     assert "map is unknown" in none.findings[0]
 
 
 def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:
-    its = random_map(17, 7).on_board()
-    frames = mapped_frames(its)
+    stored = random_map(17, 7).on_board()
+    frames = mapped_frames(stored)
     for value, seen in (
         (frames["torsion_mnmm"][100] + 900, "torsion off by 0."),
         (wire.INVALID_I32, "torsion is valid"),
     ):
         wrong = frames.copy()
         wrong["torsion_mnmm"][100] = value
-        outcome = checked(wrong, {3: its})
+        outcome = checked(wrong, {3: stored})
         assert outcome.violations == 1 and seen in outcome.findings[0]
     plain = mapped_frames(None)
     plain["torsion_mnmm"][100] = 0
@@ -415,10 +417,10 @@ def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_kernels_over_recorded_frames_give_the_same_frames(axes: int) -> None:
-    its = random_map(14, axes).on_board()
-    frames = mapped_frames(its)
+    stored = random_map(14, axes).on_board()
+    frames = mapped_frames(stored)
     frames = frames[(frames["flags"] & wire.FrameFlags.MAPPED) != 0]
-    poc, force, torque, torsion, flags = board_map.on_board_q4(frames, default_settings(), its)
+    poc, force, torque, torsion, flags = board_map.on_board_q4(frames, default_settings(), stored)
     np.testing.assert_array_equal(poc, frames["poc_um"])
     np.testing.assert_array_equal(force, frames["force_100un"])
     np.testing.assert_array_equal(torque, frames["torque_mnmm"])
@@ -437,12 +439,12 @@ def test_a_fitted_maps_file_makes_the_same_blob(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
 def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
-    its = random_map(16, axes).on_board()
-    frames = mapped_frames(its, pdc=2100)
+    stored = random_map(16, axes).on_board()
+    frames = mapped_frames(stored, pdc=2100)
     frames = frames[(frames["flags"] & wire.FrameFlags.MAPPED) != 0][50:]
     pressure = board_map.pdc_above_rest_q4(frames) / 16
     tare = frames["tare_q4"] / 16
-    results = biotac.compute(frames["counts"], tare, wrench_map=its.blob, pdc_above_rest=pressure)
+    results = biotac.compute(frames["counts"], tare, wrench_map=stored.blob, pdc_above_rest=pressure)
     np.testing.assert_allclose(results["force_n"], frames["force_100un"] / 1e4, atol=3e-2)
     np.testing.assert_allclose(results["torque_nmm"], frames["torque_mnmm"] / 1e3, atol=0.3)
     assert results.dtype == biotac.MAPPED_RESULT_DTYPE and np.isnan(results["torsion_nmm"]).all() == (axes < 7)
@@ -452,15 +454,15 @@ def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
     np.testing.assert_array_equal(results["poc_mm"], plain["poc_mm"])
     if axes == 3:
         np.testing.assert_array_equal(results["torque_nmm"][:, 1:], plain["torque_nmm"][:, 1:])
-    one = biotac.compute(frames["counts"][7], tare[7], wrench_map=its, pdc_above_rest=pressure[7])
+    one = biotac.compute(frames["counts"][7], tare[7], wrench_map=stored, pdc_above_rest=pressure[7])
     assert one.shape == ()
     np.testing.assert_allclose(one["force_n"], results["force_n"][7], rtol=1e-12)  # NumPy sums in another order
     again = np.zeros(len(frames), biotac.MAPPED_RESULT_DTYPE)
-    assert biotac.compute(frames["counts"], tare, out=again, wrench_map=its, pdc_above_rest=pressure) is again
+    assert biotac.compute(frames["counts"], tare, out=again, wrench_map=stored, pdc_above_rest=pressure) is again
     assert again.tobytes() == results.tobytes()
     with pytest.raises(ValueError, match="expected a contiguous, writeable MAPPED_RESULT_DTYPE of shape"):
-        biotac.compute(frames["counts"], tare, out=plain, wrench_map=its, pdc_above_rest=pressure)
-    missing = biotac.compute(frames["counts"], tare, wrench_map=its)
+        biotac.compute(frames["counts"], tare, out=plain, wrench_map=stored, pdc_above_rest=pressure)
+    missing = biotac.compute(frames["counts"], tare, wrench_map=stored)
     assert np.isnan(missing["force_n"]).all() and not np.isnan(missing["poc_mm"]).any()
     with pytest.raises(ValueError, match=r"pdc_above_rest has shape \(3,\), expected"):
-        biotac.compute(frames["counts"], tare, wrench_map=its, pdc_above_rest=pressure[:3])
+        biotac.compute(frames["counts"], tare, wrench_map=stored, pdc_above_rest=pressure[:3])

@@ -47,14 +47,14 @@ def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
 
 def test_it_is_the_trained_map_to_what_16_bits_leave_and_along_the_normals() -> None:
     counts = pressed(4000, 1)
-    its = judged(counts)
-    assert (its.share == population.ALL).sum() > 20
-    assert ((its.share > 0) & (its.share < population.ALL)).sum() > 20
+    judgement = judged(counts)
+    assert (judgement.share == population.ALL).sum() > 20
+    assert ((judgement.share > 0) & (judgement.share < population.ALL)).sum() > 20
     got = biotac.compute(counts, TARE, POPULATION)["force_n"]
     trained = population_map.load(None).population
     # shares differ by a step where the board's map is rounded over it
-    step = np.abs(trained.force(counts, TARE) - its.otherwise_n) / population.ALL
-    step[(its.share == 0) | (its.share == population.ALL)] = 0.0
+    step = np.abs(trained.force(counts, TARE) - judgement.otherwise_n) / population.ALL
+    step[(judgement.share == 0) | (judgement.share == population.ALL)] = 0.0
     assert (np.abs(got - trained.published(counts, TARE)) <= step + 1e-9).all()
 
 
@@ -98,15 +98,15 @@ def test_sigma_is_what_a_new_finger_leaves_and_grows_away_from_the_training() ->
     counts = pressed(4000, 6)
     rows = rows_of(POPULATION, counts)
     outside = rows["flags"] & wire.FrameFlags.OUTSIDE != 0
-    its = judged(counts)
-    np.testing.assert_array_equal(outside, its.outside)
+    judgement = judged(counts)
+    np.testing.assert_array_equal(outside, judgement.outside)
     assert (rows["force_sigma_100un"][outside] == wire.INVALID_COUNT).all()
-    sigma_n, like = rows["force_sigma_100un"] / 1e4, ~outside & (its.share == population.ALL)
+    sigma_n, like = rows["force_sigma_100un"] / 1e4, ~outside & (judgement.share == population.ALL)
     assert like.any()
     trained = np.broadcast_to(population_map.load(None).sigma_n, sigma_n.shape)
     np.testing.assert_allclose(sigma_n[like], trained[like], rtol=0, atol=1.1e-4)
-    unlike = ~outside & (its.share == 0)
-    strength_n = np.linalg.norm(its.otherwise_n, axis=1, keepdims=True)
+    unlike = ~outside & (judgement.share == 0)
+    strength_n = np.linalg.norm(judgement.otherwise_n, axis=1, keepdims=True)
     np.testing.assert_allclose(
         sigma_n[unlike], (strength_n * [0.15, 0.15, 0.3])[unlike], rtol=0, atol=3e-4 + 1e-3 * strength_n.max()
     )

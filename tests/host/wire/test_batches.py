@@ -122,9 +122,9 @@ def test_sequence_and_time_are_unwrapped_for_each_finger() -> None:
     sent = [(f, 65530 + k, 2**32 - 30_000 + 10_000 * k) for k in range(12) for f in (0, 3)]
     frames = np.concatenate([decoder.feed(frame(*s)).frames for s in sent])
     for finger in (0, 3):
-        mine = frames[frames["finger"] == finger]
-        assert mine["seq"].tolist() == list(range(65530, 65542))
-        assert np.all(np.diff(mine["t_us"]) == 10_000)
+        own = frames[frames["finger"] == finger]
+        assert own["seq"].tolist() == list(range(65530, 65542))
+        assert np.all(np.diff(own["t_us"]) == 10_000)
     assert decoder.lost == 0
 
 

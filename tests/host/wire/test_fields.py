@@ -43,16 +43,20 @@ def test_json_says_null_where_there_is_no_value(rows) -> None:
         assert text == json.loads(json.dumps(as_json(biotac.Frame.from_row(row)), allow_nan=False))
         for name in ("poc_mm", "force_n", "tare", "counts"):
             gone = row[name] == 65535 if name == "counts" else np.isnan(row[name])
-            assert text[name] == [None if g else its for its, g in zip(row[name].tolist(), gone, strict=True)], name
+            assert text[name] == [
+                None if g else expected for expected, g in zip(row[name].tolist(), gone, strict=True)
+            ], name
 
 
 def test_compute_takes_rows(rows) -> None:
     """What it makes of them is what the board made, to the wire's rounding: half a step of each."""
     lin = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # whose arithmetic on the board is as fine as the wire
-    its = biotac.compute(rows, settings=lin)
+    expected = biotac.compute(rows, settings=lin)
     for name, step in (("poc_mm", 1e-3), ("force_n", 1e-4), ("torque_nmm", 1e-3)):
-        good = ~np.isnan(rows[name]).any(axis=1) & ~np.isnan(its[name]).any(axis=1)
+        good = ~np.isnan(rows[name]).any(axis=1) & ~np.isnan(expected[name]).any(axis=1)
         assert good.sum() > 100
-        assert np.abs(its[name] - rows[name])[good].max() <= 1.5 * step, name  # the board's own error and half a step
+        assert np.abs(expected[name] - rows[name])[good].max() <= 1.5 * step, (
+            name
+        )  # the board's own error and half a step
     with pytest.raises(ValueError, match="expected compute"):
         biotac.compute(rows["counts"])

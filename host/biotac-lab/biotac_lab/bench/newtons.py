@@ -156,7 +156,7 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
     if len(runs) > 1:
         fingers = [training.sums_of(training.aligned(run)) for run in runs]
         return {
-            path.name: training.train([its for j, its in enumerate(fingers) if j != k], symmetric=True)
+            path.name: training.train([finger for j, finger in enumerate(fingers) if j != k], symmetric=True)
             for k, path in enumerate(files)
         }, ["population maps are trained on the other recordings, symmetric like the package's"]
     kept = load_population(None)
@@ -166,31 +166,31 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
     return {path.name: kept.population}, ["the population map is the package's"]
 
 
-def _untrained(its: Population, run: Run) -> dict[str, list[float]]:
-    found = held_out_error.worth(its, training.aligned(run))
+def _untrained(population_map: Population, run: Run) -> dict[str, list[float]]:
+    found = held_out_error.worth(population_map, training.aligned(run))
     all_three = {POPULATION: found.rmse_n, PRESSES: found.rmse_scale5_n, MINUTE: found.rmse_60s_n}
     return {key: rmse.tolist() for key, rmse in all_three.items() if rmse is not None}
 
 
-def _noise(its: Validation) -> list[float]:
+def _noise(validation: Validation) -> list[float]:
     """RMS effect, N, of electrode noise through the map of the whole run. Second differences leave out slow loads."""
-    run, rng = its.run, np.random.default_rng(0)
+    run, rng = validation.run, np.random.default_rng(0)
     curve = np.diff(run.counts, n=2, axis=0)
     sigma = np.median(np.abs(curve), axis=0) / 0.6745 / np.sqrt(6.0)
     rows = rng.integers(0, len(run.counts), 2000)
     pdc = None if run.pdc is None else run.pdc[rows]
-    map_of_all = its.wrench_map
+    map_of_all = validation.wrench_map
     counts = run.counts[rows]
     noisy = counts + rng.normal(size=counts.shape) * sigma
-    there, here = (map_of_all.predict(its, pdc)[:, :3] for its in (noisy, counts))
+    there, here = (map_of_all.predict(each, pdc)[:, :3] for each in (noisy, counts))
     noise_n: list[float] = rmse(there, here).tolist()
     return noise_n
 
 
-def _repeatability(its: Validation) -> list[float]:
+def _repeatability(validation: Validation) -> list[float]:
     """Differences of held-out errors between rows of nearly equal counts seconds apart, which no map could explain."""
-    run = its.run
-    error = its.predicted[0][:, :3] - run.truth[:, :3]
+    run = validation.run
+    error = validation.predicted[0][:, :3] - run.truth[:, :3]
     rows = np.arange(0, len(run.counts), EVERY_ROW)
     near, distance = _nearest(run.counts - run.tare, rows)
     same = distance <= np.quantile(distance, NEAREST)

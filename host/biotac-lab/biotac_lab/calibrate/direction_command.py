@@ -100,9 +100,9 @@ def is_light(force_n: Any) -> Any:
     return (size_n > LIGHT_N[0]) & (size_n < LIGHT_N[1])
 
 
-def of_population(name: str, its: population.Population, run: wrench.Run) -> Table:
+def of_population(name: str, prior: population.Population, run: wrench.Run) -> Table:
     """The direction of a map that was trained on other fingers."""
-    force_n, outside = its.published(run.counts, run.tare), its.judged(run.counts, run.tare).outside
+    force_n, outside = prior.published(run.counts, run.tare), prior.judged(run.counts, run.tare).outside
     light = is_light(run.truth)
     every = [(name, slice(None))] + ([(f"{name}, {LIGHT}", light)] if light.any() else [])
     rows = [

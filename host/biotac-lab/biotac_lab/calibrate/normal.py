@@ -70,7 +70,7 @@ def held_out(looks: Looks) -> Floats:
     fitting = _Fitting(looks)
     result = np.empty_like(looks.normals)
     for k, rows in enumerate(fitting.rows):
-        result[rows] = fitting.said(rows, fitting.all_but(k))
+        result[rows] = fitting.predicted(rows, fitting.all_but(k))
     return result
 
 
@@ -99,7 +99,7 @@ class _Fitting:
         self._gram = np.array([self._z[rows].T @ self._z[rows] for rows in self.rows])
         self._cross = np.array([self._z[rows].T @ left[rows] for rows in self.rows])
 
-    def said(self, rows: npt.NDArray[np.intp], coefficients: Floats) -> Floats:
+    def predicted(self, rows: npt.NDArray[np.intp], coefficients: Floats) -> Floats:
         """Unit normals of ``rows``."""
         return _unit(self._formula[rows] + self._z[rows] @ coefficients)
 
@@ -108,9 +108,9 @@ class _Fitting:
         kept = [k for k in range(len(self.rows)) if k != out]
         errors = []
         for ridge in RIDGES:
-            said = [self.said(self.rows[k], self._solved([j for j in kept if j != k], ridge)) for k in kept]
+            predicted = [self.predicted(self.rows[k], self._solved([j for j in kept if j != k], ridge)) for k in kept]
             truth = [self._normals[self.rows[k]] for k in kept]
-            errors.append(np.median(angles_deg(np.concatenate(said), np.concatenate(truth))))
+            errors.append(np.median(angles_deg(np.concatenate(predicted), np.concatenate(truth))))
         return self._solved(kept, RIDGES[int(np.argmin(errors))])
 
     def _solved(self, contacts: list[int], ridge: float) -> Floats:

@@ -72,16 +72,16 @@ def by_paper(trial: Trial, settings: Settings, name: str = PAPER) -> Estimate:
     return Estimate(name, frames["force_n"], frames["torque_nmm"])
 
 
-def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
+def by_map(trial: Trial, fitted: WrenchMap, name: str) -> Estimate:
     """A fitted map on the trial's counts, with the board's tare of each frame in place of the map's own.
 
     Raises InputError when the map needs PDC and the trial has none.
     """
-    if its.with_pdc and not np.isfinite(trial.pressure).any():
+    if fitted.with_pdc and not np.isfinite(trial.pressure).any():
         raise InputError(f"map {name} needs PDC, but {trial.name} has none; choose a map trained without PDC")
     counts = np.where(trial.counts == messages.INVALID_COUNT, np.nan, trial.counts)
-    wrench = replace(its, tare=trial.tare).predict(counts, trial.pressure)
-    columns = {axis: k for k, axis in enumerate(its.axes)}
+    wrench = replace(fitted, tare=trial.tare).predict(counts, trial.pressure)
+    columns = {axis: k for k, axis in enumerate(fitted.axes)}
     force = wrench[:, [columns[axis] for axis in ("Fx", "Fy", "Fz")]]
     torque = wrench[:, [columns[axis] for axis in ("Mx", "My", "Mz")]] if "Mz" in columns else None
     own = wrench[:, columns["torsion"]] if "torsion" in columns else None

@@ -74,8 +74,8 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force:
 def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bool) -> Trial:
     recording = Recording(path)
     _require(path, needs, ("E", "PDC", "F") if own_force else ("E", "PDC"))
-    mine = recording.frames[recording.frames["finger"] == finger]
-    if not len(mine):
+    own = recording.frames[recording.frames["finger"] == finger]
+    if not len(own):
         there = ", ".join(str(k) for k in np.unique(recording.frames["finger"])) or "none"
         raise RecordingError(
             f"{path}: no frames from finger {finger}; fingers with frames: {there}; choose one with --finger"
@@ -83,9 +83,9 @@ def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bo
     notes = ["tare: the board's own, from the recorded counts", *recording.problems]
     if own_force:
         notes.append("force: as the board published it, with its own scales; there was no force plate")
-    force = np.nan_to_num(mine["force_n"]) if own_force else None
-    time_s = (mine["t_us"] - mine["t_us"][0]) / 1e6
-    counts, pdc = mine["counts"].copy(), mine["pdc"].copy()
+    force = np.nan_to_num(own["force_n"]) if own_force else None
+    time_s = (own["t_us"] - own["t_us"][0]) / 1e6
+    counts, pdc = own["counts"].copy(), own["pdc"].copy()
     return Trial(path.name, time_s, (), counts, pdc, on_board(counts, pdc), force, None, notes=tuple(notes))
 
 

@@ -59,15 +59,17 @@ def _quantity(panel: Any, trial: Trial, estimates: Sequence[Estimate], axis: str
         panel.plot(trial.time_s[::step], truth[::step], color="#111111", linewidth=3, alpha=0.3, label="applied")
     colors = iter(MAP_COLORS)
     papers = iter((PAPER_COLOR, OTHER_PAPER_COLOR))
-    for its in estimates:
-        at_contact = None if trial.at_mm is None or its.torque_nmm is None else its.torsion_nmm(trial.at_mm)
-        line = _of(axis, its.force_n, its.torque_nmm, at_contact)
+    for trace in estimates:
+        at_contact = None if trial.at_mm is None or trace.torque_nmm is None else trace.torsion_nmm(trial.at_mm)
+        line = _of(axis, trace.force_n, trace.torque_nmm, at_contact)
         if line is None:
             continue
-        of_paper = its.name.startswith(PAPER)
+        of_paper = trace.name.startswith(PAPER)
         color = next(papers, PAPER_COLOR) if of_paper else next(colors, MAP_COLORS[-1])
         # a map's line follows the noise of every count: drawn last, it would hide the others
-        panel.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=its.name, zorder=3 + of_paper)
+        panel.plot(
+            trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=trace.name, zorder=3 + of_paper
+        )
     panel.axhline(0.0, color="#111111", linewidth=0.6)
     panel.set_ylabel(f"{axis} [{'N' if axis.startswith('F') else 'N mm'}]")
     _legend(panel)

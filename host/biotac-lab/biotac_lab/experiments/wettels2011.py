@@ -92,15 +92,15 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
     pairs = pool.submit(more.pairs, finger, size.pairs, seed)
     real = [pool.submit(force.recorded, path, steps, seed, options.show) for path in options.real]
     table3, drawn = paf.run(finger, size.paf_places, seed)
-    said = nets.result()
+    estimates = nets.result()
     parts = {
         "paf": table3,
         "impedance": paf.impedance(finger),
         "correlations": paf.correlations(finger, PAPER_PLACES, seed),
         "roc": [by_row.result(), by_contact.result(), *grown.result()],
-        "force": [{"how": how} | force.scores(one, rows.force_n) for how, one in said.items()],
+        "force": [{"how": how} | force.scores(one, rows.force_n) for how, one in estimates.items()],
         "force_places": list(size.force_places),
-        "classes": force.by_class(said[force.A_PRIORI], rows),
+        "classes": force.by_class(estimates[force.A_PRIORI], rows),
         "reductions": reduced.result(),
         "pairs": pairs.result(),
         "bars": bars.result(),
@@ -116,7 +116,7 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
     ]
     if options.quick:
         notes.append("--quick: far too few rows for the figures to mean anything")
-    return Result(f"emulated finger, seed {seed}", parts, notes, drawn, (rows.force_n, said[force.A_PRIORI]))
+    return Result(f"emulated finger, seed {seed}", parts, notes, drawn, (rows.force_n, estimates[force.A_PRIORI]))
 
 
 def _checks(parts: Facts) -> list[Facts]:
@@ -159,9 +159,9 @@ def _draw(result: Result, figure: Any) -> None:
     axes.set(xticks=range(4), yticks=range(4), xticklabels=names, yticklabels=names, xlabel="true", ylabel="found")
     axes.set_title(f"figure 7: by {result.parts['roc'][-1]['what']}, held out")
     inner = grid[2, :].subgridspec(1, 3)
-    true, said = result.force
+    true, estimates = result.force
     for k, name in enumerate(("x", "y", "z")):
         axes = figure.add_subplot(inner[0, k])
-        axes.plot(true[:, k], said[:, k], ".", markersize=1, color="#1d4ed8")
+        axes.plot(true[:, k], estimates[:, k], ".", markersize=1, color="#1d4ed8")
         axes.axline((0, 0), slope=1, color="#dc2626", linewidth=0.8)
         axes.set(title=f"figure 12: F{name} [N], held out", xlabel="true", ylabel="nets by class")

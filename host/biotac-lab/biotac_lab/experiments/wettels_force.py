@@ -68,8 +68,8 @@ def reductions(rows: Stimulations, steps: int, seed: int) -> list[Facts]:
     """Figure 10: one net for each way to choose its inputs, held out by contact."""
     found = []
     for name, how in REDUCTIONS.items():
-        said = _held_out(rows.counts - rows.tare, rows.force_n, rows.contact, steps=steps, seed=seed, **how)
-        found.append({"how": name} | scores(said, rows.force_n))
+        estimates = _held_out(rows.counts - rows.tare, rows.force_n, rows.contact, steps=steps, seed=seed, **how)
+        found.append({"how": name} | scores(estimates, rows.force_n))
     return found
 
 
@@ -82,19 +82,19 @@ def _held_out(above: Floats, force_n: Floats, groups: force.Integers, **how: Any
     return force.cross_validated(above, groups, FOLDS, predict)
 
 
-def scores(said: Floats, truth: Floats) -> Facts:
+def scores(estimates: Floats, truth: Floats) -> Facts:
     """Table 4's scores for each axis, and the RMSE over all three."""
-    good = np.isfinite(said).all(axis=1)
-    pooled = float(np.sqrt(((said - truth)[good] ** 2).mean())) if good.any() else np.nan
-    each = {axis: score(said[:, k], truth[:, k], least=LEAST_N) for k, axis in enumerate(AXES)}
+    good = np.isfinite(estimates).all(axis=1)
+    pooled = float(np.sqrt(((estimates - truth)[good] ** 2).mean())) if good.any() else np.nan
+    each = {axis: score(estimates[:, k], truth[:, k], least=LEAST_N) for k, axis in enumerate(AXES)}
     return {"pooled_n": plain(pooled), "axes": each}
 
 
-def by_class(said: Floats, rows: Stimulations) -> list[Facts]:
+def by_class(estimates: Floats, rows: Stimulations) -> list[Facts]:
     """Table 4 of one prediction, for each class."""
     kind = force.classes(skin(rows.contact_mm)[:, 0], rows.probe >= 2)
     return [
-        {"class": name} | scores(said[kind == c], rows.force_n[kind == c])
+        {"class": name} | scores(estimates[kind == c], rows.force_n[kind == c])
         for c, name in enumerate(force.CLASSES)
         if (kind == c).any()
     ]

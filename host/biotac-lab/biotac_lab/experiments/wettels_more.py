@@ -41,8 +41,8 @@ def pairs(finger: Finger, each: int, seed: int) -> list[Facts]:
         right, off, share_off = 0, [], []
         places = np.array([_pair(apart, rng) for _ in range(each)])[:, : 1 if apart == 0.0 else 2]
         force = rng.uniform(*FORCE_N, places.shape[:2])
-        said = _read(finger, places, force, rng) - tare
-        for row, true_mm, true_n in zip(said, places, force, strict=True):
+        estimates = _read(finger, places, force, rng) - tare
+        for row, true_mm, true_n in zip(estimates, places, force, strict=True):
             found = several.contacts(row)
             if len(found) != len(true_mm):
                 continue

@@ -34,22 +34,22 @@ def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts]
         truth = skin(pressed.contact_mm)
         firm = np.linalg.norm(pressed.force_n, axis=1) > THRESHOLD_N
         for equation, as_printed in EQUATIONS.items():
-            said = paf(pressed.counts - pressed.tare, as_printed=as_printed, threshold_n=0.0)["dr_mm"]
+            estimates = paf(pressed.counts - pressed.tare, as_printed=as_printed, threshold_n=0.0)["dr_mm"]
             for technique in TECHNIQUES:
-                found = _by(technique, said, firm, pressed)
+                found = _by(technique, estimates, firm, pressed)
                 row: Facts = {"load": load, "equation": equation, "technique": technique}
                 row["share"] = plain(np.isfinite(found).all(axis=1).mean())
                 for k, name in enumerate("dr"):
                     row[name] = score(found[:, k], truth[:, k])
                 rows.append(row)
                 if drawn is None and technique == "both" and not as_printed:
-                    drawn = truth, said, found
+                    drawn = truth, estimates, found
     return rows, drawn
 
 
-def _by(technique: str, said: Floats, firm: Any, pressed: Stimulations) -> Floats:
+def _by(technique: str, estimates: Floats, firm: Any, pressed: Stimulations) -> Floats:
     """The estimate ``said`` by one technique; each contact is smoothed alone, as nothing lies between two of them."""
-    found = said if technique in TECHNIQUES[:2] else np.where(firm[:, None], said, np.nan)
+    found = estimates if technique in TECHNIQUES[:2] else np.where(firm[:, None], estimates, np.nan)
     if technique in ("none", "force threshold"):
         return found
     smooth = np.full_like(found, np.nan)

@@ -103,8 +103,8 @@ def cross_validated(
     """
     from sklearn.model_selection import GroupKFold
 
-    said = np.full((len(above), axes), np.nan)
+    estimates = np.full((len(above), axes), np.nan)
     for training, test in GroupKFold(folds).split(above, groups=groups):
         masks = [np.isin(np.arange(len(above)), part) for part in (training, test)]
-        said[masks[1]] = predict(*masks)
-    return said
+        estimates[masks[1]] = predict(*masks)
+    return estimates

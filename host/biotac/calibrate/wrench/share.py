@@ -18,7 +18,7 @@ FRAME = "F and M: X lateral, to E11's side; Y to the tip; Z out of the pad; forc
 TEXTS = ("frame", "sensor", "plate", "licence")  # that ``about`` has to say, beside the units
 
 
-def share(run: Run, place: Path, *, plate: str, licence: str) -> None:
+def share(run: Run, target: Path, *, plate: str, licence: str) -> None:
     """Write ``run`` with what a stranger needs: units, frame, sensor, plate and licence.
 
     Counts are rounded to whole ones. ``load_run`` reads it, and so does all that takes an .npz.
@@ -35,7 +35,7 @@ def share(run: Run, place: Path, *, plate: str, licence: str) -> None:
         fields["PDC"] = np.rint(run.pdc - run.pdc.min()).astype(np.uint16)
     about = {"units": {name: UNITS[name] for name in fields if name in UNITS}, "frame": FRAME, "notes": run.notes}
     about |= {"sensor": run.serial or "unknown", "plate": plate, "licence": licence}
-    with place.open("wb") as file:
+    with target.open("wb") as file:
         np.savez_compressed(file, about=json.dumps(about), **fields)
 
 

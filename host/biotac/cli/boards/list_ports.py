@@ -56,16 +56,16 @@ def simulated() -> dict[str, str]:
     found: dict[str, str] = {}
     for process in sorted(Path("/proc").glob("[0-9]*")):
         with suppress(OSError, ValueError):  # it is over, or another user's
-            words = _words(process)
-            if "biotac" not in "".join(Path(word).name for word in words[:2]):
+            parts = _words(process)
+            if "biotac" not in "".join(Path(word).name for word in parts[:2]):
                 continue
             ttys = [line.split()[1] for file in (process / "fdinfo").iterdir()
                     for line in file.read_text().splitlines() if line.startswith("tty-index:")]  # fmt: skip
-            if Path(words[0]).name == "biotac-sim":  # the firmware; its parent has the words that were typed
-                words = _words(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
-            names = [Path(word).name for word in words]
+            if Path(parts[0]).name == "biotac-sim":  # the firmware; its parent has the words that were typed
+                parts = _words(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
+            names = [Path(word).name for word in parts]
             if "biotac" in names:  # or else it is another program's own
-                command = ["biotac", *words[names.index("biotac") + 1 :]]
+                command = ["biotac", *parts[names.index("biotac") + 1 :]]
                 found |= {f"/dev/pts/{tty}": printable(" ".join(command)) for tty in ttys[:1]}
     return found
 
@@ -113,5 +113,5 @@ def as_line(facts: dict[str, Any]) -> str:
         known = [str(facts[key]) for key in ("port", "description", "serial_number") if facts[key]]
         return "  ".join("not our USB id" if text == "n/a" else text for text in known)  # pyserial's for no description
     fingers = ", ".join(map(str, facts["fingers"])) or "none"
-    words = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
-    return "  ".join([facts["port"], *words])
+    parts = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
+    return "  ".join([facts["port"], *parts])

@@ -101,8 +101,8 @@ def run(args: argparse.Namespace) -> int:
         loaded = load(path, beside, finger=args.finger, serial=args.serial, force=args.force)
         facts = _calibrate(args, loaded)
         if args.share is not None:
-            with whole(args.share, overwrite=args.force) as place:
-                share(loaded.run, place, plate=args.plate, licence=args.licence)
+            with whole(args.share, overwrite=args.force) as target:
+                share(loaded.run, target, plate=args.plate, licence=args.licence)
         outputs.say(args, facts, _text(facts))
     return 0
 

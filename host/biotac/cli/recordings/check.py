@@ -27,8 +27,8 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.recording.suffix.lower() == ".npz":
         about = check_shared(args.recording)
-        words = ", ".join(f"{name} {about[name]}" for name in ("sensor", "plate", "licence"))
-        say(args, about, printable(f"{args.recording}: {about['rows']} rows, good; {words}"))
+        origin = ", ".join(f"{name} {about[name]}" for name in ("sensor", "plate", "licence"))
+        say(args, about, printable(f"{args.recording}: {about['rows']} rows, good; {origin}"))
         return 0
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck()

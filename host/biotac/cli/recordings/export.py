@@ -75,16 +75,16 @@ def run(args: argparse.Namespace) -> int:
             progress.show(f"{out}: {share:.0%}, Ctrl-C stops and leaves nothing behind")
 
         if imports:
-            with _recording_at(out, args.force, written) as place:
-                made: dict[str, Any] = import_btd(source, place, show)
+            with _recording_at(out, args.force, written) as target:
+                made: dict[str, Any] = import_btd(source, target, show)
                 text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
             changes = read_settings(args.settings) if args.settings else {}
             if args.poc_weights:
                 changes[wire.Setting.POC_WEIGHTS] = int(wire.PocWeights[args.poc_weights.upper()])
             recording = load(source)
-            with _recording_at(out, args.force, written) as place:
-                notes = recompute(recording, place, changes, keep_tare=args.keep_tare, show=show)
+            with _recording_at(out, args.force, written) as target:
+                notes = recompute(recording, target, changes, keep_tare=args.keep_tare, show=show)
             for note in notes:
                 outputs.note(printable(note))
             made = {"frames": len(recording.frames), "pac": len(recording.pac), "notes": notes}
@@ -104,15 +104,15 @@ def run(args: argparse.Namespace) -> int:
 def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]:
     """Where to write a recording that becomes ``out``, or is exported there; ``written`` gets the files' paths."""
     if out.suffix.lower() == RECORDING:
-        with whole(out, overwrite=force) as place:
-            yield place
+        with whole(out, overwrite=force) as target:
+            yield target
         written.append(out)
         return
     try:
         with TemporaryDirectory(prefix="biotac-export-") as folder:
-            place = Path(folder) / "made.mcap"
-            yield place
-            written += export(Recording(place), out, overwrite=force)
+            target = Path(folder) / "made.mcap"
+            yield target
+            written += export(Recording(target), out, overwrite=force)
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt(*interrupt.args or (f"{out} was not written",)) from None
 

@@ -46,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_cut(args: argparse.Namespace) -> int:
     recording = load(args.recording)
-    with whole(args.out, overwrite=args.force) as place:
-        begin_s, end_s = cut(recording, place, args.from_s, args.to_s)
+    with whole(args.out, overwrite=args.force) as path:
+        begin_s, end_s = cut(recording, path, args.from_s, args.to_s)
     facts = {"written": str(args.out), "begin_s": begin_s, "end_s": end_s}
     say(args, facts, printable(f"{begin_s:.2f} to {end_s:.2f} s of {args.recording} to {args.out}"))
     return 0

@@ -55,15 +55,15 @@ class Fingers(Node):
         self._stamps.keep()
         for message in batch.messages:
             if isinstance(message, biotac.Event) and message.kind in list(biotac.EventKind):
-                said = String(data=biotac.EventKind(message.kind).name)
-                self._topics[message.finger, "event"].publish(said)
+                kind_text = String(data=biotac.EventKind(message.kind).name)
+                self._topics[message.finger, "event"].publish(kind_text)
         if not len(batch.frames):
             return
         first = self._stamps.by_arrival == 0
         stamps_s = np.empty(len(batch.frames))
         for finger in np.unique(batch.frames["finger"]).tolist():
-            its = batch.frames["finger"] == finger
-            stamps_s[its] = self._stamps.of(batch.frames["t_us"][its].astype(np.float64), finger)
+            rows = batch.frames["finger"] == finger
+            stamps_s[rows] = self._stamps.of(batch.frames["t_us"][rows].astype(np.float64), finger)
         if first and self._stamps.by_arrival:
             self.get_logger().warning("the board's clock is not known yet: frames are stamped on arrival")
         for row, stamp_s in zip(batch.frames, stamps_s.tolist(), strict=True):
