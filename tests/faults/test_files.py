@@ -270,7 +270,7 @@ def test_toml_made_to_hurt_is_refused_in_little_time_and_memory(tmp_path: Path, 
     assert path.stat().st_size < 1 << 20
     reported = used_by_another(f"load_source({str(path)!r})")
     assert reported.isprintable() and reported != "read"
-    assert refused_or_read(lambda parts: read_mounting(str(parts)), path)
+    assert refused_or_read(lambda file: read_mounting(str(file)), path)
 
 
 def test_what_is_dotted_but_no_key_is_read() -> None:
@@ -376,10 +376,10 @@ def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatc
     """Work in rows, not seconds: states of a timeline, and of those the ones with a load of their own."""
     states, loads = [0], [0]
 
-    def deform(parts: physics.States) -> tuple[np.ndarray, np.ndarray]:
-        states[0] += len(parts)
-        loads[0] += len(np.unique(parts.force_n))
-        return np.zeros((len(parts), 19)), np.zeros((len(parts), 19))
+    def deform(moved: physics.States) -> tuple[np.ndarray, np.ndarray]:
+        states[0] += len(moved)
+        loads[0] += len(np.unique(moved.force_n))
+        return np.zeros((len(moved), 19)), np.zeros((len(moved), 19))
 
     monkeypatch.setattr(physics, "deform", deform)
     path = tmp_path / "long.toml"

@@ -58,7 +58,7 @@ def test_the_nearest_row_is_none_of_the_same_press() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["newtons"], "no recording given"),
         (["batch", "F1.npz"], "does not use a recording"),

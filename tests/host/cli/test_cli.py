@@ -155,7 +155,7 @@ def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("name = 'x'\n[[step]]\ndo = 'press\n", "bad.toml:3: "),
         (
@@ -165,12 +165,12 @@ def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
         ("name = 'x'\n[[step]]\ndo = 'jump'\nseconds = 1\n", ":3: step 1: key 'do'"),
     ],
 )
-def test_a_malformed_scenario_exits_2_with_line_and_key(capsys, tmp_path: Path, text: str, arguments: str) -> None:
+def test_a_malformed_scenario_exits_2_with_line_and_key(capsys, tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(text)
     error = fails(capsys, 2, "demo", str(path), "--out", str(tmp_path / "out"))
     assert "bad.toml" in error
-    assert arguments in error
+    assert message in error
 
 
 @pytest.mark.parametrize(
@@ -272,7 +272,7 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
 
 
 @pytest.mark.parametrize(
-    ("command", "words"),
+    ("command", "message"),
     [
         ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
         ("calibrate press P --scale --readings 1,x", "--readings: seen '1,x'; expected numbers, separated by commas"),
@@ -284,8 +284,8 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
         ("calibrate press PORT --scale --forces 2,,3", "--forces: seen ''; expected newtons above 0 and below 100"),
     ],
 )
-def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, arguments: str, capsys) -> None:
+def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, message: str, capsys) -> None:
     with pytest.raises(SystemExit) as refused:
         main(command.split())
     assert refused.value.code == 2
-    assert arguments in capsys.readouterr().err
+    assert message in capsys.readouterr().err
