@@ -11,7 +11,10 @@ import pytest
 from rig import Rig
 
 import biotac
-from biotac import CommandRefusedError, FaultFlags, InputError, Setting
+from biotac import CommandRefusedError, FaultFlags, FrameFlags, InputError, Setting
+from biotac.doctor import judge
+from biotac.doctor.listening import examine
+from biotac.errors import StreamTakenError
 from biotac.hand.opening import shake_hands
 from biotac.link.serial_port import SerialLink
 from biotac.sim.emulated import EmulatedBoard, new_pty
@@ -53,11 +56,20 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
         with biotac.open(board.path) as other:
             assert other.info.boot_id == hand.info.boot_id
             assert other.status().streams == hand.status().streams != 0
-            with pytest.raises(CommandRefusedError, match="LINK_BUSY"):
+            with pytest.raises(CommandRefusedError, match="LINK_BUSY.*--take-link of biotac flash and doctor"):
                 other.read(0.1)
             assert len(hand.read(0.1)) > 0
-            hand.stop()
-            assert len(other.read(0.1)) > 0
+            hand.hold(0)
+        found = judge(examine(board.path, seconds=0.5))
+        assert [finding.code for finding in found] == ["refused"]
+        assert "refused" not in [finding.code for finding in judge(examine(board.path, seconds=0.5, take_link=True))]
+        with pytest.raises(StreamTakenError, match="the board's other port"):
+            hand.read(2.0)
+    with biotac.open(board.path) as other:
+        assert (other.read(0.1)["flags"] & FrameFlags.HELD)[-2:].any()
+        assert other.status().faults & FaultFlags.LINK_TAKEN
+        other.release()
+        other.board.clear_faults()
     with shake_hands(UartLink(board.uart_path)) as hand:  # which knows no limit
         status = hand.status()
         assert (status.messages_dropped, status.rx_errors, status.slots_late) == (0, 0, 0)

@@ -97,6 +97,8 @@ class FakeBoard:
             return encode(wire.Calibration.ID, none.pack())
         if message_id == wire.GetMap.ID:
             return encode(wire.MapInfo.ID, wire.MapInfo(payload[0], payload[1], 0, (0,) * 16, 0, 0, 0).pack())
+        if message_id == wire.TakeLink.ID:
+            self.events.append("take link")
         if message_id == wire.SaveSettings.ID:
             self.events.append("save")
             self.stored = dict(self.settings)

@@ -40,7 +40,7 @@ enum bt_error {
     BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
     BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
     BT_ERROR_NOT_WHOLE = 13, // data are missing or do not match the CRC-32: upload them again
-    BT_ERROR_LINK_BUSY = 14, // the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or send TAKE_LINK
+    BT_ERROR_LINK_BUSY = 14, // the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or take the link over: --take-link of biotac flash and doctor, hand.take_link()
 };
 
 // State of a finger's tare machine (SPEC.md, Tare).

@@ -130,6 +130,11 @@ def add_port(parser: argparse.ArgumentParser, more: str = "") -> None:
     )
 
 
+def add_take_link(parser: argparse.ArgumentParser) -> None:
+    text = "take the board over from the host at its other port, whose stream ends; what it holds stays held"
+    parser.add_argument("--take-link", action="store_true", help=text)
+
+
 def numbers(text: str) -> tuple[float, ...]:
     """Several finite numbers, separated by commas; empty for an empty text."""
     found = tuple(number(part) for part in text.split(",")) if text else ()

@@ -85,6 +85,11 @@ CATALOGUE: dict[str, Entry] = {
         "The board went away or fell silent while it was being examined: cable, hub, power, or firmware that hangs.",
         "Try another cable and another USB socket without a hub; check the sensors' supply for short circuits.",
     ),
+    "refused": error(
+        "The board answers, but refuses to be examined: LINK_BUSY while the host at its other port streams or holds a "
+        "finger.",
+        "End that, or use `biotac doctor --take-link`, which ends its stream and leaves held what it holds.",
+    ),
     # ---- version
     "wire_version": error(
         "Firmware and library speak different major versions of the protocol, and do not understand each other.",

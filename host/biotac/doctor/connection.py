@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ..errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
+from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
 from ..link.holders import in_words
 from ..version import __version__
 from ..wire.identity import version_text
@@ -43,6 +43,8 @@ def check(facts: Facts) -> Iterator[Finding]:
         yield Finding("board_lost", str(error))
     if isinstance(error, WireVersionError):
         yield Finding("wire_version", str(error))
+    if isinstance(error, CommandRefusedError):
+        yield Finding("refused", str(error))
     if facts.board is not None:
         for warning in facts.board.warnings:
             yield Finding(warning.code, warning.text)

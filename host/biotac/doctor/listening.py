@@ -20,11 +20,13 @@ def examine(
     *,
     seconds: float = 3.0,
     expected_fingers: int | None = None,
+    take_link: bool = False,
     by: Callable[[Hand], BoardFacts] | None = None,
 ) -> Facts:
     """All facts about ``port``, or about the only board if ``port`` is None; errors become facts.
 
-    ``by``: gets them from a hand that reconnects, in place of ``listen`` for some seconds.
+    ``take_link``: from the host at the board's other port. ``by``: gets them from a hand that reconnects, in place of
+    ``listen`` for some seconds.
     """
     system = look(port)
     device = device_of(port, system.boards)
@@ -37,6 +39,8 @@ def examine(
     try:
         # pace=1.0: a simulated board runs in real time, unless its PORT says otherwise.
         with open_board(device, pace=1.0, reconnect=by is not None) as hand:
+            if take_link:
+                hand.take_link()
             return Facts(device, system, None, by(hand) if by else listen(hand, seconds), expected_fingers)
     except BiotacError as error:
         return Facts(device, system, error)

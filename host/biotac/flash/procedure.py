@@ -45,6 +45,7 @@ def flash(
     keep: bool = True,
     restore_from: Backup | None = None,
     downgrade: bool = False,
+    take_link: bool = False,
     say: Say = lambda text: None,
     show: ShowBlocks = lambda done, of: None,
 ) -> Outcome:
@@ -53,7 +54,8 @@ def flash(
     The settings are first saved to ``backup_path`` (default: a new file in the working directory). Without ``keep``
     they are not saved, and a board whose firmware does not answer is flashed too. ``restore_from`` replaces the
     settings just saved; a board already in its loader cannot be asked for its settings and gets only these. An image
-    older than the board's firmware is refused without ``downgrade``.
+    older than the board's firmware is refused without ``downgrade``. ``take_link`` ends what the host at the board's
+    other port streams and holds; without it, that host has the board refuse.
 
     Raises InputError, before the board is changed, for an image that does not fit it, and FlashError for whatever
     fails after that.
@@ -69,7 +71,8 @@ def flash(
     before: wire.Hello | None = None
     written: Backup | None = None
     if loader is None:
-        before, written = leave(image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, say=say)
+        how = {"backup_path": backup_path, "keep": keep, "downgrade": downgrade, "take_link": take_link, "say": say}
+        before, written = leave(image, target, **how)
     elif target.there():
         raise InputError(
             f"{target.port} is plugged in, and another board is in its loader ({loader.name}); unplug one of them"
@@ -85,6 +88,8 @@ def flash(
         loader.write(image, show)
         say("waiting for the board to come back")
         with target.reopen() as hand:
+            if take_link:  # the other host may have begun again
+                hand.take_link()
             check(image, before, hand.info)
             settings = None if backup is None else restore(hand, backup)
             return Outcome(target.port, loader.name, before, hand.info, backup, settings)
@@ -96,7 +101,7 @@ def first_ready(loaders: Sequence[Loader]) -> Loader | None:
 
 
 def leave(
-    image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, say: Say
+    image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, take_link: bool, say: Say
 ) -> tuple[wire.Hello | None, Backup | None]:
     """Identify the board, save its settings, and send it to its loader; return its HELLO and the backup."""
     try:
@@ -119,6 +124,8 @@ def leave(
                 "firmware may not understand newer settings; use --downgrade if you mean it"
             )
         say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
+        if take_link:
+            hand.take_link()
         # A sensor board has no settings to save.
         backup = save(hand, backup_path) if keep and hand.info.board != wire.Board.PICO_SENSOR else None
         if backup is not None:

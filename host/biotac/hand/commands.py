@@ -18,6 +18,8 @@ from .views import Latest, finger_index
 
 Finger: TypeAlias = str | SupportsIndex
 Answer = TypeVar("Answer")
+#: How long a board keeps the link for a host that took it, and says nothing.
+TAKEN_S = 10.0
 
 
 class Commands:
@@ -57,6 +59,13 @@ class Commands:
         """Feed ``clock`` with round trips: they give it the bound on its error, and later ones the drift."""
         for _ in range(round_trips):
             self.status()
+
+    def take_link(self) -> None:
+        """Take the board over from the host at its other port, whose stream ends; what it holds stays held.
+
+        Both are told, and the other is refused (LINK_BUSY) until this hand stops, or has said nothing for TAKEN_S.
+        """
+        self.tell(wire.TakeLink(0, round(1000 * TAKEN_S)))
 
     def sensor_status(self, finger: Finger) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""

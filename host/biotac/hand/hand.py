@@ -226,6 +226,7 @@ class Hand:
     ping = _of(Commands.ping)
     status = _of(Commands.status)
     sync = _of(Commands.sync)
+    take_link = _of(Commands.take_link)
     sensor_status = _of(Commands.sensor_status)
     sensor_info = _of(Commands.sensor_info)
     point = _of(Commands.point)

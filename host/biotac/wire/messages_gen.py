@@ -43,7 +43,7 @@ class Error(IntEnum):
     OTHER_SENSOR = 11  # made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
     NOT_BEGUN = 12  # no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
     NOT_WHOLE = 13  # data are missing or do not match the CRC-32: upload them again
-    LINK_BUSY = 14  # the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or send TAKE_LINK
+    LINK_BUSY = 14  # the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or take the link over: --take-link of biotac flash and doctor, hand.take_link()
 
 
 class TareState(IntEnum):
@@ -236,7 +236,7 @@ ERROR_DOC: dict[int, str] = {
     11: "made for a sensor with another serial number: plug that sensor in, or send no serial number to force it",
     12: "no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload",
     13: "data are missing or do not match the CRC-32: upload them again",
-    14: "the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or send TAKE_LINK",
+    14: "the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or take the link over: --take-link of biotac flash and doctor, hand.take_link()",
 }
 
 

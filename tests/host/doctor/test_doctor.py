@@ -21,7 +21,14 @@ from biotac.clock import Fit
 from biotac.doctor import CATALOGUE, BoardFacts, Facts, Finding, PairFacts, SystemFacts, bringup, judge, leads, udev
 from biotac.doctor.bringup import Bringup, Restart
 from biotac.doctor.connection import release
-from biotac.errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
+from biotac.errors import (
+    CommandRefusedError,
+    DeviceLostError,
+    NotAGatewayError,
+    PortBusyError,
+    PortError,
+    WireVersionError,
+)
 from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder
 from biotac.version import __version__
@@ -251,6 +258,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("modem_manager", Facts(PORT, SystemFacts(modem_manager=True), board=healthy()), "ID_MM_DEVICE_IGNORE"),
     ("not_a_gateway", Facts(PORT, error=NotAGatewayError("nothing answers")), "nothing answers"),
     ("board_lost", Facts(PORT, error=DeviceLostError("went away")), "went away"),
+    ("refused", Facts(PORT, error=CommandRefusedError("LINK_BUSY")), "LINK_BUSY"),
     ("wire_version", Facts(PORT, error=WireVersionError("speaks wire 9.0")), "wire 9.0"),
     ("schema_differs", board(warnings=[HandWarning("schema_differs", "other schema")]), "other schema"),
     (

@@ -72,6 +72,12 @@ def test_what_differs_afterwards_is_restored_and_saved(fake: FakeBoard, tmp_path
     assert outcome.settings.changed == ("poc_weights", "idle_period_ms")
 
 
+def test_the_link_is_taken_before_the_loader_and_again_before_what_is_restored(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.settings |= {1: 2}
+    flash(read_image(make_image(tmp_path)), fake, [fake], take_link=True)
+    assert fake.events == ["take link", "loader", "write", "take link", "set 1", "save"]
+
+
 def test_a_setting_that_the_new_firmware_has_not_is_named(fake: FakeBoard, tmp_path: Path) -> None:
     del fake.stored[NEW_SETTING]
     outcome = flash(read_image(make_image(tmp_path)), fake, [fake])

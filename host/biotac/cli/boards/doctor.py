@@ -53,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("install", "print"),
         help="only install (as root) or print the Linux rule that lets you open boards",
     )
+    values.add_take_link(parser)
     parser.add_argument("--fingers", type=int, help="how many sensors to expect (default: those that answer)")
 
 
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         press_s = PRESS_S if has_crystal(hand) and args.sensor_port is None else PLAYED_PRESS_S
         return measure(hand, seen, tell, seconds=args.seconds, press_s=press_s)
 
-    how = {"seconds": args.seconds, "by": first_evening if args.bringup else None}
+    how = {"seconds": args.seconds, "take_link": args.take_link, "by": first_evening if args.bringup else None}
     if args.sensor_port is None:
         facts = examine(args.port, expected_fingers=args.fingers, **how)
     else:

@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--backup", type=Path, metavar="FILE", help="new file for the settings (default: one in this folder)"
     )
     parser.add_argument("--no-backup", action="store_true", help="flash even a board whose firmware does not answer")
+    values.add_take_link(parser)
     parser.add_argument("--downgrade", action="store_true", help="flash an image older than the running firmware")
     parser.add_argument(
         "--restore", type=Path, metavar="FILE", help="restore settings from this backup instead of the board's own"
@@ -67,6 +68,7 @@ def how(args: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     return {
         "keep": not args.no_backup,
         "downgrade": args.downgrade,
+        "take_link": args.take_link,
         "say": say,
         "show": lambda done, of: progress.show(f"{done} of {of} blocks"),
     }
