@@ -56,7 +56,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
         with biotac.open(board.path) as other:
             assert other.info.boot_id == hand.info.boot_id
             assert other.status().streams == hand.status().streams != 0
-            with pytest.raises(CommandRefusedError, match="LINK_BUSY.*--take-link of biotac flash and doctor"):
+            with pytest.raises(CommandRefusedError, match=r"LINK_BUSY.*--take-link of biotac flash and doctor"):
                 other.read(0.1)
             assert len(hand.read(0.1)) > 0
             hand.hold(0)
