@@ -71,7 +71,13 @@ def flash(
     before: wire.Hello | None = None
     written: Backup | None = None
     if loader is None:
-        how = {"backup_path": backup_path, "keep": keep, "downgrade": downgrade, "take_link": take_link, "say": say}
+        how: dict[str, Any] = {
+            "backup_path": backup_path,
+            "keep": keep,
+            "downgrade": downgrade,
+            "take_link": take_link,
+            "say": say,
+        }
         before, written = leave(image, target, **how)
     elif target.there():
         raise InputError(
