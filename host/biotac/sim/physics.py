@@ -16,9 +16,11 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from ..calibrate.press.few_shot import Scale
 from ..core import geometry as surface
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
+from .known_finger import answered
 
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")
@@ -210,15 +212,17 @@ class Finger:
 
     ``profile``: "new" has the paper's rest resistance and a quiet converter, "worn" what the public
     recordings show (numerics.md 1.1 and 1.4: 1.4 to 3.9 kOhm, sigma 5, 0.5 % glitches).
+    With ``scale`` it is a finger that the population map knows, but for that correction (known_finger.py).
     ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and 30 C, and gap sensitivity.
     """
 
-    def __init__(self, seed: int, profile: Profile = "new") -> None:
+    def __init__(self, seed: int, profile: Profile = "new", scale: Scale | None = None) -> None:
         worn = profile == "worn"
         rng = np.random.default_rng([seed, 0])
         low_ohm, high_ohm = (1400.0, 3900.0) if worn else (3000.0, 5000.0)
         self.seed = seed
         self.profile: Profile = profile
+        self.scale = scale
         self.r0_ohm: Floats = rng.uniform(low_ohm, high_ohm, ELECTRODES)
         self.gap_gain: Floats = rng.normal(1.0, 0.06, ELECTRODES)
         # real drift is one-dimensional: one rate a finger, loadings 0.82 to 1.16 (biotac.md finding 6)
@@ -233,7 +237,14 @@ class Finger:
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
-        return self.counts_of(*states.deformation, states.warm_c)
+        counts, touched = self.counts_of(*states.deformation, states.warm_c), states.force_n > 0.0
+        if self.scale is not None and touched.any():
+            at_rest = self.rest_counts(states.warm_c)[touched]
+            load = np.column_stack([counts[touched] - at_rest, states.wrench()[0][touched]])
+            unique, inverse = np.unique(load, axis=0, return_inverse=True)  # a scenario mostly holds still
+            e = answered(unique[:, :ELECTRODES], self.rest_counts(np.zeros(1))[0], unique[:, ELECTRODES:], self.scale)
+            counts[touched] = at_rest + e[inverse.reshape(-1)]
+        return counts
 
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
         """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""

@@ -39,7 +39,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     boundary = np.append(frame, frame[-1] + 1)
 
     samples = np.empty((frames, count, slots.SLOTS_PER_FRAME), dtype=np.uint16)
-    emulated = tuple(Finger(spec.seed, spec.profile) for spec in specs)
+    emulated = tuple(Finger(spec.seed, spec.profile, spec.scale) for spec in specs)
     for index, track in enumerate(scenario.tracks[:count]):
         states = track.states(_seconds(np.arange(played + 1)))
         codes = _codes([fault for fault in scenario.faults if fault.finger == index], period)

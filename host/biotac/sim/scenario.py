@@ -1,7 +1,8 @@
 """The scenario format: a TOML timeline of what touches the fingers.
 
 Top level: ``name``; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
-``gains = "fit"`` (see gains.py). ``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``.
+``gains = "fit"`` (see gains.py). ``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``, and, for a finger
+that the population map knows, the correction that the map needs on it, ``z_gain`` and ``balance`` (known_finger.py).
 ``[[step]]``, played in order, each with ``seconds`` and optionally ``fingers = [0, ...]`` (others
 hold meanwhile):
 
@@ -27,6 +28,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from ..calibrate.press.few_shot import Scale
 from ..core import geometry as surface
 from ..errors import ScenarioError
 from ..wire import sensor_gen as _sensor
@@ -78,6 +80,7 @@ class FingerSpec:
     seed: int
     profile: Profile
     serial: str
+    scale: Scale | None = None
 
 
 @dataclass(frozen=True)
@@ -151,14 +154,17 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
         return tuple(FingerSpec(seed + k, "new", default_serial(seed + k)) for k in range(count))
     specs = []
     for index, table in enumerate(tables):
-        table.only(("seed", "profile", "serial"))
+        table.only(("seed", "profile", "serial", "z_gain", "balance"))
         own = table.integer("seed", 0, SEED_MAX) if "seed" in table else seed + index
         word = table.choice("profile", PROFILES) if "profile" in table else "new"
         profile = next(known for known in PROFILES if known == word)  # narrows str to Profile
         serial = default_serial(own)
         if "serial" in table:
             serial = table.text("serial", r"BT[0-9A-Za-z]{14}", "16 letters and digits that begin with BT")
-        specs.append(FingerSpec(own, profile, serial))
+        scale = None
+        if "z_gain" in table or "balance" in table:
+            scale = Scale(table.number("z_gain", 0.5, 2.0, ""), table.number("balance", -0.5, 0.5, ""))
+        specs.append(FingerSpec(own, profile, serial, scale))
     return tuple(specs)
 
 

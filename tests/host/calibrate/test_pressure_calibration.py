@@ -69,9 +69,10 @@ def test_the_bundled_scenario_is_the_experiments() -> None:
 
 
 def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
-    assert main(["calibrate", "press", "sim:fingers.toml", "--pressure", "--json", "--out", str(tmp_path)]) == 0
-    output = capsys.readouterr()
-    facts = json.loads(output.out)
+    port = "sim:fingers.toml?pace=fast"
+    assert main(["calibrate", "press", port, "--pressure", "--json", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    facts = json.loads(said.out)
     assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
     for one in facts["fingers"]:
         assert -K_LOW <= one["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
@@ -82,8 +83,8 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
         assert (own.pressure_gain_nn, own.serial) == (one["pressure_gain_nn"], one["serial"])
         assert own.serial == f"BTSIM{one['finger'] + 1:011d}"
         provenance = json.loads((tmp_path / f"finger{one['finger']}.json").read_text())["provenance"]
-        assert provenance["from"] == "sim:fingers.toml" and provenance["rows"] == 150
-    assert output.err.splitlines()[:3] == [
+        assert provenance["from"] == port and provenance["rows"] == 150
+    assert said.err.splitlines()[:3] == [
         "let go of finger 0, and do not touch it",
         "1 of 3: press finger 0 with about 2 N, and hold still",
         "held: let go of finger 0",
@@ -142,7 +143,7 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
         raise biotac.CommandRefusedError("SaveSettings: NOT_STORED", 10)
 
     monkeypatch.setattr("biotac.hand.configuration.Configuration.save_settings", refuse)
-    port = "sim:fingers.toml?fingers=1"
+    port = "sim:fingers.toml?fingers=1&pace=fast"
     assert main(["calibrate", "press", port, "--pressure", "--save", "--out", str(tmp_path)]) == 7
     output = capsys.readouterr()
     assert "NOT_STORED" in output.err and "in force until the next reboot" in output.out
@@ -151,7 +152,7 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
 
 def test_files_that_are_there_are_seen_before_anybody_presses(tmp_path: Path, capsys) -> None:
     (tmp_path / "finger3.json").write_text("mine")
-    assert main(["calibrate", "press", "sim:fingers.toml", "--pressure", "--out", str(tmp_path)]) == 2
+    assert main(["calibrate", "press", "sim:fingers.toml?pace=fast", "--pressure", "--out", str(tmp_path)]) == 2
     assert "finger3.json already exists" in capsys.readouterr().err
     assert (tmp_path / "finger3.json").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
 

@@ -1,4 +1,4 @@
-"""`biotac calibrate press --scale`: guided on the emulated hand, from its recording, and held out."""
+"""`biotac calibrate press --scale`, and a rehearsal of it and of --weights: guided, from a recording, and held out."""
 
 from __future__ import annotations
 
@@ -11,11 +11,16 @@ import pytest
 
 from biotac.calibrate import population as population_map
 from biotac.calibrate.population import Population
+from biotac.calibrate.press import few_shot
 from biotac.calibrate.press.few_shot import scaled
 from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
+from biotac.core.geometry import RADIUS_MM
 from biotac.errors import InputError
 from biotac.map.file import load_fitted
+from biotac.sim.loading import bundled_scenario
+from biotac.sim.physics import Finger, States
+from biotac.sim.scenario import parse_scenario
 
 TARE = np.full(19, 2800.0)
 
@@ -57,24 +62,53 @@ def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
     assert "no better than" in found(tilted, presses, scaled).why_not(np.full(3, 100.0))
 
 
-def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "own.wrench.json"
-    words = [
-        *("calibrate", "press"),
-        # An idle simulated board plays on: not to be over before a busy computer has fitted the map.
-        *("sim:fingers.toml?fingers=1&seconds=2400", "--scale", "--finger", "index", "--presses", "3", "--json"),
-    ]
-    assert main([*words, "--out", str(out)]) == 1  # nothing was uploaded
-    output = capsys.readouterr()
-    assert "1 of 3: push the pad" in output.err and "biotac: " not in output.err  # prompts are no errors
-    facts = json.loads(output.out)
-    assert facts["shown_n"] == [2.0, 3.5, 5.0]
-    assert load_fitted(out).axes == ("Fx", "Fy", "Fz")
-    # the emulated finger is poked by a point and no flat: nothing for a map of flat plates
-    assert facts["why_not"] and "board" not in facts
-    assert main([*words, "--force"]) == 0
+@pytest.mark.parametrize(
+    ("against", "presses", "then"), [("--scale", 5, "let go"), ("--weights", 10, "take the weight off")]
+)
+def test_a_rehearsal_finds_what_the_scenario_hides(
+    against: str, presses: int, then: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario, out = f"{against[2:]}.toml", tmp_path / "own.wrench.json"
+    words = ["calibrate", "press", f"sim:{scenario}?pace=fast", against, "--finger", "index", "--json"]
+    assert main([*words, "--out", str(out)]) == 0
+    printed = capsys.readouterr()
+    prompts = printed.err.splitlines()
+    assert [line.split(" of ")[0] for line in prompts[1:-1:2]] == [str(k + 1) for k in range(presses)]
+    assert prompts[2:-1:2] == [f"held: {then}"] * presses and prompts[-1] == "done"
+    facts = json.loads(printed.out)
+    (hidden,) = parse_scenario(bundled_scenario(scenario), file=scenario).fingers
+    assert hidden.scale is not None
+    assert abs(facts["gain"] - hidden.scale.gain) < facts["gain_sigma"] < few_shot.GAIN_SPREAD
+    assert abs(facts["balance"] - hidden.scale.balance) < facts["balance_sigma"] < few_shot.BALANCE_SPREAD
+    assert not facts["why_not"] and facts["board"]["outside"] == 0
+
+    # between the places of the rehearsal
+    x_mm, force_n = np.repeat([-7.0, -4.0, -2.5], 3), np.tile([2.5, 3.5, 5.0], 3)
+    nothing, contact_mm = np.zeros(9), np.column_stack([x_mm, np.zeros(9), np.full(9, -RADIUS_MM)])
+    states = States(contact_mm, force_n, np.zeros((9, 3)), nothing, np.full(9, 3.5), nothing)
+    finger = Finger(hidden.seed, hidden.profile, hidden.scale)
+    own, trained = load_fitted(out), population_map.load(None)
+    e = finger.counts(states) - finger.rest_counts(np.zeros(1))
+    for error_n, held_out_n, before_n in zip(
+        np.abs(own.predict(own.tare + e) - states.wrench()[0]).max(axis=0)[[0, 2]],
+        np.array(facts["held_out_n"])[[0, 2]],
+        np.array(facts["before_n"])[[0, 2]],
+        strict=True,
+    ):
+        assert error_n < 2.0 * held_out_n < 2.0 * before_n
+    assert (np.array(facts["held_out_n"]) < trained.sigma_scale5_n).all()
+
+
+def test_a_finger_that_the_map_does_not_know_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    # An idle simulated board plays on: not to be over before a busy computer has fitted the map.
+    words = ["calibrate", "press", "sim:fingers.toml?fingers=1&seconds=2400&pace=fast", "--scale", "--finger", "index"]
+    words += ["--presses", "3", "--json"]
+    assert main(words) == 1
     facts = json.loads(capsys.readouterr().out)
-    assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0
+    assert facts["shown_n"] == [2.0, 3.5, 5.0] and "board" not in facts
+    assert "no better than" in facts["why_not"] or "unlike" in facts["why_not"]
+    assert main([*words, "--force"]) == 0
+    assert json.loads(capsys.readouterr().out)["board"]["frames_bit_for_bit"] > 0
 
 
 def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -113,7 +113,16 @@ def test_a_scale_that_is_unplugged_is_told() -> None:
 
 
 def test_a_calibration_reads_the_scale_at_every_press(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["calibrate", "press", "sim:fingers.toml?fingers=1", "--finger", "index", "--presses", "3", "--json"]
+    words = [
+        "calibrate",
+        "press",
+        "sim:fingers.toml?fingers=1&pace=fast",
+        "--finger",
+        "index",
+        "--presses",
+        "3",
+        "--json",
+    ]
     shown = [b"S S     204.0 g\r\n", b"S S     357.0 g\r\n", b"S S     510.0 g\r\n"]
     with printing(shown) as port:
         assert (

@@ -280,8 +280,6 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
             "calibrate press P --scale --readings 1,nan",
             "--readings: seen '1,nan'; expected numbers, separated by commas",
         ),
-        ("calibrate press PORT --scale --verify hard", "--verify: seen 'hard'; expected newtons above 0 and below 100"),
-        ("calibrate press PORT --scale --forces 2,,3", "--forces: seen ''; expected newtons above 0 and below 100"),
     ],
 )
 def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, message: str, capsys) -> None:

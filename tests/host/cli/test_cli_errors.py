@@ -137,7 +137,6 @@ CASES: list[tuple[int, str, str]] = [
     (2, "t_s and force_n, or", "calibrate press @rec.mcap --pressure @list.json"),
     (2, "press harder", "calibrate press @rec.mcap --pressure --readings 2,3,4,3"),
     (2, "expected 4 or more", "calibrate press @rec.mcap --pressure --readings 2,3,4"),
-    (2, "expected 3 or more", "calibrate press sim:fingers.toml --pressure --forces 2,3"),
     (2, "expected --finger NAME", "calibrate press sim:fingers.toml --scale"),
     (2, "check its cable", "calibrate population sim:press.toml --finger thumb"),
     (3, "`biotac list`", f"calibrate population {NO_PORT} --finger 0"),

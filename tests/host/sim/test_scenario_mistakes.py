@@ -136,6 +136,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
     ),
     ("six tables", 'name = "t"\n' + "[[finger]]\n" * 6 + REST, 2, "", "key 'finger' has 6 tables"),
     ("profile", 'name = "t"\n[[finger]]\n[[finger]]\nprofile = "old"\n' + REST, 4, "finger 2", "'profile' is 'old'"),
+    ("half", 'name = "t"\n[[finger]]\nz_gain = 1.1\n' + REST, 2, "finger 1", "'balance' is missing"),
     ("serial", 'name = "t"\n[[finger]]\nserial = "BT1"\n' + REST, 3, "finger 1", "'serial' is 'BT1'"),
     ("fault kind", fault(0, kind="odd"), 9, "fault 1", "'kind' is 'odd': expected one of bad_parity"),
     ("fault finger", fault(0, finger=1), 8, "fault 1", "'finger' is 1"),

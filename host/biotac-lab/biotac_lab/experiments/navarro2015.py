@@ -29,7 +29,6 @@ from biotac.calibrate.press import (
     Press,
     Procedure,
     Truth,
-    Unattended,
     Verification,
     fit,
     guide,
@@ -100,7 +99,7 @@ def calibrate(
     first = Procedure(fingers, CALIBRATION_FORCES_N)
     show(f"{profile}: three presses per finger")
     with _played(text, board) as (hand, truth):
-        guide(hand, first, truth, Unattended())
+        guide(hand, first, truth, None)
     fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
 
     second = Procedure(fingers, VERIFICATION_FORCES_N)
@@ -130,7 +129,7 @@ def places(seed: int) -> Table:
     text = scenario("places", [seed], "new", presses([0], forces, np.repeat(PLACES, each).tolist()))
     procedure = Procedure([0], forces)
     with _played(text, "posix") as (hand, truth):
-        guide(hand, procedure, truth, Unattended())
+        guide(hand, procedure, truth, None)
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]
     rows = [

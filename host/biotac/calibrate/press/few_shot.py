@@ -23,10 +23,15 @@ PULL = 1000.0  # weight of the population map against the finger's own data, in 
 
 @dataclass(frozen=True)
 class Scale:
-    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x."""
+    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x.
+
+    The sigmas are how unsure presses leave them: as much as fingers differ, less what the presses say.
+    """
 
     gain: float = 1.0
     balance: float = 0.0
+    gain_sigma: float = GAIN_SPREAD
+    balance_sigma: float = BALANCE_SPREAD
 
     def applied(self, force: Floats) -> Floats:
         """The population map's force (n, 3) in N, corrected."""
@@ -52,9 +57,10 @@ def scale_of(felt_n: Floats, shown_n: Floats) -> Scale:
             "its pad straight down"
         )
     size = float(z @ z)
-    gain = 1.0 + float(z @ (shown_n - z)) / (size + (PRESS_ERROR_N[2] / GAIN_SPREAD) ** 2)
-    balance = float(z @ felt_n[:, 0]) / (size + (PRESS_ERROR_N[0] / BALANCE_SPREAD) ** 2)
-    return Scale(gain, balance)
+    for_gain = size + (PRESS_ERROR_N[2] / GAIN_SPREAD) ** 2
+    for_balance = size + (PRESS_ERROR_N[0] / BALANCE_SPREAD) ** 2
+    gain, balance = 1.0 + float(z @ (shown_n - z)) / for_gain, float(z @ felt_n[:, 0]) / for_balance
+    return Scale(gain, balance, PRESS_ERROR_N[2] / for_gain**0.5, PRESS_ERROR_N[0] / for_balance**0.5)
 
 
 def scaled(population: Population, columns: Floats, force_n: Floats) -> Population:
@@ -62,16 +68,22 @@ def scaled(population: Population, columns: Floats, force_n: Floats) -> Populati
     return scale_of(columns @ population.coefficients, force_n[:, 2]).on(population)
 
 
+def mixing_of(felt_n: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+    """The mixing (3, 3) of the map's axes, felt to true, from forces (k, 3) in N, and one sigma of each number."""
+    mixing, sigma = np.eye(len(PRESS_ERROR_N)), np.empty((len(PRESS_ERROR_N),) * 2)
+    for axis, error_n in enumerate(PRESS_ERROR_N):
+        unsure = np.linalg.inv(felt_n.T @ felt_n + (error_n / MIXING_SPREAD) ** 2 * np.eye(len(mixing)))
+        mixing[:, axis] += unsure @ felt_n.T @ (force_n - felt_n)[:, axis]
+        sigma[:, axis] = error_n * np.sqrt(np.diag(unsure))
+    return mixing, sigma
+
+
 def weighed(population: Population, columns: Floats, force_n: Floats) -> Population:
     """The map fitted to weights: mean ``columns`` (k, 114) while each lay still, and its force (k, 3) in N.
 
     A mixing of the axes, nine numbers, is fitted first; what it leaves then changes the columns' coefficients.
     """
-    felt_n = columns @ population.coefficients
-    mixing = np.eye(len(PRESS_ERROR_N))
-    for axis, error_n in enumerate(PRESS_ERROR_N):
-        pull = (error_n / MIXING_SPREAD) ** 2 * np.eye(len(mixing))
-        mixing[:, axis] += np.linalg.solve(felt_n.T @ felt_n + pull, felt_n.T @ (force_n - felt_n)[:, axis])
+    mixing, _ = mixing_of(columns @ population.coefficients, force_n)
     mixed = replace(population, coefficients=population.coefficients @ mixing)
     k = len(columns)
     mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))

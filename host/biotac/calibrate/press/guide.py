@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from ...errors import InputError
 from ...hand.hand import Hand
 from ...wire.batches import Batch
 from .detector import Press, Procedure, Step
@@ -22,43 +21,38 @@ class Face(Protocol):
         """The force in N at the press just held, as a scale shows it; asked only without a reference."""
 
 
-class Unattended:
-    """A Face for scenarios, which press by themselves."""
-
-    def show(self, step: Step | None) -> None: ...
-
-    def force_n(self, step: Step) -> float:
-        raise InputError(f"finger {step.finger}, press {step.press} has no force; expected a reference")
-
-
 def guide(
     hand: Hand,
     procedure: Procedure,
     reference: Reference | None,
-    face: Face,
+    face: Face | None,
     *,
     heard: Callable[[Batch], None] = lambda batch: None,
 ) -> dict[int, list[Press]]:
     """Feed ``procedure`` with what ``hand`` streams until it is done; the presses by finger, each with its force.
 
-    The force is the ``reference``'s, or what ``face`` gives. Starts the stream if necessary and leaves it on. ``heard``
-    gets every batch. Raises InputError when a finger waits too long, or a simulated source ends first.
+    The force is the ``reference``'s, or what ``face`` gives; a scenario, which presses by itself, needs no face. Starts
+    the stream if necessary and leaves it on. ``heard`` gets every batch. Raises InputError when a finger waits too
+    long, or a simulated source ends first.
     """
     forces_n: list[float] = []
 
     def show(step: Step | None) -> None:
-        if reference is None:
-            ask_forces(procedure, forces_n, face)
-        face.show(step)
+        if face is not None:
+            if reference is None:
+                ask_forces(procedure, forces_n, face)
+            face.show(step)
 
     shown = procedure.step
     show(shown)
     for batch in hand.batches():
         heard(batch)
-        procedure.feed(rows_of(batch.wire, batch.t_us, reference))
-        if procedure.step != shown:
-            shown = procedure.step
-            show(shown)
+        rows = rows_of(batch.wire, batch.t_us, reference)
+        for k in range(len(rows)):  # one by one: a batch may hold more than one step
+            procedure.feed(rows[k : k + 1])
+            if procedure.step != shown:
+                shown = procedure.step
+                show(shown)
         if procedure.done:
             break
     procedure.finish()

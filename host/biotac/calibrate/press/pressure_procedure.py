@@ -26,24 +26,13 @@ from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, 
 AROUND_ROWS = 50  # before and after a touch, in which the plate's force is taken as this finger's
 
 
-def calibrate(
-    hand: Hand,
-    face: Face,
-    *,
-    fingers: Sequence[int] = (),
-    forces_n: Sequence[float] = CALIBRATION_FORCES_N,
-    verification_n: Sequence[float] = VERIFICATION_FORCES_N,
-    made_s: int,
-    save: bool = False,
-) -> Outcome:
-    """K of each of ``fingers`` (none: all) on a board, which presses with about ``forces_n``, then ``verification_n``.
+def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int, save: bool = False) -> Outcome:
+    """K of each of ``fingers`` (none: all) on a board, from the paper's presses.
 
     The force is the board's scenario's, or what ``face`` gives. ``save`` keeps the result over reboots; see
     Outcome.not_saved if the board refuses. Raises InputError for presses that cannot be used, for a finger without a
     sensor, and for a sensor that was changed meanwhile; the board then keeps nothing beyond the next reboot.
     """
-    if len(forces_n) < MIN_PRESSES:
-        raise InputError(f"{len(forces_n)} presses are planned, expected {MIN_PRESSES} or more; name more forces")
     absent = sorted(set(fingers) - set(hand.fingers))
     if absent or not hand.fingers:
         there = f"{', '.join(map(str, hand.fingers))} are" if hand.fingers else "none is"
@@ -51,7 +40,7 @@ def calibrate(
     fingers = fingers or hand.fingers
     serials = {finger: _serial(hand, finger) for finger in fingers}
     reference = None if hand.link.source is None else Truth(hand.link.source)
-    procedure = Procedure(fingers, forces_n, verification_n, needs_force=reference is not None)
+    procedure = Procedure(fingers, CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, needs_force=reference is not None)
     held = guide(hand, procedure, reference, face)
     hand.stop()
     outcome = Outcome()

@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ HELP = (
     "weights or to a plate, or one gain from pressure to force. Guided on a board, or from a recording of that."
 )
 SIDES = ("its pad", "E1's side", "its tip", "E11's side")
-EXAMPLE = "biotac calibrate press sim:fingers.toml --scale --finger index --presses 3"
+EXAMPLE = "biotac calibrate press sim:scale.toml --scale --finger index"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,12 +78,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         text = f"{what} (default {','.join(f'{value:g}' for value in default)})"
         parser.add_argument(name, metavar=metavar, type=values.numbers, default=default, help=text)
-    asked = ",".join(f"{force:g}" for force in pressure.CALIBRATION_FORCES_N)
-    parser.add_argument("--forces", metavar="N,N,N", type=_forces, help=f"newtons to press with, --pressure ({asked})")
-    parser.add_argument(
-        "--verify", metavar="N", type=_force, default=pressure.VERIFICATION_FORCES_N[0],
-        help="newtons of the verification press, --pressure (default %(default)g)",
-    )  # fmt: skip
     parser.add_argument("--population", metavar="FILE", type=Path, help="another map than the package's own")
     parser.add_argument(
         "--out", metavar="PATH", type=Path,
@@ -109,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         recording = load(Path(args.where))
         serial = next((ascii_text(s.serial) for s in recording.sensors if s.finger == finger), "")
         return _fit_map(args, _recorded(args, recording, loads), serial, None)
-    with biotac.open(args.where) as hand:
+    with biotac.open(args.where, pace=1.0) as hand:  # prompts that a person can follow
         values.check_answers(hand, finger)
         held = _guided(args, hand, loads)
         return _fit_map(args, held, ascii_text(hand.sensor_info(finger).serial), hand)
@@ -216,15 +211,17 @@ def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[we
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
     """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
     trained = population.load(args.population)
+    felt_n, scale = held.columns @ trained.population.coefficients, None
     if args.weights:
         fit, how, forces = few_shot.weighed, "weights on tilted blocks", {"force_n": held.force_n.tolist()}
+        mixing, sigma = few_shot.mixing_of(felt_n, held.force_n)
+        scale = few_shot.Scale(mixing[2, 2], -mixing[2, 0], sigma[2, 2], sigma[2, 0])
     elif args.plate:
         held = known_force.of_plate(held, trained.population)
         fit, how, forces = few_shot.plated, "presses of a plate", {"force_n": held.force_n.tolist()}
     else:
-        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n[:, 2])
-        fit, how = few_shot.scaled, "presses on a scale"
-        forces = {"shown_n": held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
+        scale = few_shot.scale_of(felt_n, held.force_n[:, 2])
+        fit, how, forces = few_shot.scaled, "presses on a scale", {"shown_n": held.force_n[:, 2].tolist()}
     found = known_force.found(trained.population, held, fit)
     own = found.own.wrench_map(held.tare)
     (finger,), made_s = args.finger, int(time.time())
@@ -233,6 +230,7 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         "serial": serial,
         "presses": len(held.force_n),
         **forces,
+        **(asdict(scale) if scale else {}),
         "before_n": found.before_n.tolist(),
         "held_out_n": found.held_out_n.tolist(),
         "before_deg": found.before_deg,
@@ -265,9 +263,12 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
         return "  ".join(f"{value:5.2f}" for value in axes)
 
     cure = "tare, and load the pad flat, firmly and steadily, or upload it anyway with --force"
-    gain = f": z gain {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N" if "gain" in facts else ""
+    gain = (
+        "  z gain {gain:.3f} (one sigma {gain_sigma:.3f}), balance {balance:+.3f} N/N (one sigma {balance_sigma:.3f})"
+    )
     return [
-        f"finger {facts['finger']}, {facts['presses']} {how}{gain}",
+        f"finger {facts['finger']}, {facts['presses']} {how}",
+        *([gain.format(**facts)] if "gain" in facts else []),
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N, {facts['before_deg']:.1f} deg",
         f"  each press held out:          {numbers(facts['held_out_n'])} N, {facts['held_out_deg']:.1f} deg",
         f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
@@ -319,21 +320,6 @@ def _on_board(args: argparse.Namespace, made_s: int) -> pressure.Outcome:
         lambda step: _typed_n(step, args.unit),
         "let go of finger {finger}",
     )
-    forces_n = args.forces or pressure.CALIBRATION_FORCES_N
-    with biotac.open(args.where) as hand:
+    with biotac.open(args.where, pace=1.0) as hand:  # prompts that a person can follow
         _check_terminal(hand, args.where)
-        return pressure_procedure.calibrate(
-            hand, face, fingers=args.finger, forces_n=forces_n, verification_n=(args.verify,), made_s=made_s,
-            save=args.save,
-        )  # fmt: skip
-
-
-def _force(text: str) -> float:
-    force = values.number(text)
-    if not 0 < force < MAX_N:
-        raise argparse.ArgumentTypeError(f"seen {text!r}; expected newtons above 0 and below {MAX_N:g}")
-    return force
-
-
-def _forces(text: str) -> tuple[float, ...]:
-    return tuple(_force(part) for part in text.split(","))
+        return pressure_procedure.calibrate(hand, face, fingers=args.finger, made_s=made_s, save=args.save)
