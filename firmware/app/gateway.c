@@ -128,6 +128,8 @@ static void measure(void *context, bt_msg_board_facts *msg)
     msg->supply_mv = facts.supply_mv;
     msg->die_centi_c = facts.die_centi_c;
     msg->bus_khz = facts.bus_khz;
+    msg->slots_dma_late = gateway->sampler.dma_late;
+    msg->early_faults = facts.early_faults;
 }
 
 static void clock_bus(void *context, uint16_t khz)
@@ -241,7 +243,8 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     }
     // Absent sensors are read too: one that is plugged in later shows up by itself.
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;
-    bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us);
+    bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us,
+                     bt_settings_get(&gateway->session.settings, BT_SETTING_SLOTS_BY_CORE) != 0);
     port_alarm_at(port, start_us);
 }
 
@@ -363,6 +366,10 @@ void bt_gateway_poll(bt_gateway *gateway)
     if (session->slots_late != gateway->sampler.late) {
         session->slots_late = gateway->sampler.late;
         session->faults |= BT_FAULT_FLAG_SLOTS_LATE;
+    }
+    if (gateway->dma_late != gateway->sampler.dma_late) {
+        gateway->dma_late = gateway->sampler.dma_late;
+        session->faults |= BT_FAULT_FLAG_SLOT_DMA_LATE;
     }
     bt_session_tick(session, port_now_us(gateway->port));
 }

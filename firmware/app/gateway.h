@@ -13,7 +13,8 @@ typedef struct {
     bt_session session;
     bt_flash flash;
     bt_map_flash map_flash;
-    uint32_t round; // being assembled
+    uint32_t round;    // being assembled
+    uint32_t dma_late; // of the sampler, as last seen
     bool round_open;
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
     bt_kept_tares *kept;             // NULL: the board has no memory for them

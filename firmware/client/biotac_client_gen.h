@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0xE9E11A08u
+#define BT_SCHEMA_HASH 0x9CB21262u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -171,7 +171,8 @@ enum bt_event_kind {
 #define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its streams
 #define BT_FAULT_FLAG_TARE_RESTORED (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
 #define BT_FAULT_FLAG_EARLY_FAULT (1u << 11) // one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
-#define BT_FAULT_FLAGS 0xFFFu // all there are
+#define BT_FAULT_FLAG_SLOT_DMA_LATE (1u << 12) // slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
+#define BT_FAULT_FLAGS 0x1FFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
@@ -208,8 +209,9 @@ enum bt_setting {
     BT_SETTING_FORCE_MODEL = 14, // [enum force_model]
     BT_SETTING_UART_BITS_PER_S = 15, // [bit/s]
     BT_SETTING_LOADER_BY_TOUCH = 17, // [bool]
+    BT_SETTING_SLOTS_BY_CORE = 19, // [bool]
 };
-#define BT_SETTINGS 16
+#define BT_SETTINGS 17
 
 // Identifies the board. Reply to HELLO_REQUEST.
 #define BT_HELLO_ID 0x01
@@ -468,7 +470,7 @@ typedef struct {
 
 // What a board measures of itself. Reply to GET_BOARD_FACTS.
 #define BT_BOARD_FACTS_ID 0x19
-#define BT_BOARD_FACTS_BYTES 28
+#define BT_BOARD_FACTS_BYTES 34
 typedef struct {
     uint8_t req_id; // [1] as in the command
     uint32_t t_us; // [us] device time at which usb_frame and usb_starts were read
@@ -480,6 +482,8 @@ typedef struct {
     uint16_t supply_mv; // [mV] the board's supply, before its regulator; 0: not measured
     int16_t die_centi_c; // [1/100 degree Celsius] temperature of the microcontroller; -32768: not measured
     uint16_t bus_khz; // [kHz] clock rate of the sensors' bus
+    uint32_t slots_dma_late; // [1] slots lost since boot because the DMA was late with a word
+    uint16_t early_faults; // [1] starts before this one that failed before the firmware ran
 } bt_msg_board_facts;
 
 // First command of a host. Allowed at any time.
@@ -828,7 +832,7 @@ static const uint8_t bt_client_layout[] = {
     BT_TOUCH_ID, 4, 0x41, 0x81, 0x02, 0x81,
     BT_EVENT_ID, 5, 0x41, 0x81, 0x04, 0x82, 0x41,
     BT_BANDS_ID, 4, 0x41, 0x81, 0x02, 0x86,
-    BT_BOARD_FACTS_ID, 7, 0x01, 0x81, 0x41, 0x82, 0x03, 0x81, 0x43,
+    BT_BOARD_FACTS_ID, 9, 0x01, 0x81, 0x41, 0x82, 0x03, 0x81, 0x43, 0x81, 0x41,
     BT_HELLO_REQUEST_ID, 2, 0x01, 0x81,
     BT_START_ID, 2, 0x03, 0x41,
     BT_STOP_ID, 1, 0x01,
@@ -886,7 +890,7 @@ typedef char bt_msg_idle_lies_so[sizeof(bt_msg_idle) == 28 ? 1 : -1];
 typedef char bt_msg_touch_lies_so[sizeof(bt_msg_touch) == 16 ? 1 : -1];
 typedef char bt_msg_event_lies_so[sizeof(bt_msg_event) == 24 ? 1 : -1];
 typedef char bt_msg_bands_lies_so[sizeof(bt_msg_bands) == 36 ? 1 : -1];
-typedef char bt_msg_board_facts_lies_so[sizeof(bt_msg_board_facts) == 36 ? 1 : -1];
+typedef char bt_msg_board_facts_lies_so[sizeof(bt_msg_board_facts) == 44 ? 1 : -1];
 typedef char bt_msg_hello_request_lies_so[sizeof(bt_msg_hello_request) == 8 ? 1 : -1];
 typedef char bt_msg_start_lies_so[sizeof(bt_msg_start) == 6 ? 1 : -1];
 typedef char bt_msg_stop_lies_so[sizeof(bt_msg_stop) == 1 ? 1 : -1];
@@ -944,7 +948,7 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
-#define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1)
+#define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)

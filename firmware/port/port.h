@@ -46,8 +46,9 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi);
 // and port_spi_slot_end may be called; 0 if the core must do it word by word (spi_word_by_word.h).
 uint32_t port_spi_slot_begin(bt_port *port, uint16_t command, uint8_t mask);
 
-// The sensors' answers: BT_MAX_FINGERS words; 0 for sensors not in mask, and for all if a word was late.
-void port_spi_slot_end(bt_port *port, uint16_t *word);
+// The sensors' answers: BT_MAX_FINGERS words, 0 for sensors not in mask. False if one was late: which is
+// whose, nobody knows then.
+bool port_spi_slot_end(bt_port *port, uint16_t *word);
 
 // ---- links to hosts -------------------------------------------------------------------------
 // Link 0 is USB, or whatever else a board has only one of; link 1 a UART.
@@ -93,6 +94,7 @@ typedef struct {
     uint16_t supply_mv;
     int16_t die_centi_c; // PORT_NOT_MEASURED: unknown
     uint16_t bus_khz;
+    uint16_t early_faults; // starts before this one that failed before port_init
 } port_facts;
 #define PORT_NOT_MEASURED INT16_MIN
 #define PORT_NO_FACTS                                                                                        \

@@ -10,9 +10,10 @@ uint32_t port_spi_slot_begin(bt_port *port, uint16_t command, uint8_t mask)
     return 0;
 }
 
-void port_spi_slot_end(bt_port *port, uint16_t *word)
+bool port_spi_slot_end(bt_port *port, uint16_t *word)
 {
     (void)port, (void)word;
+    return true;
 }
 
 #endif

@@ -8,20 +8,20 @@
 _Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
                "ring indices wrap in a byte");
 
-void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us)
+void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us, bool by_core)
 {
     memset(sampler, 0, sizeof *sampler);
     sampler->port = port;
     sampler->fingers = fingers;
     sampler->slot_start_us = start_us;
+    sampler->by_core = by_core;
 }
 
 // Only the interrupt writes it, so a plain load and store will do; ++ would need an atomic read-modify-write,
 // which a Cortex-M0+ does not have.
-static void count_late(bt_sampler *sampler)
+static void count(_Atomic uint32_t *lost)
 {
-    uint32_t late = atomic_load_explicit(&sampler->late, memory_order_relaxed);
-    atomic_store_explicit(&sampler->late, late + 1, memory_order_relaxed);
+    atomic_store_explicit(lost, atomic_load_explicit(lost, memory_order_relaxed) + 1, memory_order_relaxed);
 }
 
 static void push(bt_sampler *sampler)
@@ -29,7 +29,7 @@ static void push(bt_sampler *sampler)
     uint8_t head = atomic_load_explicit(&sampler->head, memory_order_relaxed);
     uint8_t tail = atomic_load_explicit(&sampler->tail, memory_order_acquire);
     if ((uint8_t)(head - tail) == BT_SLOT_RING) {
-        count_late(sampler);
+        count(&sampler->late);
         return;
     }
     sampler->ring[head % BT_SLOT_RING] = sampler->current;
@@ -97,7 +97,7 @@ static uint32_t command(bt_sampler *sampler)
     uint8_t mask = (uint8_t)(sampler->fingers & ~sampler->current.asked);
     sampler->commanded = true;
     sampler->current.t_us = port_now_us(sampler->port);
-    uint32_t busy_us = port_spi_slot_begin(sampler->port, (uint16_t)(code << 8), mask);
+    uint32_t busy_us = sampler->by_core ? 0 : port_spi_slot_begin(sampler->port, (uint16_t)(code << 8), mask);
     sampler->by_itself = busy_us != 0;
     if (sampler->by_itself) {
         return port_now_us(sampler->port) + busy_us;
@@ -117,11 +117,15 @@ static uint16_t read_one(const bt_sampler *sampler, uint8_t f)
     return word;
 }
 
-// Read the sensors one by one; absent ones read as silent.
-static void read_sensors(bt_sampler *sampler)
+// Read the sensors one by one; absent ones read as silent. False when hardware did, and was late: such a slot
+// is lost, and nothing is said of its sensors. When it always is, the core goes on without.
+static bool read_sensors(bt_sampler *sampler)
 {
+    bool in_time = true;
     if (sampler->by_itself) {
-        port_spi_slot_end(sampler->port, sampler->current.word);
+        in_time = port_spi_slot_end(sampler->port, sampler->current.word);
+        sampler->late_in_a_row = in_time ? 0 : (uint8_t)(sampler->late_in_a_row + 1);
+        sampler->by_core = sampler->late_in_a_row == BT_SLOTS;
     }
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bool asked = sampler->current.asked >> f & 1;
@@ -141,6 +145,7 @@ static void read_sensors(bt_sampler *sampler)
             port_delay_us(sampler->port, BT_GAP_US);
         }
     }
+    return in_time;
 }
 
 uint32_t bt_sampler_alarm(bt_sampler *sampler)
@@ -148,14 +153,17 @@ uint32_t bt_sampler_alarm(bt_sampler *sampler)
     if (!sampler->commanded) {
         return command(sampler);
     }
-    read_sensors(sampler);
+    if (read_sensors(sampler)) {
+        push(sampler);
+    } else {
+        count(&sampler->dma_late);
+    }
     sampler->commanded = false;
-    push(sampler);
     advance(sampler);
     // An interrupt held off for longer than a slot loses slots, but not the time base. The next command must
     // not follow the last read sooner than the bus allows.
     while ((int32_t)(sampler->slot_start_us - port_now_us(sampler->port)) <= BT_GAP_US) {
-        count_late(sampler);
+        count(&sampler->late);
         advance(sampler);
     }
     return sampler->slot_start_us;

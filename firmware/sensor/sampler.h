@@ -31,6 +31,8 @@ typedef struct {
     uint8_t fingers; // bit mask of the sensors that are read
     bool commanded;  // the command is out, the reads are due
     bool by_itself;  // hardware does the slot under way (port_spi_slot_begin)
+    bool by_core;    // it never does
+    uint8_t late_in_a_row;
     bt_slot current;
     uint32_t slot_start_us;
     uint32_t fraction;  // of slot_start_us, in 1/BT_SLOT_HZ us
@@ -38,13 +40,14 @@ typedef struct {
     uint32_t ask_round; // from this round on; written before ask
     bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole once their round is
     bt_slot ring[BT_SLOT_RING];
-    atomic_uchar head;     // written by the interrupt only
-    atomic_uchar tail;     // written by the main loop only
-    _Atomic uint32_t late; // slots lost
+    atomic_uchar head;         // written by the interrupt only
+    atomic_uchar tail;         // written by the main loop only
+    _Atomic uint32_t late;     // slots lost
+    _Atomic uint32_t dma_late; // slots lost because hardware was late with a word
 } bt_sampler;
 
-// The first slot begins at start_us. The caller arms the alarm for start_us.
-void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us);
+// The first slot begins at start_us. The caller arms the alarm for start_us. by_core: word by word.
+void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us, bool by_core);
 
 // Interrupt context: do what is due. Returns when to be called next; `commanded` is false when a slot is
 // over.

@@ -172,6 +172,31 @@ def test_a_host_without_power_is_at_the_other_end(board: Board) -> None:
     assert emulated.until(1, usb={"state": "configured"})["usb"]["driven_unpowered"] == 0
 
 
+@known_from("USB 2.0, 9.6.3; Linux refuses more since 2.6.16")
+def test_a_hub_without_a_supply_gives_100_ma(board: Board) -> None:
+    """it asks for no more, which is what the board draws; sensors are powered apart"""
+    assert board.open("hub gives 100 mA")[1].counters()["usb"]["state"] == "configured"
+
+
+# ---- the sensors' bus --------------------------------------------------------------------------------------------
+
+
+@known_from("nobody has seen it: slot.c relies on the data sheet, 2.5")
+def test_the_dma_is_late_with_a_word_of_every_slot(board: Board) -> None:
+    """slots are counted as lost (SLOT_DMA_LATE), no finger as unplugged; after 44 the core clocks the bus"""
+    hand, emulated = board.open(fingers=5)
+    hand.stream()
+    hand.read(0.1)
+    emulated.do("pace the DMA 2 times as slowly")
+    assert (hand.read(0.2)["counts"][-5:] != wire.INVALID_COUNT).all()
+    hand.stop()
+    faults = hand.board.faults()
+    assert faults.board == FaultFlags.STARTED | FaultFlags.SLOT_DMA_LATE
+    assert hand.board.measure().slots_dma_late == 44
+    assert hand.status().fingers_present == 0b11111
+    assert not any(hand.sensor_status(finger).words_stuck for finger in hand.fingers)
+
+
 # ---- boot and flash ----------------------------------------------------------------------------------------------
 
 

@@ -27,7 +27,7 @@ export function crcStep(crc, byte) {
 }
 
 /** time: DeviceTime, with which its timers stand still. wrong(what): the program asked for what is not modelled. */
-export function correctDma(mcu, time, wrong) {
+export function correctDma(mcu, time, wrong, board = { dmaSlowness: 1 }) {
   const { dma } = mcu
   const [read, write] = [dma.readUint32.bind(dma), dma.writeUint32.bind(dma)]
   const paced = new Set() // channels that a timer has paced
@@ -83,7 +83,7 @@ export function correctDma(mcu, time, wrong) {
   function tick(channel) {
     if (time.held) return waiting.add(channel)
     const ratio = read(TIMERS + 4 * (channel.treqValue - TIMER0))
-    const period = ((ratio & 0xffff) / (ratio >>> 16)) * (1e9 / mcu.clkSys)
+    const period = ((ratio & 0xffff) / (ratio >>> 16)) * (1e9 / mcu.clkSys) * board.dmaSlowness
     const now = mcu.clock.nanos
     if (!(period > 0) || !Number.isFinite(period)) return wrong('a DMA channel paced by a timer that stands')
     paced.add(channel)

@@ -77,10 +77,13 @@ export class Rig {
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
       'stretch a word': () => (this.sensors.stretched = true),
+      'pace the DMA ([0-9.]+) times as slowly': (times) => (this.board.dmaSlowness = Number(times)),
       'corrupt a (bulk|control) handshake': (kind) => (this.usb.corrupting = kind),
       'wear the flash out': () => Object.assign(this.board, { eraseNanos: 400e6, programNanos: 3e6 }), // data sheet
       'erase in (\\d+) ms': (ms) => (this.board.eraseNanos = Number(ms) * 1e6),
       'flash chip (\\w{6})': (id) => (this.board.flashId = [...Buffer.from(id, 'hex')]),
+      'chip revision (\\d)': (n) => (this.board.revision = Number(n)),
+      'hub gives (\\d+) mA': (ma) => (this.board.hubMilliamps = Number(ma)),
       'supply at (\\d+) mV': (mv) => (this.board.supplyMv = Number(mv)),
       'clock ([0-9.]+) times as fast': (times) => (this.board.frameNanos = Math.round(1e6 * Number(times))),
       'lose a start of frame in (\\d+)': (n) => (this.board.lostFrames = Number(n)),

@@ -19,6 +19,7 @@ const HARD_FAULT = 3
 const FAULT_AFTER_NS = 1e6 // the image is being copied then
 
 const ROSC = 0x40060
+const SYSINFO = 0x40000
 const ROSC_RANDOMBIT = 0x1c
 
 /** What outlives a power cycle, for the rig to keep. */
@@ -34,6 +35,9 @@ export class Board {
     this.lostFrames = Infinity // one start of frame in so many does not come
     this.supplyMv = 4750 // VBUS less a diode
     this.celsius = 27
+    this.revision = 2 // of the chip: B2
+    this.hubMilliamps = 500
+    this.dmaSlowness = 1 // of channels that a timer paces
     this.atErase = null // what happens beside the next one
     this.misreads = 0 // starts in which a word of the image is read wrongly from flash
     this.faultyStarts = 0 // starts that an exception ends before the program runs
@@ -76,7 +80,7 @@ export class BootRom {
     this.onLoader = onLoader
     this.onCut = onCut
     this.flash = new Flash(mcu, board, (what) => this.#wrong(what))
-    correctDma(mcu, time, (what) => this.#wrong(what))
+    correctDma(mcu, time, (what) => this.#wrong(what), board)
     this.#install()
     this.#randomBit()
     this.#measures()
@@ -162,6 +166,9 @@ export class BootRom {
   // ---- the rest ----------------------------------------------------------------------------------------
 
   #randomBit() {
+    const sysinfo = this.mcu.peripherals[SYSINFO]
+    const read = sysinfo.readUint32.bind(sysinfo)
+    sysinfo.readUint32 = (offset) => (offset === 0 ? ((this.board.revision << 28) | 0x2927) >>> 0 : read(offset))
     const rosc = this.mcu.peripherals[ROSC]
     rosc.readUint32 = (offset) => (offset === ROSC_RANDOMBIT ? this.board.randomBit() : 0)
   }

@@ -17,6 +17,7 @@ const RTS = 2
 const BULK = 2
 const ENDPOINT_DESCRIPTOR = 5
 const ADDRESS = 5
+const MAX_POWER = 8 // of a configuration, in 2 mA
 const PACKET = 64
 const PULLUP = 1 << 16 // of SIE_CTRL
 const CONTROLLER_ON = 1 // of MAIN_CTRL
@@ -333,7 +334,7 @@ export class UsbHost {
   }
 
   #configure(device, all) {
-    if (all === null) return
+    if (all === null || 2 * all[MAX_POWER] > this.bus.board.hubMilliamps) return
     const word = (at) => device[at] | (device[at + 1] << 8)
     this.device = { vendor: word(8), product: word(10), release: word(12), address: this.usb.addrEndp & 0x7f }
     this.device.class = [...device.slice(4, 7)]

@@ -49,13 +49,14 @@ static bool wants(bt_session *session, unsigned f)
     return false;
 }
 
+// One at a time: each costs the sampling interrupt some 10 us a slot.
 uint8_t bt_sensors_to_ask(bt_session *session)
 {
     uint8_t mask = 0;
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         bool asked = session->asked >> f & 1; // this round does not show whether it answers
-        if (!asked && session->unsure >> f & 1 && wants(session, f)) {
-            mask = (uint8_t)(mask | 1u << f);
+        if (mask == 0 && !asked && session->unsure >> f & 1 && wants(session, f)) {
+            mask = (uint8_t)(1u << f);
         }
     }
     return mask;

@@ -874,6 +874,8 @@ void bt_msg_board_facts_pack(const bt_msg_board_facts *msg, uint8_t out[BT_BOARD
     at = put(at, (uint32_t)msg->supply_mv, 2);
     at = put(at, (uint32_t)msg->die_centi_c, 2);
     at = put(at, (uint32_t)msg->bus_khz, 2);
+    at = put(at, (uint32_t)msg->slots_dma_late, 4);
+    at = put(at, (uint32_t)msg->early_faults, 2);
     (void)at;
 }
 
@@ -903,6 +905,10 @@ void bt_msg_board_facts_unpack(bt_msg_board_facts *msg, const uint8_t in[BT_BOAR
     msg->die_centi_c = (int16_t)value;
     at = get(at, &value, 2);
     msg->bus_khz = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->slots_dma_late = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->early_faults = (uint16_t)value;
     (void)at;
 }
 
@@ -1859,6 +1865,7 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_FORCE_MODEL, 0, 1, 1},
     {BT_SETTING_UART_BITS_PER_S, 0, 3000000, 0},
     {BT_SETTING_LOADER_BY_TOUCH, 0, 1, 1},
+    {BT_SETTING_SLOTS_BY_CORE, 0, 1, 0},
 };
 
 const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {

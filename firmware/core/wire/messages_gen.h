@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0xE9E11A08u
+#define BT_SCHEMA_HASH 0x9CB21262u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -181,7 +181,8 @@ enum bt_event_kind {
 #define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its streams
 #define BT_FAULT_FLAG_TARE_RESTORED (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
 #define BT_FAULT_FLAG_EARLY_FAULT (1u << 11) // one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
-#define BT_FAULT_FLAGS 0xFFFu // all there are
+#define BT_FAULT_FLAG_SLOT_DMA_LATE (1u << 12) // slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
+#define BT_FAULT_FLAGS 0x1FFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
@@ -218,8 +219,9 @@ enum bt_setting {
     BT_SETTING_FORCE_MODEL = 14, // [enum force_model]
     BT_SETTING_UART_BITS_PER_S = 15, // [bit/s]
     BT_SETTING_LOADER_BY_TOUCH = 17, // [bool]
+    BT_SETTING_SLOTS_BY_CORE = 19, // [bool]
 };
-#define BT_SETTINGS 16
+#define BT_SETTINGS 17
 
 // Ranges, for the bounds that the core asserts.
 #define BT_SETTING_POC_WEIGHTS_MIN (0)
@@ -254,6 +256,8 @@ enum bt_setting {
 #define BT_SETTING_UART_BITS_PER_S_MAX 3000000
 #define BT_SETTING_LOADER_BY_TOUCH_MIN (0)
 #define BT_SETTING_LOADER_BY_TOUCH_MAX 1
+#define BT_SETTING_SLOTS_BY_CORE_MIN (0)
+#define BT_SETTING_SLOTS_BY_CORE_MAX 1
 
 typedef struct {
     uint8_t id;
@@ -559,7 +563,7 @@ void bt_msg_bands_unpack(bt_msg_bands *msg, const uint8_t in[BT_BANDS_BYTES]);
 
 // What a board measures of itself. Reply to GET_BOARD_FACTS.
 #define BT_BOARD_FACTS_ID 0x19
-#define BT_BOARD_FACTS_BYTES 28
+#define BT_BOARD_FACTS_BYTES 34
 typedef struct {
     uint8_t req_id; // [1] as in the command
     uint32_t t_us; // [us] device time at which usb_frame and usb_starts were read
@@ -571,6 +575,8 @@ typedef struct {
     uint16_t supply_mv; // [mV] the board's supply, before its regulator; 0: not measured
     int16_t die_centi_c; // [1/100 degree Celsius] temperature of the microcontroller; -32768: not measured
     uint16_t bus_khz; // [kHz] clock rate of the sensors' bus
+    uint32_t slots_dma_late; // [1] slots lost since boot because the DMA was late with a word
+    uint16_t early_faults; // [1] starts before this one that failed before the firmware ran
 } bt_msg_board_facts;
 void bt_msg_board_facts_pack(const bt_msg_board_facts *msg, uint8_t out[BT_BOARD_FACTS_BYTES]);
 void bt_msg_board_facts_unpack(bt_msg_board_facts *msg, const uint8_t in[BT_BOARD_FACTS_BYTES]);
@@ -996,7 +1002,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
-#define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1)
+#define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)

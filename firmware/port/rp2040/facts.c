@@ -38,6 +38,7 @@ port_facts port_measure(bt_port *port)
     memcpy(facts.flash_id, flash_jedec_id, sizeof facts.flash_id);
     facts.erase_us = flash_erase_us;
     facts.bus_khz = (uint16_t)spi_khz();
+    facts.early_faults = early_faults;
     facts.t_us = port_now_us(port);
     facts.usb_frame = (uint16_t)USB_SOF_RD;
     facts.usb_starts = usb_starts;

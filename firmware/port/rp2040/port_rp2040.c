@@ -23,6 +23,7 @@ static bool has_id;
 static char serial_text[2 * FLASH_ID_BYTES + 1];
 static uint32_t boot_id;
 static uint16_t started_by;
+uint16_t early_faults;
 static bool leaving, into_loader;
 static uint32_t leave_us;
 
@@ -73,7 +74,8 @@ static void note_start(void)
         started_by = reason & WATCHDOG_TIMED_OUT ? BT_FAULT_FLAG_HUNG : BT_FAULT_FLAG_CRASHED;
     }
     WATCHDOG_SCRATCH1 = RUNNING;
-    started_by |= early_faults() != 0 ? BT_FAULT_FLAG_EARLY_FAULT : 0;
+    early_faults = count_early_faults();
+    started_by |= early_faults != 0 ? BT_FAULT_FLAG_EARLY_FAULT : 0;
 }
 
 bt_port *port_init(int argc, char **argv)

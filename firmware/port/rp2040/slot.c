@@ -102,7 +102,7 @@ uint32_t port_spi_slot_begin(bt_port *port, uint16_t mosi, uint8_t mask)
     return SLOT_US;
 }
 
-void port_spi_slot_end(bt_port *port, uint16_t *word)
+bool port_spi_slot_end(bt_port *port, uint16_t *word)
 {
     bool in_time = !(DMA_CTRL_TRIG(DMA_DEALER) & DMA_BUSY) && !(SPI0_SSPSR & (SSPSR_RNE | SSPSR_BSY));
     if (!in_time) {
@@ -113,8 +113,9 @@ void port_spi_slot_end(bt_port *port, uint16_t *word)
     spi_select_at_once(0);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         IO_BANK0_GPIO_CTRL(select_pin[f]) = GPIO_FUNC_SIO; // high by now as the core has it
-        word[f] = in_time && (read_mask >> f & 1) ? (uint16_t)got[f] : 0;
+        word[f] = read_mask >> f & 1 ? (uint16_t)got[f] : 0;
     }
+    return in_time;
 }
 
 port_abilities port_describe(bt_port *port)

@@ -117,6 +117,7 @@ static uint32_t end(void)
 
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
+    SPI0_SSPCR0 = spi_control; // idle since the last word
     begin(mosi);
     return (uint16_t)end();
 }

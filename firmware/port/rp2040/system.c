@@ -28,9 +28,9 @@ AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, 
 // In scratch 2: starts in a row that have not got as far as port_init.
 #define STARTS 0x42540000u
 
-uint32_t early_faults(void)
+uint16_t count_early_faults(void)
 {
-    const uint32_t before = WATCHDOG_SCRATCH2 - STARTS - 1;
+    const uint16_t before = (uint16_t)(WATCHDOG_SCRATCH2 - STARTS - 1);
     WATCHDOG_SCRATCH2 = STARTS;
     return before;
 }

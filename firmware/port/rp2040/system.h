@@ -9,9 +9,9 @@
 #include <stdint.h>
 
 // ---- system.c
-void watchdog_feed(void); // boot2.S has started it
-// Starts that ended before port_init, since power-on or the last one that did not. Call once.
-uint32_t early_faults(void);
+void watchdog_feed(void);     // boot2.S has started it
+extern uint16_t early_faults; // port_rp2040.c: starts before this one that ended before port_init
+uint16_t count_early_faults(void);
 
 // ---- timer.c
 void timer_start(void);

@@ -70,6 +70,8 @@ def _board(seen: Bringup) -> list[str]:
     rows = [
         ["chip id", f"0x{last.chip_id:08X}", "revision in the first digit: 1 is B0 or B1, 2 is B2"],
         ["flash", f"{flash} {bringup.FLASH.get(flash, '')}", ", ".join(bringup.FLASH)],
+        ["slots lost by late DMA", str(last.slots_dma_late), "none"],
+        ["starts that failed", str(last.early_faults), "none"],
         ["erase of a sector", f"{last.erase_us / 1000:.1f} ms", f"at most {bringup.ERASE_MAX_US / 1000:.0f} ms"],
         ["supply", f"{last.supply_mv} mV" if last.supply_mv else "not measured", f"{low} to {high} mV"],
         ["temperature", _celsius(last), "-20 to 85 degrees"],

@@ -226,9 +226,23 @@ CATALOGUE: dict[str, Entry] = {
         "commands may differ.",
         "Try it with nothing at stake first: save settings, cut the power, compare. Tell us the id and the board.",
     ),
+    "chip_old": warning(
+        "The RP2040 has revision B0 or B1, of before late 2021. Behind a busy hub it may not come out of a reset "
+        "of the bus (RP2040-E5), and the firmware has no workaround: it then does not appear, or not again.",
+        "Plug the board straight into the computer, or take one with revision B2.",
+    ),
+    "dma_late": error(
+        "Slots were lost because the DMA was late with a word; when it is late 44 times in a row, the core clocks the "
+        "bus itself until the next start.",
+        "`biotac config set slots_by_core 1` and a restart make that last. Report it with bringup.md.",
+    ),
+    "early_fault": error(
+        "The board had to start more than once: its image was read wrongly, or an exception came before it ran.",
+        "Flash it again. If that does not help, its flash is bad, or its supply at power-on.",
+    ),
     "flash_slow": error(
-        "Erasing a sector of flash takes longer than the firmware allows for: its watchdog may restart the board in "
-        "the middle of it, and saving holds up sampling for as long.",
+        "Erasing a sector of flash takes longer than a Pico's chip ever does. Saving holds up sampling meanwhile, and "
+        "from two seconds on the watchdog restarts the board in the middle of it.",
         "Do not save settings or maps while anything is held. Use a board with a W25Q16JV.",
     ),
     "supply": error(

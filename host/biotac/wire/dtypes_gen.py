@@ -245,6 +245,8 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("supply_mv", "<u2"),
             ("die_centi_c", "<i2"),
             ("bus_khz", "<u2"),
+            ("slots_dma_late", "<u4"),
+            ("early_faults", "<u2"),
         ]
     ),
     wire.HelloRequest.ID: np.dtype(

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0xE9E11A08
+SCHEMA_HASH = 0x9CB21262
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -197,6 +197,7 @@ class FaultFlags(IntFlag):
     LINK_TAKEN = 1 << 9  # the host at one of the board's ports took over from the one at the other, and ended its streams
     TARE_RESTORED = 1 << 10  # after a hang or a crash, a finger has the tare and HOLD of before
     EARLY_FAULT = 1 << 11  # one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
+    SLOT_DMA_LATE = 1 << 12  # slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
 
 
 class StreamFlags(IntFlag):
@@ -379,6 +380,7 @@ FAULT_FLAG_DOC: dict[int, str] = {
     512: "the host at one of the board's ports took over from the one at the other, and ended its streams",
     1024: "after a hang or a crash, a finger has the tare and HOLD of before",
     2048: "one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came",
+    4096: "slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start",
 }
 
 
@@ -421,6 +423,7 @@ class Setting(IntEnum):
     FORCE_MODEL = 14
     UART_BITS_PER_S = 15
     LOADER_BY_TOUCH = 17
+    SLOTS_BY_CORE = 19
 
 
 class SettingSpec(NamedTuple):
@@ -497,6 +500,10 @@ SETTINGS: dict[Setting, SettingSpec] = {
     Setting.LOADER_BY_TOUCH: SettingSpec(
         "bool", 0, 1, 1,
         "1: opening and closing the USB port at 1200 baud enters the boot loader, unless a finger is touched or held; 0: only REBOOT_BOOTLOADER does",
+    ),
+    Setting.SLOTS_BY_CORE: SettingSpec(
+        "bool", 0, 1, 0,
+        "1: the core clocks the sensors' bus word by word, for a board whose DMA does not do it in time (SLOT_DMA_LATE). Used from the board's next start if saved",
     ),
 }
 
@@ -1343,12 +1350,14 @@ class BoardFacts:
     supply_mv: int
     die_centi_c: int
     bus_khz: int
+    slots_dma_late: int
+    early_faults: int
 
     ID: ClassVar[int] = 0x19
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIHII3BIHhH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIHII3BIHhHIH")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 28 bytes."""
+        """Payload without id and CRC, 34 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.t_us,
@@ -1360,6 +1369,8 @@ class BoardFacts:
             self.supply_mv,
             self.die_centi_c,
             self.bus_khz,
+            self.slots_dma_late,
+            self.early_faults,
         )
 
     @classmethod
@@ -1377,6 +1388,8 @@ class BoardFacts:
             v[9],
             v[10],
             v[11],
+            v[12],
+            v[13],
         )
 
 

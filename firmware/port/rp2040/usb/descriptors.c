@@ -31,7 +31,7 @@ const uint8_t usb_device_descriptor[USB_DEVICE_BYTES] = {
 // clang-format off: one item a line
 const uint8_t usb_config_descriptor[USB_CONFIG_BYTES] = {
     9, 2, LOW(USB_CONFIG_BYTES), HIGH(USB_CONFIG_BYTES), // a configuration with all that follows
-    2, 1, 0, 0x80, 250, // interfaces, its number, no name, from the bus, 500 mA
+    2, 1, 0, 0x80, 50, // interfaces, its number, no name, from the bus, 100 mA
     8, 11, 0, 2, 2, 2, 0, 0, // interfaces 0 and 1 belong together: CDC-ACM
     9, 4, 0, 0, 1, 2, 2, 0, 0, // interface 0: control, one endpoint
     5, 0x24, 0, 0x20, 0x01, // CDC 1.2
