@@ -8,6 +8,7 @@ import select
 import threading
 import time
 import tty
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,6 +38,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_report_header(config: pytest.Config) -> list[str]:
     """What no rig of tests/hil says, because its tests are not even collected."""
     return [] if config.getoption("--port") else ["tests/hil: no --port, so no real board is tested"]
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """What each rig of tests/hil passed, and what it left out, by what its board cannot."""
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for outcome in ("passed", "failed", "error", "skipped"):
+        for report in terminalreporter.stats.get(outcome, []):
+            rig = dict(report.user_properties).get("rig") if hasattr(report, "user_properties") else None
+            if rig is not None:
+                why = report.longrepr[2].removeprefix(f"Skipped: {rig}: ") if outcome == "skipped" else ""
+                counts[rig][f"left out: {why.removeprefix('Skipped: ')}" if why else outcome] += 1
+    for rig, told in counts.items():
+        terminalreporter.section(f"rig {rig}")
+        for what, count in told.items():
+            terminalreporter.line(f"{count:5} {what}")
 
 
 @pytest.fixture(scope="session", autouse=True)

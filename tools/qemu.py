@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Run an image of the Cortex-M4F reference board (firmware/boards/m4f) in QEMU's mps2-an386.
+"""Run an image of the Cortex-M4F reference board (tests/target/m4f) in QEMU's mps2-an386.
 
     tools/qemu.py [--seconds N] IMAGE.elf
 
@@ -30,7 +30,7 @@ def argv(elf: Path) -> list[str]:
 def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
     """The image's exit code, and its output."""
     if not elf.is_file():
-        raise Failed(f"{elf} is missing; build it: cmake -S firmware --preset m4f && cmake --build build/m4f")
+        raise Failed(f"{elf} is missing; build it: cmake -S tests/target/m4f -B build/m4f -G Ninja && cmake --build build/m4f")
     try:
         done = subprocess.run(argv(elf), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               timeout=seconds, check=False)  # fmt: skip
@@ -46,7 +46,7 @@ def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=SECONDS, help="kill it after this long (default %(default)g)")
-    parser.add_argument("image", type=Path, help="an .elf built from firmware/boards/m4f")
+    parser.add_argument("image", type=Path, help="an .elf built from tests/target/m4f")
     args = parser.parse_args()
     code, output = run(args.image, args.seconds)
     sys.stdout.write(output)

@@ -4,7 +4,7 @@
 # PORT is a folder of firmware/port, CPU the compiler's options for the core, LINKER a script in the port's folder. Makes
 # NAME.elf and NAME.bin (what is stored from its first byte on), with whatever PORT/image.cmake adds, and holds it to
 # limits.json of the board's folder.
-#   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with port/semihosted for the chip's bus and flash
+#   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for its bus and flash
 if(NOT CMAKE_TOOLCHAIN_FILE)
   set(CMAKE_TOOLCHAIN_FILE ${CMAKE_CURRENT_LIST_DIR}/arm-none-eabi.cmake)
 endif()
@@ -54,11 +54,12 @@ endfunction()
 function(emulated_image name port_name cpu linker)
   set(port ${fw}/port/${port_name})
   file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c
-    ${fw}/port/semihosted/*.c ${port}/*.c)
+    ${fw}/../tests/target/semihosted.c ${port}/*.c)
   list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$|/emu/stream\\.c$")
   qemu_executable(${name} ${port_name} ${cpu} ${linker} "${sources}" ${ARGN})
   target_link_options(${name} PRIVATE
-    -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_idle,--wrap=port_identify)
+    -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_delay_us,--wrap=bt_port_alarm,--wrap=port_idle
+    -Wl,--wrap=port_identify)
 endfunction()
 
 # Whatever runs in QEMU on a port: its start-up, and no limits.
@@ -71,7 +72,7 @@ function(qemu_executable name port_name cpu linker sources)
   target_compile_options(${name} PRIVATE ${cpu})
   target_compile_definitions(${name} PRIVATE BOARD_NEVER_SLEEPS ${ARGN})
   target_include_directories(${name} PRIVATE ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m
-    ${port} ${boards}/m4f ${CMAKE_CURRENT_LIST_DIR})
+    ${port} ${fw}/../tests/target ${CMAKE_CURRENT_LIST_DIR})
   target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections -Wl,--fatal-warnings
     -T ${port}/${linker})
   board_compile_options(${sources} ${shared})

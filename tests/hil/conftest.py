@@ -51,7 +51,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def rig(rig_name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
     """The board under test; whatever was opened on it is closed after the test."""
     facts = RIGS[rig_name]
-    if "command" in facts:
+    request.node.user_properties.append(("rig", rig_name))  # for the table at the end
+    if facts.get("command"):
         command = facts["command"].format(image_command=request.config.getoption("--image-command"))
         monkeypatch.setenv("BIOTAC_SIM", command)
     option = missing_port(rig_name, request.config)

@@ -28,12 +28,13 @@ class Restarts:
         path = folder / "world.toml"
         path.write_text(world)
         self._source = load_source(path)
-        if rig.name != "posix":
+        self._is_a_process = rig.facts.get("board") == "posix"
+        if not self._is_a_process:
             rig.need("power")
         self._open()
 
     def _open(self) -> None:
-        if self._rig.name == "posix":
+        if self._is_a_process:
             self.board: Any = KeptBoard(self._source, self._flash)
         else:
             self.board = start_board(self._rig.facts["board"], self._source, pace=0.0)

@@ -1,4 +1,4 @@
-"""A rig: a board with its surroundings, and what can be done to it. rigs/*.toml describe them."""
+"""A rig: a board with its surroundings, and what can be done to it: rigs/*.toml and firmware/boards/*/rig.toml."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from biotac.sim.source import Source
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+NO_MAPS = "a {} keeps no wrench maps (HELLO)"  # of board_name()
 
 
 @dataclass
@@ -93,7 +94,16 @@ class Rig:
 
 
 def all_rigs() -> dict[str, dict[str, Any]]:
-    return {path.stem: tomllib.loads(path.read_text()) for path in sorted((HERE / "rigs").glob("*.toml"))}
+    """Those of rigs/*.toml by their name, and a board's own by its folder's; each with what it is ``like``."""
+    rigs = {path.stem: tomllib.loads(path.read_text()) for path in sorted((HERE / "rigs").glob("*.toml"))}
+    for path in sorted((ROOT / "firmware/boards").glob("*/rig.toml")):
+        rigs[path.parent.name] = tomllib.loads(path.read_text())
+
+    def whole(facts: dict[str, Any]) -> dict[str, Any]:
+        like = whole(rigs[facts["like"]]) if "like" in facts else {}
+        return like | facts | {"cannot": like.get("cannot", {}) | facts.get("cannot", {})}
+
+    return {name: whole(facts) for name, facts in rigs.items()}
 
 
 def prepare(facts: dict[str, Any]) -> str | None:

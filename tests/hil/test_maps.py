@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kept_board import serial_of
 from maps import BIG, make_map
-from rig import Rig
+from rig import NO_MAPS, Rig
 from test_calibration import reboot
 
 import biotac
@@ -21,6 +21,7 @@ from biotac.map.board_map import PART_BYTES, for_any_sensor, part
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.reader import Recording
 from biotac.wire import messages_gen as wire
+from biotac.wire.identity import board_name
 
 SECTOR = 4096
 
@@ -34,7 +35,7 @@ def board(board: Callable[[str], biotac.Hand]) -> Callable[[str], biotac.Hand]:
         if hand.info.map_bytes == 0:
             with pytest.raises(InputError, match="keeps no wrench maps"):
                 hand.board.set_map(0, make_map(1))
-            pytest.skip(f"a {bytes(hand.info.board_name).decode()} keeps no wrench maps (HELLO)")
+            pytest.skip(NO_MAPS.format(board_name(hand.info)))
         return hand
 
     return opened

@@ -6,6 +6,8 @@ import pytest
 
 from biotac import Setting
 from biotac.errors import CommandRefusedError
+from biotac.wire import messages_gen as wire
+from biotac.wire.identity import board_name
 
 
 def test_saving_is_refused_while_streaming_and_done_when_not(board) -> None:
@@ -19,8 +21,9 @@ def test_saving_is_refused_while_streaming_and_done_when_not(board) -> None:
     assert hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
 
 
-def test_a_process_has_no_loader(rig, board) -> None:
-    if rig.name != "posix":
-        pytest.skip(f"{rig.name} has a loader, and would leave for it")
+def test_a_process_has_no_loader(board) -> None:
+    hand = board("press.toml")
+    if hand.info.board != wire.Board.POSIX_SIM:
+        pytest.skip(f"a {board_name(hand.info)} has a loader, and would leave for it")
     with pytest.raises(CommandRefusedError, match="this kind of board cannot do that"):
-        board("press.toml").board.reboot_bootloader()
+        hand.board.reboot_bootloader()

@@ -75,12 +75,12 @@ M0PLUS = ("-mcpu=cortex-m0plus",)
 M4F = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 RP2040JS = "rp2040js 1.4.1, by the Cortex-M0+ manual without flash wait states or bus contention"
 M0PLUS_START = (HERE / "m0plus.c",)
-REFERENCE = FIRMWARE / "boards" / "m4f"  # the M4F's reset code and memory map are those of its board
+REFERENCE = ROOT / "tests" / "target" / "m4f"  # the M4F's reset code and memory map are those of its board
 QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
 BOARDS = (
     Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld"),
     Board("m4f", "Cortex-M4F", QEMU, M4F, (REFERENCE / "startup.c", HERE / "m4f.c"), REFERENCE / "m4f.ld",
-          (f"-I{REFERENCE}",)),
+          (f"-I{REFERENCE.parent}",)),
 )  # fmt: skip
 
 

@@ -119,7 +119,7 @@ def check(elf: Path, objdump: str, limits: Limits, port: Path) -> list[str]:
     parts = sections(elf, objdump, limits)
     flash = sum(part.bytes for part in parts.values() if part.stored)
     ram = sum(part.bytes for part in parts.values() if part.in_ram)
-    program = stack.load(elf, objdump, elf.parent, POINTERS | limits.pointers)
+    program = stack.load(elf, objdump, elf.parent / "CMakeFiles" / f"{elf.stem}.dir", POINTERS | limits.pointers)
     program.functions[ROM] = stack.Function(0, limits.rom_stack_bytes)
     interrupts = [name for name in limits.interrupts if name in program.functions]
     depth, chains = stack_depth(program, interrupts)

@@ -1,7 +1,7 @@
 // What an image asks of QEMU itself, by the ARM semihosting instruction. On silicon without a debugger it
-// faults: one more reason why this board is no product.
-#ifndef BIOTAC_M4F_SEMIHOSTING_H
-#define BIOTAC_M4F_SEMIHOSTING_H
+// faults: nothing that includes this is for a board that one can buy.
+#ifndef BIOTAC_SEMIHOSTING_H
+#define BIOTAC_SEMIHOSTING_H
 
 #include <stdint.h>
 

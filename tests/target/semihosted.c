@@ -24,16 +24,20 @@
 #define KEPT_BYTES   32768u // two sectors of up to 16 KiB
 #define LOOKS_FOR_GO 200u   // turns of the main loop between two looks
 #define HANDED_OVER  5000u  // turns in which the link sends what is left
+#define LATE_US      20u    // an alarm that comes later than this is late; before, it is QEMU's translating
+#define TRANSFER_NS  (16u * 1000000000u / BT_SPI_HZ)
 
 enum mode { READ = 1, UPDATE = 3 }; // "rb", "r+b"
 
 static char line[600];
 static const char *tape_name, *go_name, *serials, *flash_name;
 static uint32_t boot_id, tape_file;
-static bool read_line, ready, held, over;
+static bool read_line, ready, begun, held, over;
 static volatile bool stands;
 static volatile uint32_t stands_at_us, behind_us, alarm_us;
 static uint32_t turns;
+static volatile bool in_alarm;
+static uint64_t slot_ns;
 
 static bt_emu_bus bus;
 static bt_tape tape;
@@ -108,8 +112,7 @@ static void read_command_line(void)
     }
 }
 
-// ---- time: the port's, but for where it stands still
-// -------------------------------------------------------
+// ---- time: the port's, but for where it stands still ------------------------------------------------------
 
 uint32_t __real_clock_us(void);
 uint32_t __wrap_clock_us(void);
@@ -117,38 +120,76 @@ void __real_port_alarm_at(bt_port *port, uint32_t at_us);
 void __wrap_port_alarm_at(bt_port *port, uint32_t at_us);
 void __real_port_idle(bt_port *port);
 void __wrap_port_idle(bt_port *port);
+void __real_port_delay_us(bt_port *port, uint32_t us);
+void __wrap_port_delay_us(bt_port *port, uint32_t us);
+bool __real_bt_port_alarm(void);
+bool __wrap_bt_port_alarm(void);
 port_identity __wrap_port_identify(bt_port *port);
 
 uint32_t __wrap_clock_us(void)
 {
+    if (in_alarm) {
+        return (uint32_t)(slot_ns / 1000);
+    }
+    if (!begun) { // whole ms until the first alarm is set, or every run would begin some us apart
+        return __real_clock_us() / 1000 * 1000;
+    }
     return stands ? stands_at_us : __real_clock_us() - behind_us;
 }
 
 static uint64_t ns_of(uint32_t us)
 {
-    static uint32_t last_us, high;
-    high += us < last_us && last_us - us > UINT32_MAX / 2;
-    last_us = us;
-    return ((uint64_t)high << 32 | us) * 1000;
+    static uint64_t last_us;
+    last_us += (uint64_t)(int64_t)(int32_t)(us - (uint32_t)last_us);
+    return last_us * 1000;
 }
 
 static uint64_t now_ns(void)
 {
-    return ns_of(__wrap_clock_us());
+    return in_alarm ? slot_ns : ns_of(__wrap_clock_us());
+}
+
+// QEMU counts instructions, which is nobody's clock: in the alarm's interrupt time is the alarm's own, and
+// passes with words and waits, as on the posix port. One that really is late stays late.
+bool __wrap_bt_port_alarm(void)
+{
+    const uint32_t now_us = __wrap_clock_us();
+    slot_ns = ns_of(now_us - alarm_us < LATE_US ? alarm_us : now_us);
+    in_alarm = true;
+    const bool work = __real_bt_port_alarm();
+    in_alarm = false;
+    return work;
+}
+
+void __wrap_port_delay_us(bt_port *port, uint32_t us)
+{
+    if (in_alarm) {
+        slot_ns += (uint64_t)us * 1000;
+    } else {
+        __real_port_delay_us(port, us);
+    }
 }
 
 // While time stands still no alarm is set.
 void __wrap_port_alarm_at(bt_port *port, uint32_t at_us)
 {
-    const int32_t ahead_us = (int32_t)(at_us - __wrap_clock_us());
+    const uint32_t now_us = __wrap_clock_us();
+    const int32_t ahead_us = (int32_t)(at_us - now_us);
+    if (!begun) {
+        behind_us = __real_clock_us() - now_us;
+        begun = true;
+    }
     over = over || bt_tape_over(&tape, now_ns() + (uint64_t)(ahead_us > 0 ? ahead_us : 0) * 1000);
     if ((held || over) && !stands) {
-        stands_at_us = __wrap_clock_us();
+        stands_at_us = now_us;
         stands = true;
     }
     alarm_us = at_us;
     if (!stands) {
+        const bool was_in_alarm = in_alarm;
+        in_alarm = false; // the chip's timer counts on
         __real_port_alarm_at(port, at_us);
+        in_alarm = was_in_alarm;
     }
 }
 
@@ -174,8 +215,7 @@ void __wrap_port_idle(bt_port *port)
     __real_port_idle(port);
 }
 
-// ---- the sensors
-// -------------------------------------------------------------------------------------------
+// ---- the sensors ------------------------------------------------------------------------------------------
 
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
@@ -196,12 +236,16 @@ void port_spi_select(bt_port *port, uint8_t mask)
 
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
-    return bt_emu_bus_transfer16(&bus, mosi, now_ns());
+    const uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, now_ns());
+    slot_ns += TRANSFER_NS;
+    return miso;
 }
 
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
-    return bt_emu_bus_transfer8(&bus, mosi, now_ns());
+    const uint8_t miso = bt_emu_bus_transfer8(&bus, mosi, now_ns());
+    slot_ns += TRANSFER_NS / 2;
+    return miso;
 }
 
 void port_spi_rate(bt_port *port, uint32_t khz)
@@ -215,8 +259,7 @@ void spi_start(void)
     bt_emu_bus_init(&bus, tape.fingers, serials[0] == '-' ? "" : serials, count, &tape);
 }
 
-// ---- flash, as NOR flash is
-// ----------------------------------------------------------------------------------
+// ---- flash, as NOR flash is -------------------------------------------------------------------------------
 
 uint32_t flash_erase_us;
 
@@ -253,8 +296,7 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
     memcpy(data, kept + offset, bytes);
 }
 
-// ---- identity: an emulator has neither the chip's number nor its image where the note expects it
-// ---------------
+// ---- identity: an emulator has neither the chip's number nor its image where the note expects it ----------
 
 port_identity __wrap_port_identify(bt_port *port)
 {

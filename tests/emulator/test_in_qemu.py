@@ -1,0 +1,66 @@
+"""Board images in QEMU (firmware/boards/*/rig.toml), as much as a day has time for; at night they run tests/hil."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from kept_board import KeptBoard
+
+import biotac
+from biotac.cli.main import main
+from biotac.hand.opening import shake_hands
+from biotac.sim.loading import load_source
+from biotac.sim.process import SimLink
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "hil"))
+
+from rig import all_rigs, in_ci, prepare
+
+BOARDS = {name: rig for name, rig in all_rigs().items() if "qemu_gateway" in rig.get("command", "")}
+
+
+@pytest.fixture(params=BOARDS)
+def board(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """While a test runs, sim: is this image in QEMU."""
+    facts = BOARDS[request.param]
+    if why := prepare(facts):
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+    monkeypatch.setenv("BIOTAC_SIM", facts["command"])
+    return facts
+
+
+def test_it_is_healthy_with_five_fingers(board: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "sim:press.toml?fingers=5", "--seconds", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["findings"] == []
+
+
+@pytest.mark.parametrize("seconds", [2, pytest.param(60, marks=pytest.mark.nightly)])
+def test_it_computes_what_the_simulated_board_computes(
+    board: dict[str, Any], seconds: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    source, recording = f"sim:press.toml?fingers=5&seconds={seconds}", tmp_path / "here.mcap"
+    with biotac.open(source) as hand:
+        with hand.record(recording):
+            here = hand.read_batch(1000).wire
+        status, hello = hand.status(), hand.info
+    assert (hello.board, hello.fingers) == (board["board_id"], 5)
+    assert (len(here), status.slots_late, status.messages_dropped) == (500 * seconds, 0, 0)
+    assert main(["check", str(recording)]) == 0
+    monkeypatch.delenv("BIOTAC_SIM")
+    with biotac.open(source) as hand:
+        there = hand.read_batch(1000).wire
+    here["t_us"] -= here["t_us"][0] - there["t_us"][0]  # they do not start at the same microsecond
+    assert here.tobytes() == there.tobytes()
+
+
+def test_what_it_saved_is_there_after_a_restart(board: dict[str, Any], tmp_path: Path) -> None:
+    source = load_source("press.toml", seconds=1)
+    for expected in (100, 250, 260):
+        with shake_hands(SimLink("qemu", KeptBoard(source, tmp_path / "flash.bin"))) as hand:
+            assert hand.board.settings()[biotac.Setting.IDLE_PERIOD_MS] == expected
+            hand.board.set_setting(biotac.Setting.IDLE_PERIOD_MS, 250 if expected == 100 else 260)
+            hand.board.save_settings()
