@@ -30,7 +30,8 @@ def argv(elf: Path) -> list[str]:
 def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
     """The image's exit code, and its output."""
     if not elf.is_file():
-        raise Failed(f"{elf} is missing; build it: cmake -S tests/target/m4f -B build/m4f -G Ninja && cmake --build build/m4f")
+        build = "cmake -S tests/target/m4f -B build/m4f -G Ninja && cmake --build build/m4f"
+        raise Failed(f"{elf} is missing; build it: {build}")
     try:
         done = subprocess.run(argv(elf), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               timeout=seconds, check=False)  # fmt: skip
