@@ -251,7 +251,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
 bool bt_gateway_alarm(bt_gateway *gateway)
 {
     port_alarm_at(gateway->port, bt_sampler_alarm(&gateway->sampler));
-    return !gateway->sampler.commanded;
+    // A turn of the main loop costs more than a slot's work: every second slot wakes it, and a round's last.
+    const uint8_t next = gateway->sampler.current.slot;
+    return !gateway->sampler.commanded && (next % 2 != 0 || next == 0);
 }
 
 static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)

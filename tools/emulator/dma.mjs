@@ -1,23 +1,10 @@
-// What rp2040js declares of the DMA and does not run, from the data sheet: the sniffer (2.5.5.2), pacing timers (2.5.5.1;
-// as published their period is upside down), and the time that transfers take, a cycle each where nothing paces them.
-// The sniffer takes bytes and CRC-32 only; whatever else a program asks of it is wrong here.
-const SNIFF_CTRL = 0x434
-const SNIFF_DATA = 0x438
-const EN = 1
-const OUT_REV = 1 << 10
-const OUT_INV = 1 << 11
-const CHANNEL_SNIFF_EN = 1 << 23
+// What rp2040js declares of the DMA and does not run, from the data sheet: pacing timers (2.5.5.1; as published their
+// period is upside down), and the time that transfers take, a cycle each where nothing paces them.
 const UNPACED = 0x3f
 const TIMER0 = 0x3b
 const TIMER3 = 0x3e
 const TIMERS = 0x420
 const POLYNOMIAL = 0x04c11db7
-
-function reversed(value, bits) {
-  let out = 0
-  for (let k = 0; k < bits; k++) out = (out << 1) | ((value >>> k) & 1)
-  return out >>> 0
-}
 
 /** One byte into a CRC that is not reflected. */
 export function crcStep(crc, byte) {
@@ -29,7 +16,7 @@ export function crcStep(crc, byte) {
 /** time: DeviceTime, with which its timers stand still. wrong(what): the program asked for what is not modelled. */
 export function correctDma(mcu, time, wrong, board = { dmaSlowness: 1 }) {
   const { dma } = mcu
-  const [read, write] = [dma.readUint32.bind(dma), dma.writeUint32.bind(dma)]
+  const read = dma.readUint32.bind(dma)
   const paced = new Set() // channels that a timer has paced
   const waiting = new Set() // for time to go on
   time.onHold.push(() => {
@@ -44,32 +31,8 @@ export function correctDma(mcu, time, wrong, board = { dmaSlowness: 1 }) {
     waiting.clear()
     for (const channel of those) if (channel.active) tick(channel)
   })
-  let control = 0
-  let data = 0
-  dma.readUint32 = (offset) => {
-    if (offset === SNIFF_CTRL) return control
-    if (offset !== SNIFF_DATA) return read(offset)
-    const out = control & OUT_REV ? reversed(data, 32) : data
-    return (control & OUT_INV ? ~out : out) >>> 0
-  }
-  dma.writeUint32 = (offset, value) => {
-    if (offset === SNIFF_CTRL) control = value
-    else if (offset === SNIFF_DATA) data = value >>> 0
-    else write(offset, value)
-  }
   for (const channel of dma.channels) {
-    const { transfer } = channel
     const schedule = channel.scheduleTransfer.bind(channel)
-    channel.transfer = () => {
-      const sniffed = control & EN && ((control >>> 1) & 15) === channel.index && channel.ctrl & CHANNEL_SNIFF_EN
-      if (sniffed) {
-        const calculation = (control >>> 5) & 15
-        if (calculation > 1 || channel.dataSize !== 1) wrong('a sniffer that is not for the CRC-32 of bytes')
-        const byte = mcu.readUint8(channel.readAddr)
-        data = crcStep(data, calculation === 1 ? reversed(byte, 8) : byte)
-      }
-      transfer()
-    }
     channel.transferAlarm = mcu.clock.createAlarm(channel.transfer)
     channel.scheduleTransfer = () => {
       const { treqValue } = channel

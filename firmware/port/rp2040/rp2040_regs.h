@@ -37,7 +37,6 @@
 #define DMA_READ_TRIG(channel)            REG32(0x5000003Cu + 0x40u * (channel)) // alias 3
 #define DMA_TREQS_DUE(channel)            REG32(0x50000800u + 0x40u * (channel)) // CTDREQ; any write: none
 #define DMA_BUSY                          (1u << 24)
-#define DMA_SNIFF_THIS                    (1u << 23)
 #define DMA_QUIET                         (1u << 21) // no interrupt
 #define DMA_UNPACED                       (0x3Fu << 15)
 #define DMA_BY_TIMER0                     (0x3Bu << 15)
@@ -53,17 +52,8 @@
 #define DMA_HIGH_PRIORITY                 (1u << 1)
 #define DMA_CHANNEL_EN                    (1u << 0)
 #define DMA_TIMER0                        REG32(0x50000420u) // ticks: clk_sys times upper over lower half
-#define DMA_SNIFF_CTRL                    REG32(0x50000434u)
-#define DMA_SNIFF_DATA                    REG32(0x50000438u)
-#define DMA_SNIFF_OUT_INV                 (1u << 11)
-#define DMA_SNIFF_OUT_REV                 (1u << 10)
-#define DMA_SNIFF_CALC_CRC32_REVERSED     (1u << 5) // polynomial 0x04C11DB7, each byte's lowest bit first
-#define DMA_SNIFF_CHANNEL(channel)        ((uint32_t)(channel) << 1)
-#define DMA_SNIFF_EN                      (1u << 0)
 #define DMA_START                         REG32(0x50000430u) // bit channel
 #define DMA_CHAN_ABORT                    REG32(0x50000444u)
-
-// ---- 2.13 power-on state machine
 
 // ---- 2.14 resets
 #define RESETS_RESET      REG32(0x4000C000u)
