@@ -6,7 +6,6 @@ import html
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,20 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.gap import Gap
-from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..core.bands import bands_of
 from ..errors import InputError, RecordingError
 from ..keep.calibration import own_settings
 from ..wire import messages_gen as wire
-from ..wire.batches import StreamDecoder
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire, frames_from_wire
 from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
-from .block import FRAME, IDLE, PAC, ROWS, Packet, as_sent
-from .blocks import Block, Blocks, lost_between
+from .block import FRAME, Packet, as_sent
+from .blocks import Block, Blocks
+from .contents import Contents
 from .facts import Facts
 from .index import Index
 from .labels import Label
@@ -37,6 +35,10 @@ from .selection import fields_named, part_of
 from .stamps import Stamps, unwrapped_us
 from .summary import lines, summary
 from .tabular import Selection
+
+
+def _of_contents(name: str) -> Any:
+    return property(lambda recording: getattr(recording._contents, name))
 
 
 class Recording:
@@ -62,25 +64,22 @@ class Recording:
     once. Raises RecordingError when nothing can be read, or when the file has changed since it was opened.
     """
 
-    problems: list[str]
-    cut_off: bool
-    damaged_chunks: int
-    wrong_checksums: int
-    arrived_ns: list[int]
-    all_here_ns: list[int | None]
-    messages: list[Any]
-    pac: StructArray
-    idle: StructArray
-    seq: NDArray[np.int64]
-    t_us: NDArray[np.int64]
-    counts: FramingCounts
-    pac_lost: int
-    disordered: int
-    frames_lost: int
-    gaps: list[Gap]
-    _blocks: list[Block]
-    _sent: StructArray
-    _gaps: list[list[Gap]]
+    problems: list[str] = _of_contents("problems")
+    cut_off: bool = _of_contents("cut_off")
+    damaged_chunks: int = _of_contents("damaged_chunks")
+    wrong_checksums: int = _of_contents("wrong_checksums")
+    arrived_ns: list[int] = _of_contents("arrived_ns")
+    all_here_ns: list[int | None] = _of_contents("all_here_ns")
+    messages: list[Any] = _of_contents("messages")
+    pac: StructArray = _of_contents("pac")
+    idle: StructArray = _of_contents("idle")
+    seq: NDArray[np.int64] = _of_contents("seq")
+    t_us: NDArray[np.int64] = _of_contents("t_us")
+    counts: FramingCounts = _of_contents("counts")
+    pac_lost: int = _of_contents("pac_lost")
+    disordered: int = _of_contents("disordered")
+    frames_lost: int = _of_contents("frames_lost")
+    gaps: list[Gap] = _of_contents("gaps")
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] | None = None) -> None:
         self.path = Path(path)
@@ -91,75 +90,34 @@ class Recording:
             if blocks.metadata is not None and not blocks.scan.problems:
                 self._take_metadata(blocks.metadata)
                 return
-        self._read_all(show or (lambda share: None))
+        self._contents = Contents(self.path, show) if show else Contents(self.path)
+        self._take_metadata(self._contents.metadata)
 
-    def __getattr__(self, name: str) -> Any:
-        if name not in Recording.__annotations__ or "_sent" in vars(self):
-            raise AttributeError(f"a Recording has no {name!r}")
-        self._read_all(lambda share: None)
-        return vars(self)[name]
-
-    def _read_all(self, show: Callable[[float], None]) -> None:
+    @cached_property
+    def _contents(self) -> Contents:
         if self._index is not None:
             self._index.check(self.path)
-        blocks = Blocks(self.path)
-        own: list[Block] = []
-        for block in blocks:
-            own.append(block)
-            show(blocks.scan.share)
-        self.problems = blocks.scan.problems
-        self.cut_off = blocks.scan.cut_off
-        self.damaged_chunks = blocks.scan.damaged_chunks
-        self.wrong_checksums = blocks.scan.wrong_checksums
-        if blocks.metadata is None:
-            raise RecordingError(self._without_metadata(blocks.damaged_metadata > 0))
-        self._take_metadata(blocks.metadata)
-        self._blocks = own
-        self.arrived_ns = [block.arrived_ns for block in own]
-        # Imported recordings store the first time for both.
-        self.all_here_ns = [block.all_here_ns if block.all_here_ns != block.arrived_ns else None for block in own]
-        decoder = StreamDecoder()
-        decoder.accept_newer_minor()
-        self.messages = decoder.feed(b"".join(block.rest.packets for block in own)).messages
-        sent, self.pac, self.idle = (self._rows_of(kind) for kind in (FRAME, PAC, IDLE))
-        self.seq, self.t_us = sent["seq"].astype(np.int64), sent["t_us"]
-        rows = len(sent) + len(self.pac) + len(self.idle)
-        self.counts = replace(decoder.counts, good=decoder.counts.good + rows)
-        rests = [block.rest for block in own]
-        self.pac_lost = sum(rest.lost_pac for rest in rests)
-        self.disordered = sum(rest.disordered for rest in rests)
-        self._gaps = [[gap for facts in rest.gaps if (gap := self._gap(facts)) is not None] for rest in rests]
-        self.gaps = [gap for before_block in self._gaps for gap in before_block]
-        in_damaged = sum(block.missing for block in own) + lost_between(own)
-        self.frames_lost = sum(frames for rest in rests for _, _, frames in rest.lost) + in_damaged
-        if self.cut_off and not len(self.seq):
-            raise RecordingError(f"{self.path} was cut off before its first second was complete; record it again")
-        self._sent = sent
-        self.problems += self._later_labels[1]
-        self._describe_losses([loss for rest in rests for loss in rest.lost], in_damaged)
-
-    def _rows_of(self, kind: int) -> StructArray:
-        return np.concatenate([np.empty(0, ROWS[kind]), *(block.rows[kind] for block in self._blocks)])
+        return Contents(self.path)
 
     def packets(self, from_us: int = 0) -> Iterator[tuple[int, Packet]]:
         """Messages in order of arrival, each with its block's number; without blocks that end before ``from_us``."""
-        for k, block in enumerate(self._blocks):
+        for k, block in enumerate(self._contents.blocks):
             for packet in block.packets() if from_us <= (block.rest.last_us or from_us) else ():
                 yield k, packet
 
     def gaps_before(self, block: int) -> list[Gap]:
         """Those between this block, by its number in ``blocks``, and the one before it."""
-        return self._gaps[block]
+        return self._contents.gaps_before[block]
 
     @cached_property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,), in order of arrival."""
-        return frames_from_wire(self._sent, self.seq, self.t_us)
+        return frames_from_wire(self._contents.sent, self.seq, self.t_us)
 
     @cached_property
     def wire(self) -> StructArray:
         """The FRAME messages as sent, with seq and t_us wrapped."""
-        return as_sent(self._sent, FRAME)
+        return as_sent(self._contents.sent, FRAME)
 
     @cached_property
     def bands(self) -> StructArray:
@@ -178,7 +136,7 @@ class Recording:
     @cached_property
     def blocks(self) -> list[bytes]:
         """The wire bytes as they came, about one second per block."""
-        return [b"".join(packet.data for packet in block.packets()) for block in self._blocks]
+        return [b"".join(packet.data for packet in block.packets()) for block in self._contents.blocks]
 
     def select(
         self,
@@ -220,11 +178,7 @@ class Recording:
         for facts in (facts for block in self.heads() for facts in block.rest.labels):
             with suppress(TypeError, AttributeError, InputError):  # a damaged one
                 live.append(Label(**facts))
-        return labels_module.in_order([*live, *self._later_labels[0]])
-
-    @cached_property
-    def _later_labels(self) -> tuple[list[Label], list[str]]:
-        return labels_module.read(self.path, self.begin_ns)
+        return labels_module.in_order([*live, *labels_module.read(self.path, self.begin_ns)[0]])
 
     def mark(
         self,
@@ -243,8 +197,7 @@ class Recording:
         t_us, end_us = (None if s is None else self.begin_us + round(s * 1e6) for s in (at_s, until_s))
         number = None if finger is None else finger_of(finger, self.names)
         labels_module.append(self.path, self.begin_ns, Label(text, t_us, end_us, number, facts))
-        for name in ("labels", "_later_labels"):
-            vars(self).pop(name, None)
+        vars(self).pop("labels", None)
 
     def __repr__(self) -> str:
         facts = summary(self)
@@ -276,13 +229,14 @@ class Recording:
     @cached_property
     def _stamps(self) -> Stamps:
         stamps = Stamps(self.begin_us, self.begin_ns)
-        for t_us, at_ns in self._arrivals():
-            stamps.arrived(t_us, at_ns)
+        for block in self.heads():
+            if block.rest.last_us is not None and block.all_here_ns != block.arrived_ns:
+                stamps.arrived(block.rest.last_us, block.all_here_ns)
         return stamps
 
     def heads(self) -> list[Block]:
         """The blocks, without their rows unless all has been read."""
-        return self._blocks if "_sent" in vars(self) or self._index is None else self._heads
+        return self._contents.blocks if "_contents" in vars(self) or self._index is None else self._heads
 
     @cached_property
     def _heads(self) -> list[Block]:
@@ -290,46 +244,10 @@ class Recording:
         every = range(len(self._index.blocks))
         return list(Blocks(self.path, {}, (), check=False, index=self._index, only=every))
 
-    def _arrivals(self) -> Iterator[tuple[int, int]]:
-        """Last device time of each block that has rows, and when it had arrived."""
-        for block in self.heads():
-            if block.rest.last_us is not None and block.all_here_ns != block.arrived_ns:
-                yield block.rest.last_us, block.all_here_ns
-
     def __getitem__(self, finger: int | str) -> StructArray:
         """The frames of one finger, by number or by its recorded name. Raises KeyError for an unknown name."""
         rows: StructArray = self.frames[self.frames["finger"] == finger_of(finger, self.names)]
         return rows
-
-    def clock(self, promised_delay_s: float = 0.01) -> DeviceClock:
-        """The board's clock against the recording computer's; its host_time_s is in seconds since 1970.
-
-        Each block was written when its last frame had arrived. A recording holds no round trips, so the stated
-        uncertainty rests on ``promised_delay_s``: you promise that in every 5 s at least one of these frames took no
-        longer than this from the board to the file.
-        """
-        clock = DeviceClock(promised_delay_s=promised_delay_s, unix_offset_s=0.0)
-        for t_us, at_ns in self._arrivals():
-            clock.arrived(t_us + LAST_SAMPLE_US, at_ns / 1e9)
-        return clock
-
-    def _gap(self, facts: dict[str, Any]) -> Gap | None:
-        try:
-            gap = Gap(**facts)
-            self.problems.append(gap.words())
-            return gap
-        except TypeError as error:
-            self.problems.append(f"a gap is marked in {self.path.name}, but its entry is damaged ({error})")
-            return None
-
-    def _without_metadata(self, damaged: bool) -> str:
-        if damaged:
-            return f"{self.path} has damaged metadata (wrong checksum) and cannot be used; try another copy"
-        if self.problems:
-            return (
-                f"{self.path} is cut off or damaged and has no readable metadata; try another copy or record it again"
-            )
-        return f"{self.path} is an MCAP file but not a biotac recording; expected a file written by `biotac record`"
 
     def _take_metadata(self, metadata: dict[str, str]) -> None:
         layout.check_version(self.path, metadata)
@@ -356,7 +274,7 @@ class Recording:
     @property
     def fingers(self) -> list[int]:
         """Fingers with at least one frame, heartbeat, PAC, BANDS or EVENT."""
-        rows = (self._sent, self.idle, self.pac)
+        rows = (self._contents.sent, self.idle, self.pac)
         others = {m.finger for m in self.messages if isinstance(m, (wire.Bands, wire.Event))}
         return sorted(others | {int(finger) for table in rows for finger in np.unique(table["finger"])})
 
@@ -376,19 +294,3 @@ class Recording:
     def begin_ns(self) -> int:
         """``begin_us`` on the host's clock (Unix), in ns; late by the delay of the link."""
         return self.heads()[0].arrived_ns if self.heads() else 0
-
-    def _describe_losses(self, losses: list[tuple[int, int, int]], in_damaged: int) -> None:
-        for finger, seq, lost in losses[:10]:
-            self.problems.append(f"finger {finger}: {lost} frame(s) missing after frame {seq}")
-        if len(losses) > 10:
-            self.problems.append(f"{len(losses) - 10} more losses")
-        if in_damaged:
-            self.problems.append(f"{in_damaged} frame(s) of damaged seconds are missing")
-        numbers = {block.number for block in self._blocks}
-        if not self.problems and len(numbers) != max(numbers, default=-1) + 1:
-            self.problems.append(f"{self.path.name} is damaged: seconds of it are missing")
-        if (counts := self.counts).bad:
-            self.problems.append(
-                f"{counts.bad} packet(s) rejected: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
-                f"{counts.bad_length} wrong length, {counts.too_long} too long"
-            )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import doctest
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +17,6 @@ import biotac.clock
 from biotac.clock import LAST_SAMPLE_US, Arrivals, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
 from biotac.clock.band import between
 from biotac.clock.segment import WANDER_PER_S
-from biotac.recording.facts import Facts
-from biotac.recording.writer import Writer
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
@@ -313,29 +310,6 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
     assert abs(now.host_s - begin_s - now.t_us / 1e6) <= now.uncertainty_s <= hand.clock.quickest_round_trip_s
     unix_s = float(hand.clock.unix_time_s(now.t_us))
     assert unix_s - now.host_s == pytest.approx(time.time() - time.monotonic(), abs=60)
-
-
-def test_a_recording_has_a_clock_too(tmp_path: Path) -> None:
-    with biotac.open("sim:press.toml") as hand:
-        hand.record(tmp_path / "fast.mcap")
-        batch = hand.read_batch(5.0)
-        facts = Facts(hand.info, [hand.sensor_info(0)], hand.board.settings())
-    # Written again as if it had come from a board whose time 0 was at second 1000, through a jittery link.
-    rng = np.random.default_rng(1)
-    at_s = 1000.0
-    clocks = {"clock_s": lambda: at_s, "unix_ns": lambda: int(at_s * 1e9)}
-    recorder = Writer(tmp_path / "real.mcap", facts, "port", **clocks)
-    for row in batch.wire:
-        at_s = 1000.0 + (int(row["t_us"]) + 10_000) / 1e6 + 0.0002 + 0.001 * rng.random()
-        recorder.write(encode(wire.Frame.ID, row.tobytes()))
-    recorder.close()
-    recording = biotac.Recording(tmp_path / "real.mcap")
-    clock = recording.clock(promised_delay_s=0.002)
-    t_us = recording.frames["t_us"]
-    error_s = clock.unix_time_s(t_us) - (1000.0 + t_us / 1e6)
-    bound_s = clock.uncertainty_s(t_us)
-    assert (np.abs(error_s) <= bound_s).all()
-    assert np.median(bound_s) < 0.003
 
 
 class Heard:

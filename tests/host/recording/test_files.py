@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from record_all import record_all
+from ros_topics import of_topic
 
 import biotac
 from biotac.cli.main import main
@@ -46,6 +47,7 @@ def test_a_part_has_the_bytes_and_labels_of_the_whole(recorded: Path, tmp_path: 
     assert 3.2 < since_s.min() <= 5.2 and 7 - 0.01 <= since_s.max() < 9
     (label,) = part.labels  # in the recording itself now
     assert label.words() == "slip trial=3" and label.t_us == whole.begin_us + 5_500_000
+    assert [m.msg for *_, m in of_topic(part.path, "/biotac/log")] == ["slip trial=3"]  # for Foxglove and Rerun
     assert part.metadata["cut_from"] == "a.mcap"
     assert main(["file", "cut", str(recorded), str(tmp_path / "none.mcap"), "--from", "100"]) == 2
     assert not (tmp_path / "none.mcap").exists()

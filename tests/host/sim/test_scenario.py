@@ -220,6 +220,7 @@ def test_the_bundled_scenarios_are_these() -> None:
 def test_the_page_and_a_new_scenario_have_every_verb_and_fault(tmp_path: Path) -> None:
     new = tmp_path / "new.toml"
     assert main(["sim", "--new", str(new)]) == 0
+    assert main(["sim", "--new", str(new)]) == 2 and main(["sim", "--new", str(new), "--force"]) == 0
     page, text = (ROOT / "host/docs/guides/simulator.md").read_text(encoding="utf-8"), new.read_text(encoding="utf-8")
     for word in (*STEP_KEYS, *(key for keys in STEP_KEYS.values() for key in keys), *FAULT_CODES):
         assert f"`{word}" in page and word in text, word

@@ -46,13 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
     parser.add_argument("--new", metavar="FILE", type=Path, help="only write a scenario with every verb, and comments")
+    parser.add_argument("--force", action="store_true", help="with --new: overwrite FILE")
     sensor_board.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the pty's path, then run until Ctrl-C; or play on a sensor board."""
     if args.new is not None:
-        write_new(args.new, bundled_scenario("verbs.toml").decode())
+        write_new(args.new, bundled_scenario("verbs.toml").decode(), overwrite=args.force)
         say(args, {"scenario": str(args.new)}, f"{args.new}: change it, and play it with `biotac view sim:{args.new}`")
         return 0
     seconds = args.seconds or (SCENARIO_S if (args.source or "").endswith(".toml") else None)

@@ -65,7 +65,9 @@ def run(args: argparse.Namespace) -> int:
     if out.suffix.lower() != RECORDING:
         writer_for(out)
     elif not (imports or recomputes):
-        raise InputError(f"{out}: {source} is an .mcap file already; add --recompute, or name a file of another format")
+        raise InputError(
+            f"{out}: {source} is an .mcap file already; add --recompute, name another format, or take `biotac file cut`"
+        )
     elif imports and recomputes:
         raise InputError(f"{source} is recomputed as it is read; export it to .mcap first, then recompute that")
     written: list[Path] = []
