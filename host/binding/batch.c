@@ -54,15 +54,6 @@ void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *
     }
 }
 
-void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, uint16_t *filtered_q4)
-{
-    bt_pressure pressure = {.filter_milli = filter_milli};
-    for (int64_t k = 0; k < n; k++) {
-        bt_pressure_add(&pressure, pdc[k]);
-        filtered_q4[k] = bt_pressure_filtered_q4(&pressure);
-    }
-}
-
 int bt_rail_count(void)
 {
     return BT_RAIL_COUNT;

@@ -28,9 +28,6 @@ void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const u
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
                         int32_t *force_100un);
 
-// The words of n rounds through the filter, from its beginning. pdc, filtered_q4: (n,).
-void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, uint16_t *filtered_q4);
-
 int bt_rail_count(void);         // BT_RAIL_COUNT
 int bt_active_q4(void);          // BT_ACTIVE_Q4
 int bt_active_for_torsion(void); // BT_ACTIVE_FOR_TORSION

@@ -188,7 +188,7 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
         assert bool(program.of("marked")) == (next_us - last_us > JUMP_US)
         return
     else:
-        gaps = [biotac.Gap.from_text(one["gap"]) for one in program.of("gap")]
+        gaps = [biotac.Gap(**one["gap"]) for one in program.of("gap")]
     if way == "callbacks":
         assert len(program.of("on_gap")) == len(gaps)
     if next_us - last_us <= JUMP_US:
@@ -285,7 +285,7 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
     if way == "record":
         gaps = [gap for path in program.of("paths")[0]["paths"] for gap in biotac.Recording(path).gaps]
     else:
-        gaps = [biotac.Gap.from_text(one["gap"]) for one in program.of("gap")]
+        gaps = [biotac.Gap(**one["gap"]) for one in program.of("gap")]
     assert [gap.reason for gap in gaps] == [{"reset": "rebooted"}.get(cause, "silence" if cause == "silent" else cause)]
 
 
@@ -313,7 +313,7 @@ def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path,
     if way == "record":
         (gap,) = biotac.Recording(program.of("paths")[0]["paths"][0]).gaps
     else:
-        (gap,) = (biotac.Gap.from_text(one["gap"]) for one in program.of("gap"))
+        (gap,) = (biotac.Gap(**one["gap"]) for one in program.of("gap"))
     assert (gap.reason, gap.fingers, (gap.last_t_us, gap.next_t_us)) == ("finger", 0b10, hole())
 
 

@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from contextlib import closing, suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
@@ -31,7 +32,7 @@ def say_gaps(batch: biotac.Batch) -> None:
     """The gaps that a batch tells."""
     for message in batch.messages:
         if isinstance(message, biotac.Gap):
-            say(gap=message.as_text())
+            say(gap=asdict(message))
 
 
 def say_batch(batch: biotac.Batch) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal, cast
+from dataclasses import dataclass, replace
+from typing import Literal, cast
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from ..wire.messages_gen import FrameFlags
 from ..wire.sensor_gen import MAX_SENSORS
 from ..wire.slots import FRAME_HZ
 
-GAP = "gap"  # its name in a recording's metadata
 # More than this between two rows of a finger is told.
 JUMP_US = 250_000
 # Of a longer batch, as of a board whose time does not pass, each finger's own latest row counts, not the batch's.
@@ -63,20 +62,6 @@ class Gap:
     fingers: int = 0
     frames_missed: int | None = None
     holds_lapsed: int = 0
-
-    def as_text(self) -> dict[str, str]:
-        """Its values as text, for a recording's metadata, which holds nothing else."""
-        return {name: "" if value is None else str(value) for name, value in asdict(self).items()}
-
-    @classmethod
-    def from_text(cls, text: Mapping[str, str]) -> Gap:
-        """Inverse of as_text. Raises KeyError or ValueError for text that as_text cannot have made."""
-        if text["reason"] not in WORDS:
-            raise ValueError(f"reason {text['reason']!r}")
-        values: dict[str, Any] = {n: int(text[n]) if text[n] else None for n in cls.__slots__ if n != "reason"}
-        if None in {values[n] for n in values if n not in ("last_t_us", "next_t_us", "frames_missed")}:
-            raise ValueError("a time, a boot or fingers are missing")
-        return cls(cast(Reason, text["reason"]), **values)
 
     def words(self) -> str:
         """One sentence for people."""

@@ -68,9 +68,12 @@ def its_fit(rows: Any) -> Fit:
 
 def test_the_filter_is_the_papers_by_hand() -> None:
     def filtered(words: list[int], filter_milli: int) -> list[float]:
-        filtered_q4 = ffi.new("uint16_t[]", len(words))
-        lib.bt_pressure_filter(len(words), ffi.new("uint16_t[]", words), filter_milli, filtered_q4)
-        return [value / Q4_PER_COUNT for value in filtered_q4]
+        pressure = ffi.new("bt_pressure *", {"filter_milli": filter_milli})
+        found = []
+        for word in words:
+            lib.bt_pressure_add(pressure, word)
+            found.append(lib.bt_pressure_filtered_q4(pressure) / Q4_PER_COUNT)
+        return found
 
     assert filtered([100, 200, 200, 60], 500) == [100, 150, 175, 117.5]
     assert filtered([100, 200], 1000) == [100, 200]
