@@ -51,12 +51,12 @@ static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], ui
         bool pairs = coefficients[blocks[b][0]] == 190;
         for (uint32_t axis = 0; axis < axes; axis += axis == 0 ? 3 : axes) {
             uint32_t width = axis == 0 ? 3 : axes - 3; // of the group
-            uint32_t its = coefficients[blocks[b][0]] * width;
-            for (uint32_t k = 0; k < its; k += 2) {
+            uint32_t values = coefficients[blocks[b][0]] * width;
+            for (uint32_t k = 0; k < values; k += 2) {
                 uint32_t first = bench_step(&seed) % 2001 - 1000; // a row of ten stays in bounds
                 uint32_t second = bench_step(&seed) % 2001 - 1000;
-                first = pairs || k < its - width ? first & 0xFFFF : 0; // behind 19 columns, or one
-                second = pairs || k + 1 < its - width ? second << 16 : 0;
+                first = pairs || k < values - width ? first & 0xFFFF : 0; // behind 19 columns, or one
+                second = pairs || k + 1 < values - width ? second << 16 : 0;
                 out->blob[words++] = first | second;
             }
         }

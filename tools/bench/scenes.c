@@ -26,7 +26,7 @@ static _Alignas(4) uint16_t encoded[(BT_ENCODED_MAX_BYTES + 1) / 2];
 // What keeps the compiler from dropping a result.
 static volatile uint32_t sink;
 
-#define SCENE(its) static void its(__attribute__((unused)) const bt_solve_settings *settings)
+#define SCENE(name) static void name(__attribute__((unused)) const bt_solve_settings *settings)
 
 static void words(bt_finger *finger, const uint16_t count[BT_SLOTS])
 {
@@ -200,10 +200,10 @@ static void mapped(const bt_map *map)
     sink = (uint32_t)force_100un[0];
 }
 
-#define MAP_SCENE(its)                                                                                       \
-    SCENE(map_##its)                                                                                         \
+#define MAP_SCENE(name)                                                                                      \
+    SCENE(map_##name)                                                                                        \
     {                                                                                                        \
-        mapped(&its.map);                                                                                    \
+        mapped(&name.map);                                                                                   \
     }
 
 MAP_SCENE(affine)
