@@ -21,6 +21,7 @@ from rig import all_rigs, in_ci, prepare
 
 import biotac
 from biotac import FaultFlags
+from biotac.doctor import bringup
 from biotac.wire import messages_gen as wire
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -192,7 +193,9 @@ def test_the_dma_is_late_with_a_word_of_every_slot(board: Board) -> None:
     hand.stop()
     faults = hand.board.faults()
     assert faults.board == FaultFlags.STARTED | FaultFlags.SLOT_DMA_LATE
-    assert hand.board.measure().slots_dma_late == 44
+    facts = hand.board.measure()
+    assert facts.slots_dma_late == 44
+    assert [one.code for one in bringup._board(bringup.Bringup(chip=[facts]))] == ["dma_late"]
     assert hand.status().fingers_present == 0b11111
     assert not any(hand.sensor_status(finger).words_stuck for finger in hand.fingers)
 
