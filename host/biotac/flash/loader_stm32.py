@@ -9,7 +9,7 @@ import contextlib
 import io
 from typing import Any
 
-from ..errors import BiotacError, DeviceLostError, FlashError
+from ..errors import BiotacError, DeviceLostError, FlashError, NotAGatewayError
 from ..hand.hand import Hand
 from ..link.ports import open_link
 from .image import Image
@@ -21,6 +21,7 @@ BACK_S = 10.0
 BOOT_AT, IMAGE_AT = 0x0800_0000, 0x0800_C000  # firmware/port/stm32f405/stm32f405.ld
 #: Where each sector of an STM32F405 begins, and where the last one ends.
 SECTORS = (0, 0x4000, 0x8000, 0xC000, 0x1_0000, *range(0x2_0000, 0x10_0001, 0x2_0000))
+CHIP = 0x413  # what the loader of an STM32F405 says (AN2606)
 FIRST_WORDS = 8  # stack and reset, the first of the image, again at BOOT_AT
 
 
@@ -35,7 +36,11 @@ class UartTarget(Target):
         return False
 
     def open(self) -> Hand:
-        return Hand(open_link(self.port))
+        try:
+            return Hand(open_link(self.port))
+        except NotAGatewayError as error:
+            rate = "baud= has to be the board's uart_bits_per_s, 921600 unless another was saved"
+            raise NotAGatewayError(f"{error}; {rate}") from error
 
     def touch(self) -> None:
         raise FlashError(f"{self.port} does not enter its loader: hold BOOT0 high, reset it, and flash again")
@@ -93,6 +98,12 @@ class Stm32Loader(Loader):
         sectors = [0, *(k for k in range(3, len(SECTORS) - 1) if SECTORS[k] < end)]
         try:
             self._board.get()
+            chip = self._board.get_id()
+            if chip != CHIP:
+                raise FlashError(
+                    f"{self.name} says that its chip is 0x{chip:03X}; {image.path} is for an STM32F405, 0x{CHIP:03X}: "
+                    "nothing was written; connect that board"
+                )
             with contextlib.redirect_stderr(io.StringIO()):  # the package says there that it takes ten seconds
                 self._board.erase_memory(sectors)
             for k, block in enumerate(image.blocks):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import struct
 import threading
 import tty
@@ -12,11 +13,14 @@ from typing import Any
 
 import pytest
 import serial
+from deframer import Deframer
+from fake_flash_board import FakeBoard
 
+from biotac.cli.main import main
 from biotac.errors import FlashError, InputError
-from biotac.flash.image import read_image
-from biotac.flash.loader_stm32 import BOOT_AT, IMAGE_AT, SECTORS, Stm32Loader
-from biotac.flash.note import seal
+from biotac.flash.image import Image, read_image
+from biotac.flash.loader_stm32 import BOOT_AT, CHIP, IMAGE_AT, SECTORS, Stm32Loader
+from biotac.flash.note import find, seal
 from biotac.wire import messages_gen as wire
 
 pytest.importorskip("stm32loader")
@@ -26,12 +30,16 @@ FLASH_BYTES = SECTORS[-1]
 
 
 class Rom:
-    """The loader: 1 MiB of flash, erased in sectors, and what was done to it."""
+    """The loader: 1 MiB of flash, erased in sectors, and what was done to it. On the same wires, a firmware that runs."""
 
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
-        self.device = os.ttyname(self._slave)
+        self.device = self.path = os.ttyname(self._slave)
+        self.chip = CHIP
+        self.firmware: FakeBoard | None = None
+        self.stuck_at = -1  # a byte that cannot be programmed
+        self.image_bytes = 70_000
         self.flash = bytearray(os.urandom(FLASH_BYTES))
         self.events: list[tuple[str, int]] = []
         self.writes_left = 1 << 30  # then its supply is gone
@@ -47,17 +55,29 @@ class Rom:
         os.write(self._master, data)
 
     def _run(self) -> None:
-        synchronized = False
+        synchronized, deframer = False, Deframer()
         try:
             while True:
                 byte = self._read(1)
-                if byte == b"\x7f" and not synchronized:
-                    synchronized = True
-                    self._say(ACK)
+                if self.firmware is not None and not self.firmware.in_loader:
+                    synchronized = False
+                    for message in deframer.feed(byte):
+                        self._say(self.firmware._answer(*message))
+                    continue
+                if not synchronized:
+                    synchronized = byte == b"\x7f"
+                    self._say(ACK if synchronized else b"")
                     continue
                 command = byte[0]
-                good = synchronized and self._read(1)[0] == command ^ 0xFF
-                do = {0x00: self._get, 0x11: self._read_memory, 0x21: self._go, 0x31: self._write, 0x44: self._erase}
+                good = self._read(1)[0] == command ^ 0xFF
+                do = {
+                    0x00: self._get,
+                    0x02: self._get_id,
+                    0x11: self._read_memory,
+                    0x21: self._go,
+                    0x31: self._write,
+                    0x44: self._erase,
+                }
                 if not good or command not in do:
                     self._say(NACK)
                     continue
@@ -73,8 +93,11 @@ class Rom:
         return int(struct.unpack(">I", bytes(data))[0]) - BOOT_AT
 
     def _get(self) -> None:
-        commands = bytes([0x00, 0x11, 0x21, 0x31, 0x44])
+        commands = bytes([0x00, 0x02, 0x11, 0x21, 0x31, 0x44])
         self._say(bytes([len(commands), 0x31]) + commands + ACK)
+
+    def _get_id(self) -> None:
+        self._say(b"\x01" + struct.pack(">H", self.chip) + ACK)
 
     def _read_memory(self) -> None:
         at = self._address()
@@ -84,6 +107,9 @@ class Rom:
 
     def _go(self) -> None:
         self.events.append(("go", self._address()))
+        if self.firmware is not None:  # it finds in flash who it is
+            at = IMAGE_AT - BOOT_AT
+            self.firmware.write(Image(Path(), (), find(bytes(self.flash[at : at + self.image_bytes]))), print)
 
     def _write(self) -> None:
         at = self._address()
@@ -95,6 +121,7 @@ class Rom:
         self.writes_left -= 1
         for k, byte in enumerate(data):
             self.flash[at + k] &= byte  # programming only clears bits
+            self.flash[at + k] &= 0 if at + k == self.stuck_at else 255
         self.events.append(("write", at))
         self._say(ACK)
 
@@ -111,9 +138,11 @@ class Rom:
 def a_pty_has_no_parity(monkeypatch: pytest.MonkeyPatch) -> None:
     real = serial.Serial
 
-    def without(**words: Any) -> serial.Serial:
-        assert (words["baudrate"], words["parity"]) == (115_200, "E")  # AN3155
-        return real(**words | {"parity": "N"})
+    def without(*place: Any, **options: Any) -> serial.Serial:
+        if "parity" in options:
+            assert (options["baudrate"], options["parity"]) == (115_200, "E")  # AN3155
+            options["parity"] = "N"
+        return real(*place, **options)
 
     monkeypatch.setattr("stm32loader.uart.serial.Serial", without)
 
@@ -182,3 +211,60 @@ def test_a_bin_of_another_board_or_none_is_refused(tmp_path: Path, image) -> Non
     path.write_bytes(seal(path.read_bytes().replace(struct.pack("<HH", 2, 5), struct.pack("<HH", 2, 2))))
     with pytest.raises(InputError, match=r"a PICO.*use the build's \.uf2"):
         read_image(path)
+
+
+@pytest.fixture
+def running(rom: Rom, hello) -> FakeBoard:
+    """A board that runs the gateway; ``rom`` is its loader."""
+
+    def on_its_uart(answer: Any) -> Rom:
+        return rom
+
+    rom.firmware = FakeBoard(on_its_uart, hello)
+    rom.firmware.board = int(wire.Board.STM32F405)
+    rom.firmware.version = (0, 9, 0)
+    return rom.firmware
+
+
+def flash(rom: Rom, image: Path, *words: str) -> int:
+    return main(["flash", f"uart:{rom.path}?baud=921600", str(image), "--backup", str(image.parent / "x.toml"), *words])
+
+
+def test_a_running_board_is_flashed_over_its_uart_and_its_settings_compared(rom, running, image, capsys) -> None:
+    path = image(rom.image_bytes)
+    assert flash(rom, path) == 0
+    assert running.events == ["loader", "write"] and running.version == (1, 0, 0)
+    assert ("go", 0) in rom.events
+    assert "settings match" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("wrong", "cure"),
+    [
+        ({"chip": 0x431}, "is 0x431; .* nothing was written; connect that board"),
+        ({"stuck_at": 0xC123}, "reads back other bytes at 0x0800C100 .* flash again"),
+    ],
+)
+def test_a_wrong_chip_and_flash_that_is_worn_out_are_told(rom, running, image, capsys, wrong, cure: str) -> None:
+    vars(rom).update(wrong)
+    assert flash(rom, image(rom.image_bytes)) == FlashError.exit_code
+    assert re.search(cure, capsys.readouterr().err.replace("\n", " "))
+    assert bool([e for e in rom.events if e[0] == "erase"]) == ("chip" not in wrong)
+    assert rom.flash[:8] != image(rom.image_bytes).read_bytes()[:8]
+
+
+def test_a_board_that_does_not_answer_at_this_rate_is_told_with_its_cure(
+    rom, running, image, capsys, brief_silence
+) -> None:
+    running.answers = False
+    assert flash(rom, image(rom.image_bytes)) != 0
+    error = capsys.readouterr().err
+    assert "baud= has to be the board's uart_bits_per_s" in error and "--no-backup" in error
+    assert rom.events == []
+
+
+def test_an_image_for_another_board_is_refused_before_anything_is_written(rom, running, image, capsys) -> None:
+    running.board = int(wire.Board.PICO)
+    assert flash(rom, image(rom.image_bytes)) == InputError.exit_code
+    assert "use that board's image" in capsys.readouterr().err
+    assert rom.events == []
