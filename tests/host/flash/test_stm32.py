@@ -30,7 +30,7 @@ FLASH_BYTES = SECTORS[-1]
 
 
 class Rom:
-    """The loader: 1 MiB of flash, erased in sectors, and what was done to it. On the same wires, a firmware that runs."""
+    """The loader: 1 MiB of flash, erased in sectors, and what was done to it; or the firmware, on the same wires."""
 
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
