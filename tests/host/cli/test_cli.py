@@ -120,6 +120,13 @@ def test_stream_of_touched_fingers_is_silent_at_rest(capsys) -> None:
     assert len(flags) - touched < 20
 
 
+def test_stream_prints_events_between_the_frames(capsys) -> None:
+    assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "4", "--json", "--events"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    kinds = [row["event"] for row in rows if "event" in row]
+    assert "touch" in kinds and any("force_n" in row for row in rows)
+
+
 def test_stream_thins_out_for_people(capsys) -> None:
     assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "1", "--rate", "5"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 5
