@@ -14,6 +14,7 @@ from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
 from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
+from ...wire.slots import FRAME_HZ
 from .. import values
 from ..outputs import note
 
@@ -45,14 +46,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def batches(hand: biotac.Hand, seconds: float | None) -> Iterator[tuple[biotac.Batch, float]]:
-    """Batches, each with the device time since the first, until ``seconds`` of it have passed."""
+    """Batches, each with the device time of rows, each with its 10 ms, until it is ``seconds``."""
     first_us: int | None = None
     passed_s = 0.0
     for batch in hand.batches():
         last_us = batch.last_t_us()
         if last_us is not None:
             first_us = batch.first_t_us() if first_us is None else first_us
-            passed_s = (last_us - (first_us or 0)) / 1e6
+            passed_s = (last_us - (first_us or 0) + round(1e6 / FRAME_HZ)) / 1e6
         yield batch, passed_s
         if seconds is not None and passed_s >= seconds:
             break
