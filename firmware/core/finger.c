@@ -25,7 +25,6 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
 void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *settings)
 {
     bt_tare_begin(&finger->tare, settings);
-    finger->health.same = 0;
     finger->round.t_us = t_us;
     finger->round.good_words = 0;
     finger->next_slot = 0;
@@ -42,9 +41,8 @@ static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
     }
     unsigned electrode = channel - BT_CHANNEL_E1;
     if (electrode < BT_ELECTRODES) {
-        uint16_t used = bt_health_word(&finger->health, electrode, count, round->electrode[electrode]);
         round->electrode[electrode] = count;
-        return bt_tare_electrode(&finger->tare, electrode, used);
+        return bt_tare_electrode(&finger->tare, electrode, count);
     }
     switch (channel) {
     case BT_CHANNEL_PDC:
@@ -183,10 +181,17 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     finger->silent_rounds = 0;
     // A tare command between two rounds may already have changed the tare.
     finger->tare_unsent = finger->tare.changed;
-    bt_health_round(&finger->health, &finger->round, &finger->tare.trigger, &finger->tare.noise,
-                    may_be_touched(finger));
+    uint32_t alone =
+        bt_health_round(&finger->health, &finger->round, &finger->tare.trigger, &finger->tare.noise);
+    if (alone != 0) {
+        bt_health_alone(&finger->health, alone, may_be_touched(finger));
+    }
+    if (finger->health.sensor_fault == BT_SENSOR_FAULT_FROZEN) {
+        finger->tare.trigger.without = BT_ALL_ELECTRODES;
+    }
     bt_tare_end(&finger->tare, finger->round.t_us, settings);
     recover(finger);
+    bt_trigger_leave_out(&finger->tare.trigger, finger->health.out);
     finger->tare_unsent = finger->tare_unsent || finger->tare.changed;
     finger->tare.changed = false;
     return true;

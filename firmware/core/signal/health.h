@@ -8,65 +8,60 @@
 //
 // A condemned electrode is given back at rest, with a new tare, once it has been calm for two seconds.
 //
-// Units: counts; sums over a window of four rounds are in 1/4 count (q2).
+// Four rounds are a window. No round pays for everything: while a window fills, the one before is searched
+// for words that repeat in the first round and for moves in the second, its verdict comes in the third, and
+// the fourth is for half of the running means.
+//
+// Units: counts; a window's sums are in 1/4 count (q2), running means in 1/16 count (q4).
 #ifndef BIOTAC_HEALTH_H
 #define BIOTAC_HEALTH_H
 
+#include "signal/moves.h"
 #include "signal/noise.h"
 #include "signal/trigger.h"
 
-// What the filtered counts of some rounds sum up to, and summed up to when the skin last moved.
 typedef struct {
-    bt_lanes sum, anchor;
-} bt_health_window;
-
-typedef struct {
+    bt_lanes sum[2];         // of a window's filtered counts: the one that fills, and the one before
+    uint8_t filling;         // which
+    uint8_t rounds;          // in it
+    uint8_t windows;         // judged since all electrodes were anchored; saturates
+    uint8_t judged;          // windows; wraps
+    bool pressure_alive;     // static pressure has moved
     uint32_t out;            // electrodes condemned, a bit mask
     uint8_t electrode_fault; // enum bt_sensor_fault of the latest of these
     uint8_t sensor_fault;    // enum bt_sensor_fault
-    uint32_t same;           // electrodes whose word of this round is that of the round before
-    uint32_t unchanged;      // electrodes that have said one count for unchanged_rounds
-    uint16_t unchanged_rounds;
-    uint8_t longest_rounds; // in which some electrode of this sensor repeated its word and then changed it
-    bool pressure_alive;    // static pressure has moved
-    uint16_t travel_q2;     // by how much the others moved in these, summed up; saturates
-    uint8_t same_rounds;    // in which all electrodes repeated their words
-    uint8_t alive_rounds;   // in which they did not; saturates: only what was alive can freeze
-    uint32_t up, down;      // trigger's, of the round before
-    uint8_t flips[BT_ELECTRODES];
-    bool flipping; // not all flips are 0
-    bt_health_window fast, slow;
-    bool anchored;   // both have anchors
-    uint8_t rounds;  // of the fast window
-    uint8_t windows; // of the slow one
+    uint32_t up, down;       // trigger's, of the round before
+    uint32_t flips[3];       // electrodes that jumped back and forth once, twice, three times lately
+    bt_lanes anchor;         // a window's sums when the skin last moved
+    bt_lanes mean;           // running: goes a quarter of the way to every second window
+    bt_lanes mean_anchor;
+    bt_moves moves, mean_moves;
+    uint32_t same;      // electrodes that said one count throughout the window
+    uint32_t unchanged; // that did so for unchanged_windows
+    uint8_t unchanged_windows;
+    uint8_t longest; // windows in which an electrode of this sensor repeated its word, and then changed it
+    uint8_t alive_windows; // in which words changed; saturates: only what was alive is soon called frozen
+    uint8_t moved_windows; // since nothing had moved; saturates
+    uint8_t calm_windows;  // in which no condemned electrode moved; saturates
+    uint16_t travel_q2;    // by how much the others moved while some were unchanged; saturates
     uint16_t anchor_tdc;
-    uint8_t anchor_rounds; // since the fast anchors were set; saturates
-    uint32_t suspect;      // electrodes that the fast window before was the first to see moving alone
-    uint32_t alone_fast;   // electrodes that have moved alone since their anchors were set
-    uint32_t alone_slow;
-    uint32_t alone;            // in this touch: those that did
-    uint8_t calm_windows;      // in which no condemned electrode moved; saturates
-    uint32_t noise_count2;     // the noise that the limits are for
-    uint16_t fast_sd, slow_sd; // of a difference of two windows' sums, by noise
+    uint32_t unknown;               // trigger's, of the window before
+    uint32_t suspect, mean_suspect; // electrodes that were seen moving alone
+    uint32_t alone;                 // in this touch: those that did
+    uint32_t noise_count2;          // the noise that the limits are for
+    uint16_t sum_sd, mean_sd;       // of a difference of two sums, of two means, by noise
+    uint16_t sum_limit, mean_limit; // up to which a move is not alone, whatever the others do
 } bt_health;
 
 void bt_health_reset(bt_health *health);
 
-// Take an electrode's word and the one before. Returns the word to use.
-#ifndef BT_CDEF // called for every electrode in every round, hence inline
-static inline uint16_t bt_health_word(bt_health *health, unsigned electrode, uint16_t count, uint16_t before)
-{
-    if (count == before) {
-        health->same |= 1u << electrode;
-    }
-    return health->out != 0 && health->out >> electrode & 1 ? BT_INVALID_COUNT : count;
-}
-#endif
+// End a round: judge its words. Returns the electrodes that moved alone.
+uint32_t bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
+                         const bt_noise *noise);
 
-// End a round: judge its words. `touched`: something may touch the finger. With FROZEN, trigger.without
-// becomes all electrodes.
-void bt_health_round(bt_health *health, const bt_round *round, bt_trigger *trigger, const bt_noise *noise,
-                     bool touched);
+// What moved alone while nothing touched is broken. A tip no wider than an electrode that slides over it
+// moves it alone, too.
+void bt_health_alone(bt_health *health, uint32_t electrodes, bool touched);
 
 // Returns the electrodes to be used again from the next round on, and forgets that they were condemned. Call
 // it while the finger rests, or while too many are out.

@@ -20,6 +20,8 @@ typedef struct {
     uint8_t good_words; // 0: nothing answered
 } bt_round;
 
+#define BT_ALL_ELECTRODES ((1u << BT_ELECTRODES) - 1)
+
 void bt_round_clear(bt_round *round);
 
 #define BT_RAIL_COUNT 4090 // from this count on, and at 0, a reading is at the end of its range

@@ -18,13 +18,25 @@ void bt_trigger_reset(bt_trigger *trigger)
         trigger->smooth.lane[i] = BT_TRIGGER_UNREAD;
         trigger->rest.lane[i] = BT_TRIGGER_UNREAD;
     }
+    bt_trigger_leave_out(trigger, 0);
     bt_trigger_begin(trigger, BT_TRIGGER_NEVER);
 }
 
-int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode)
+void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes)
 {
-    trigger->without |= 1u << electrode;
-    // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten.
+    trigger->out = electrodes;
+    trigger->usable = electrodes == 0 ? BT_RAIL_COUNT - 1 : 0;
+}
+
+int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count)
+{
+    const bt_lanes *from = trigger->limit == BT_TRIGGER_NEVER ? &trigger->smooth : &trigger->rest;
+    if (bt_count_usable(count) && !(trigger->out >> electrode & 1)) {
+        (void)bt_trigger_filter(trigger, electrode, count, from->lane[electrode]);
+    } else {
+        trigger->without |= 1u << electrode;
+        // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten.
+    }
     int32_t e = (int32_t)trigger->smooth.lane[electrode] - trigger->rest.lane[electrode];
     return trigger->room -= e * e;
 }

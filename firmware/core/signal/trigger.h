@@ -42,6 +42,9 @@ typedef struct {
     uint32_t far_before;
     uint32_t up; // lanes whose word of this round jumped by more than BT_TRIGGER_JUMP from the filter's value
     uint32_t down;
+    uint32_t
+        usable; // counts from 1 on that are used unseen: all but the rails, or none while electrodes are out
+    uint32_t out;      // electrodes whose words are not to be used: those that health.h has condemned
     uint32_t without;  // electrodes whose word of this round is not used: missing, railed or condemned
     bool pressure_now; // this round had a good pressure word
 } bt_trigger;
@@ -66,10 +69,13 @@ static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
 }
 #endif
 
-// The rare cases: a word that is not used, and one that is far off. The first returns the room left,
+// The rare cases: a word that may not be used, and one that is far off. The first returns the room left,
 // the second the filter's new value.
-int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode);
+int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count);
 uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count);
+
+// Do without these electrodes' words from the next round on.
+void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes);
 
 #define BT_TRIGGER_FAR  24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
 #define BT_TRIGGER_JUMP 48
@@ -87,18 +93,18 @@ static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uin
 // Take an electrode's word, 0..4095 or BT_INVALID_COUNT, while no touch is expected.
 static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
-    if (bt_count_usable(count)) {
+    if ((uint32_t)count - 1 < trigger->usable) {
         (void)bt_trigger_filter(trigger, electrode, count, trigger->smooth.lane[electrode]);
     } else {
-        (void)bt_trigger_repeat(trigger, electrode);
+        (void)bt_trigger_doubt(trigger, electrode, count);
     }
 }
 
 // The same while a touch is expected. Returns the room left.
 static inline int32_t bt_trigger_electrode(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
-    if (!bt_count_usable(count)) {
-        return bt_trigger_repeat(trigger, electrode);
+    if ((uint32_t)count - 1 >= trigger->usable) {
+        return bt_trigger_doubt(trigger, electrode, count);
     }
     uint16_t smooth = bt_trigger_filter(trigger, electrode, count, trigger->rest.lane[electrode]);
     int32_t e = smooth - trigger->rest.lane[electrode]; // a first word sets its own rest

@@ -23,6 +23,7 @@ static void play(const uint16_t electrode[BT_ELECTRODES])
         memset(count, 0xFF, sizeof count);
         unsigned channel = bt_slot_channel[slot] - BT_CHANNEL_E1;
         count[0] = channel < BT_ELECTRODES ? electrode[channel] : PDC_REST;
+        count[0] = (uint16_t)(count[0] + (channel == 0 && round_number % 4 == 0)); // lest it is frozen
         bt_session_slot(&session, slot, count, t_us + slot);
     }
     bt_session_end_round(&session);
@@ -84,7 +85,7 @@ static void heartbeats_come_in_their_period(void **state)
             assert_int_equal(idle.seq, 50 + k * rounds);
             assert_int_equal(idle.t_us, 10000 * (50 + k * rounds));
             assert_int_equal(idle.finger, 0);
-            assert_int_equal(idle.energy_count2, 0);
+            assert_in_range(idle.energy_count2, 0, 1);
         }
     }
 }

@@ -1,0 +1,52 @@
+#include "signal/moves.h"
+
+#include "fixed_point.h"
+
+_Static_assert(BT_WINDOW_ROUNDS *BT_TRIGGER_UNREAD <= UINT16_MAX, "a sum must fit its half of a pair");
+
+uint32_t bt_window_begin(bt_lanes *sum, const bt_lanes *last, const bt_lanes *smooth)
+{
+    uint32_t same = 0;
+    for (unsigned k = 0; k < BT_LANES / 2; k++) {
+        uint32_t words = smooth->pair[k];
+        uint32_t differ = (sum->pair[k] ^ last->pair[k]) | (last->pair[k] ^ words * BT_WINDOW_ROUNDS);
+        sum->pair[k] = words;
+        same |= (differ & 0xFFFF) == 0 ? 1u << 2 * k : 0;
+        same |= differ >> 16 == 0 ? 2u << 2 * k : 0;
+    }
+    return same & BT_ALL_ELECTRODES;
+}
+
+void bt_window_add(bt_lanes *sum, const bt_lanes *smooth)
+{
+    BT_UNROLL
+    for (unsigned k = 0; k < BT_LANES / 2; k++) {
+        sum->pair[k] += smooth->pair[k];
+    }
+}
+
+void bt_mean_add(bt_lanes *mean_q4, const bt_lanes *sum_q2, unsigned first)
+{
+    for (unsigned k = first / 2; k < first / 2 + BT_LANES / 4; k++) {
+        mean_q4->pair[k] += sum_q2->pair[k] - (mean_q4->pair[k] >> 2 & 0x3FFF3FFF);
+    }
+}
+
+void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end,
+                  uint32_t without)
+{
+    bt_moves sum = first == 0 ? (bt_moves){0} : *moves;
+    unsigned i = first;
+    without >>= first;
+    do {
+        int32_t move = now->lane[i] - anchor->lane[i];
+        uint32_t size = bt_abs32(move);
+        if (!(without & 1)) {
+            sum.total += size;
+            sum.along += move;
+            sum.top = size > sum.top ? size : sum.top;
+        }
+        without >>= 1;
+    } while (++i < end);
+    *moves = sum;
+}
