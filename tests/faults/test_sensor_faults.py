@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import courses
 import numpy as np
 import pytest
 import random_courses
@@ -17,6 +18,8 @@ import wrong_by
 from sensor_faults import FAULTS, SILENT_ROUNDS, WHEN, outcome
 
 from biotac import Finger, FrameFlags
+from biotac.sim import sampling
+from biotac.sim.timeline import Pose
 from biotac.wire import slots
 from biotac.wire.native import ffi, lib
 
@@ -57,6 +60,39 @@ def condemned(rows: np.ndarray) -> np.ndarray:
 def test_a_healthy_finger_is_never_condemned(seed: int) -> None:
     recipe = random_courses.draw(seed)
     assert not condemned(random_courses.make(recipe).run(pdc=recipe.pdc)).any()
+
+
+@pytest.mark.parametrize("hours", [0.5, pytest.param(20.0, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("life", ["new", "worn", "warming"])
+def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: str, hours: float) -> None:
+    """The same half hour of presses again and again, with noise of its own each time."""
+    script = courses.script(91, "worn" if life == "worn" else "new")
+    script.sensor.drift_per_min *= 0.02  # so that twenty hours of it stay within the range
+    rng = np.random.default_rng(len(life))
+    while script.track.seconds < 1700:
+        at = Pose(float(rng.uniform(-11, 2)), float(rng.uniform(-2.5, 2.5)), tip_mm=float(rng.uniform(0.5, 4.0)))
+        script.rest(float(rng.uniform(1, 12)))
+        if life == "warming":
+            celsius = float(rng.uniform(-3, 3)) if script.track.pose.celsius < 34 else -4.0
+            script.warm(celsius, abs(celsius) / float(rng.uniform(0.02, 0.3)))
+        script.load(float(rng.uniform(0.3, 10)), float(np.exp(rng.uniform(-0.7, 4.5))), at)
+        script.hold(float(rng.uniform(0.2, 12))).load(0, float(np.exp(rng.uniform(0, 4.5))))
+    script.rest(10).warm(30 - script.track.pose.celsius, 60).rest(60)
+    course, finger = script.make(), Finger()
+    seconds, flags = 0.0, FrameFlags(0)
+    creep = course.reads[-50:].mean(axis=0) - course.reads[:50].mean(axis=0)
+    while seconds < 3600 * hours:
+        counts = course.reads + rng.normal(0, script.sensor.noise_counts, course.reads.shape)
+        hit = rng.random(counts.shape) < script.sensor.glitch_share
+        hit[1:] &= ~hit[:-1]  # never two in a row
+        counts -= hit * rng.uniform(30, 66, counts.shape)
+        counts += seconds / script.track.seconds * creep
+        pdc = course.pressure + rng.normal(0, sampling.PDC_NOISE, len(course))
+        rows = finger.feed(np.rint(counts).astype(np.uint16), np.rint(pdc).astype(np.uint16), tdc=course.words["tdc"])
+        assert not condemned(rows).any()
+        flags |= FrameFlags(int(np.bitwise_or.reduce(rows["flags"])))
+        seconds += script.track.seconds
+    assert FrameFlags.CONTACT in flags and FrameFlags.PDC_FLAT not in flags
 
 
 @pytest.mark.parametrize(
