@@ -26,7 +26,7 @@ DEFECTS = {
     "erase in 600 ms": ("flash_slow", "a sector took 60"),
     "supply at 3900 mV": ("supply", "mV; expected 4100 to 5500 mV"),
     "clock 1.005 times as fast": ("clock_off", "ppm against USB's frames"),
-    "finger 1 feels 0.02 of PDC": ("pdc_weak", "counts/N, up to "),
+    "finger 1 feels 0.02 of PDC": ("pressure_flat", "counts/N, up to "),
     "finger 1 feels 0 of E7": ("channel_stuck", "finger 1: E7"),
     "lose a start of frame in 5": ("usb_frames", "starts of frame did not come"),
 }

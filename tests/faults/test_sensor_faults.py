@@ -111,18 +111,26 @@ def test_no_electrode_of_the_public_recordings_is_condemned(file: str, counts: s
     assert not condemned(Finger().feed(words, pdc)).any()
 
 
-@pytest.mark.parametrize("model", ["lin", "population"])
-@pytest.mark.parametrize("word", [0, 4095])
-def test_the_force_stays_useful_without_an_electrode(model: str, word: int) -> None:
-    """Open or shorted, whichever electrode it is: within 30 % or 0.5 N of the healthy finger's in 9 of 10 places."""
+BROKEN = {
+    "open": lambda x, rng: np.full_like(x, 4095),
+    "shorted": lambda x, rng: np.zeros_like(x),
+    "floating": lambda x, rng: rng.integers(1, 4089, len(x)),
+    "stuck": lambda x, rng: np.full_like(x, x[0]),
+}
+
+
+@pytest.mark.parametrize("model", sensor_faults.MODELS)
+@pytest.mark.parametrize("fault", BROKEN)
+def test_the_force_stays_useful_without_an_electrode(fault: str, model: str) -> None:
+    """Whichever electrode it is: within 30 % or 0.5 N of the healthy finger's in 9 of 10 places."""
     useful = []
-    for seed in range(20, 30):
-        of = sensor_faults.press(seed, force_n=3.0)
-        held = slice(of.hold + 50, of.free)
+    for seed in range(20, 25):
+        of, rng = sensor_faults.press(seed, "worn" if seed % 2 else "new", force_n=3.0), np.random.default_rng(seed)
+        held, begin = slice(of.hold + 50, of.free), of.begins("rest")
         truth = of.healthy(model)["force_100un"][held].mean(axis=0) / 1e4
         for electrode in slots.ELECTRODE_SLOT:
             bad = of.words.copy()
-            bad[of.begins("rest") :, electrode] = word
+            bad[begin:, electrode] = BROKEN[fault](bad[begin:, electrode], rng)
             force = sensor_faults.run(bad, of.settings(model))["force_100un"][held].mean(axis=0) / 1e4
             useful.append(np.linalg.norm(force - truth) <= max(0.5, 0.3 * float(np.linalg.norm(truth))))
     assert np.mean(useful) >= 0.9

@@ -284,7 +284,9 @@ def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:
     if np.isnan(gain):
         yield Finding("not_pressed", f"finger {finger} was not pressed with {TOUCHED_N:g} N")
     elif gain < PDC_PER_N:
-        yield Finding("pdc_weak", f"finger {finger}: {gain:.1f} counts/N, up to {most_n:.1f} N; fingers have 62 to 111")
+        yield Finding(
+            "pressure_flat", f"finger {finger}: {gain:.1f} counts/N, up to {most_n:.1f} N; fingers have 62 to 111"
+        )
     drift = pdc_per_c(seen.of(finger))
     if abs(drift) > PDC_PER_C:
         yield Finding("pdc_warm", f"finger {finger}: {drift:+.0f} counts a degree; expected up to {PDC_PER_C:.0f}")

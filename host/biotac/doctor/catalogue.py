@@ -272,11 +272,6 @@ CATALOGUE: dict[str, Entry] = {
         "Nobody pressed the finger when asked to, so nothing is known of its static pressure.",
         "Run it again, and press every finger on its pad with some newtons.",
     ),
-    "pdc_weak": error(
-        "Static pressure hardly rises with force: the fluid is gone, there is a bubble in it, or the pressure sensor "
-        "is broken. The board takes a finger without pressure for untouched, and would tare out what it holds.",
-        "Check the inflation (manual), refill the finger, or replace it; do not grip with it until then.",
-    ),
     "pdc_warm": warning(
         "Static pressure moves with temperature by more than expected: a warm object looks like a touch.",
         "Tell us the number. Let the finger warm up before you tare it.",

@@ -395,7 +395,7 @@ EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
         "finger 1 is clean up to 4.46 MHz",
     ),
     ("not_pressed", rows("force_n", lambda its: 0.2), "finger 1"),
-    ("pdc_weak", rows("pdc", lambda its: 2000 + np.where(its["flags"], 6, 0)), "2.0 counts/N"),
+    ("pressure_flat", rows("pdc", lambda its: 2000 + np.where(its["flags"], 6, 0)), "2.0 counts/N"),
     ("pdc_warm", lambda seen: warm(seen.frames[1::2]), "finger 1: +40 counts a degree"),
     ("restart", lambda seen: seen.restarts.append(Restart(1.0, 0b01, int(wire.FaultFlags.STARTED))), "after restart 3"),
     ("restart", lambda seen: seen.restarts.append(Restart(1.0, 0b11, int(wire.FaultFlags.HUNG))), "HUNG"),
