@@ -383,6 +383,9 @@ def rows(name: str, values: Callable[[np.ndarray], Any]) -> Callable[[Bringup], 
 
 EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
     ("flash_unknown", chip(flash_id=(0xC8, 0x40, 0x15)), "c84015"),
+    ("chip_old", chip(chip_id=0x10002927), "0x10002927"),
+    ("dma_late", chip(slots_dma_late=3), "3 slots"),
+    ("early_fault", chip(early_faults=2), "2 starts"),
     ("flash_slow", chip(erase_us=400_001), "400 ms"),
     ("supply", chip(supply_mv=4099), "4099 mV"),
     ("supply", chip(supply_mv=5501), "5501 mV"),
