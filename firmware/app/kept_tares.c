@@ -51,8 +51,7 @@ void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session)
         if (tare->tared && session->info[f].present && !(session->unsure >> f & 1)) {
             memcpy(to->serial, session->info[f].serial, sizeof to->serial);
         }
-        to->base = tare->base;
-        to->held = tare->held;
+        bt_tare_keep(tare, &to->tare);
     }
     older->crc32 = bt_crc32((const uint8_t *)older, offsetof(bt_kept_copy, crc32));
 }
@@ -66,7 +65,7 @@ bool bt_kept_tares_restore(const bt_kept_tares *kept, bt_session *session)
         const bt_sensor_info *info = &session->info[f];
         if (info->present && from->serial[0] != 0
             && memcmp(from->serial, info->serial, sizeof from->serial) == 0) {
-            bt_tare_restore(&session->finger[f].tare, &from->base, from->held != 0);
+            bt_tare_restore(&session->finger[f].tare, &from->tare);
             any = true;
         }
     }

@@ -7,8 +7,7 @@
 
 typedef struct {
     uint8_t serial[BT_SERIAL_BYTES]; // the sensor's; zeros: nothing is kept
-    bt_baseline base;
-    uint32_t held;
+    bt_tare_kept tare;
 } bt_kept_tare;
 
 typedef struct {

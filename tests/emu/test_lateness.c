@@ -163,8 +163,8 @@ static void a_hang_forgets_no_tare_and_no_hold(void **state)
             assert_true(gateway.session.finger[f].tare.tared);
             before[f] = gateway.session.finger[f].tare.base;
         }
-        gateway.kept->copy[0].finger[3].base.pdc_q16 ^= damaged > 0;
-        gateway.kept->copy[1].finger[3].base.pdc_q16 ^= damaged > 1;
+        gateway.kept->copy[0].finger[3].tare.base.pdc_q16 ^= damaged > 0;
+        gateway.kept->copy[1].finger[3].tare.base.pdc_q16 ^= damaged > 1;
         fake_started_by = BT_FAULT_FLAG_HUNG;
         boot(START_NS);
         fake_started_by = BT_FAULT_FLAG_STARTED;

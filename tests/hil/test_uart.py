@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from held_press import of
 from rig import Rig
 
 import biotac
@@ -20,7 +21,7 @@ from biotac.link.serial_port import SerialLink
 from biotac.sim.emulated import EmulatedBoard, new_pty
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
-from biotac.wire.framing import open_frame
+from biotac.wire.framing import encode, open_frame
 
 CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
 BAUD = 400_000  # FRAMEs of two fingers fit; with PAC they do not
@@ -58,8 +59,10 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
             assert other.status().streams == hand.status().streams != 0
             with pytest.raises(CommandRefusedError, match=r"LINK_BUSY.*--take-link of biotac flash and doctor"):
                 other.read(0.1)
-            assert len(hand.read(0.1)) > 0
             hand.hold(0)
+            board.do("open and close 1000 times")
+            held = of(hand.read(1.0), 0)
+            assert (held["flags"][-FRAMES:] & FrameFlags.HELD).all() and hand.stats.frames_lost == 0
         found = judge(examine(board.path, seconds=0.5))
         assert [finding.code for finding in found] == ["refused"]
         assert "refused" not in [finding.code for finding in judge(examine(board.path, seconds=0.5, take_link=True))]
@@ -82,6 +85,41 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
         assert status.messages_dropped > 0 and status.faults & FaultFlags.DROPPED
     counters = board.counters()["uart"]
     assert counters["overruns"] == 0 and abs(counters["fastest_bits_per_s"] / BAUD - 1) < 0.005
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("how", ["cut power", "lose interrupts"])
+def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> None:
+    rig.need("uart")
+    # So slow that asking it for its time, and a busy computer, take none of it.
+    board = EmulatedBoard("pico", load_source("press.toml", fingers=5, seconds=900.0), pace=0.05, hold=True, uart=True)
+    rig.opened.append(board)
+    board.release()
+    with biotac.open(board.path) as hand:
+        hand.board.set_setting(Setting.UART_BITS_PER_S, 3_000_000)
+        hand.board.save_settings()
+    start = b"\0" + encode(wire.Start.ID, wire.Start(1, int(wire.StreamFlags.FRAMES), 31, 60_000).pack())
+    for path, configured in ((board.uart_path, None), (board.path, "configured")):
+        with open(path, "r+b", buffering=0) as port:
+            os.set_blocking(port.fileno(), False)
+            port.read()
+            now = before = board.counters()
+            board.say(how)
+            while now["boots"] == before["boots"] or (configured and now["usb"]["state"] != configured):
+                before, now = (now if now["boots"] == before["boots"] else before), board.counters()
+            begun_s, came = (now if configured else before)["emulated_s"], b""
+            port.write(start)
+            while wire.Frame.ID not in numbers(came):
+                came += port.read() or b""
+                ended_s = board.counters()["emulated_s"]
+            print(f"{how}, {path}: first FRAME after {1000 * (ended_s - begun_s):.0f} ms")
+            assert ended_s - begun_s < 0.15
+
+
+def numbers(came: bytes) -> list[int]:
+    """Of the whole messages in what a board sent."""
+    opened = [open_frame(frame) for frame in came.split(b"\0") if frame]
+    return [message[0] for message in opened if message is not None]
 
 
 def the_client_prints_what_python_reads(board: EmulatedBoard, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""The tare machine's thresholds: a header in C, and the table of verdicts in SPEC.md."""
+"""The tare machine's thresholds: a header in C, and the tables of verdicts and thresholds in SPEC.md."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ def header(table: dict[str, Any]) -> str:
 
 
 def spec(root: Path, table: dict[str, Any]) -> str:
-    """SPEC.md with its table of verdicts as the thresholds say it."""
+    """SPEC.md with its table of verdicts as the thresholds say it, and the thresholds."""
     limits = {name: entry["value"] for name, entry in table["limit"].items()}
     rows = [f"| {v['to']} | {v['reason']} | {v['when'].format(**limits)} |\n" for v in table["verdict"]]
     head, rest = (root / "protocol/SPEC.md").read_text(encoding="utf-8").split(BEGIN)
+    rows += ["\n| threshold | value | |\n|---|---|---|\n"]
+    rows += [f"| `{name}` | {entry['value']} | {entry['doc']} |\n" for name, entry in table["limit"].items()]
     return head + BEGIN + "| to | reason | when |\n|---|---|---|\n" + "".join(rows) + END + rest.split(END)[1]

@@ -5,8 +5,6 @@
 #include "solve/poc.h"
 #include "touch/thermal.h"
 
-#define WARMED_100UN 1500 // 0.15 N
-
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
 // |gain| times the length of all electrodes' normals along one axis, as a vector: nN * 1/1000, and 1e8 of
@@ -44,7 +42,7 @@ static uint32_t warmed_max_q8(const bt_gains *gains, bool population)
     for (int d = 0; d < 3; d++) {
         most = bt_abs32(force_100un[d]) > most ? bt_abs32(force_100un[d]) : most;
     }
-    uint32_t limit_q8 = 2 * BT_WRONG_SHARE * 256 * WARMED_100UN / most;
+    uint32_t limit_q8 = 2 * BT_WRONG_SHARE * 256 * BT_WARMED_100UN / most;
     return population || limit_q8 > BT_DEGREE_Q8 ? BT_DEGREE_Q8 : limit_q8;
 }
 

@@ -19,7 +19,7 @@ typedef struct {
     uint32_t force_per_count_100un_q16[3]; // force per count of noise on every electrode
     const bt_map *map;                     // used instead of the gains; NULL: none
     bool population;                       // without a map, force comes from the population map
-    uint32_t warmed_max_q8;                // change of TDC that may make the force wrong by WARMED_N
+    uint32_t warmed_max_q8;                // change of TDC that may make the force wrong by WARMED_100UN
 } bt_solve_settings;
 
 // Leaves `map` NULL, for the caller to set.

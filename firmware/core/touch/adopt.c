@@ -28,16 +28,6 @@ void bt_adopt_aim(bt_tare *tare)
     bt_adopt_aim_pressure(tare);
 }
 
-static void forget_contact(bt_tare *tare)
-{
-    tare->hits = 0;
-    tare->contact_rounds = 0;
-    tare->let_go = false;
-    bt_release_begin(&tare->release);
-    bt_thermal_begin(&tare->thermal);
-    bt_watch_begin(&tare->watch);
-}
-
 void bt_adopt_tell(bt_tare *tare, uint8_t reason)
 {
     tare->reason = reason;
@@ -56,7 +46,12 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
         bt_adopt_electrode(tare, i);
     }
     bt_adopt_aim_pressure(tare);
-    forget_contact(tare);
+    tare->hits = 0;
+    tare->contact_rounds = 0;
+    tare->let_go = false;
+    bt_release_begin(&tare->release);
+    bt_thermal_begin(&tare->thermal);
+    bt_watch_begin(&tare->watch);
     bt_rollback_start(&tare->rollback, base);
     tare->partial = true;
 }

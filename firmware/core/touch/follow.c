@@ -31,12 +31,6 @@ static bool rests(const bt_tare *tare)
     return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial;
 }
 
-// While the host says that something is held, only drift is followed.
-static bool tracks(const bt_tare *tare)
-{
-    return rests(tare) && !tare->held;
-}
-
 static void shift_all(bt_tare *tare, int32_t step_q16)
 {
     for (unsigned i = 0; i < BT_ELECTRODES && step_q16 != 0; i++) {
@@ -96,7 +90,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
     uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
     bt_watch_side(&tare->watch, mean_q16, *base_q16);
     uint32_t before_q16 = *base_q16;
-    if (tracks(tare)) {
+    if (rests(tare) && !tare->held) { // else only drift is followed
         *base_q16 = bt_baseline_follow(*base_q16, mean_q16, BT_SLEW_Q16);
     }
     if (rests(tare)) {
@@ -113,7 +107,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
 static void serve_pressure(bt_tare *tare)
 {
     uint32_t mean_q16 = (uint32_t)bt_sweep_close(&tare->sweep, BT_LANE_PDC, BT_STILL_SPAN_Q3) << 13;
-    if (tracks(tare) && bt_tare_pdc_known(tare)) {
+    if (rests(tare) && !tare->held && bt_tare_pdc_known(tare)) {
         uint32_t before_q16 = tare->base.pdc_q16;
         bool back = tare->age_rounds < BACK_ROUNDS && tare->comes_back_q16 > 0;
         int32_t slew_q16 = mean_q16 < before_q16 ? PDC_SINK_Q16 : back ? PDC_BACK_Q16 : PDC_SLEW_Q16;

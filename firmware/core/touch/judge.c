@@ -85,11 +85,10 @@ static void judge_release(bt_tare *tare)
 static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
 {
     bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
-    bool rests = tare->sweep.still_sweeps >= BT_WATCH_SWEEPS;
     if (tare->watch.wait_sweeps > 1) {
         tare->watch.wait_sweeps--;
     }
-    bool due = tare->watch.wait_sweeps == 1 && rests;
+    bool due = tare->watch.wait_sweeps == 1 && tare->sweep.still_sweeps >= BT_WATCH_SWEEPS;
     if (bt_watch_crept(&tare->watch)) {
         tare->drift.settled = 0;
     }

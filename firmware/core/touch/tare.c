@@ -18,8 +18,6 @@ bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
     };
 }
 
-// ---- temperature ----------------------------------------------------------------------------
-
 void bt_tare_temperature(bt_tare *tare, uint16_t tdc)
 {
     bt_thermal_add(&tare->thermal, tdc, tare->sweep.round == BT_SWEEP_ROUNDS - 1);
@@ -176,25 +174,29 @@ uint8_t bt_tare_now(bt_tare *tare)
     return BT_ERROR_OK;
 }
 
-static void set(bt_tare *tare, const bt_baseline *base, uint8_t reason)
-{
-    bt_adopt(tare, base, BT_TARE_STATE_REST, reason);
-    tare->unsure = false;
-}
-
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base)
 {
     if (tare->state == BT_TARE_STATE_FAULT) {
         return BT_ERROR_RAILED;
     }
-    set(tare, base, BT_TARE_REASON_HOST_SET);
+    bt_adopt(tare, base, BT_TARE_STATE_REST, BT_TARE_REASON_HOST_SET);
+    tare->unsure = false;
     return BT_ERROR_OK;
 }
 
-void bt_tare_restore(bt_tare *tare, const bt_baseline *base, bool held)
+void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept)
 {
-    set(tare, base, BT_TARE_REASON_RESTORED);
-    tare->held = held;
+    *kept = (bt_tare_kept){tare->base, tare->drift.sure_q20, tare->drift.sweeps, tare->held, tare->unsure};
+}
+
+void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept)
+{
+    bt_adopt(tare, &kept->base, BT_TARE_STATE_REST, BT_TARE_REASON_RESTORED);
+    tare->drift.sure_q20 = kept->drift_q20;
+    tare->drift.sweeps = kept->drift_sweeps;
+    bt_drift_revert(&tare->drift);
+    tare->held = kept->held;
+    tare->unsure = kept->unsure;
 }
 
 void bt_tare_hold(bt_tare *tare)

@@ -42,8 +42,17 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 
-// After a reset of the board: the tare from before it, and whether the host held the finger then.
-void bt_tare_restore(bt_tare *tare, const bt_baseline *base, bool held);
+// What outlives a reset of the board, so that a grip goes on with the tare from before it: it drifts on as it
+// did, is held if it was, and if it was in doubt it still is.
+typedef struct {
+    bt_baseline base;
+    int32_t drift_q20;
+    uint8_t drift_sweeps;
+    bool held, unsure;
+} bt_tare_kept;
+
+void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept);
+void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept);
 
 // The host says that the finger holds something, or no longer does; or the host has been silent for too long.
 void bt_tare_hold(bt_tare *tare);

@@ -3,7 +3,7 @@
 #include "fixed_point.h"
 #include "signal/round.h"
 
-#define TDC_SHIFT   4 // a low-pass of 16 rounds, as a step of TDC is half an electrode count
+#define TDC_SHIFT   3 // a low-pass of 8 rounds, as a step of TDC is half an electrode count
 #define SLOW_SHIFT  7
 #define APPLIED_MAX (500 << 16) // 15 degrees; more is a broken thermometer
 

@@ -17,7 +17,7 @@
 #define BT_WARMER_Q8 (BT_DEGREE_Q8 / 2) // pressure may have risen by a quarter of the lightest press
 
 typedef struct {
-    uint32_t tdc_q8;      // low-passed over 16 rounds; 0 until read
+    uint32_t tdc_q8;      // low-passed over 8 rounds; 0 until read
     int32_t slow_q14;     // low-passed over 128 sweeps more
     uint32_t tdc_then_q8; // when the contact began
     int32_t applied_q16;  // in the tare, or being added to it

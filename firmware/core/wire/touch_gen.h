@@ -27,6 +27,7 @@
 #define BT_MOVES_SHARE 64 // at most this many times pressure's square in energy: 1 to 14 in real presses
 #define BT_FLAT_SHARE 1024 // more than this many times: up to 400 were seen in the first second of real presses, and 2500 at 2 counts/N
 #define BT_DEGREE_TDC 33 // counts of TDC in a degree, at 30 C
+#define BT_WARMED_100UN 1200 // force, 0.1 mN, that temperature may make wrong before TEMP is set; with a map and the population's: a degree
 #define BT_WRONG_SHARE 2 // of the counts that the tare follows temperature by, so much may be wrong
 
 #endif

@@ -192,6 +192,40 @@ static void a_controller_does_not_notice_what_happens_at_the_other_port(void **s
     assert_int_equal(session.faults & ~BT_FAULT_FLAG_LINK_DAMAGED, 0);
 }
 
+// Both controllers want the link, and take it in turns while a finger is held; the other's port opens and
+// closes.
+static void a_link_that_is_taken_in_turns_tells_both_and_lets_go_of_nothing(void **state)
+{
+    (void)state;
+    uint32_t draw = 777;
+    unsigned owner = UART;
+    assert_int_equal(stream_at(owner, 200), BT_ERROR_OK);
+    assert_int_equal(ask(owner, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
+    for (int turn = 0; turn < 2000; turn++) {
+        draw = draw * 1664525 + 1013904223;
+        const unsigned at = draw >> 16 & 1;
+        now_us += 1000 * (draw >> 20 & 127);
+        if (draw >> 28 & 1) {
+            bt_session_link_down(&session, !owner);
+        }
+        if (at != owner) {
+            assert_int_equal(stream_at(at, 200), BT_ERROR_LINK_BUSY);
+            assert_int_equal(take_at(at, 200), BT_ERROR_OK);
+            assert_int_equal(told(), 1 << USB | 1 << UART);
+            assert_int_equal(stream_at(at, 200), BT_ERROR_OK);
+            owner = at;
+        }
+        bt_session_tick(&session, now_us);
+        assert_int_equal(ask(owner, BT_PING_ID, "\1", 1), BT_ERROR_OK);
+        if (turn % 16 == 0) {
+            assert_int_equal(frames_go_to(), owner);
+        }
+        assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+        assert_true(session.finger[0].tare.held);
+    }
+    assert_int_equal(session.faults, BT_FAULT_FLAG_LINK_TAKEN);
+}
+
 static int at_time_0(void **state)
 {
     now_us = 0;
@@ -208,6 +242,7 @@ int main(void)
         T(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent),
         T(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses),
         T(a_controller_does_not_notice_what_happens_at_the_other_port),
+        T(a_link_that_is_taken_in_turns_tells_both_and_lets_go_of_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -91,18 +91,21 @@ static void a_restored_tare_carries_a_grip_over_a_reset(void **state)
 {
     (void)state;
     for (int held = 0; held < 2; held++) {
-        emulated_finger finger;
+        emulated_finger before, finger;
+        bt_tare_kept kept;
+        finger_init(&before);
+        run_seconds(&before, 10);
+        before.tare.held = held;
+        before.tare.unsure = !held;
+        bt_tare_keep(&before.tare, &kept);
         finger_init(&finger);
-        bt_baseline base = {.pdc_q16 = PDC_REST << 16};
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            base.electrode_q16[i] = (uint32_t)lround(rest_count(&finger, i)) << 16;
-        }
-        bt_tare_restore(&finger.tare, &base, held);
+        bt_tare_restore(&finger.tare, &kept);
         finger.load = 300;
         finger.pdc_load = 200;
         assert_true(run_until(&finger, BT_TARE_STATE_CONTACT, 20) <= 5);
         run_seconds(&finger, 60);
         assert_true(finger.tare.state == BT_TARE_STATE_CONTACT && finger.tare.held == held);
+        assert_true(finger.tare.unsure == !held); // what was in doubt still is
         assert_true(fabs(share_kept(&finger, 300) - 1) < 0.02);
     }
 }

@@ -1,13 +1,13 @@
 // What temperature does to the tare in contact, against the low-pass in closed form.
 //
-// After n sweeps of a step by d the low-pass of 16 rounds has moved by d (1 - (15/16)^8n). It is kept in
-// 1/256 count and each round cuts off less than one of them, of which 15/16 are left in the next: together
-// less than 16/256.
+// After n sweeps of a step by d the low-pass of 8 rounds has moved by d (1 - (7/8)^8n). It is kept in 1/256
+// count and each round cuts off less than one of them, of which 7/8 are left in the next: together less than
+// 8/256.
 #include "emulated_finger.h"
 
 #include "solve/results.h"
 
-#define CUT   (16.0 / 256)
+#define CUT   (8.0 / 256)
 #define APART 1000.0 // the bound: 500 counts up, 500 down
 #define T0    1000
 #define SWEEP BT_SWEEP_ROUNDS
@@ -72,7 +72,7 @@ static double moved(const emulated_finger *finger, const bt_baseline *from, int 
 
 static double low_passed(double step, double sweeps)
 {
-    return step * (1 - pow(15.0 / 16, SWEEP * sweeps));
+    return step * (1 - pow(7.0 / 8, SWEEP * sweeps));
 }
 
 static double clipped(double value, double low, double high)
