@@ -140,7 +140,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
 #define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are railed or missing: do not trust the results
-#define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by 0.15 N with the finger's gains, or by a degree: the tare is uncertain
+#define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
 #define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion if the map has them, come from the finger's wrench map
 #define BT_FRAME_FLAG_DOUBT (1u << 19) // tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays

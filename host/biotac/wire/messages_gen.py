@@ -164,7 +164,7 @@ class FrameFlags(IntFlag):
     BASE_OLD = 1 << 13  # in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
     TARE_CHANGED = 1 << 14  # first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
     FAULT = 1 << 15  # more than two electrodes are railed or missing: do not trust the results
-    TEMP = 1 << 16  # the temperature has changed since the contact began, by so much that the force may be off by 0.15 N with the finger's gains, or by a degree: the tare is uncertain
+    TEMP = 1 << 16  # the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion if the map has them, come from the finger's wrench map
     DOUBT = 1 << 19  # tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
@@ -348,7 +348,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     8192: "in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes",
     16384: "first frame with a new tare, or after HOLD or RELEASE (see the TARE message)",
     32768: "more than two electrodes are railed or missing: do not trust the results",
-    65536: "the temperature has changed since the contact began, by so much that the force may be off by 0.15 N with the finger's gains, or by a degree: the tare is uncertain",
+    65536: "the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain",
     131072: "some quantity is not subscribed to, and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion if the map has them, come from the finger's wrench map",
     524288: "tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays",
