@@ -45,7 +45,7 @@ def content(path: Path) -> tuple[dict[str, Any], list[str]]:
     facts = {name: getattr(found, name) for name in names} | {
         name: getattr(found, name).tobytes() for name in ("frames", "pac", "idle", "wire")
     }
-    return facts | {"blocks": found.blocks, "gaps": found.gaps, "arrivals": list(found._arrivals())}, found.problems
+    return facts | {"blocks": found.blocks, "gaps": found.gaps, "arrivals": found.all_here_ns}, found.problems
 
 
 def loaded(path: Path) -> tuple[bytes, bool]:
