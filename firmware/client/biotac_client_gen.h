@@ -49,7 +49,7 @@ enum bt_sensor_fault {
     BT_SENSOR_FAULT_MISSING = 2, // no good word comes from it
     BT_SENSOR_FAULT_ALONE = 3, // it moved while the rest of the skin did not: it floats, drifts or is loose
     BT_SENSOR_FAULT_STUCK = 4, // it repeats one count while the skin moves
-    BT_SENSOR_FAULT_FROZEN = 5, // every electrode has repeated its word for ten rounds
+    BT_SENSOR_FAULT_FROZEN = 5, // every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
     BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     BT_SENSOR_FAULT_NOISY = 7, // at least five electrodes jump from round to round, too much for a tare to be taken
 };

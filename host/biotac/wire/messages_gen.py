@@ -64,7 +64,7 @@ class SensorFault(IntEnum):
     MISSING = 2  # no good word comes from it
     ALONE = 3  # it moved while the rest of the skin did not: it floats, drifts or is loose
     STUCK = 4  # it repeats one count while the skin moves
-    FROZEN = 5  # every electrode has repeated its word for ten rounds
+    FROZEN = 5  # every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
     TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     NOISY = 7  # at least five electrodes jump from round to round, too much for a tare to be taken
 
@@ -256,7 +256,7 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     2: "no good word comes from it",
     3: "it moved while the rest of the skin did not: it floats, drifts or is loose",
     4: "it repeats one count while the skin moves",
-    5: "every electrode has repeated its word for ten rounds",
+    5: "every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s",
     6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
     7: "at least five electrodes jump from round to round, too much for a tare to be taken",
 }
