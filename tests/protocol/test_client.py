@@ -119,7 +119,7 @@ def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -
         board.close()
     *acted, last = done.stderr.splitlines()
     forces = [tuple(int(word, 16) for word in line.split()) for line in acted]
-    assert len(forces) == 100 and last == "00000000 lost"
+    assert len(forces) in (100, 101) and last == "00000000 lost"  # a poll may bring both fingers of a round
     assert {finger for finger, *_ in forces} == {0, 1}
     with biotac.open("sim:press.toml?fingers=2&seconds=60") as hand:
         output = hand.read_batch(4000).wire

@@ -11,6 +11,7 @@ import pytest
 import biotac
 from biotac.cli.main import main
 from biotac.core.compiled import FORCE_GAINS, reference_q4
+from biotac.recording.crosscheck import FORCE_BOUND_MN
 from biotac.wire import messages_gen as wire
 
 
@@ -130,7 +131,7 @@ def test_settings_come_from_a_file(folder, recorded, capsys) -> None:
     new = biotac.Recording(out)
     truth = reference_q4(new.wire["counts"], new.wire["tare_q4"], new.settings)
     valid = ~np.isnan(new.frames["force_n"][:, 2])
-    assert np.abs(new.frames["force_n"][valid] - truth.force_n[valid]).max() <= 0.5e-4 + 1e-9
+    assert np.abs(new.frames["force_n"][valid] - truth.force_n[valid]).max() <= FORCE_BOUND_MN / 1e3
     about = json.loads(new.metadata["recomputed"])
     assert about["from"] == "a.mcap" and about["changes"] == {"force_gain_z_nn": 4_524_468}
 
