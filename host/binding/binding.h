@@ -5,6 +5,7 @@
 #define BIOTAC_BINDING_H
 
 #include "batch.h"
+#include "blocks.h"
 #include "bounds.h"
 #include "columns.h"
 #include "decode/decode.h"
@@ -14,7 +15,6 @@
 #include "device.h"
 #include "finger.h"
 #include "lin2013.h"
-#include "lin_float64.h"
 #include "map/complete.h"
 #include "map/map.h"
 #include "record.h"

@@ -29,9 +29,14 @@ static void add(double factor, const double coefficient[3], double sum[3])
 }
 
 void bt_population_replace(const double coefficient[BT_POPULATION_COLUMNS][3],
-                           const int32_t e_q4[BT_ELECTRODES], double *results)
+                           const uint16_t counts[BT_ELECTRODES], const int32_t tare_q4[BT_ELECTRODES],
+                           double *results)
 {
+    int32_t e_q4[BT_ELECTRODES];
     double gate[3], force[3] = {0, 0, 0};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = counts[i] != BT_INVALID_COUNT ? 16 * counts[i] - tare_q4[i] : 0;
+    }
     int32_t force_100un[3];
     bt_likeness likeness = bt_population_force(e_q4, force_100un);
     double share = likeness.share / (double)BT_POPULATION_ALL;

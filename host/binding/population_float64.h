@@ -11,8 +11,9 @@
 #define BT_POPULATION_COLUMNS (6 * BT_ELECTRODES)
 
 // results: poc_mm, force_n, torque_nmm of Lin's, of which force becomes the published one, and torque x what
-// follows. e_q4: signals in 1/16 count, 0 for a missing electrode.
+// follows. counts: 0..4095 or BT_INVALID_COUNT.
 void bt_population_replace(const double coefficient[BT_POPULATION_COLUMNS][3],
-                           const int32_t e_q4[BT_ELECTRODES], double *results);
+                           const uint16_t counts[BT_ELECTRODES], const int32_t tare_q4[BT_ELECTRODES],
+                           double *results);
 
 #endif

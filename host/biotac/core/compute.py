@@ -1,6 +1,6 @@
 """Point of contact, force and torque of whole recordings, in float64.
 
-The formulas are those of core.compiled.reference_q4 and map.population, in C: host/binding/lin_float64.c,
+The formulas are those of core.compiled.reference_q4 and map.population, in C: host/binding/blocks.c,
 population_float64.c.
 """
 
@@ -32,7 +32,7 @@ _ONE = (_ELECTRODES,)
 _ALL_GOOD = -1
 
 # Looked up once: a call with one frame takes less time than a few of these would.
-_frames = lib.bt_lin_frames
+_blocks = lib.bt_blocks
 _buffer = ffi.from_buffer
 _one_frame = lib.bt_one_frame
 
@@ -103,7 +103,7 @@ def compute(
     base_stride = base.strides[0] if base.ndim == 2 else 0
     if base.size == 0:  # no rows: NumPy may give a stride of 0, which means a single row to C
         return out
-    bad = _frames(plan, n, _address(raw), raw_stride, _address(base), base_stride, _buffer(out))
+    bad = _blocks(plan, n, _address(raw), raw_stride, _address(base), base_stride, _buffer(out))
     if bad != _ALL_GOOD:
         raise ValueError(_explain(bad, raw, base))
     return out
@@ -160,7 +160,7 @@ def _default_plan() -> Any:
 
 @lru_cache(maxsize=16)
 def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
-    """The bt_lin_plan for these settings. It is only read, so calls may share it."""
+    """The bt_block_plan for these settings. It is only read, so calls may share it."""
     settings = dict(items)
     for key in settings:
         if key not in _DEFAULTS:
@@ -170,11 +170,12 @@ def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
         spec = wire.SETTINGS[key]
         if not spec.low <= value <= spec.high:
             raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
-    plan = ffi.new("bt_lin_plan *")
+    plan = ffi.new("bt_block_plan *")
     from ..map import population  # here: everybody would wait for it at `import biotac`
 
     coefficients = population.compiled_coefficients() if population.in_force(chosen) else ffi.NULL
-    lib.bt_lin_plan_init(plan, formula_settings(chosen), coefficients)
+    if not lib.bt_block_plan_init(plan, formula_settings(chosen), coefficients):
+        raise RuntimeError("host/binding/blocks.c mirrors a different geometry from the generated one")
     return plan
 
 
