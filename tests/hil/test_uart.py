@@ -35,15 +35,27 @@ class UartLink(SerialLink):
     patience = 60.0
 
 
-def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None:
+def a_pico(rig: Rig, *, fingers: int, pace: float) -> EmulatedBoard:
+    """Emulated, with its UART on a pty."""
     rig.need("uart")
-    # Its time runs by the clock while the client is compiled and waited for, and stands still behind the tape.
-    board = EmulatedBoard("pico", load_source("press.toml", fingers=2, seconds=900.0), pace=1.0, hold=True, uart=True)
+    board = EmulatedBoard(
+        "pico", load_source("press.toml", fingers=fingers, seconds=900.0), pace=pace, hold=True, uart=True
+    )
     rig.opened.append(board)
     board.release()
+    return board
+
+
+def save_rate(hand: biotac.Hand, bits_per_s: int) -> None:
+    hand.board.set_setting(Setting.UART_BITS_PER_S, bits_per_s)
+    hand.board.save_settings()
+
+
+def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None:
+    # Its time runs by the clock while the client is compiled and waited for, and stands still behind the tape.
+    board = a_pico(rig, fingers=2, pace=1.0)
     with biotac.open(board.path) as hand:
-        hand.board.set_setting(Setting.UART_BITS_PER_S, BAUD)
-        hand.board.save_settings()
+        save_rate(hand, BAUD)
         assert board.counters()["uart"] is None  # not before the next start
     board.do("cut power")
     board.until(PATIENCE_S, uart={"sent": 0})
@@ -90,14 +102,10 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
 @pytest.mark.long
 @pytest.mark.parametrize("how", ["cut power", "lose interrupts"])
 def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> None:
-    rig.need("uart")
     # So slow that asking it for its time, and a busy computer, take none of it.
-    board = EmulatedBoard("pico", load_source("press.toml", fingers=5, seconds=900.0), pace=0.05, hold=True, uart=True)
-    rig.opened.append(board)
-    board.release()
+    board = a_pico(rig, fingers=5, pace=0.05)
     with biotac.open(board.path) as hand:
-        hand.board.set_setting(Setting.UART_BITS_PER_S, 3_000_000)
-        hand.board.save_settings()
+        save_rate(hand, 3_000_000)
     start = b"\0" + encode(wire.Start.ID, wire.Start(1, int(wire.StreamFlags.FRAMES), 31, 60_000).pack())
     for path, configured in ((board.uart_path, None), (board.path, "configured")):
         with open(path, "r+b", buffering=0) as port:

@@ -234,7 +234,8 @@ CATALOGUE: dict[str, Entry] = {
     "dma_late": error(
         "Slots were lost because the DMA was late with a word; when it is late 44 times in a row, the core clocks the "
         "bus itself until the next start.",
-        "`biotac config set slots_by_core 1` and a restart make that last. Report it with bringup.md.",
+        "`hand.board.set_setting(Setting.SLOTS_BY_CORE, 1)`, `hand.board.save_settings()` and a restart make that "
+        "last. Report it with bringup.md.",
     ),
     "early_fault": error(
         "The board had to start more than once: its image was read wrongly, or an exception came before it ran.",

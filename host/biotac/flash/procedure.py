@@ -71,14 +71,9 @@ def flash(
     before: wire.Hello | None = None
     written: Backup | None = None
     if loader is None:
-        how: dict[str, Any] = {
-            "backup_path": backup_path,
-            "keep": keep,
-            "downgrade": downgrade,
-            "take_link": take_link,
-            "say": say,
-        }
-        before, written = leave(image, target, **how)
+        before, written = leave(
+            image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, take_link=take_link, say=say
+        )
     elif target.there():
         raise InputError(
             f"{target.port} is plugged in, and another board is in its loader ({loader.name}); unplug one of them"

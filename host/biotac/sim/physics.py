@@ -11,16 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from ..calibrate.press.few_shot import Scale
 from ..core import geometry as surface
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
-from .known_finger import answered
+
+if TYPE_CHECKING:
+    from ..calibrate.press.few_shot import Scale
 
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")
@@ -239,6 +240,8 @@ class Finger:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
         counts, touched = self.counts_of(*states.deformation, states.warm_c), states.force_n > 0.0
         if self.scale is not None and touched.any():
+            from .known_finger import answered  # with all that calibrates, which few fingers need
+
             at_rest = self.rest_counts(states.warm_c)[touched]
             load = np.column_stack([counts[touched] - at_rest, states.wrench()[0][touched]])
             unique, inverse = np.unique(load, axis=0, return_inverse=True)  # a scenario mostly holds still

@@ -27,8 +27,8 @@ Changes run straight over the step's time and stay until changed again. ``[[faul
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from ..calibrate.press.few_shot import Scale
 from ..core import geometry as surface
 from ..errors import ScenarioError
 from ..wire import sensor_gen as _sensor
@@ -37,6 +37,9 @@ from .physics import PROFILES, Profile
 from .source import MAX_SECONDS
 from .tables import Table, parse_toml
 from .timeline import Pose, Track
+
+if TYPE_CHECKING:
+    from ..calibrate.press.few_shot import Scale
 
 RELEASE_S = 0.1
 FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
@@ -163,6 +166,8 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
             serial = table.text("serial", r"BT[0-9A-Za-z]{14}", "16 letters and digits that begin with BT")
         scale = None
         if "z_gain" in table or "balance" in table:
+            from ..calibrate.press.few_shot import Scale  # few scenarios need what calibrates
+
             scale = Scale(table.number("z_gain", 0.5, 2.0, ""), table.number("balance", -0.5, 0.5, ""))
         specs.append(FingerSpec(own, profile, serial, scale))
     return tuple(specs)

@@ -48,7 +48,7 @@ def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts]
 
 
 def _by(technique: str, estimates: Floats, firm: Any, pressed: Stimulations) -> Floats:
-    """The estimate ``said`` by one technique; each contact is smoothed alone, as nothing lies between two of them."""
+    """The ``estimates`` by one technique; each contact is smoothed alone, as nothing lies between two of them."""
     found = estimates if technique in TECHNIQUES[:2] else np.where(firm[:, None], estimates, np.nan)
     if technique in ("none", "force threshold"):
         return found
