@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kept_board import serial_of
 from rig import Rig
 
 import biotac
@@ -24,7 +25,7 @@ BOOT_S = 5  # of the board's time
 
 
 def for_finger(hand: biotac.Hand, finger: int) -> Calibration:
-    return replace(OWN, serial=bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode())
+    return replace(OWN, serial=serial_of(hand, finger))
 
 
 def test_a_calibration_is_set_told_and_cleared(board: Callable[[str], biotac.Hand]) -> None:
@@ -123,4 +124,8 @@ def reboot(hand: biotac.Hand, boots: int) -> None:
     board = hand.link.board  # type: ignore[attr-defined]
     board.say("cut power")
     board.until(BOOT_S, boots=boots, usb={"state": "configured"})
-    hand.ping()
+    # What is kept for a sensor is in force once the sensor, which had no power either, has said which one it is.
+    asked = 0
+    while not all(serial_of(hand, finger) for finger in (0, 1)):
+        asked += 1
+        assert asked < 1000
