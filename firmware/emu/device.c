@@ -59,14 +59,14 @@ static void lose_power(bt_emu_device *device, bool swapped)
 }
 
 // The line's present fault, or 0.
-static uint16_t line_fault(bt_emu_device *device, uint16_t said)
+static uint16_t line_fault(bt_emu_device *device, uint16_t word)
 {
-    if (said == BT_EMU_FAULT_SWAPPED || said == BT_EMU_FAULT_UNPLUGGED) {
-        lose_power(device, said == BT_EMU_FAULT_SWAPPED);
+    if (word == BT_EMU_FAULT_SWAPPED || word == BT_EMU_FAULT_UNPLUGGED) {
+        lose_power(device, word == BT_EMU_FAULT_SWAPPED);
         return BT_EMU_FAULT_UNPLUGGED;
     }
     device->unplugged = false;
-    return said > BT_FULL_SCALE_COUNT ? said : 0;
+    return word > BT_FULL_SCALE_COUNT ? word : 0;
 }
 
 static uint16_t line_now(bt_emu_device *device, uint64_t t_ns)
@@ -245,8 +245,8 @@ uint16_t bt_emu_word_ahead(const bt_emu_device *device, unsigned bytes, bool set
     if (device->pending != PROPERTY || !settled) {
         return word_now(device, settled);
     }
-    uint16_t said = device->source(device->context, device->finger, BT_EMU_LINE, t_ns);
-    uint16_t fault = said > BT_FULL_SCALE_COUNT ? said : BT_EMU_FAULT_NONE;
+    uint16_t word = device->source(device->context, device->finger, BT_EMU_LINE, t_ns);
+    uint16_t fault = word > BT_FULL_SCALE_COUNT ? word : BT_EMU_FAULT_NONE;
     unsigned at = device->property_at + bytes;
     uint8_t high = on_the_line(property_byte(device, at), fault, false);
     return (uint16_t)(high << 8 | on_the_line(property_byte(device, at + 1), fault, true));

@@ -98,18 +98,18 @@ static void hear(uint8_t finger, const exchange *heard, bool alone)
     bool settled = alone && heard->offer & OFFER_SETTLED;
     // What was offered tells on which side of the 50 us it was.
     bt_emu_select(device, true, settled ? device->released_ns + BT_SETTLE_US * 1000 : device->released_ns);
-    uint16_t said = 0;
+    uint16_t answer = 0;
     for (int k = 0; k < heard->bytes; k++) {
         uint8_t mosi = k == 0 ? (uint8_t)(heard->mosi >> 8) : k == 1 ? (uint8_t)heard->mosi : 0;
         uint8_t miso = bt_emu_transfer8(device, mosi, end_ns);
-        said = (uint16_t)(k > 1 ? said : said | miso << (k == 0 ? 8 : 0));
+        answer = (uint16_t)(k > 1 ? answer : answer | miso << (k == 0 ? 8 : 0));
     }
     bt_emu_select(device, false, end_ns);
     if (alone && heard->mosi <= BT_READ_MOSI_MAX) {
         uint16_t mask = heard->bytes == 1 ? 0xFF00 : 0xFFFF;
         uint16_t offered = heard->offer & OFFER_DRIVE ? WORD_OF(heard->offer) : 0;
         counts.words++;
-        counts.late += ((said ^ offered) & mask) != 0 || heard->bytes > 2; // there are no more in an offer
+        counts.late += ((answer ^ offered) & mask) != 0 || heard->bytes > 2; // there are no more in an offer
     }
 }
 

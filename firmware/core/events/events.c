@@ -227,9 +227,9 @@ static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const
 
 // True while no other event may begin: during a slip, and after a jolt of a finger that is untouched or
 // landing.
-static inline bool is_told(const bt_events *events)
+static inline bool event_is_on(const bt_events *events)
 {
-    return events->slipping || (events->jolt_told && (events->landing || !events->touched));
+    return events->slipping || (events->jolt_raised && (events->landing || !events->touched));
 }
 
 // All that matters now is how long it lasts, so both sides are summed as one.
@@ -263,7 +263,7 @@ static inline void shake(bt_events *events, const uint16_t *pac, const uint16_t 
         events->peak_count2 = 0;
         events->dragged = 0;
     }
-    if (is_told(events)) {
+    if (event_is_on(events)) {
         go_on(events, pac, before, samples);
     } else {
         add_shaken(events, pac, before, samples);
@@ -273,14 +273,14 @@ static inline void shake(bt_events *events, const uint16_t *pac, const uint16_t 
 
 static uint32_t end_slip(bt_events *events)
 {
-    uint32_t told = events->slipping ? EVENT(BT_EVENT_KIND_STUCK) : 0;
+    uint32_t raised = events->slipping ? EVENT(BT_EVENT_KIND_STUCK) : 0;
     events->slipping = false;
-    return told;
+    return raised;
 }
 
 static uint32_t end_shaking(bt_events *events)
 {
-    events->jolt_told = false;
+    events->jolt_raised = false;
     events->landing = events->landing && events->now - events->touch_began < LANDING_MIN_SAMPLES;
     return end_slip(events);
 }
@@ -302,30 +302,30 @@ static bool begins_to_slip(bt_events *events)
 
 static inline uint32_t judge(bt_events *events)
 {
-    uint32_t told = 0;
+    uint32_t raised = 0;
     if (!shakes(events)) {
         return end_shaking(events);
     }
-    if (!events->jolt_told
+    if (!events->jolt_raised
         && events->risen_count2 + events->fallen_count2 > JOLT_LEVELS * events->level_count2) {
-        events->jolt_told = true;
-        told = EVENT(BT_EVENT_KIND_JOLT);
+        events->jolt_raised = true;
+        raised = EVENT(BT_EVENT_KIND_JOLT);
     }
     if (!events->touched) {
-        return told | end_slip(events);
+        return raised | end_slip(events);
     }
     events->landing = events->landing && events->now - events->touch_began < LANDING_MAX_SAMPLES;
     if (!events->slipping && !events->landing && begins_to_slip(events)) {
         events->slipping = true;
-        told |= EVENT(BT_EVENT_KIND_SLIP);
+        raised |= EVENT(BT_EVENT_KIND_SLIP);
     }
-    return told;
+    return raised;
 }
 
 uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME],
                        unsigned end)
 {
-    uint32_t told = 0;
+    uint32_t raised = 0;
     unsigned k = events->samples_done < end ? events->samples_done : 0;
     const uint16_t *before;
     if (k > 0) {
@@ -347,15 +347,15 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     events->samples_done = (uint8_t)end;
     const bool goes_on = events->slipping && events->touched && shakes(events);
     if ((shook || events->landing) && !goes_on) {
-        told = judge(events);
+        raised = judge(events);
     }
     if (!events->touched && tare->state == BT_TARE_STATE_CONTACT) {
-        told |= touched_again(events, tare);
+        raised |= touched_again(events, tare);
     }
     if (end == BT_PAC_PER_FRAME) {
         end_round(events, tare);
     }
-    return told;
+    return raised;
 }
 
 // ---- messages

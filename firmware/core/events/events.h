@@ -32,8 +32,8 @@ typedef struct {
     uint8_t watched; // slot of the watched electrode; BT_EVENTS_NO_SLOT while untouched
     uint8_t dragged; // samples of this vibration that changed by more than in a squeeze
     bool touched;
-    bool landing;   // touched, and dynamic pressure has not been quiet since then
-    bool jolt_told; // a JOLT was reported for this vibration
+    bool landing;     // touched, and dynamic pressure has not been quiet since then
+    bool jolt_raised; // a JOLT was reported for this vibration
     bool slipping;
     uint8_t samples_done;      // of this round's PAC samples
     uint32_t now;              // number of the next sample

@@ -30,12 +30,12 @@ static void subscribe_as_at_first(bt_session *session)
 static void take_over(bt_session *session)
 {
     const uint8_t before = session->owner, after = session->link;
-    const bool told = bt_session_is_kept(session) || session->streams != 0;
+    const bool was_in_use = bt_session_is_kept(session) || session->streams != 0;
     bt_session_stop(session);
     subscribe_as_at_first(session);
     session->owner = after;
     session->heard_us = session->command_us;
-    if (told) {
+    if (was_in_use) {
         session->faults |= BT_FAULT_FLAG_LINK_TAKEN;
         session->link = before;
         bt_session_send_status(session, 0, session->command_us);

@@ -156,11 +156,11 @@ static void read_control(void)
 
 static void stand_still(void)
 {
-    static bool told;
+    static bool reported;
     link_due = true;
     pty_flush();
-    if (ended && !told) {
-        told = true;
+    if (ended && !reported) {
+        reported = true;
         printf("end\n");
         (void)fflush(stdout);
     }

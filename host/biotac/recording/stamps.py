@@ -19,12 +19,12 @@ _SETTLED_US = 600e6  # of the clock's course at a time, before it forgets what i
 _REACH_US = 200e6
 
 
-def unwrapped_us(begin_us: int, told_us: npt.ArrayLike) -> NDArray[np.int64]:
+def unwrapped_us(begin_us: int, stamps_us: npt.ArrayLike) -> NDArray[np.int64]:
     """Device times of messages in order, 32 bits as sent, unwrapped from ``begin_us`` on.
 
     STATUS comes every second, so neighbours are never half a wrap apart.
     """
-    return np.unwrap(np.append(begin_us, told_us).astype(np.int64), period=2**32)[1:].astype(np.int64)
+    return np.unwrap(np.append(begin_us, stamps_us).astype(np.int64), period=2**32)[1:].astype(np.int64)
 
 
 class Stamps:

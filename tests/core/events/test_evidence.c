@@ -52,7 +52,7 @@ static void a_slip_goes_both_ways_by_more_than_twenty_levels(void **state)
     } cases[] = {{2000, 2001, 0}, {2001, 2000, 0}, {2001, 2001, TOLD(SLIP)}};
     for (int k = 0; k < 3; k++) {
         (void)held(state);
-        events.jolt_told = true;
+        events.jolt_raised = true;
         assert_int_equal(shaken(cases[k].risen, cases[k].fallen), cases[k].told);
         assert_int_equal(events.slipping, cases[k].told != 0);
         (void)held(state);
@@ -84,7 +84,7 @@ static void evidence_is_no_more_than_a_hundred_levels_of_each_side(void **state)
     events.risen_count2 = events.fallen_count2 = 10000 + TOLL;
     assert_int_equal(stretch(), TOLD(JOLT));
     assert_true(events.risen_count2 == 10000 && events.fallen_count2 == 10000);
-    events.jolt_told = false;
+    events.jolt_raised = false;
     events.risen_count2 = events.fallen_count2 = 10001 + TOLL;
     (void)stretch();
     assert_true(events.risen_count2 == 10000 && events.fallen_count2 == 10000);
@@ -134,14 +134,14 @@ static void while_it_slips_both_sides_are_one(void **state)
     assert_true(events.slipping);
     events.risen_count2 = 800;
     assert_int_equal(stretch(), TOLD(STUCK));
-    assert_false(events.slipping || events.jolt_told);
+    assert_false(events.slipping || events.jolt_raised);
     assert_int_equal(stretch(), 0);
 }
 
 static void what_was_told_of_shakes_on_until_it_is_over(void **state)
 {
     static const struct {
-        bool jolt_told, landing, touched, one;
+        bool jolt_raised, landing, touched, one;
     } cases[] = {{true, true, true, true},
                  {true, false, true, false},
                  {true, false, false, true},
@@ -151,7 +151,7 @@ static void what_was_told_of_shakes_on_until_it_is_over(void **state)
         (void)held(state);
         tare.state = BT_TARE_STATE_REST;
         events.touch_began = events.now;
-        events.jolt_told = cases[k].jolt_told;
+        events.jolt_raised = cases[k].jolt_raised;
         events.landing = cases[k].landing;
         events.touched = cases[k].touched;
         events.risen_count2 = events.fallen_count2 = 1000;
@@ -213,7 +213,7 @@ static void a_drag_is_a_slip_of_one_sign(void **state)
         assert_true(change < 75 || events.slip_began == events.now - 1);
     }
     (void)held(state);
-    events.jolt_told = true;
+    events.jolt_raised = true;
     events.dragged = 43;
     assert_int_equal(shaken(100, 0), 0);
     events.dragged = 44;
@@ -229,7 +229,7 @@ static void a_slip_began_with_its_vibration(void **state)
     } cases[] = {{18, true}, {19, false}, {1, true}, {-1, false}, {-18, false}, {-19, true}};
     for (int k = 0; k < 6; k++) {
         (void)held(state);
-        events.jolt_told = true;
+        events.jolt_raised = true;
         events.rise_began = 99000;
         events.fall_began = 99000 + (uint32_t)cases[k].fall_after_rise;
         assert_int_equal(shaken(2001, 2001), TOLD(SLIP));

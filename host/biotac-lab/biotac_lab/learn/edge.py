@@ -53,6 +53,6 @@ def train(seen: Floats, angle_rad: Floats, *, seed: int = 0, steps: int = nets.S
     return Orientation(reduction, net)
 
 
-def turn(said_rad: Floats, truth_rad: Floats) -> Floats:
-    """The difference ``said_rad`` - ``truth_rad`` of two edge directions (n,), -pi/2 to pi/2 rad."""
-    return np.mod(said_rad - truth_rad + np.pi / 2, np.pi) - np.pi / 2
+def turn(estimate_rad: Floats, truth_rad: Floats) -> Floats:
+    """The difference ``estimate_rad`` - ``truth_rad`` of two edge directions (n,), -pi/2 to pi/2 rad."""
+    return np.mod(estimate_rad - truth_rad + np.pi / 2, np.pi) - np.pi / 2

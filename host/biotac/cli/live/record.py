@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     progress = Progress()
     recorded_s = 0.0
     with biotac.open(args.port) as hand:
-        earlier = faults_told(hand)
+        earlier = latched_faults(hand)
         recorder = hand.record(args.out, overwrite=args.force, note=args.note)
         with suppress(KeyboardInterrupt):  # the usual way to stop a recording
             for _, recorded_s in batches(hand, args.seconds):
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         progress.done()
         recorder.close()
         stats = hand.stats
-        faults = [line for line in faults_told(hand) if line not in earlier]
+        faults = [line for line in latched_faults(hand) if line not in earlier]
     facts: dict[str, Any] = {
         "recording": str(args.out),
         "frames": recorder.frames,
@@ -63,6 +63,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def faults_told(hand: biotac.Hand) -> list[str]:
+def latched_faults(hand: biotac.Hand) -> list[str]:
     """The board's latched faults, a line each."""
     return str(hand.board.faults()).splitlines()
