@@ -91,10 +91,10 @@ m4f_tests() { # arguments go to ctest
     ctest --test-dir build/m4f -j2 --output-on-failure "$@"
 }
 
-python_tests() { # arguments go to pytest; two processes, each with whole files, for what tests of a file share
-    # Skipped tests say why, once a reason. What hangs is told with where it stands, after longer than any test takes on
-    # a busy computer.
-    pytest -rsfE -n 2 --dist loadfile --timeout 900 "$@"
+python_tests() { # arguments go to pytest; processes with whole files each, for what tests of a file share
+    # Three on two cores: almost half of the time a test waits for a board whose time is real. Skipped tests say why,
+    # once a reason. What hangs is named with where it stands, after longer than any test takes on a busy computer.
+    pytest -rsfE -n 3 --dist loadfile --timeout 900 "$@"
 }
 
 fuzzing() {
