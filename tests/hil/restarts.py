@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from kept_board import KeptBoard
-from rig import Rig
+from rig import Rig, start
 
 import biotac
 from biotac.hand.opening import shake_hands
 from biotac.sim.emulated import EmulatedBoard
 from biotac.sim.loading import load_source
-from biotac.sim.ports import start_board
 from biotac.sim.process import SimLink
 
 BOOT_S = 10  # of the board's time, with the second that its watchdog takes
@@ -37,7 +36,7 @@ class Restarts:
         if self._is_a_process:
             self.board: Any = KeptBoard(self._source, self._flash)
         else:
-            self.board = start_board(self._rig.facts["board"], self._source, pace=0.0)
+            self.board = start(self._rig.facts["board"], self._source, pace=0.0)
         self.link = SimLink(self._rig.name, self.board)
         self._rig.opened.append(self.link)
         self._meet()

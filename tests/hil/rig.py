@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import tomllib
+from two_picos import TwoPicos
 
 import biotac
 from bench import BenchPty, open_bench
@@ -46,23 +47,26 @@ class Rig:
         """It has the ability: for what is but a part of a test."""
         return ability not in self.facts.get("cannot", {})
 
-    def open(self, source: str = "press.toml") -> biotac.Hand:
+    def open(self, source: str = "press.toml", *, reconnect: bool = False) -> biotac.Hand:
         """Open the board; a rig that plays scenarios plays ``source``, which may carry ?options."""
         path, _, options = source.partition("?")
-        if self.sensors_are_a_board:
-            sim = parse_sim(f"sim:{source}", pace=1.0)
-            return self.open_with(load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds))
-        hand = biotac.open(self.facts["port"].format(source=path, options=options, port=self.port))
+        if self.sensors_are_a_board or self.facts.get("board") == "two_picos":
+            sim = parse_sim(f"sim:{source}", pace=0.0)
+            played = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
+            return self.open_with(played, pace=sim.pace, reconnect=reconnect)
+        port = self.facts["port"].format(source=path, options=options, port=self.port)
+        hand = biotac.open(port, reconnect=reconnect)
         self.opened.append(hand)
         return hand
 
-    def open_with(self, source: Source) -> biotac.Hand:
+    def open_with(self, source: Source, *, pace: float = 0.0, reconnect: bool = False) -> biotac.Hand:
         """Open the board with words that no file holds."""
         self.need("scenarios")
         if self.sensors_are_a_board:
             hand = open_bench(self.port, self.sensor_port, source)
         else:
-            hand = shake_hands(SimLink(self.name, start_board(self.facts["board"], source, pace=0.0)))
+            link = SimLink(self.name, start(self.facts["board"], source, pace=pace))
+            hand = shake_hands(link, reconnect=reconnect)
         self.opened.append(hand)
         return hand
 
@@ -82,7 +86,7 @@ class Rig:
         if self.sensors_are_a_board:
             board = BenchPty(self.port, self.sensor_port, load_source(source, seconds=600))
         else:
-            board = start_board(self.facts["board"], load_source(source, seconds=600), pace=pace)
+            board = start(self.facts["board"], load_source(source, seconds=600), pace=pace)
         board.release()
         self.opened.append(board)
         return board
@@ -91,6 +95,10 @@ class Rig:
         for one in reversed(self.opened):
             one.close()
         self.opened.clear()
+
+
+def start(board: str, source: Source, *, pace: float) -> SimBoard:
+    return TwoPicos(source, pace=pace, hold=True) if board == "two_picos" else start_board(board, source, pace=pace)
 
 
 def all_rigs() -> dict[str, dict[str, Any]]:

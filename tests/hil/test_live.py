@@ -16,8 +16,7 @@ from biotac.wire import messages_gen as wire
 )
 def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason: str) -> None:
     rig.need(ability)
-    port = rig.facts["port"].format(source="press.toml", options="fingers=2&seconds=600", port=rig.port)
-    with biotac.open(port, reconnect=True) as hand:
+    with rig.open("press.toml?fingers=2&seconds=600", reconnect=True) as hand:
         hand.board.set_setting(wire.Setting.IDLE_PERIOD_MS, 70)
         hand.stream("force", "raw")
         before = hand.info.boot_id

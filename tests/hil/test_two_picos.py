@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from rig import all_rigs, in_ci, prepare
+from two_picos import TwoPicos
 
 import biotac
 from biotac.doctor import Facts, PairFacts, leads
@@ -16,7 +17,6 @@ from biotac.doctor.listening import listen
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
-from biotac.sim.two_picos import TwoPicos
 from biotac.wire import messages_gen as wire
 
 RIG = "two_picos"

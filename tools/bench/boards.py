@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import statistics
 import subprocess
@@ -210,11 +209,6 @@ def counts() -> dict[str, Any]:
         for board in BOARDS
     }
 
-
-def bits_frames() -> int:
-    found = re.search(r"#define BITS_FRAMES (\d+)", (HERE / "bits.h").read_text(encoding="utf-8"))
-    assert found is not None
-    return int(found.group(1))
 
 
 def bits(board: Board) -> int:

@@ -13,11 +13,8 @@
 static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
 static uint16_t rest_lane[LANES], press_lane[LANES];
 static bt_tare_settings tare_settings;
-static bt_trigger trigger;
-static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma,
-    press_lin;
-static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, rest_events, press_events,
-    shaken_events, jolt_events, slip_events;
+static bt_finger rest_front, press_front, rest_whole, press_whole, press_sigma, press_lin;
+static bt_finger rest_words, rest_events, press_events, shaken_events, slip_events;
 static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, joined;
 static bt_msg_frame message;
 static bt_msg_frame sent;
@@ -62,10 +59,6 @@ static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32
     bt_results(&finger->round, &finger->tare, settings, quantities, &message);
 }
 
-SCENE(one_word)
-{
-    sink = (uint32_t)bt_trigger_electrode(&trigger, 3, rest_lane[3]);
-}
 
 SCENE(front_at_rest)
 {
@@ -94,34 +87,12 @@ SCENE(whole_by_lin)
     pressed(&press_lin, &lins, BT_WANT_ALL);
 }
 
-SCENE(force_only)
-{
-    pressed(&press_force, settings, BT_WANT_FORCE);
-}
-
-SCENE(poc_only)
-{
-    pressed(&press_poc, settings, BT_WANT_POC);
-}
 
 SCENE(with_sigma)
 {
     pressed(&press_sigma, settings, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
 }
 
-SCENE(five_at_rest)
-{
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        untouched(&rest_five[f]);
-    }
-}
-
-SCENE(five_in_contact)
-{
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        pressed(&press_five[f], settings, BT_WANT_ALL);
-    }
-}
 
 SCENE(all_words)
 {
@@ -167,11 +138,6 @@ SCENE(events_shaken)
     events(&shaken_events);
 }
 
-// What shakes and never is a slip: nothing touches.
-SCENE(events_jolting)
-{
-    events(&jolt_events);
-}
 
 SCENE(events_slipping)
 {
@@ -230,17 +196,15 @@ SCENE(map_opened)
 }
 
 const bench_scene bench_scenes[] = {
-    {"trigger", "one word", one_word},
+
     {"front end", "at rest", front_at_rest},
     {"front end", "in contact", front_in_contact},
     {"whole frame", "at rest", whole_at_rest},
     {"whole frame", "in contact", whole_in_contact},
     {"whole frame", "in contact, Lin's scales", whole_by_lin},
-    {"whole frame", "in contact, force only", force_only},
-    {"whole frame", "in contact, PoC only", poc_only},
+
     {"whole frame", "in contact, with sigma", with_sigma},
-    {"five fingers", "at rest", five_at_rest},
-    {"five fingers", "in contact", five_in_contact},
+
     {"wrench map", "signals and offset, 3 axes", map_affine},
     {"wrench map", "sign-split, 3 axes", map_sign_split},
     {"wrench map", "gated sign-split, 3 axes", map_gated},
@@ -254,7 +218,7 @@ const bench_scene bench_scenes[] = {
     {"events", "at rest", events_at_rest},
     {"events", "in contact", events_in_contact},
     {"events", "shaken, nothing told", events_shaken},
-    {"events", "jolting", events_jolting},
+
     {"events", "slipping", events_slipping},
     {"bands", "a round", bands_of_a_round},
     {"link", "44 words taken in, at rest", all_words},
@@ -295,12 +259,11 @@ void bench_scenes_init(void)
     }
     bt_finger_reset(&rest_front, 0);
     run(&rest_front, rest_count, 400);
-    trigger = rest_front.tare.trigger;
     rest_whole = rest_words = press_front = rest_front;
     run(&press_front, press_count, 50);
     press_front.tare.noise.count2 = 400; // exact counts have none
-    press_whole = press_lin = press_force = press_poc = press_sigma = press_front;
-    rest_events = jolt_events = rest_front;
+    press_whole = press_lin = press_sigma = press_front;
+    rest_events = rest_front;
     press_events = slip_events = press_front;
     sink = bt_finger_events(&press_events, 0, true);
     sink = bt_finger_events(&slip_events, 0, true);
@@ -310,7 +273,7 @@ void bench_scenes_init(void)
     shaken_events.events.landing = false;
     shaken_events.events.level_count2 = 3200; // so that a round of this is not enough for any
     swing(&shaken_events, 70);
-    swing(&jolt_events, 200);
+
     swing(&slip_events, 200);
     for (int k = 0; k < 110; k++) { // until it has landed
         events(&slip_events);
@@ -318,8 +281,4 @@ void bench_scenes_init(void)
     bt_finger finger = press_front;
     const bt_solve_settings settings = bt_solve_settings_from(&all);
     bt_finger_frame(&finger, &settings, finger.quantities, 0, &sent);
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        rest_five[f] = rest_front;
-        press_five[f] = press_front;
-    }
 }

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
+import zlib
+
 from .schema import GENERATED
 
-POLYNOMIAL = 0xEDB88320  # reflected
 PER_LINE = 8
-
-
-def entry(byte: int) -> int:
-    crc = byte
-    for _ in range(8):
-        crc = crc >> 1 ^ (POLYNOMIAL if crc & 1 else 0)
-    return crc
+ONES = 0xFFFFFFFF  # zlib's start and end
 
 
 def source() -> str:
-    words = [f"0x{entry(byte):08X}," for byte in range(256)]
+    words = [f"0x{zlib.crc32(bytes([byte]), ONES) ^ ONES:08X}," for byte in range(256)]
     lines = [
         f"// {GENERATED}",
         '#include "wire/crc32.h"',

@@ -60,12 +60,7 @@ def reciprocal(contract: Contract) -> tuple[list[int], int]:
 
 def header(contract: Contract) -> str:
     layout = contract.map
-    blob, fixed, centroid, conductance = (
-        layout["blob"],
-        layout["fixed"],
-        layout["centroid"],
-        layout["conductance"],
-    )
+    blob, fixed, centroid, conductance = (layout[name] for name in ("blob", "fixed", "centroid", "conductance"))
     guesses, twice = reciprocal(contract)
     lines = [
         f"#define BT_MAP_VERSION {blob['version']}",

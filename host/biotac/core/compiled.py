@@ -5,8 +5,7 @@ Both run over the same recorded integers, so that any difference comes from arit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,7 @@ ELECTRODES = len(ELECTRODE_NAMES)
 Settings = dict[wire.Setting, int]
 
 
-@dataclass(frozen=True)
-class Results:
+class Results(NamedTuple):
     """poc_mm, force_n, torque_nmm, each (n, 3) float64; NaN where there is no answer."""
 
     poc_mm: NDArray[np.float64]

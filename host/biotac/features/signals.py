@@ -31,11 +31,16 @@ def signals(rows: npt.NDArray[Any]) -> Floats:
                 f"(n, {ELECTRODES})"
             )
         return rows.astype(np.float64)
-    missing = [name for name in ("counts", "tare") if name not in rows.dtype.names]
-    if missing:
-        raise InputError(f"rows have no {' and no '.join(missing)}: expected frames; load those fields too")
+    check_fields(rows, "counts", "tare")
     counts = rows["counts"]
     return np.where(counts == INVALID_COUNT, np.nan, counts - rows["tare"].astype(np.float64))
+
+
+def check_fields(rows: npt.NDArray[Any], *names: str) -> None:
+    """Raises InputError unless the rows have these fields."""
+    missing = [name for name in names if name not in (rows.dtype.names or ())]
+    if missing:
+        raise InputError(f"rows have no {' and no '.join(missing)}: expected frames; load those fields too")
 
 
 def skin(points_mm: Floats) -> Floats:

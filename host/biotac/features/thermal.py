@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
+from .signals import check_fields
 
 KELVIN_AT_0_C = 273.15
 RANGE_C = (0.0, 75.0)  # from SynTouch's manual; a BioTac SP reads 47 to 63 by it, which looks valid
@@ -28,9 +28,7 @@ def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
     ``tdc`` or ``tac``.
     """
     rows = np.atleast_1d(rows)
-    missing = [name for name in ("tdc", "tac") if name not in (rows.dtype.names or ())]
-    if missing:
-        raise InputError(f"rows have no {' and no '.join(missing)}: expected frames; load those fields too")
+    check_fields(rows, "tdc", "tac")
     result = np.zeros(len(rows), THERMAL_DTYPE)
     share = np.clip(rows["tdc"].astype(np.float64), 1.0, _sensor.FULL_SCALE_COUNT) / _sensor.FULL_SCALE_COUNT
     inside = _sensor.TDC_A / share - _sensor.TDC_B

@@ -130,8 +130,5 @@ class Commands:
                 self.release(*fingers)
 
     def _mask(self, fingers: tuple[Finger, ...]) -> int:
-        return (
-            self._latest.mask([f if isinstance(f, str) else operator.index(f) for f in fingers])
-            if fingers
-            else ALL_FINGERS
-        )
+        named = [f if isinstance(f, str) else operator.index(f) for f in fingers]
+        return self._latest.mask(named) if named else ALL_FINGERS

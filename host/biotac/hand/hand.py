@@ -32,7 +32,7 @@ from ..wire.frames import Frame, StructArray
 from ..wire.sensor_gen import MAX_SENSORS
 from .commands import Commands
 from .configuration import Configuration
-from .record import Mark, Recorder, check_free
+from .record import Mark, Recorder
 from .views import Fingers, FingerView, Latest, checked_names, finger_index
 
 P = ParamSpec("P")
@@ -152,7 +152,7 @@ class Hand:
         """
         number = self._latest.present(finger)
         self._let_pass()
-        return FingerView(self._latest.name(number), number, self._latest, self)
+        return FingerView(self._latest.name(number), number, self._latest, self._go)
 
     def __iter__(self) -> Iterator[str]:
         """Names of the fingers whose sensor answered; a chip select without a name is given as text."""
@@ -281,9 +281,10 @@ class Hand:
         """
         queue, stream, closing = self._pulled, self._stream, self._reader.closing
         with self._by_one_thread():
-            self._begin_to_pull()
-            self._latest.report()
-            stream.go()
+            if not self._has_pulled:
+                self._has_pulled = True
+                self._pulled.begin()
+            self._go()
             while True:
                 self._latest.report()
                 over = not stream.on  # before the queue is emptied, so that nothing is left in it
@@ -300,11 +301,6 @@ class Hand:
         if not self._has_pulled and not self._pulled.lets_pass:
             self._pulled.lets_pass = True
             self._pulled.clear()
-
-    def _begin_to_pull(self) -> None:
-        if not self._has_pulled:
-            self._has_pulled = True
-            self._pulled.begin()
 
     @contextmanager
     def _by_one_thread(self) -> Iterator[None]:
@@ -394,7 +390,7 @@ class Hand:
 
     def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
         """Call ``fn`` when what a finger holds begins to slip: with the events of ``on_event`` that are SLIP."""
-        return self.on_event(_only(wire.EventKind.SLIP, fn))
+        return self._on(wire.Event, self._if_new(fn, wire.EventKind.SLIP))
 
     def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
         """Call ``fn`` as soon as a resting finger's signals move, within the round: a hint that CONTACT may follow.
@@ -428,12 +424,12 @@ class Hand:
         self._stream.imply(kind)
         return self._callbacks.add(kind, fn)
 
-    def _if_new(self, fn: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def _if_new(self, fn: Callable[[Any], Any], kind: wire.EventKind | None = None) -> Callable[[Any], Any]:
         reader, max_age_s = self._reader, self._latest.max_age_s
 
         @wraps(fn)
         def call(message: Any) -> None:
-            if reader.age_s(message.t_us) <= max_age_s:
+            if kind in (None, getattr(message, "kind", None)) and reader.age_s(message.t_us) <= max_age_s:
                 fn(message)
 
         return call
@@ -485,30 +481,15 @@ class Hand:
         recording of this hand is still open.
         """
         self._latest.report()
-        check_free(self._recorders[-1] if self._recorders else None)
-        mid_stream = self._stream.on
-        recorder = Recorder(
-            self._board,
-            self._commands,
-            self.board,
-            self._troubles,
-            Path(path),
-            overwrite=overwrite,
-            mid_stream=mid_stream,
-        )
+        for recorder in self._recorders:
+            if not recorder.closed:
+                raise InputError(f"this hand is being recorded to {recorder.path}; close that recorder first")
+        how = {"overwrite": overwrite, "mid_stream": self._stream.on}
+        recorder = Recorder(self._board, self._commands, self.board, self._troubles, Path(path), **how)
         self._recorders[:] = [recorder]
         if note:
             recorder.mark(note, None, {}, timed=False)
         return recorder
-
-
-def _only(kind: wire.EventKind, fn: Callable[[wire.Event], Any]) -> Callable[[wire.Event], Any]:
-    @wraps(fn)
-    def call(event: wire.Event) -> None:
-        if event.kind == kind:
-            fn(event)
-
-    return call
 
 
 def _reporter(board: Board, troubles: Troubles) -> Callable[[], None]:

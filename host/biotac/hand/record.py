@@ -217,9 +217,3 @@ class Mark:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._recorder._end(self._label)
-
-
-def check_free(recorder: Recorder | None) -> None:
-    """Raise InputError while ``recorder`` is open: a hand has one recording at a time."""
-    if recorder is not None and not recorder.closed:
-        raise InputError(f"this hand is being recorded to {recorder.path}; close that recorder first")

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from operator import index
-from typing import Any, NoReturn, Protocol, SupportsIndex, TypeAlias, TypeVar, cast
+from typing import Any, NoReturn, SupportsIndex, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,15 +27,8 @@ Fingers: TypeAlias = int | str | Iterable[str | int]
 #: Chip selects by name, unless ``biotac.open(..., fingers=...)`` says otherwise.
 DEFAULT_NAMES = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
 
-NOTHING_YET = (
-    FrameFlags.UNTARED
-    | FrameFlags.POC_INVALID
-    | FrameFlags.ELECTRODE_MISSING
-    | FrameFlags.PDC_MISSING
-    | FrameFlags.TAC_MISSING
-    | FrameFlags.TDC_MISSING
-    | FrameFlags.FAULT
-)
+_MISSING = FrameFlags.ELECTRODE_MISSING | FrameFlags.PDC_MISSING | FrameFlags.TAC_MISSING | FrameFlags.TDC_MISSING
+NOTHING_YET = FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.FAULT | _MISSING
 
 
 def checked_names(names: Mapping[str, int] | None) -> dict[str, int]:
@@ -211,13 +204,6 @@ def _counts(row: Any) -> NDArray[np.uint16]:
     return np.asarray(row, np.uint16)
 
 
-class Streams(Protocol):
-    """What a view needs of its hand."""
-
-    def _go(self) -> None:
-        """Start the stream unless it runs."""
-
-
 class FingerView:
     """The latest values of one finger, ``hand["index"]``, read without waiting.
 
@@ -229,11 +215,11 @@ class FingerView:
     CallbackError or OSError when a callback or a recording has failed since the last call.
     """
 
-    def __init__(self, name: str, finger: int, latest: Latest, hand: Streams) -> None:
+    def __init__(self, name: str, finger: int, latest: Latest, go: Callable[[], None]) -> None:
         self.name = name
         self.finger = finger
         self._latest = latest
-        self._hand = hand  # which would be closed with its last reference
+        self._go = go  # starts the stream; holds the hand, which would be closed with its last reference
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
@@ -252,7 +238,7 @@ class FingerView:
 
         Raises TimeoutError when none comes in time, DeviceLostError when the board is lost.
         """
-        self._hand._go()
+        self._go()
         self._latest.wait(self.finger, timeout_s)
         return self.frame
 

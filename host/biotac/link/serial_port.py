@@ -74,19 +74,13 @@ class SerialLink(Link):
 
     def _drain(self) -> bytes:
         # Read the descriptor itself: pyserial's read() and in_waiting would cost as much as all the decoding.
-        fd = self._serial.fileno()
-        try:
-            pieces = [os.read(fd, ONE_READ_BYTES)]
-        except BlockingIOError:
-            return b""  # another program took what was there
-        if not pieces[0]:
-            raise OSError("it hung up")
         # One tty read gives 4 KiB at most, and a reader that takes only one per wake-up loses data at high rates.
-        while len(pieces[-1]) >= TTY_BYTES and len(pieces) < READ_BYTES // TTY_BYTES:
-            try:
+        fd, pieces = self._serial.fileno(), list[bytes]()
+        with suppress(BlockingIOError):  # that was all, or another program took it
+            while not pieces or (len(pieces[-1]) >= TTY_BYTES and len(pieces) < READ_BYTES // TTY_BYTES):
                 pieces.append(os.read(fd, ONE_READ_BYTES))
-            except BlockingIOError:
-                break
+        if pieces[:1] == [b""]:
+            raise OSError("it hung up")
         return b"".join(pieces)
 
     def _read_blocking(self, timeout_s: float) -> bytes:

@@ -4,35 +4,24 @@ from __future__ import annotations
 
 import os
 import time
-from typing import Any
 
 import serial
 
-from ..errors import DeviceLostError, PortError
-from .base import Link
-from .serial_port import READ_BYTES, went_away
+from ..errors import PortError
+from .serial_port import READ_BYTES, USB_BITS_PER_S, SerialLink, went_away
 
 # rfc2217 sends every change of the timeout to its far end, so it stays fixed; a read consists of several such waits.
 WAIT_S = 0.05
 
 
-class UrlLink(Link):
+class UrlLink(SerialLink):
     """A byte pipe to a port that pyserial opens by URL. Several times slower than a port of this computer."""
-
-    def __init__(self, url: str) -> None:
-        self.port = url
-        self._serial: Any = None
-        self.reopen(url)
-
-    def places(self) -> list[str]:
-        """The same URL."""
-        return [self.port]
 
     def reopen(self, place: str) -> None:
         self.close()
         try:
             patience = {"write_timeout": 2} if place.startswith("socket:") else {}  # rfc2217 has no write timeout
-            self._serial = serial.serial_for_url(place, 115200, timeout=WAIT_S, **patience)
+            self._serial = serial.serial_for_url(place, USB_BITS_PER_S, timeout=WAIT_S, **patience)
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(
                 f"{place} cannot be opened ({error}); check host and port, and that it is shared"
@@ -51,15 +40,3 @@ class UrlLink(Link):
                     return b""
         except (serial.SerialException, OSError) as error:
             raise went_away(self.port, error) from error
-
-    def write(self, data: bytes) -> None:
-        try:
-            self._serial.write(data)
-        except (serial.SerialException, OSError) as error:
-            raise DeviceLostError(
-                f"cannot write to {self.port} ({error}); check the network and open it again"
-            ) from error
-
-    def close(self) -> None:
-        if self._serial is not None:
-            self._serial.close()

@@ -11,7 +11,6 @@ from .emulated import EmulatedBoard
 from .loading import load_source
 from .process import SimBoard, SimLink
 from .source import Source
-from .two_picos import TwoPicos
 
 
 @dataclass(frozen=True)
@@ -31,10 +30,7 @@ FORMS = {
     "sim": "sim:SOURCE?pace=X&fingers=N&seconds=S",
     "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S&do=VERB;VERB",
 }
-EXAMPLES = {
-    "sim": "sim:press.toml?pace=real&fingers=2&seconds=5",
-    "emu": "emu:pico?source=press.toml&pace=real&fingers=2&seconds=5",
-}
+
 _OPTIONS = {"sim": {"pace", "fingers", "seconds"}, "emu": {"pace", "fingers", "seconds", "source", "image", "do"}}
 
 
@@ -56,7 +52,7 @@ def parse_sim(port: str, pace: float) -> SimPort:
             tuple(filter(None, options.get("do", "").split(";"))),
         )
     except ValueError as error:
-        raise PortError(f"{port}: {error}; an example is {EXAMPLES[scheme]}") from error
+        raise PortError(f"{port}: {error}; expected {FORMS[scheme]}") from error
 
 
 def open_sim(port: str, pace: float) -> SimLink:
@@ -75,6 +71,4 @@ def start_board(
     """
     if board == "posix":
         return SimBoard(source, pace=pace, hold=True)
-    if board == "two_picos":
-        return TwoPicos(source, pace=pace, hold=True, image=image, verbs=verbs)
     return EmulatedBoard(board, source, pace=pace, hold=True, image=image, verbs=verbs)

@@ -189,19 +189,11 @@ class StreamDecoder:
 
     def _feed(self, chunk: Buffer) -> Batch:
         size = len(chunk)
-        if type(chunk) is bytes and size <= ONE_STEP_BYTES:
+        if size <= ONE_STEP_BYTES:
             # cffi passes the address of bytes, which is faster than borrowing a buffer.
-            _feed(self._state, chunk, size)
+            _feed(self._state, bytes(chunk), size)
             return self._batch()
-        batches: list[Batch] = []
-        with ffi.from_buffer(chunk) as data:
-            at, size = 0, len(data)
-            while at < size or not batches:
-                at += _feed(self._state, data + at, size - at)
-                batches.append(self._batch())
-        if len(batches) == 1:
-            return batches[0]
-        batch = join(batches)
+        batch = join([self._feed(chunk[at : at + ONE_STEP_BYTES]) for at in range(0, size, ONE_STEP_BYTES)])
         self.taken, self.last_t_us = size, batch.last_t_us()
         return batch
 
@@ -274,10 +266,7 @@ def known(others: list[tuple[int, bytes]]) -> list[Any]:
 
 def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
     """The rows before device time ``end_us``, with all messages, and the other rows."""
-    now = batch.t_us < end_us
-    pac_now = batch.pac["t_us"] < end_us
-    idle_now = batch.idle["t_us"] < end_us
-
+    now, pac_now, idle_now = (t_us < end_us for t_us in (batch.t_us, batch.pac["t_us"], batch.idle["t_us"]))
     whole_us = batch.last_t_us()
 
     def rows(frames: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
@@ -295,13 +284,7 @@ def join(batches: list[Batch]) -> Batch:
     """One batch of all rows, in order."""
     if not batches:
         return StreamDecoder().feed(b"")
-    return Batch(
-        np.concatenate([b.wire for b in batches]),
-        np.concatenate([b.seq for b in batches]),
-        np.concatenate([b.t_us for b in batches]),
-        np.concatenate([b.pac for b in batches]),
-        np.concatenate([b.idle for b in batches]),
-        [m for b in batches for m in b.messages],
-        arrived_s=batches[-1].arrived_s,
-        taken_s=batches[-1].taken_s,
-    )
+    names, last = ("wire", "seq", "t_us", "pac", "idle"), batches[-1]
+    sent, seq, t_us, pac, idle = (np.concatenate([getattr(b, name) for b in batches]) for name in names)
+    messages = [m for b in batches for m in b.messages]
+    return Batch(sent, seq, t_us, pac, idle, messages, arrived_s=last.arrived_s, taken_s=last.taken_s)

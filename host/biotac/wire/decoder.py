@@ -19,12 +19,13 @@ STREAMED = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)  # the messages that come 
 
 # Looked up once: a few of these look-ups would take as long as a chunk of few messages.
 _decode = lib.bt_decode
-_from_buffer = ffi.from_buffer
+
 _unpack = ffi.unpack
 _frombuffer = np.frombuffer
 FRAME, PAC, IDLE = (DTYPES[message_id] for message_id in STREAMED)
 NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC, IDLE))
 _KINDS = int(lib.BT_DECODED_KINDS)
+_ROWS = ("frames", "pacs", "idles")
 ONE_STEP_BYTES = int(lib.bt_decode_bytes())
 
 # Not cleared, because the reset sets what is read: most of the memory is never touched by a short connection.
@@ -48,7 +49,7 @@ class Decoded:
 
     def messages(self) -> list[tuple[int, bytes]]:
         """All messages as (message id, payload), in order of arrival. Slow: for few messages only."""
-        rows = map(iter, (self.frames, self.pacs, self.idles))
+        rows = (iter(getattr(self, name)) for name in _ROWS)
         streams = dict(zip(STREAMED, rows, strict=True))
         others = iter(self.others)
         return [
@@ -69,34 +70,27 @@ class Decoder:
         lib.bt_decoder_reset(self._state)
         # Views of the state; they do not keep it alive, self._state does.
         self._filled = self._state.filled
-        self._data = [ffi.buffer(data) for data in self._state.data]
-        self._frames, self._pacs, self._idles, self._others, self._ids = self._data
+        self._frames, self._pacs, self._idles, self._others, self._ids = map(ffi.buffer, self._state.data)
 
     def feed(self, chunk: Buffer) -> Decoded:
         """Take any number of bytes; return what they complete."""
         size = len(chunk)
-        if type(chunk) is bytes and size <= ONE_STEP_BYTES:
-            # cffi passes the address of bytes, which is faster than borrowing a buffer. All in one place, because
-            # calling functions for the parts would cost a quarter of the time of a chunk of 4096 bytes.
-            _decode(self._state, chunk, size)
-            n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
-            return Decoded(
-                _frombuffer(self._frames[:n_frames], FRAME) if n_frames else NO_FRAME,
-                _frombuffer(self._pacs[:n_pacs], PAC) if n_pacs else NO_PAC,
-                _frombuffer(self._idles[:n_idles], IDLE) if n_idles else NO_IDLE,
-                pairs(self._others[:n_others]) if n_others else [],
-                self._ids[:n_ids],
-            )
-        steps = [(b"",) * _KINDS]
-        with _from_buffer(chunk) as data:
-            size = len(data)
-            at = 0
-            while at < size:
-                at += _decode(self._state, data + at, size - at)
-                # Copies, because the next call overwrites what this one completed.
-                steps.append(tuple(rows[:n] for rows, n in zip(self._data, _unpack(self._filled, _KINDS), strict=True)))
-        frames, pacs, idles, others, ids = (b"".join(parts) for parts in zip(*steps, strict=True))
-        return Decoded(_frombuffer(frames, FRAME), _frombuffer(pacs, PAC), _frombuffer(idles, IDLE), pairs(others), ids)
+        if size > ONE_STEP_BYTES:
+            parts = [self.feed(chunk[at : at + ONE_STEP_BYTES]) for at in range(0, size, ONE_STEP_BYTES)]
+            frames, pacs, idles = (np.concatenate([getattr(d, name) for d in parts]) for name in _ROWS)
+            others = [other for decoded in parts for other in decoded.others]
+            return Decoded(frames, pacs, idles, others, b"".join(decoded.ids for decoded in parts))
+        # cffi passes the address of bytes, which is faster than borrowing a buffer. All in one place, because calling
+        # functions for the parts would cost a quarter of the time of a chunk of 4096 bytes.
+        _decode(self._state, bytes(chunk), size)
+        n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
+        return Decoded(
+            _frombuffer(self._frames[:n_frames], FRAME) if n_frames else NO_FRAME,
+            _frombuffer(self._pacs[:n_pacs], PAC) if n_pacs else NO_PAC,
+            _frombuffer(self._idles[:n_idles], IDLE) if n_idles else NO_IDLE,
+            pairs(self._others[:n_others]) if n_others else [],
+            self._ids[:n_ids],
+        )
 
     @property
     def counts(self) -> FramingCounts:

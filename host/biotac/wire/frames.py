@@ -40,14 +40,6 @@ BANDS_DTYPE = dtype_of(BANDS_FIELDS)
 IDLE_DTYPE = dtype_of(IDLE_FIELDS)
 
 
-def _no_tare() -> NDArray[np.float32]:
-    return np.full(19, np.nan, np.float32)
-
-
-def _no_sigma() -> NDArray[np.float64]:
-    return np.full(3, np.nan)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One round of slots (10 ms) of one finger. Two are equal when all values are equal, where NaN equals NaN.
@@ -68,11 +60,11 @@ class Frame:
     force_n: NDArray[np.float64]
     torque_nmm: NDArray[np.float64]
     flags: FrameFlags
-    tare: NDArray[np.float32] = field(default_factory=_no_tare)
+    tare: NDArray[np.float32] = field(default_factory=lambda: np.full(19, np.nan, np.float32))
     pdc_tare: float = math.nan
     tare_state: int = TareState.INIT
     poc_sigma_mm: float = math.nan
-    force_sigma_n: NDArray[np.float64] = field(default_factory=_no_sigma)
+    force_sigma_n: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.nan))
     pdc_filtered: float = math.nan
     pressure_force_n: float = math.nan
     torsion_nmm: float = math.nan

@@ -93,7 +93,7 @@ def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board
 
 
 def test_three_axes_are_enough_for_force(board: Board, reference: Reference) -> None:
-    samples = replace(reference.samples, wrench=reference.samples.force_n)
+    samples = replace(reference.samples, wrench=reference.samples.wrench[:, :3])
     joined = join("board.mcap", board, replace(reference, samples=samples))
     assert joined.run.truth.shape[1] == 3
     assert np.isnan(joined.on_skin_share)
@@ -103,7 +103,7 @@ def test_a_reference_of_a_tenth_of_the_rate(
     recorded: tuple[Recording, Source], board: Board, reference: Reference
 ) -> None:
     samples = reference.samples
-    thin = Samples(samples.t_s[::10], samples.force_n[::10])
+    thin = Samples(samples.t_s[::10], samples.wrench[::10, :3])
     found = join("board.mcap", board, replace(reference, samples=thin)).run.truth
     truth = truth_of(recorded, board)[: len(found), :3]
     assert np.sqrt(((found - truth) ** 2).mean(axis=0)).max() < 0.1
@@ -113,13 +113,14 @@ def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: Board, refere
     whole = join("board.mcap", board, reference)
     samples = reference.samples
     gone = (samples.t_s > samples.t_s[0] + 135.0) & (samples.t_s < samples.t_s[0] + 137.0)
-    found = join("board.mcap", board, replace(reference, samples=Samples(samples.t_s[~gone], samples.force_n[~gone])))
+    kept = Samples(samples.t_s[~gone], samples.wrench[~gone, :3])
+    found = join("board.mcap", board, replace(reference, samples=kept))
     assert len(whole.run.truth) - len(found.run.truth) == pytest.approx(200, abs=10)
 
 
 def spoilt(reference: Reference, how: str) -> Reference:
     samples = reference.samples
-    t_s, force, torque = samples.t_s.copy(), samples.force_n.copy(), samples.wrench[:, 3:].copy()
+    t_s, force, torque = samples.t_s.copy(), samples.wrench[:, :3].copy(), samples.wrench[:, 3:].copy()
     mounting = reference.mounting
     if how == "another run":
         order = np.argsort((t_s // 1.7 * 0.61803) % 1.0, kind="stable")

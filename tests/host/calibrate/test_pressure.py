@@ -289,9 +289,8 @@ STILL = Rest(REST, 0.6, 50)
     ("given", "words"),
     [
         ([held(2, 200), held(3, 300)], "finger 0: 2 presses, expected at least 3"),
-        ([held(2, 200), held(3, 300), held(4, 400, 3, 10)], "press 3: 10 held rows, expected at least 50"),
-        ([held(2, 200), held(np.nan, 300, 2), held(4, 400)], "press 2: the reference is NaN in 50 of 50 rows"),
-        ([held(2000, 200), held(3000, 300), held(4000, 400)], r"K is 10 N/count.*is the reference in newtons\?"),
+        ([held(2, 200), held(np.nan, 300, 2), held(4, 400)], "press 2: the reference is nan N while"),
+        ([held(2000, 200), held(3000, 300), held(4000, 400)], r"K is 10 N/count.*is the reference in newtons,"),
         ([held(0.002, 200), held(0.003, 300), held(0.004, 400)], r"K is 1e-05 N/count, expected 0.0009 to 0.1"),
         ([held(-2, 200), held(3, 300), held(4, 400)], "the reference is -2 N while pressure is 200 counts above rest"),
         ([held(0, 200), held(3, 300), held(4, 400)], "the reference is 0 N while"),
@@ -318,8 +317,6 @@ def test_the_verification_counts_scatter_as_well_as_offset() -> None:
     rows = wrong.rows.copy()
     rows["board_n"] = np.tile([2.7, 3.3], HOLD_ROWS // 2)  # right in the mean
     assert verify(fitted, Press(0, 1, rows)).board_error == pytest.approx(0.1)
-    with pytest.raises(InputError, match="the board gave no force from pressure in 50 of 50 held rows"):
-        verify(fitted, held(3.0, 300))
 
 
 def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:

@@ -98,7 +98,7 @@ def test_units_of_a_csv_are_read(header: str, torque_factor: float, tmp_path: Pa
     rows = np.column_stack([5.0 + np.arange(N) * 0.002, loads])
     found = read_reference(str(written(tmp_path, header, rows)), LIN).samples
     np.testing.assert_allclose(found.t_s, rows[:, 0], rtol=1e-8)
-    np.testing.assert_allclose(found.force_n, loads[:, :3], rtol=1e-8)
+    np.testing.assert_allclose(found.wrench[:, :3], loads[:, :3], rtol=1e-8)
     np.testing.assert_allclose(found.wrench[:, 3:], loads[:, 3:] * torque_factor, rtol=1e-8)
 
 
@@ -108,7 +108,7 @@ def test_a_csv_may_have_three_axes_semicolons_and_other_columns(tmp_path: Path) 
     lines = [f"{k};{v[2]};{v[0]};{v[1]};{k * 0.01}" for k, v in enumerate(loads)]
     path.write_text("\n".join(["sample;Fz [N];Fx [N];Fy [N];t [s]", *lines]))
     found = read_reference(str(path), LIN).samples
-    np.testing.assert_allclose(found.force_n, loads[:, :3])
+    np.testing.assert_allclose(found.wrench[:, :3], loads[:, :3])
     assert found.wrench.shape[1] == 3
 
 

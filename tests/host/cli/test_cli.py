@@ -295,3 +295,22 @@ def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, mess
         main(command.split())
     assert refused.value.code == 2
     assert message in capsys.readouterr().err
+
+
+def test_view_once_plays_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[bool] = []
+
+    class Viewing:
+        url = "http://127.0.0.1"
+
+        def __init__(self, source: str, *, again: bool, **how: object) -> None:
+            asked.append(again)
+
+        def wait(self) -> None: ...
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr("biotac.view.serving.Viewing", Viewing)
+    for more in ([], ["--once"]):
+        assert main(["view", "sim:press.toml", "--no-browser", *more]) == 0
+    assert asked == [True, False]

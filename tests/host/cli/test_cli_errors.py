@@ -114,7 +114,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "record it again", "view @empty.mcap --no-browser --json"),
     (2, "name another with --folder", "view sim:press.toml --no-browser --folder +no/where"),
     (3, "`biotac list`", f"stream {NO_PORT}"),
-    (3, "an example is sim:", "stream sim:press.toml?pace=quick"),
+    (3, "expected sim:SOURCE?pace=X", "stream sim:press.toml?pace=quick"),
     (3, "`biotac list`", f"share {NO_PORT} --lsl"),
     (3, "`biotac list`", f"share {NO_PORT} --zenoh left"),
     (2, "expected up to 64 letters", "share sim:press.toml --zenoh left/right"),

@@ -211,6 +211,16 @@ def test_a_promise_stands_in_for_round_trips(seed: int) -> None:
     assert np.median(clock.uncertainty_s(t_us)) < 0.002
 
 
+def test_the_cheap_estimate_and_the_extended_fit_are_within_the_bound() -> None:
+    clock = DeviceClock()
+    for k in range(100):
+        clock.round_trip(50.0 + k, 1_000_000 * k, 50.001 + k)  # answered after half a ms
+    host_s, bound_s = clock.now().extended(np.array([102_250_000.0]))
+    for found_s in (clock.estimate_s(102_250_000), host_s[0]):
+        assert abs(found_s - 152.2505) < bound_s[0] < 0.001
+    assert np.isnan(DeviceClock().estimate_s(0))
+
+
 def test_the_example_in_the_documentation_is_true() -> None:
     done = doctest.testmod(biotac.clock)
     assert done.attempted > 0

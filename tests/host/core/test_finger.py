@@ -135,6 +135,16 @@ def test_host_tares_are_the_boards() -> None:
     assert finger.tare_counts.tolist() == [2990.0] * 19
 
 
+def test_a_hold_ends_by_release_or_lapse() -> None:
+    for end in (Finger.release, Finger.lapse):
+        finger, still = Finger(quantities=ALL_ROUNDS), np.full((30, 19), 3000)
+        held = [bool(finger.feed(still)["flags"][-1] & FrameFlags.HELD)]
+        for act in (Finger.hold, end):
+            act(finger)
+            held.append(bool(finger.feed(still)["flags"][-1] & FrameFlags.HELD))
+        assert held == [False, True, False]
+
+
 def test_settings_and_times() -> None:
     counts = np.full((40, 19), 3000)
     counts[30:, 16] -= 10

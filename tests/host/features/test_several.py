@@ -29,7 +29,7 @@ def test_the_graph_is_the_skin_s() -> None:
 def test_one_pressed_electrode_is_one_contact_over_it_and_nothing_is_none() -> None:
     assert several.contacts(np.zeros(19)) == []
     (one,) = several.contacts(signals(E19=900))
-    assert one.electrodes == (18,) and one.share == 1.0
+    assert one == several.Contact(one.poc_mm, share=1.0, electrodes=(18,))
     np.testing.assert_allclose(one.poc_mm, surface.project(surface.ELECTRODE_MM[[18]])[0])
     missing = signals(E19=900)
     missing[4] = np.nan

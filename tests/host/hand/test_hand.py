@@ -205,3 +205,23 @@ def test_one_recording_at_a_time_and_the_stream_goes_on_after_it(tmp_path) -> No
         hand.read(10.0, fresh=True)  # what comes after that
     assert biotac.Recording(tmp_path / "a.mcap").problems == []
     assert len(biotac.load(tmp_path / "b.mcap")) > 0
+
+
+def test_what_a_hand_and_its_recording_give_are_the_documented_classes(tmp_path) -> None:
+    path = tmp_path / "pressed.mcap"
+    with biotac.open("sim:press.toml?seconds=2") as hand, hand.record(path) as recorder:
+        assert isinstance(recorder, biotac.Recorder) and isinstance(hand["index"], biotac.FingerView)
+        with hand.mark("pressed"):
+            hand.read(1)
+    recording = biotac.Recording(path)
+    assert [type(label) for label in recording.labels] == [biotac.Label]
+    assert isinstance(recording.select(start_s=0.5), biotac.Selection)
+
+
+def test_the_bus_is_tried_at_another_rate_only_while_nothing_streams() -> None:
+    with biotac.open("sim:press.toml?seconds=2") as hand:
+        hand.stream()
+        with pytest.raises(biotac.CommandRefusedError, match="BUSY"):
+            hand.board.try_bus_rate(1000)
+        hand.stop()
+        assert hand.board.try_bus_rate(1000).bus_khz > 0

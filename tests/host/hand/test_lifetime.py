@@ -54,7 +54,7 @@ def test_a_finger_and_an_iteration_keep_their_hand() -> None:
     finger, alive = hand["index"], weakref.ref(hand)
     del hand
     gc.collect()
-    batches = finger._hand.batches()
+    batches = finger._go.__self__.batches()
     next(batches)
     del finger
     gc.collect()

@@ -157,6 +157,12 @@ def test_the_mesh_covers_half_a_cylinder_and_a_quarter_sphere() -> None:
 # ---- symmetry ----------------------------------------------------------------------------------
 
 
+def test_what_is_on_the_surface_is_what_the_mesh_covers() -> None:
+    mesh, _, _ = surface.ventral_mesh()
+    assert all(surface.is_on_surface(x, y) for x, y, _ in mesh)
+    assert not any(surface.is_on_surface(*xy) for xy in ((-16.1, 0), (-8, 5.2), (4, 4), (5.2, 0)))
+
+
 def test_a_mirrored_load_on_a_mirrored_sensor_gives_mirrored_counts() -> None:
     mirrored_mm = surface.ELECTRODE_MM * [1, -1, 1]
     twin = [int(np.flatnonzero((row == surface.ELECTRODE_MM).all(axis=1))[0]) for row in mirrored_mm]

@@ -104,6 +104,9 @@ def test_heartbeats_account_for_the_rounds_without_a_frame(together: bool) -> No
     assert heartbeats["frames"].tolist() == [10, 5]
     assert heartbeats["energy_count2"].tolist() == [17, 17]
     assert batches[-1].last_t_us() == 170_000
+    assert (batches[0].first_t_us(), decoder.feed(b"").first_t_us()) == (0, None)
+    assert together or batches[1].first_t_us() == 100_000
+    assert np.isnan(batches[0].taken_s)  # nobody knows when: these bytes came from no board
 
 
 @pytest.mark.parametrize("missing", [0, 1, 2, 3])

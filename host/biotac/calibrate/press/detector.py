@@ -72,12 +72,8 @@ class Press:
         force_n = self.rows["force_n"]
         return float(force_n[0] if (force_n == force_n[0]).all() else np.mean(force_n))
 
-    def with_force(self, force_n: float) -> Press:
-        """The same press with one force in all rows, as a scale showed it."""
-        return self.with_column("force_n", force_n)
-
     def with_column(self, name: str, values: Any) -> Press:
-        """The same press with other values in a column of its rows."""
+        """The same press with other values in a column of its rows, such as the one force that a scale showed."""
         rows = self.rows.copy()
         rows[name] = values
         return Press(self.finger, self.number, rows)

@@ -60,7 +60,7 @@ def guide(
         return procedure.presses
     found: dict[int, list[Press]] = {}
     for (press, _), force_n in zip(procedure.asked(), forces_n, strict=True):
-        found.setdefault(press.finger, []).append(press.with_force(force_n))
+        found.setdefault(press.finger, []).append(press.with_column("force_n", force_n))
     return found
 
 

@@ -150,7 +150,7 @@ def recorded(
     own = recording.wire["finger"] == finger
     messages, t_us = recording.wire[own], recording.frames["t_us"][own]
     found = Procedure([finger], forces_n, needs_force=False).find(rows_of(messages, t_us))[finger]
-    presses = [press.with_force(force) for press, force in zip(found, forces_n, strict=True)]
+    presses = [press.with_column("force_n", force) for press, force in zip(found, forces_n, strict=True)]
     return _held(messages, t_us, presses, toward)
 
 
@@ -165,9 +165,7 @@ def _held(frames: StructArray, t_us: Any, presses: Sequence[Press], toward: Sequ
         held = frames[np.isin(t_us, press.rows["t_us"])]
         whole = (held["counts"] != wire.INVALID_COUNT).all(axis=1) & (held["tare_q4"] != wire.INVALID_COUNT).all(axis=1)
         if not whole.any():
-            raise InputError(
-                f"press {k + 1} has no frame with all electrodes and a tare: expected one; check the sensor"
-            )
+            raise InputError(f"press {k + 1}: no frame with all electrodes and a tare: expected one; check the sensor")
         counts.append(held["counts"][whole].astype(np.float64))
         tares.append(held["tare_q4"][whole] / Q4_PER_COUNT)
         numbers.append(np.full(int(whole.sum()), k))

@@ -146,7 +146,7 @@ def calibrate_recording(
         procedure = Procedure([finger], asked, needs_force=reference is not None)
         presses = procedure.find(own_rows)[finger]
         if reference is None:
-            presses = [press.with_force(force) for press, force in zip(presses, forces_n, strict=True)]
+            presses = [press.with_column("force_n", force) for press, force in zip(presses, forces_n, strict=True)]
         fitted = outcome.add(procedure.rests[finger], presses, **source)
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
         outcome.calibrations[finger] = replace(

@@ -20,9 +20,10 @@ from typing import TextIO
 
 import numpy as np
 
+from ...core.geometry import Floats
 from ...errors import DeviceLostError, InputError, RecordingError, taken
 from .mounting import Mounting, from_json
-from .samples import Floats, Reference, Samples, check
+from .samples import Reference, Samples, check
 
 COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
 # in the order of the result; torque may be named M or T

@@ -16,12 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...documents import TOML_BYTES, parse_json, parse_toml, read_text
 from ...errors import InputError
-
-Floats = npt.NDArray[np.float64]
 
 READS = ("force on finger", "force on sensor")
 MAX_SKEW = 1e-3  # of R R' - 1: passes a rotation with three decimals, not one with a forgotten minus
@@ -120,9 +118,6 @@ def read_mounting(text: str) -> Mounting:
 def from_json(text: str, where: str) -> Mounting:
     """The mounting in one line of JSON, as in a recorded reference. Raises InputError that begins with ``where``."""
     try:
-        facts = parse_json(text)
-    except ValueError as error:
-        raise InputError(f"{where}: {error}: expected a mounting in JSON") from None
-    if not isinstance(facts, dict):
-        raise InputError(f"{where}: {text[:40]!r}: expected an object with {', '.join(KEYS)}")
-    return mounting_of(facts, where)
+        return mounting_of(dict(parse_json(text)), where)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{where}: {error}: expected a JSON object with {', '.join(KEYS)}") from None

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import PortError
-from ..link.serial_port import SerialLink
-from ..wire.sensor_gen import SLOTS
-from .emulated import EmulatedBoard, new_pty
-from .process import SimLink
-from .sensor_board import SensorBoard
-from .source import Source
+from biotac.errors import PortError
+from biotac.link.serial_port import SerialLink
+from biotac.sim.emulated import EmulatedBoard, new_pty
+from biotac.sim.process import SimLink
+from biotac.sim.sensor_board import SensorBoard
+from biotac.sim.source import Source
+from biotac.wire.sensor_gen import SLOTS
 
 NOTHING = Source("nothing", np.zeros((1, 1, len(SLOTS)), np.uint16))
 
