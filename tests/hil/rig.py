@@ -122,10 +122,10 @@ def prepare(facts: dict[str, Any]) -> str | None:
     (ROOT / "build").mkdir(exist_ok=True)
     with open(ROOT / "build/rigs.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # of several test processes one builds, the others find it built
-        for words in facts.get("prepare", []):
-            done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+        for command in facts.get("prepare", []):
+            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
             if done.returncode:
-                raise RuntimeError(f"{' '.join(words)} failed: {(done.stderr or done.stdout).strip()}")
+                raise RuntimeError(f"{' '.join(command)} failed: {(done.stderr or done.stdout).strip()}")
     return None
 
 

@@ -43,8 +43,8 @@ def boards() -> Iterator[Callable[..., Ports]]:
     running: list[subprocess.Popen[str]] = []
 
     def start(*leads: str) -> Ports:
-        words = [sys.executable, ROOT / "tools/two_boards", *leads]
-        running.append(subprocess.Popen(words, stdout=subprocess.PIPE, text=True))
+        command = [sys.executable, ROOT / "tools/two_boards", *leads]
+        running.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
         assert running[-1].stdout is not None
         _, port, _, sensor_port = running[-1].stdout.readline().split()
         return port, sensor_port
@@ -58,9 +58,9 @@ def boards() -> Iterator[Callable[..., Ports]]:
 @pytest.mark.nightly
 def test_the_suite_runs_on_two_boards_of_which_only_the_ports_are_known(boards: Callable[..., Ports]) -> None:
     port, sensor_port = boards()
-    words = ["--rig", "bench", "--port", port, "--sensor-port", sensor_port]
+    command = ["--rig", "bench", "--port", port, "--sensor-port", sensor_port]
     tests = [str(Path(__file__).with_name(name)) for name in SUITE]
-    done = subprocess.run([sys.executable, "-m", "pytest", *tests, *words], capture_output=True, text=True, cwd=ROOT)
+    done = subprocess.run([sys.executable, "-m", "pytest", *tests, *command], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stdout
     print(done.stdout)
 

@@ -75,25 +75,25 @@ def test_an_error_word_is_kept_for_the_user(play) -> None:
 
 def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     frames, _ = play(hurt_by("bad_parity", "E5"))
-    mine = of(frames, 1)
-    hurt = np.flatnonzero(mine["counts"][:, 4] == INVALID)
+    faulty = of(frames, 1)
+    hurt = np.flatnonzero(faulty["counts"][:, 4] == INVALID)
     assert hurt.tolist() == list(range(180, 210))
-    missing = (mine["flags"] & FrameFlags.ELECTRODE_MISSING) != 0
+    missing = (faulty["flags"] & FrameFlags.ELECTRODE_MISSING) != 0
     assert np.array_equal(np.flatnonzero(missing), hurt)
-    assert not np.any(np.delete(mine["counts"], 4, axis=1) == INVALID)
+    assert not np.any(np.delete(faulty["counts"], 4, axis=1) == INVALID)
     # The finger is still held: its tare and its contact outlive the fault.
-    assert ((mine["flags"][180:] & FrameFlags.CONTACT) != 0).all()
+    assert ((faulty["flags"][180:] & FrameFlags.CONTACT) != 0).all()
 
 
 @pytest.mark.long
 def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
     healthy, _ = play(HEALTHY)
     frames, _ = play(hurt_by("no_channel", "TDC"))
-    mine, other = of(frames, 1), of(healthy, 1)
+    faulty, whole = of(frames, 1), of(healthy, 1)
     hurt = slice(180, 210)
-    assert (mine["tdc"][hurt] == INVALID).all()
-    assert ((mine["flags"][hurt] & FrameFlags.TDC_MISSING) != 0).all()
-    assert mine["force_n"].tobytes() == other["force_n"].tobytes()
+    assert (faulty["tdc"][hurt] == INVALID).all()
+    assert ((faulty["flags"][hurt] & FrameFlags.TDC_MISSING) != 0).all()
+    assert faulty["force_n"].tobytes() == whole["force_n"].tobytes()
 
 
 @pytest.mark.long
@@ -110,9 +110,9 @@ def test_every_slot_of_every_finger_was_read(rig, play) -> None:
     rig.need("silence")
     _, status = play(HEALTHY)
     for finger in range(3):
-        words = status[finger]
-        assert words.words_good == 250 * 44
-        assert words.words_parity == words.words_stuck == words.words_error == 0
+        sensor = status[finger]
+        assert sensor.words_good == 250 * 44
+        assert sensor.words_parity == sensor.words_stuck == sensor.words_error == 0
 
 
 @pytest.mark.long

@@ -31,9 +31,9 @@ def for_finger(hand: biotac.Hand, finger: int) -> Calibration:
 def test_a_calibration_is_set_told_and_cleared(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     assert [hand.board.calibration(f) for f in range(5)] == [None] * 5
-    mine = for_finger(hand, 1)
-    hand.board.set_calibration(1, mine)
-    assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (mine, CalibrationState.IN_FORCE)
+    own_gains = for_finger(hand, 1)
+    hand.board.set_calibration(1, own_gains)
+    assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (own_gains, CalibrationState.IN_FORCE)
     assert hand.board.calibration_state(0) == CalibrationState.NONE
     hand.board.clear_calibration(1)
     assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (None, CalibrationState.NONE)
@@ -88,8 +88,8 @@ def test_frames_of_two_fingers_come_from_each_ones_own_gains(
 def test_gains_at_their_limits_are_as_exact_as_any_and_beyond_them_refused(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("shear.toml?fingers=2&seconds=2.5")
     for finger, top in enumerate((GAIN_MAX_NN, -GAIN_MAX_NN)):
-        its = replace(OWN, force_gain_nn=(top, -top, top), torque_gain_nn=(-top, top), pressure_gain_nn=GAIN_MAX_NN)
-        hand.board.set_calibration(finger, its)
+        limit = replace(OWN, force_gain_nn=(top, -top, top), torque_gain_nn=(-top, top), pressure_gain_nn=GAIN_MAX_NN)
+        hand.board.set_calibration(finger, limit)
     with pytest.raises((CommandRefusedError, ValueError)):
         hand.board.set_calibration(0, replace(OWN, force_gain_nn=(GAIN_MAX_NN + 1, 0, 0)))
     settings, own = hand.board.settings(), hand.board.finger_settings()
@@ -107,13 +107,13 @@ def test_a_saved_calibration_holds_after_power_was_off(rig: Rig) -> None:
     hand = rig.open("press.toml?fingers=2&pace=fast")
     hand.stop()
     hand.link.release()
-    mine = for_finger(hand, 0)
-    hand.board.set_calibration(0, mine)
+    own_gains = for_finger(hand, 0)
+    hand.board.set_calibration(0, own_gains)
     hand.board.set_calibration(1, OWN)
     hand.board.save_settings()
     hand.board.clear_calibration(0)  # not saved
     reboot(hand, 2)
-    assert hand.board.calibrations() == {0: mine, 1: OWN}
+    assert hand.board.calibrations() == {0: own_gains, 1: OWN}
     hand.board.clear_calibration(0)
     hand.board.save_settings()
     reboot(hand, 3)

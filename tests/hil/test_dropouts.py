@@ -45,10 +45,10 @@ def play(rig: Rig, tmp_path: Path, seconds: float, kind: str | None, *, calibrat
     return hand.read_batch(100).frames, hand
 
 
-def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def split(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frames before and after the longest gap."""
-    cut = int(np.argmax(np.diff(mine["t_us"].astype(np.int64)))) + 1
-    return mine[:cut], mine[cut:]
+    cut = int(np.argmax(np.diff(frames["t_us"].astype(np.int64)))) + 1
+    return frames[:cut], frames[cut:]
 
 
 def undisturbed(rig: Rig, tmp_path: Path, seconds: float) -> np.ndarray:
@@ -111,10 +111,10 @@ def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tm
     hand = rig.open(str(path))
     frames = hand.read_batch(100).frames
     assert hand.fingers == [0]
-    told = hand.sensor_info(1)
-    assert (told.present, bytes(told.serial)) == (0, b"BTSP050400018017")
-    mine, other = of(frames, 1), of(frames, 0)
-    assert len(mine) > 200 and np.all(mine["flags"] & FrameFlags.SENSOR_UNSURE)
+    sensor = hand.sensor_info(1)
+    assert (sensor.present, bytes(sensor.serial)) == (0, b"BTSP050400018017")
+    foreign, other = of(frames, 1), of(frames, 0)
+    assert len(foreign) > 200 and np.all(foreign["flags"] & FrameFlags.SENSOR_UNSURE)
     assert not np.any(other["flags"] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER))
     latched = hand.board.faults().by_index
     assert latched[1] & FrameFlags.SENSOR_UNSURE and not latched[0] & FrameFlags.SENSOR_UNSURE

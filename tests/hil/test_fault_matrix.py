@@ -59,8 +59,8 @@ def faults_of(play: dict[str, Any]) -> list[tuple[float, float]]:
 
 
 def scenario(play: dict[str, Any]) -> str:
-    its = play["kind"], play.get("channel")
-    return HEALTHY + "".join(fault(its[0], round(at_s, 3), seconds, HURT, its[1]) for at_s, seconds in faults_of(play))
+    kind, channel = play["kind"], play.get("channel")
+    return HEALTHY + "".join(fault(kind, round(at_s, 3), seconds, HURT, channel) for at_s, seconds in faults_of(play))
 
 
 def noisy(source: Source, a_bit: float) -> tuple[Source, np.ndarray, np.ndarray]:
@@ -102,11 +102,11 @@ def healthy(rig: Rig, tmp_path: Path, recorded: bool) -> biotac.Batch:
 
 def counts_file(path: Path, frames: np.ndarray, play: dict[str, Any] | None = None) -> Path:
     """The hurt finger's counts, with words that have good parity and are wrong."""
-    mine = of(frames, HURT)
-    counts = mine["counts"].copy()
+    faulty = of(frames, HURT)
+    counts = faulty["counts"].copy()
     if play is not None:
         counts[round(play["at_s"] * 100), : play["electrodes"]] = play["count"]
-    np.savez(path, E=counts, PDC=mine["pdc"], TAC=mine["tac"], TDC=mine["tdc"])
+    np.savez(path, E=counts, PDC=faulty["pdc"], TAC=faulty["tac"], TDC=faulty["tdc"])
     return path
 
 
@@ -131,24 +131,24 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     batch, status, latched = run(rig, source)
     frames = batch.frames
     assert of(frames, WITNESS).tobytes() == of(good, WITNESS).tobytes()
-    good, mine = of(good, HURT), of(frames, HURT)
+    good, faulty = of(good, HURT), of(frames, HURT)
     begin_us = good["t_us"][0]
-    missing_s = (np.setdiff1d(good["t_us"], mine["t_us"]) - begin_us) / 1e6
+    missing_s = (np.setdiff1d(good["t_us"], faulty["t_us"]) - begin_us) / 1e6
     windows = [(at_s - 0.01, at_s + seconds + BACK_S) for at_s, seconds in faults_of(play)]
     assert all(any(begin <= at_s <= end for begin, end in windows) for at_s in missing_s)
-    good = good[np.isin(good["t_us"], mine["t_us"])]
-    off_n = np.abs(mine["force_n"] - good["force_n"]).max(axis=1)  # NaN: nothing was told
-    touched, told = ((its["flags"] & FrameFlags.CONTACT) != 0 for its in (good, mine))
-    wrong = (off_n > OFF_N) & ~np.asarray(unseen) | lasting(touched != told, touched)
-    unsaid = np.flatnonzero(wrong & ((mine["flags"] & DOUBT) == 0))
-    assert not len(unsaid), [(int(k), off_n[k], FrameFlags(int(mine["flags"][k]))) for k in unsaid[:5]]
+    good = good[np.isin(good["t_us"], faulty["t_us"])]
+    off_n = np.abs(faulty["force_n"] - good["force_n"]).max(axis=1)  # NaN: nothing was told
+    touched, seen = ((rows["flags"] & FrameFlags.CONTACT) != 0 for rows in (good, faulty))
+    wrong = (off_n > OFF_N) & ~np.asarray(unseen) | lasting(touched != seen, touched)
+    unsaid = np.flatnonzero(wrong & ((faulty["flags"] & DOUBT) == 0))
+    assert not len(unsaid), [(int(k), off_n[k], FrameFlags(int(faulty["flags"][k]))) for k in unsaid[:5]]
     for name in row.get("flags", []):
-        assert (mine["flags"] & FrameFlags[name]).any(), name
+        assert (faulty["flags"] & FrameFlags[name]).any(), name
     for finger in (HURT, WITNESS):  # what a FRAME said once, the board still knows
-        said = int(np.bitwise_or.reduce(of(frames, finger)["flags"])) & LATCHED
-        assert latched.by_index[finger] & said == said
+        sent = int(np.bitwise_or.reduce(of(frames, finger)["flags"])) & LATCHED
+        assert latched.by_index[finger] & sent == sent
     if "counter" in row:
         assert getattr(status, row["counter"]) > 0
     if "a_bit" in play:
         assert status.words_parity == wrong_parity.sum()
-        assert np.array_equal(mine["counts"] == wire.INVALID_COUNT, wrong_parity[:, ELECTRODE_SLOT])
+        assert np.array_equal(faulty["counts"] == wire.INVALID_COUNT, wrong_parity[:, ELECTRODE_SLOT])

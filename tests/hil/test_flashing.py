@@ -98,8 +98,8 @@ def build_next_release(folder: Path) -> Image:
     version.write_text(text)
     build = folder / "build"
     configure = ["cmake", "-S", str(folder / "firmware/boards/pico"), "-B", str(build), "-G", "Ninja"]
-    for words in (configure, ["cmake", "--build", str(build)]):
-        done = subprocess.run(words, capture_output=True, text=True)
+    for command in (configure, ["cmake", "--build", str(build)]):
+        done = subprocess.run(command, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
     return read_image(build / "biotac-pico.uf2")
 
@@ -135,8 +135,8 @@ def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> 
         assert hand.board.maps() == {0: blob}
 
 
-def give_map(hand: Hand, finger: int, its: bytes) -> None:
-    hand.board.set_map(finger, its, force=finger == 1)
+def give_map(hand: Hand, finger: int, blob: bytes) -> None:
+    hand.board.set_map(finger, blob, force=finger == 1)
 
 
 @pytest.mark.long

@@ -51,11 +51,11 @@ def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fi
     status = hand.status()
     assert (status.slots_late, status.messages_dropped, hand.stats.frames_lost) == (0, 0, 0)
     for finger in range(5):
-        words = hand.sensor_status(finger)
-        assert words.words_good == (100 * 44 if finger < fingers else 0)
-        assert words.words_parity == words.words_error == 0
-        mine = frames[frames["finger"] == finger]
-        assert len(mine) == (100 if finger < fingers else 0)
+        sensor = hand.sensor_status(finger)
+        assert sensor.words_good == (100 * 44 if finger < fingers else 0)
+        assert sensor.words_parity == sensor.words_error == 0
+        of_one = frames[frames["finger"] == finger]
+        assert len(of_one) == (100 if finger < fingers else 0)
 
 
 @pytest.mark.long
@@ -193,11 +193,11 @@ def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(bo
         came = decoder.feed(hurt(bytes(sent), random.Random(seed)))
         missing = doubled = 0
         for finger in range(5):
-            its, mine = (np.flatnonzero(one.wire["finger"] == finger) for one in (truth, came))
-            at = its[np.searchsorted(truth.seq[its], came.seq[mine])]
-            assert (came.wire[mine] == truth.wire[at]).all() and (came.t_us[mine] == truth.t_us[at]).all()
-            missing += len(its) - len(np.unique(at))
-            doubled += len(mine) - len(np.unique(at))
+            played, arrived = (np.flatnonzero(one.wire["finger"] == finger) for one in (truth, came))
+            at = played[np.searchsorted(truth.seq[played], came.seq[arrived])]
+            assert (came.wire[arrived] == truth.wire[at]).all() and (came.t_us[arrived] == truth.t_us[at]).all()
+            missing += len(played) - len(np.unique(at))
+            doubled += len(arrived) - len(np.unique(at))
         stats = decoder.stats(0, 0)
         assert missing == stats.frames_lost > 0
         assert doubled <= stats.disordered

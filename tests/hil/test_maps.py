@@ -202,14 +202,14 @@ def opened(rig: Rig) -> biotac.Hand:
 @pytest.mark.long
 def test_a_saved_map_holds_after_power_was_off(rig: Rig) -> None:
     hand = opened(rig)
-    mine, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
-    hand.board.set_map(0, mine)
+    bound, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
+    hand.board.set_map(0, bound)
     hand.board.set_map(1, anyones)
     hand.board.save_settings()
     hand.board.clear_map(0)  # not saved
     hand.board.set_map(1, make_map(3, blocks=7))  # nor that
     reboot(hand, 2)
-    assert hand.board.maps() == {0: mine, 1: anyones}
+    assert hand.board.maps() == {0: bound, 1: anyones}
     hand.board.clear_map(0)
     hand.board.save_settings()
     reboot(hand, 3)

@@ -159,11 +159,11 @@ def test_picotool_finds_name_version_and_pins_in_the_image(rig: Rig) -> None:
     records = [word(at) - XIP for at in range(first, end, 4)]
     kinds = [(word(at) & 0xFFFF, word(at) >> 16) for at in records]
     assert {tag for _, tag in kinds} == {0x5052}
-    said = {word(at + 4): text(word(at + 8)) for at, (kind, _) in zip(records, kinds, strict=True) if kind == 6}
+    entries = {word(at + 4): text(word(at + 8)) for at, (kind, _) in zip(records, kinds, strict=True) if kind == 6}
     pins = {word(at + 4): text(word(at + 8)) for at, (kind, _) in zip(records, kinds, strict=True) if kind == 9}
-    assert said[0x02031C86] == "biotac-gateway"
-    assert said[0x11A9BC3A].endswith(f"wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}")
-    assert said[0xB63CFFBB] == "pico"
+    assert entries[0x02031C86] == "biotac-gateway"
+    assert entries[0x11A9BC3A].endswith(f"wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}")
+    assert entries[0xB63CFFBB] == "pico"
     assert pins == {
         1 << 16: "SPI MISO",
         1 << 18: "SPI SCK",

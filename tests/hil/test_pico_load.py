@@ -80,16 +80,16 @@ def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: R
     with biotac.open(f"sim:{source}") as other:
         whole = other.read(100)
     for finger in range(2):
-        mine, its = of(frames, finger), of(whole, finger)
-        after_us = (mine["t_us"] - mine["t_us"][0]).astype(np.int64)
+        seen, played = of(frames, finger), of(whole, finger)
+        after_us = (seen["t_us"] - seen["t_us"][0]).astype(np.int64)
         rounds, late_us = np.divmod(after_us + 1, 10_000)  # without slot 0 its time is worked out, to whole us
         assert (late_us <= 1_000_000 // SLOT_HZ + 1).all() and (late_us[-50:] == 1).all()
-        its = its[rounds]
-        came = mine["counts"] != INVALID_COUNT
-        assert np.array_equal(mine["counts"][came], its["counts"][came])
-        marked = mine["flags"] & FrameFlags.ELECTRODE_MISSING != 0
+        played = played[rounds]
+        came = seen["counts"] != INVALID_COUNT
+        assert np.array_equal(seen["counts"][came], played["counts"][came])
+        marked = seen["flags"] & FrameFlags.ELECTRODE_MISSING != 0
         assert np.array_equal(marked, ~came.all(axis=1)) and marked.any()
-        off_n = np.abs(mine["force_n"] - its["force_n"]).max(axis=1)
+        off_n = np.abs(seen["force_n"] - played["force_n"]).max(axis=1)
         assert not (off_n[~marked] > 0.1).any()
 
 

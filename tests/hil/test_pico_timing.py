@@ -31,11 +31,11 @@ def test_slots_are_on_time_and_the_bus_rules_kept_while_five_fingers_stream(rig:
 def test_an_event_is_with_the_host_within_a_millisecond_of_its_slot(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=3")
-    told: list[biotac.Event] = []
-    hand.on_event(told.append)
+    events: list[biotac.Event] = []
+    hand.on_event(events.append)
     frames = hand.read(100)
     seen = hand.link.board.counters()["latency"]  # type: ignore[attr-defined]
-    assert {event.kind for event in told} >= {biotac.EventKind.TOUCH} and len(frames) == 1500
+    assert {event.kind for event in events} >= {biotac.EventKind.TOUCH} and len(frames) == 1500
     assert seen["events"] >= 5
     assert seen["event_us"] <= 1000
 

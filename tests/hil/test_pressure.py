@@ -42,13 +42,13 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
     hand.record(tmp_path / "pressed.mcap")
     batch = hand.read_batch(2.5)
     hand.close()
-    mine = batch.frames["finger"] == 1
-    told = batch.frames["pressure_force_n"]
-    assert np.isnan(told[~mine]).all()
+    pressed = batch.frames["finger"] == 1
+    pressure_n = batch.frames["pressure_force_n"]
+    assert np.isnan(pressure_n[~pressed]).all()
     # 5 N are pressed: 500 counts, but for the place's factor.
     tared = batch.wire["pdc_tare_q4"] != wire.INVALID_COUNT
-    assert 4.0 < np.nanmax(told[mine]) / (GAIN_NN / 1e7) < 6.0
-    assert np.isfinite(told[mine & tared]).all() and np.isnan(told[mine & ~tared]).all()
+    assert 4.0 < np.nanmax(pressure_n[pressed]) / (GAIN_NN / 1e7) < 6.0
+    assert np.isfinite(pressure_n[pressed & tared]).all() and np.isnan(pressure_n[pressed & ~tared]).all()
     check = CrossCheck()
     check.add(batch.wire, settings, own)
     assert (check.violations, check.findings, check.pressure.starts) == (0, [], 2)
@@ -60,7 +60,7 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
         assert wrong.violations > 20
     recording = Recording(tmp_path / "pressed.mcap")
     assert recording.calibrations[1].pressure_gain_nn == GAIN_NN
-    np.testing.assert_array_equal(recording.frames["pressure_force_n"][: len(told)], told)
+    np.testing.assert_array_equal(recording.frames["pressure_force_n"][: len(pressure_n)], pressure_n)
 
 
 @pytest.mark.long

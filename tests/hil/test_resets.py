@@ -43,73 +43,73 @@ seconds = 280
 KEPT, NEW = make_map(1), make_map(2)
 
 
-def idle(its: Restarts) -> None:
-    its.hand.ping()
+def idle(run: Restarts) -> None:
+    run.hand.ping()
 
 
-def taring(its: Restarts) -> None:
-    frames = its.hand.read(0.05)
+def taring(run: Restarts) -> None:
+    frames = run.hand.read(0.05)
     assert (frames["flags"] & FrameFlags.UNTARED != 0).all()
 
 
-def streaming(its: Restarts) -> None:
-    frames = its.hand.read(0.5)
+def streaming(run: Restarts) -> None:
+    frames = run.hand.read(0.5)
     assert not (frames["flags"][-FINGERS:] & FrameFlags.UNTARED).any()
 
 
-def with_a_keep_alive(its: Restarts) -> None:
-    its.hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 31, 60_000))
-    its.link.release()
+def with_a_keep_alive(run: Restarts) -> None:
+    run.hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 31, 60_000))
+    run.link.release()
 
 
-def touched(its: Restarts) -> None:
-    frames = of(its.hand.read(2.0), PRESSED)
+def touched(run: Restarts) -> None:
+    frames = of(run.hand.read(2.0), PRESSED)
     assert frames["flags"][-1] & FrameFlags.CONTACT and frames["force_n"][-1].max() > 0.3
 
 
-def held(its: Restarts) -> None:
-    touched(its)
-    its.hand.hold(PRESSED)
-    assert of(its.hand.read(0.1, fresh=True), PRESSED)["flags"][-1] & FrameFlags.HELD
+def held(run: Restarts) -> None:
+    touched(run)
+    run.hand.hold(PRESSED)
+    assert of(run.hand.read(0.1, fresh=True), PRESSED)["flags"][-1] & FrameFlags.HELD
 
 
-def uploading_a_map(its: Restarts) -> None:
-    its.hand._board.tell(wire.BeginMap(0, AT_REST, len(NEW), zlib.crc32(NEW)))
+def uploading_a_map(run: Restarts) -> None:
+    run.hand._board.tell(wire.BeginMap(0, AT_REST, len(NEW), zlib.crc32(NEW)))
     for offset in range(0, len(NEW) - PART_BYTES, PART_BYTES):
-        its.hand._board.tell(wire.WriteMap(0, AT_REST, offset, part(NEW, offset)))
+        run.hand._board.tell(wire.WriteMap(0, AT_REST, offset, part(NEW, offset)))
 
 
-def storing(its: Restarts) -> None:
-    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
-    its.hand._board.send(wire.SaveSettings(0))
+def storing(run: Restarts) -> None:
+    run.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
+    run.hand._board.send(wire.SaveSettings(0))
 
 
 STATES = [idle, taring, streaming, with_a_keep_alive, touched, held, uploading_a_map, storing]
 
 
-def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: str, said: FaultFlags) -> None:
+def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: str, expected: FaultFlags) -> None:
     """In a state, and then not: what the board must say, and may not know any more."""
-    its = Restarts(rig, folder, WORLD)
-    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    maps = {AT_REST: KEPT} if its.hand.info.map_bytes else {}
+    run = Restarts(rig, folder, WORLD)
+    run.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    maps = {AT_REST: KEPT} if run.hand.info.map_bytes else {}
     if not maps and state is uploading_a_map:
-        pytest.skip(NO_MAPS.format(board_name(its.hand.info)))
+        pytest.skip(NO_MAPS.format(board_name(run.hand.info)))
     for finger, blob in maps.items():
-        its.hand.board.set_map(finger, blob)
-    its.hand.board.save_settings()
-    at_first_ms = its.hand.board.setting(Setting.HOLD_TIMEOUT_MS)
-    its.hand.board.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
-    before = its.hand.info
-    state(its)
-    pressed_n = of(its.hand.read(0.1), PRESSED)["force_n"][-1] if state in (touched, held) else None
-    getattr(its, how)()
-    hand, after = its.hand, its.hand.info
+        run.hand.board.set_map(finger, blob)
+    run.hand.board.save_settings()
+    at_first_ms = run.hand.board.setting(Setting.HOLD_TIMEOUT_MS)
+    run.hand.board.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
+    before = run.hand.info
+    state(run)
+    pressed_n = of(run.hand.read(0.1), PRESSED)["force_n"][-1] if state in (touched, held) else None
+    getattr(run, how)()
+    hand, after = run.hand, run.hand.info
     assert after.boot_id != before.boot_id
     assert after.board_serial == before.board_serial
     status, faults = hand.status(), hand.board.faults()
     # A tare outlives the watchdog's reset, if there was one.
     kept = bool(faults.board & FaultFlags.TARE_RESTORED)
-    assert faults.board == said | (FaultFlags.TARE_RESTORED if kept else 0) and not faults.fingers
+    assert faults.board == expected | (FaultFlags.TARE_RESTORED if kept else 0) and not faults.fingers
     assert not kept or how == "hang"
     assert kept or how != "hang" or state not in (touched, held, streaming)
     assert status.streams == 0 and status.rx_errors == 0
@@ -146,11 +146,11 @@ def test_after_it_hung_it_begins_anew_and_says_so(rig: Rig, tmp_path: Path, stat
 
 
 def test_saved_settings_that_lose_a_bit_are_told_and_the_ones_before_hold(rig: Rig, tmp_path: Path) -> None:
-    its = Restarts(rig, tmp_path, WORLD)
-    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
-    its.hand.board.save_settings()
-    its.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
-    its.flip_saved_bit(its.hand.board.save_settings)
-    its.lose_power()
-    assert its.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
-    assert its.hand.board.faults().board == FaultFlags.STARTED | FaultFlags.STORAGE
+    run = Restarts(rig, tmp_path, WORLD)
+    run.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    run.hand.board.save_settings()
+    run.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)
+    run.flip_saved_bit(run.hand.board.save_settings)
+    run.lose_power()
+    assert run.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
+    assert run.hand.board.faults().board == FaultFlags.STARTED | FaultFlags.STORAGE

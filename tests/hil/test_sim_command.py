@@ -14,8 +14,8 @@ def test_sim_gives_a_pty_for_this_board(rig, tmp_path: Path) -> None:
     rig.need("scenarios")
     rig.need("starting")
     link = tmp_path / "ttyBOARD"
-    words = [sys.executable, "-m", "biotac", "sim", "press.toml", "--fingers", "2", "--link", str(link), "--json"]
-    process = subprocess.Popen([*words, "--board", rig.facts["board"]], stdout=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "biotac", "sim", "press.toml", "--fingers", "2", "--link", str(link), "--json"]
+    process = subprocess.Popen([*command, "--board", rig.facts["board"]], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
         facts = json.loads(process.stdout.readline())
@@ -35,8 +35,8 @@ def test_an_image_that_is_none_is_refused_in_one_sentence(rig, tmp_path: Path) -
     rig.need("counters")
     image = tmp_path / "noise.bin"
     image.write_bytes(bytes(range(256)) * 8)
-    words = [sys.executable, "-m", "biotac", "info", f"emu:pico?source=press.toml&image={image}"]
-    done = subprocess.run(words, capture_output=True, text=True)
+    command = [sys.executable, "-m", "biotac", "info", f"emu:pico?source=press.toml&image={image}"]
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 3
     assert "second-stage boot" in done.stderr
     assert done.stderr.count("\n") == 1

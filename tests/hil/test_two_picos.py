@@ -64,17 +64,17 @@ def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open, seconds: 
     assert_same(batch.wire, there.wire)
     assert_same(batch.pac, there.pac)
     for finger in hand.fingers:
-        words = hand.sensor_status(finger)
-        assert words.words_parity == words.words_stuck == words.words_error == 0
+        sensor = hand.sensor_status(finger)
+        assert sensor.words_parity == sensor.words_stuck == sensor.words_error == 0
     assert board.sensor_board is not None
-    told = board.sensor_board.status()
-    assert told.words_late == told.samples_starved == 0
-    assert told.slots_served == told.slots_taken == round(seconds * 4400)
-    assert told.words >= 5 * told.slots_served  # and those that asked who is there
+    status = board.sensor_board.status()
+    assert status.words_late == status.samples_starved == 0
+    assert status.slots_served == status.slots_taken == round(seconds * 4400)
+    assert status.words >= 5 * status.slots_served  # and those that asked who is there
     leads = board.counters()["sensors"]
     assert leads["late_edges"] == 0  # the two boards were never out of step
     assert leads["answer_ns"] < leads["answer_left_ns"]
-    print(f"answers {leads['answer_ns']:.0f} of {leads['answer_left_ns']:.0f} ns, staged in {told.slowest_us} us")
+    print(f"answers {leads['answer_ns']:.0f} of {leads['answer_left_ns']:.0f} ns, staged in {status.slowest_us} us")
 
 
 FAULTS = {
@@ -122,7 +122,7 @@ LEADS = {
 @pytest.mark.nightly
 @pytest.mark.parametrize("lead", LEADS)
 def test_the_doctor_names_the_lead_that_is_wrong(opened: Open, lead: str) -> None:
-    code, words = LEADS[lead]
+    code, text = LEADS[lead]
     hand, board = opened(1.0)
     pair = board.sensor_board
     assert pair is not None
@@ -136,7 +136,7 @@ def test_the_doctor_names_the_lead_that_is_wrong(opened: Open, lead: str) -> Non
     board_facts = replace(board_facts, sensors_before=states, sensors_after=after)
     found = list(leads.check(Facts(hand.port, board=board_facts, pair=PairFacts(before, pair.status(), pair.serials))))
     assert [finding.code for finding in found] == [code], found
-    assert words in found[0].seen
+    assert text in found[0].seen
 
 
 def test_places_on_the_tape_are_told_apart() -> None:

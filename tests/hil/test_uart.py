@@ -61,8 +61,8 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
     board.until(PATIENCE_S, uart={"sent": 0})
     the_client_prints_what_python_reads(board, tmp_path)
     with shake_hands(UartLink(board.uart_path, BAUD)) as hand:
-        told = hand.read_batch(0.3)
-        assert len(told.wire) == FRAMES and len(told.pac) == 0  # PAC is for who asks for it
+        batch = hand.read_batch(0.3)
+        assert len(batch.wire) == FRAMES and len(batch.pac) == 0  # PAC is for who asks for it
         too_much = "carries 400000 bit/s, but FRAME and PAC of 2 fingers take [0-9]+; stream at most 1 "
         with pytest.raises(InputError, match=too_much):
             hand.stream("results", "pac")
@@ -136,23 +136,23 @@ def the_client_prints_what_python_reads(board: EmulatedBoard, folder: Path) -> N
     sources = [str(CLIENT / name) for name in ("example.c", "biotac_client.c")]
     subprocess.run(["cc", "-std=gnu11", *sources, "-o", str(program)], check=True)
     came = b""
-    with new_pty() as (its, path), open(board.uart_path, "r+b", buffering=0) as uart:
+    with new_pty() as (pty, path), open(board.uart_path, "r+b", buffering=0) as uart:
         os.set_blocking(uart.fileno(), False)
         held = os.open(path, os.O_RDWR | os.O_NOCTTY)  # so that its pty never hangs up
         with subprocess.Popen([str(program), path, str(FRAMES)], stdout=subprocess.PIPE, text=True) as running:
             while running.poll() is None:
-                ready = select.select([its, uart.fileno()], [], [], 0.05)[0]
-                if its in ready:
-                    uart.write(os.read(its, 4096))
+                ready = select.select([pty, uart.fileno()], [], [], 0.05)[0]
+                if pty in ready:
+                    uart.write(os.read(pty, 4096))
                 if uart.fileno() in ready and (data := uart.read(4096)):
                     came += data
-                    os.write(its, data)
+                    os.write(pty, data)
             assert running.stdout is not None
             printed = [line.split() for line in running.stdout]
         os.close(held)
     assert running.returncode == 0
     messages = [message for frame in came.split(b"\0") if frame and (message := open_frame(frame)) is not None]
     frames = [wire.Frame.unpack(payload) for number, payload in messages if number == wire.Frame.ID]
-    told = [(f.finger, f.t_us, *f.force_100un, f.flags) for f in frames[:FRAMES]]
-    assert told == [(*map(int, words[:5]), int(words[5], 16)) for words in printed]
-    assert len(told) == FRAMES
+    sent = [(f.finger, f.t_us, *f.force_100un, f.flags) for f in frames[:FRAMES]]
+    assert sent == [(*map(int, fields[:5]), int(fields[5], 16)) for fields in printed]
+    assert len(sent) == FRAMES

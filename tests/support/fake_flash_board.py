@@ -34,9 +34,9 @@ def note(
     return b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, board, *version, major, 0)
 
 
-def program(said: bytes, pages: int = 20) -> bytes:
+def program(code: bytes, pages: int = 20) -> bytes:
     """The bytes of a flash that a chip would boot."""
-    return sealed((boot2.block(b"boot") + bytes(64) + said).ljust(pages * 256, b"\x5a"))
+    return sealed((boot2.block(b"boot") + bytes(64) + code).ljust(pages * 256, b"\x5a"))
 
 
 def sealed(image: bytes) -> bytes:
@@ -47,9 +47,9 @@ def sealed(image: bytes) -> bytes:
         return image
 
 
-def make_image(folder: Path, said: bytes | None = None, name: str = "new.uf2") -> Path:
+def make_image(folder: Path, code: bytes | None = None, name: str = "new.uf2") -> Path:
     path = folder / name
-    path.write_bytes(uf2.uf2(program(note() if said is None else said)))
+    path.write_bytes(uf2.uf2(program(note() if code is None else code)))
     return path
 
 

@@ -210,7 +210,6 @@ def counts() -> dict[str, Any]:
     }
 
 
-
 def bits(board: Board) -> int:
     """The hash of the shipped kernels' results on this board."""
     elf = build(board, "bits", HERE / "bits_image.c")

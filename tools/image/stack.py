@@ -42,8 +42,8 @@ def read_functions(listing: Iterable[str]) -> dict[str, Function]:
         if head := HEAD.match(line):
             name, where = head.group(2), ""
             functions.setdefault(name, Function(int(head.group(1), 16)))
-        elif place := WHERE.match(line):
-            where = f"{place.group(1)}:{place.group(2)}"
+        elif match := WHERE.match(line):
+            where = f"{match.group(1)}:{match.group(2)}"
         elif name and (found := LINE.match(line)):
             operands = found.group(2).split("@")[0].split(";")[0].strip()
             read_line(functions[name], name, where, found.group(1), operands)

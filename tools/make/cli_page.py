@@ -39,8 +39,8 @@ def page() -> str:
 
 def exit_codes(text: str) -> Iterator[str]:
     """The epilog's exit codes as a table."""
-    words = " ".join(text.removeprefix("exit codes:").split())
-    rows = [(code, what.strip()) for code, what in re.findall(r"(\d+) (\D+)", words)]
+    text = " ".join(text.removeprefix("exit codes:").split())
+    rows = [(code, what.strip()) for code, what in re.findall(r"(\d+) (\D+)", text)]
     yield "\n".join(table(["code", "meaning"], rows))
 
 

@@ -63,10 +63,10 @@ class Board:
         """The board's HELLO, read here: nothing else may read the link meanwhile."""
         return handshake(self.link, self._write_numbered, timeout_s=self.patience_s())
 
-    def reopen(self, place: str) -> None:
-        """Open a place in place of the lost port, while nobody writes."""
+    def reopen(self, port: str) -> None:
+        """Open another port instead of the lost one, while nobody writes."""
         with self._writing:
-            self.link.reopen(place)
+            self.link.reopen(port)
 
     def patience_s(self) -> float:
         """How long one reply may take, s."""

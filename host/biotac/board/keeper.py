@@ -181,9 +181,9 @@ class Keeper:
 
     def _found(self, before: wire.Hello) -> bool:
         board = self._board
-        for place in board.link.places():
+        for port in board.link.ports():
             try:
-                board.reopen(place)
+                board.reopen(port)
                 hello = board.handshake()
             except (PortError, DeviceLostError, NotAGatewayError):
                 continue

@@ -173,7 +173,7 @@ class Reader:
     def lose(self, error: DeviceLostError, reason: Reason) -> None:
         """Stop reading, because the link broke or the board fell silent."""
         spoilt = self.link.spoilt()
-        if not (self.reconnects and self.link.places()) and not self.closing.is_set():
+        if not (self.reconnects and self.link.ports()) and not self.closing.is_set():
             self.failure = self.failure or (DeviceLostError(spoilt) if spoilt else error)
         self.lost = self.lost or reason
         self.wake()

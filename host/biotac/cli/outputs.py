@@ -19,7 +19,12 @@ def say(args: argparse.Namespace, facts: Any, text: str) -> None:
 
 def note(text: str) -> None:
     """Print a remark on stderr; stdout is for the result."""
-    print(f"biotac: {text}", file=sys.stderr)
+    step(f"biotac: {text}")
+
+
+def step(text: str) -> None:
+    """Print on stderr what is being done, or is to be done."""
+    print(text, file=sys.stderr, flush=True)
 
 
 def check_file(path: Path | None, *, overwrite: bool) -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
-from ..link.holders import in_words
+from ..link.holders import holders_text
 from ..version import __version__
 from ..wire.identity import version_text
 from .catalogue import Finding
@@ -30,11 +30,11 @@ def check(facts: Facts) -> Iterator[Finding]:
     if not system.permitted:
         yield Finding("no_permission", f"no permission to open {facts.port}; it is owned by {system.owner}")
     elif isinstance(error, PortBusyError) or (isinstance(error, PortError) and system.holders):
-        yield Finding("port_busy", f"{facts.port} is in use by {in_words(system.holders)}")
+        yield Finding("port_busy", f"{facts.port} is in use by {holders_text(system.holders)}")
     elif isinstance(error, PortError):
         yield Finding("port_failed", str(error))
     elif system.holders:
-        yield Finding("port_shared", f"{facts.port} is also open in {in_words(system.holders)}")
+        yield Finding("port_shared", f"{facts.port} is also open in {holders_text(system.holders)}")
     if system.modem_manager and not system.left_alone:
         yield Finding("modem_manager", f"ModemManager is running, and udev has no ID_MM_DEVICE_IGNORE for {facts.port}")
     if isinstance(error, NotAGatewayError):

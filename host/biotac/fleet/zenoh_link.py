@@ -57,11 +57,11 @@ class ZenohLink(Link):
         self._declared: list[Any] = []
         self.reopen(port)
 
-    def places(self) -> list[str]:
+    def ports(self) -> list[str]:
         """The same name."""
         return [self.port]
 
-    def reopen(self, place: str) -> None:
+    def reopen(self, port: str) -> None:
         self.close()
         session = network.open_session(self.port, **self._zenoh)
         try:

@@ -54,7 +54,7 @@ def parse_address(text: str) -> tuple[int, int]:
     return int(match[1]), address
 
 
-def parse_place(text: str) -> tuple[str, str]:
+def parse_chip(text: str) -> tuple[str, str]:
     """Address and kind from text such as ``1:0x50:24c32``. Raises PortError for anything else."""
     address, _, kind = text.rpartition(":")
     if kind not in KINDS:

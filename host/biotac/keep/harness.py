@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..errors import PortError
 from . import eeprom
 from .calibration import Calibration
-from .chip import Chip, parse_place
+from .chip import Chip, parse_chip
 
 FORM = "spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c02"
 
@@ -25,7 +25,7 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
     eeproms: dict[int, tuple[str, str]] = {}
     for finger, text in enumerate(texts.split(",")):
         if text:
-            eeproms[finger] = parse_place(text)
+            eeproms[finger] = parse_chip(text)
     fingers = bare.count(",") + 1
     if eeproms and max(eeproms) >= fingers:
         raise PortError(f"{port}: {max(eeproms) + 1} EEPROMs for {fingers} finger(s); expected at most one per finger")

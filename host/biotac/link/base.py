@@ -83,12 +83,12 @@ class Link(Protocol):
         """What another program did to the port, when that is why nothing can be read any more; empty otherwise."""
         return ""
 
-    def places(self) -> list[str]:
+    def ports(self) -> list[str]:
         """Where the board may be found after it went away, likeliest first; empty when it cannot come back."""
         return []
 
-    def reopen(self, place: str) -> None:
-        """Open one of ``places`` in place of the lost port. Raises PortError."""
+    def reopen(self, port: str) -> None:
+        """Open one of ``ports()`` instead of the lost port. Raises PortError."""
         raise PortError(f"{self.port} cannot be reopened; open a new link")
 
     def close(self) -> None:

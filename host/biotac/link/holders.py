@@ -33,7 +33,7 @@ def holders(path: str, proc: Path = PROC) -> list[Holder]:
     return found
 
 
-def in_words(found: list[Holder]) -> str:
+def holders_text(found: list[Holder]) -> str:
     """The holders as text for use in a sentence."""
     return ", ".join(map(str, found)) if found else "another program"
 

@@ -13,7 +13,7 @@ from serial.tools.list_ports import comports
 
 from ..errors import DeviceLostError, PortBusyError, PortError
 from .base import Link
-from .holders import holders, in_words
+from .holders import holders, holders_text
 from .port_text import options_of
 
 READ_BYTES = 65536
@@ -41,19 +41,19 @@ class SerialLink(Link):
             return ""
         return f"another program changed the settings of {self.port}, as `stty` does; end it and open the port again"
 
-    def places(self) -> list[str]:
+    def ports(self) -> list[str]:
         """The same path, and wherever a USB device with the same serial number is now. Other ports are left alone."""
         moved = [p.device for p in comports() if self._usb_serial and p.serial_number == self._usb_serial]
         return [self._path, *(path for path in moved if path != self._path)]
 
-    def reopen(self, place: str) -> None:
+    def reopen(self, port: str) -> None:
         SerialLink.close(self)  # the port alone, not what a subclass closes with it
         try:
             rate = self.bits_per_s or USB_BITS_PER_S
             exclusive = True if os.name == "posix" else None  # on Windows access always is
-            self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive)
+            self._serial = serial.Serial(port, rate, timeout=0, write_timeout=2, exclusive=exclusive)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise open_error(place, error) from error
+            raise open_error(port, error) from error
         if os.name == "posix":
             self.fd = self._serial.fileno()
             _one_byte_at_least(self.fd)
@@ -143,7 +143,7 @@ def open_error(path: str, error: Exception) -> PortError:
         return PortError(f"no port {path}; `biotac list` shows the ports of this machine")
     # Windows says "access is denied" for a port that a program has open; there it means nothing else.
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text or "access is denied" in text:
-        return PortBusyError(f"{path} is in use by {in_words(holders(path))}; close that program and try again")
+        return PortBusyError(f"{path} is in use by {holders_text(holders(path))}; close that program and try again")
     if code == errno.EACCES or "permission" in text:
         return PortError(f"no permission to open {path}; `biotac doctor` tells how to get it")
     return PortError(

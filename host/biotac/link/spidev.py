@@ -64,14 +64,14 @@ def parse_spidev(port: str) -> list[tuple[int, int]]:
 
 def open_devices(port: str) -> list[Any]:
     """A ``spidev.SpiDev`` for each finger of the port. Raises PortError when one cannot be opened."""
-    places = parse_spidev(port)
+    devices = parse_spidev(port)
     try:
         import spidev
     except ImportError as error:
         raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[bus]'") from error
-    opened = [spidev.SpiDev() for _ in places]
+    opened = [spidev.SpiDev() for _ in devices]
     with ExitStack() as on_failure:
-        for spi, (bus, device) in zip(opened, places, strict=True):
+        for spi, (bus, device) in zip(opened, devices, strict=True):
             try:
                 spi.open(bus, device)
                 on_failure.callback(spi.close)

@@ -17,17 +17,15 @@ WAIT_S = 0.05
 class UrlLink(SerialLink):
     """A byte pipe to a port that pyserial opens by URL. Several times slower than a port of this computer."""
 
-    def reopen(self, place: str) -> None:
+    def reopen(self, port: str) -> None:
         self.close()
         try:
-            patience = {"write_timeout": 2} if place.startswith("socket:") else {}  # rfc2217 has no write timeout
-            self._serial = serial.serial_for_url(place, USB_BITS_PER_S, timeout=WAIT_S, **patience)
+            patience = {"write_timeout": 2} if port.startswith("socket:") else {}  # rfc2217 has no write timeout
+            self._serial = serial.serial_for_url(port, USB_BITS_PER_S, timeout=WAIT_S, **patience)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortError(
-                f"{place} cannot be opened ({error}); check host and port, and that it is shared"
-            ) from error
+            raise PortError(f"{port} cannot be opened ({error}); check host and port, and that it is shared") from error
         # A socket can be read in C like any port. rfc2217 is Telnet underneath, which pyserial has to parse.
-        self.fd = self._serial.fileno() if os.name == "posix" and place.startswith("socket:") else None
+        self.fd = self._serial.fileno() if os.name == "posix" and port.startswith("socket:") else None
 
     def read(self, timeout_s: float) -> bytes:
         deadline_s = time.monotonic() + timeout_s

@@ -163,14 +163,14 @@ def find_folder() -> Path:
     """tools/emulator of the repository that contains the working directory, this environment or this file."""
     override = os.environ.get("BIOTAC_EMULATOR")
     if override:
-        places = [Path(override)]
+        folders = [Path(override)]
     else:
         starts = [Path.cwd(), Path(sys.prefix), Path(__file__).resolve()]
-        places = [place / "tools" / "emulator" for start in starts for place in (start, *start.parents)]
-    for place in places:
-        if (place / "main.mjs").is_file():
-            return place.resolve()
+        folders = [folder / "tools" / "emulator" for start in starts for folder in (start, *start.parents)]
+    for folder in folders:
+        if (folder / "main.mjs").is_file():
+            return folder.resolve()
     raise PortError(
-        f"no emulator in {places[0]}; it is in the project's repository: run from inside a clone, or set "
+        f"no emulator in {folders[0]}; it is in the project's repository: run from inside a clone, or set "
         "BIOTAC_EMULATOR to its tools/emulator"
     )

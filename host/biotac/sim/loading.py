@@ -34,16 +34,16 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
         raise InputError(f"fingers is {fingers!r}: expected 1 to {_sensor.MAX_SENSORS}")
     if seconds is not None and not (math.isfinite(seconds) and 0.01 <= seconds <= MAX_SECONDS):
         raise InputError(f"seconds is {seconds!r}: expected 0.01 to {MAX_SECONDS:.0f} s")
-    place = Path(path)
-    if place.exists() and not place.is_file():  # a pipe would be waited for, for ever
-        raise InputError(f"{place}: not a file: expected a scenario or a recording; check the path")
-    lower = place.name.lower()
+    file = Path(path)
+    if file.exists() and not file.is_file():  # a pipe would be waited for, for ever
+        raise InputError(f"{file}: not a file: expected a scenario or a recording; check the path")
+    lower = file.name.lower()
     if lower.endswith(".toml"):
-        return play(parse_scenario(_scenario_bytes(place), file=place.name), fingers=fingers, seconds=seconds)
+        return play(parse_scenario(_scenario_bytes(file), file=file.name), fingers=fingers, seconds=seconds)
     if lower.endswith(".npz"):
-        return load_npz(place, fingers=fingers, seconds=seconds)
+        return load_npz(file, fingers=fingers, seconds=seconds)
     if lower.endswith((".btd", ".btd.gz")):
-        return load_btd(place, fingers=fingers, seconds=seconds)
+        return load_btd(file, fingers=fingers, seconds=seconds)
     raise InputError(
         f"{path}: unknown kind of source: expected .toml (scenario), .npz, .btd or .btd.gz (recording); "
         f"bundled scenarios: {', '.join(bundled_scenarios())}"
@@ -55,13 +55,13 @@ def bundled_scenario(name: str) -> bytes:
     return (resources.files(__package__) / "scenarios" / name).read_bytes()
 
 
-def _scenario_bytes(place: Path) -> bytes:
+def _scenario_bytes(file: Path) -> bytes:
     try:
-        if not place.exists() and place.parent == Path() and place.name in bundled_scenarios():
-            return bundled_scenario(place.name)
-        return place.read_bytes()
+        if not file.exists() and file.parent == Path() and file.name in bundled_scenarios():
+            return bundled_scenario(file.name)
+        return file.read_bytes()
     except OSError as error:
         raise InputError(
-            f"{place}: cannot be read ({error.strerror}): expected a scenario's path or one of "
+            f"{file}: cannot be read ({error.strerror}): expected a scenario's path or one of "
             f"{', '.join(bundled_scenarios())}"
         ) from error

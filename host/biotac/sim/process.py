@@ -45,7 +45,7 @@ class SimBoard:
             raise
         first = self._process.stdout.readline().decode().split()
         if len(first) != 2 or first[0] != "pty":
-            error = self._last_words()
+            error = self._last_lines()
             self.close()
             raise PortError(f"the simulator did not start: {error or 'no message'}")
         self.path = first[1]
@@ -72,7 +72,7 @@ class SimBoard:
                 return
             text = os.read(self.stdout_fd, 65536)
             if not text:
-                raise DeviceLostError(f"the simulated board died: {self._last_words() or 'no message'}")
+                raise DeviceLostError(f"the simulated board died: {self._last_lines() or 'no message'}")
             *lines, self._heard = (self._heard + text).split(b"\n")
             for line in lines:
                 if line == b"end":
@@ -95,7 +95,7 @@ class SimBoard:
             self._process.kill()
         self._folder.cleanup()  # again, for a board that did not start
 
-    def _last_words(self) -> str:
+    def _last_lines(self) -> str:
         self._process.wait(timeout=60)
         return " ".join(self._process.stderr.read().decode(errors="replace").split("\n")).strip()
 
@@ -118,12 +118,12 @@ class SimLink(SerialLink):
         self.pace = board.pace
         self.keeps_time = board.pace == 1.0
 
-    def places(self) -> list[str]:
+    def ports(self) -> list[str]:
         """The same pty: it stays while its board is unplugged or without power."""
         return [self.board.path]
 
-    def reopen(self, place: str) -> None:
-        super().reopen(place)
+    def reopen(self, port: str) -> None:
+        super().reopen(port)
         self.fd = None  # the process must be watched as well
 
     def wait(self, timeout_s: float) -> bool:

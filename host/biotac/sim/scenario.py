@@ -215,7 +215,7 @@ def _press(step: Table, track: Track, seconds: float) -> None:
         return
     if force_n == 0.0:
         raise step.error("force_n", "is 0 but nothing touches", "more than 0 N to start a contact")
-    x_mm, y_mm = _place(step, "at", "at_mm")
+    x_mm, y_mm = _point_mm(step, "at", "at_mm")
     tip_mm = step.number("tip_mm", 0.5, 10.0, "mm") if "tip_mm" in step else FLAT_MM
     start = Pose(x_mm=x_mm, y_mm=y_mm, tip_mm=tip_mm, celsius=track.pose.celsius)
     track.ramp(seconds, replace(start, force_n=force_n), start=start)
@@ -237,12 +237,12 @@ def _move(step: Table, do: str, track: Track, seconds: float, finger: int) -> No
         torsion = step.number("torsion_nmm", -TORSION_MAX_NMM, TORSION_MAX_NMM, "N mm")
         pose = replace(pose, torsion_nmm=torsion)
     else:
-        x_mm, y_mm = _place(step, "to", "to_mm")
+        x_mm, y_mm = _point_mm(step, "to", "to_mm")
         pose = replace(pose, x_mm=x_mm, y_mm=y_mm)
     track.ramp(seconds, pose)
 
 
-def _place(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
+def _point_mm(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
     """The contact's x and y: over a named electrode, or given."""
     if name_key in step and pair_key in step:
         raise step.error(pair_key, f"is given beside '{name_key}'", "one of the two", "remove one")

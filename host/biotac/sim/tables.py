@@ -33,8 +33,8 @@ class Lines:
 
     def table(self, name: str, index: int) -> int:
         """Line of the header of the ``index``-th table called ``name``; 1 if it has no header."""
-        places = self._tables.get(name, [])
-        return places[index] if index < len(places) else 1
+        found = self._tables.get(name, [])
+        return found[index] if index < len(found) else 1
 
     def key(self, start: int, key: str) -> int:
         """Line of ``key`` in the table whose header is at line ``start`` (0: the top level).
@@ -46,8 +46,8 @@ class Lines:
         for number in range(start + 1, ends[0] if ends else len(self._lines) + 1):
             if pattern.match(self._lines[number - 1]):
                 return number
-        places = [number for number, header in self._headers if header.strip("\"'") == key]
-        return places[0] if places and start == 0 else max(start, 1)
+        found = [number for number, header in self._headers if header.strip("\"'") == key]
+        return found[0] if found and start == 0 else max(start, 1)
 
 
 def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
@@ -61,11 +61,11 @@ def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
         return documents.parse_toml(text), Lines(text)
     except documents.TOMLDecodeError as error:
         seen = str(error)
-        place = re.search(r"\s*\(at line (\d+), column \d+\)|\s*\(at end of document\)", seen)
+        match = re.search(r"\s*\(at line (\d+), column \d+\)|\s*\(at end of document\)", seen)
         line = text.rstrip().count("\n") + 1
-        if place is not None:
-            line = int(place.group(1) or line)
-            seen = seen[: place.start()]
+        if match is not None:
+            line = int(match.group(1) or line)
+            seen = seen[: match.start()]
         raise ScenarioError(f"{file}:{line}: not valid TOML: {seen}: expected `key = value`; correct it") from None
     except ValueError as error:
         raise ScenarioError(

@@ -71,8 +71,8 @@ def test_the_bundled_scenario_is_the_experiments() -> None:
 def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     port = "sim:fingers.toml?pace=fast"
     assert main(["calibrate", "press", port, "--pressure", "--json", "--out", str(tmp_path)]) == 0
-    said = capsys.readouterr()
-    facts = json.loads(said.out)
+    output = capsys.readouterr()
+    facts = json.loads(output.out)
     assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
     for one in facts["fingers"]:
         assert -K_LOW <= one["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
@@ -84,7 +84,7 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
         assert own.serial == f"BTSIM{one['finger'] + 1:011d}"
         provenance = json.loads((tmp_path / f"finger{one['finger']}.json").read_text())["provenance"]
         assert provenance["from"] == port and provenance["rows"] == 150
-    assert said.err.splitlines()[:3] == [
+    assert output.err.splitlines()[:3] == [
         "let go of finger 0, and do not touch it",
         "1 of 3: press finger 0 with about 2 N, and hold still",
         "held: let go of finger 0",
@@ -237,7 +237,7 @@ def without_one(values: np.ndarray) -> np.ndarray:
     ("change", "words"),
     [
         (lambda v: v * [1, 1000, 1000, 1000], "forces up to 5000, expected newtons, at most 200"),
-        (lambda v: v * [1, 20, 20, 20], "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
+        (lambda v: v * [1, 20, 20, 20], "N/count, expected 0.0009 to 0.1; is the reference in newtons, and"),
         (lambda v: np.add(v, [0.6, 0, 0, 0]), "they agree best with pressure -59 rows after the force"),
         (lambda v: np.add(v, [1e4, 0, 0, 0]), "covers none of"),
         (without_one, "1 of 3110 rows with NaN"),
@@ -251,10 +251,10 @@ def test_a_reference_that_is_none_is_refused_with_its_number(
 ) -> None:
     with (pressed / "plate.csv").open(newline="") as f:
         head, *rows = list(csv.reader(f))
-    place, values = tmp_path / "changed.csv", np.array(rows, np.float64)
-    with place.open("w", newline="") as out:
+    path, values = tmp_path / "changed.csv", np.array(rows, np.float64)
+    with path.open("w", newline="") as out:
         csv.writer(out).writerows([head, *change(values).tolist()] if change else [["t_ms", *head[1:]], *rows])
-    assert run(pressed, str(place), "--out", str(tmp_path / "out")) == 2
+    assert run(pressed, str(path), "--out", str(tmp_path / "out")) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

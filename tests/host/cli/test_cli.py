@@ -36,8 +36,8 @@ def fails(capsys, code: int, *arguments: str) -> str:
 def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
     assert parser().format_help().count("\n") <= 40
     assert len(VERBS) <= 18
-    for name, (place, text) in VERBS.items():
-        example = importlib.import_module(f"biotac.cli.{place}").EXAMPLE
+    for name, (module, text) in VERBS.items():
+        example = importlib.import_module(f"biotac.cli.{module}").EXAMPLE
         with pytest.raises(SystemExit):
             main([name, "--help"])
         output = capsys.readouterr().out

@@ -282,14 +282,14 @@ def test_batches_that_are_not_the_boards_are_left_alone(shared) -> None:
     """Played again, of no number or of a wild one, too long."""
     draw, kept = random.Random(3), []
     with shared.client() as session, biotac.open(shared.port()) as hand:
-        place = network.key("left", f"wire/{shared.share.epoch}")
-        listening = session.declare_subscriber(place, lambda sample: kept.append(sample.payload.to_bytes()))
+        key = network.key("left", f"wire/{shared.share.epoch}")
+        listening = session.declare_subscriber(key, lambda sample: kept.append(sample.payload.to_bytes()))
         until(hand, 60)
         listening.undeclare()
         for data in [*kept[:5], b"", bytes(8), network.NUMBER.pack(2**64 - 1) + b"\1\0", *kept[:5]]:
-            session.put(place, data)
+            session.put(key, data)
         for _ in range(20):
-            session.put(place, network.NUMBER.pack(2**63) + draw.randbytes(draw.choice([1, 300, 5 << 20])))
+            session.put(key, network.NUMBER.pack(2**63) + draw.randbytes(draw.choice([1, 300, 5 << 20])))
         rows = 0
         seen: dict[int, int] = {}
         for batch in hand.batches():

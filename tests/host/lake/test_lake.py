@@ -108,15 +108,15 @@ def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -
         "tare": lambda rec: [m for m in rec.messages if isinstance(m, wire.Tare)],
         "status": lambda rec: [m for m in rec.messages if isinstance(m, wire.Status)],
     }.items():
-        told = sql(capsys, lake, f"SELECT recording, count(*) AS n FROM {topic} GROUP BY recording")
-        assert {row["recording"]: row["n"] for row in told} == {
+        rows = sql(capsys, lake, f"SELECT recording, count(*) AS n FROM {topic} GROUP BY recording")
+        assert {row["recording"]: row["n"] for row in rows} == {
             name: len(rows_of(rec)) for name, rec in by_id.items() if len(rows_of(rec))
         }
     name, own = next((name, rec) for name, rec in by_id.items() if rec.calibrations)
-    told = sql(capsys, lake, f"SELECT DISTINCT finger, sensor, calibration FROM frames WHERE recording = '{name}'")
-    assert {row["finger"]: row["sensor"] for row in told} == ids.sensors(own)
-    assert {row["finger"]: row["calibration"] for row in told} == ids.calibrations(own)
-    assert len({row["calibration"] for row in told}) == 2  # and without one it is null
+    rows = sql(capsys, lake, f"SELECT DISTINCT finger, sensor, calibration FROM frames WHERE recording = '{name}'")
+    assert {row["finger"]: row["sensor"] for row in rows} == ids.sensors(own)
+    assert {row["finger"]: row["calibration"] for row in rows} == ids.calibrations(own)
+    assert len({row["calibration"] for row in rows}) == 2  # and without one it is null
     assert sql(capsys, lake, "SELECT count(*) AS n FROM frames WHERE calibration IS NULL")[0]["n"] == sum(
         len(rec.frames) for rec in by_id.values() if rec is not own
     )
@@ -124,11 +124,11 @@ def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -
 
 def test_columns_are_those_of_the_parquet_export(sources, lake, tmp_path) -> None:
     assert main(["export", str(sources[0]), str(tmp_path / "a.parquet")]) == 0
-    place = file_of(lake, "frames", ids.recording_id(sources[0])[0])
-    alone, mine = (pq.read_table(path, partitioning=None) for path in (tmp_path / "a.parquet", place))
-    assert set(mine.column_names) - set(alone.column_names) == {"recording", "sensor", "calibration"}
-    assert mine.select(alone.column_names).equals(alone)  # nulls, stamps and all
-    assert mine["counts_E1"].null_count + mine["force_z_n"].null_count > 0
+    stored = file_of(lake, "frames", ids.recording_id(sources[0])[0])
+    alone, in_lake = (pq.read_table(path, partitioning=None) for path in (tmp_path / "a.parquet", stored))
+    assert set(in_lake.column_names) - set(alone.column_names) == {"recording", "sensor", "calibration"}
+    assert in_lake.select(alone.column_names).equals(alone)  # nulls, stamps and all
+    assert in_lake["counts_E1"].null_count + in_lake["force_z_n"].null_count > 0
 
 
 def test_other_programs_read_it_as_it_is(sources, lake) -> None:
@@ -143,25 +143,25 @@ def test_times_of_messages_are_unwrapped(sources) -> None:
     """Of a board that has run for three and a half hours: 32 bits of us are 71.6 min."""
     status = next(m for m in biotac.Recording(sources[0]).messages if isinstance(m, wire.Status))
     t_us = [3 * 2**32 - 900_000, 3 * 2**32 + 100_000]
-    told = SimpleNamespace(
+    recording = SimpleNamespace(
         messages=[replace(status, t_us=at % 2**32) for at in t_us],
         begin_us=3 * 2**32 - 1_000_000,
         stamp_ns=lambda t_us: t_us * 1000,
     )
-    (table,) = message_tables(told)
+    (table,) = message_tables(recording)
     assert table.kind == "status" and table.finger is None
     assert table.arrays["t_us"].tolist() == t_us
 
 
 def test_again_does_nothing_and_grown_files_replace(sources, tmp_path, capsys) -> None:
     folder, cut, grown = tmp_path / "lake", tmp_path / "cut.mcap", tmp_path / "grown.mcap"
-    told = biotac.Recording(sources[1])
-    data = b"".join(told.blocks)
+    recording = biotac.Recording(sources[1])
+    data = b"".join(recording.blocks)
     middle = data.index(b"\0", len(data) // 2) + 1
     for path, blocks in ((cut, [data[:middle]]), (grown, [data[:middle], data[middle:]])):
-        file = RecordingFile(path.open("xb"), told.metadata)
+        file = RecordingFile(path.open("xb"), recording.metadata)
         for k, block in enumerate(blocks):
-            file.add(block, told.begin_ns + k)
+            file.add(block, recording.begin_ns + k)
         file.close()
     whole = biotac.Recording(grown)
     assert ids.recording_id(cut) == ids.recording_id(grown) != ids.recording_id(sources[1])
@@ -271,8 +271,8 @@ def test_a_file_that_fails_is_named_and_the_rest_is_done(sources, lake, tmp_path
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(b"no recording")
     assert export([bad, *sources, tmp_path / "no.mcap"], tmp_path / "lake") == 2
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 2 and "bad.mcap" in said[0] and "no.mcap" in said[1]
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2 and "bad.mcap" in lines[0] and "no.mcap" in lines[1]
     assert hashes(tmp_path / "lake") == hashes(lake)
 
 
@@ -418,9 +418,9 @@ def test_sql_prints_csv_and_says_what_is_wrong(lake, capsys) -> None:
         ("SELECT f.force_z FROM frames f", "; the query 'DESCRIBE TOPIC' lists columns"),  # DuckDB names none
     ):
         assert main(["lake", "sql", query, str(lake)]) == 2
-        (said,) = capsys.readouterr().err.splitlines()
-        assert columns in said and "; topics are bands, frames" in said
-        assert "!" not in said and "LINE" not in said
+        (line,) = capsys.readouterr().err.splitlines()
+        assert columns in line and "; topics are bands, frames" in line
+        assert "!" not in line and "LINE" not in line
     assert "force_z_n" in {row["column_name"] for row in sql(capsys, lake, "DESCRIBE frames")}
 
 

@@ -162,9 +162,9 @@ HEADER = "DataStructure: 2.0\r\nSerial Number: ,,BTSP050400018017\0\x10\r\nOther
 def btd_lines(frames: int = 3) -> list[list[float]]:
     """Sensors: absent, there, absent. Value = 100 * frame + place in the frame."""
     return [
-        [0.01 * frame + place / 4400, 5 + frame // 2, 40 + frame, channel, 0, 1, 100 * frame + place, 0, 0, 1]
+        [0.01 * frame + slot / 4400, 5 + frame // 2, 40 + frame, channel, 0, 1, 100 * frame + slot, 0, 0, 1]
         for frame in range(frames)
-        for place, channel in enumerate(ORDER)
+        for slot, channel in enumerate(ORDER)
     ]
 
 
@@ -181,8 +181,8 @@ def test_btd_frames_are_put_into_our_slot_order(tmp_path: Path, name: str) -> No
     assert source.samples.shape == (3, 1, 44) and source.skipped_frames == 0
     frame = list(source.samples[1, 0])
     # the file's slots are PAC E1 PAC E2 ... E19 PAC PDC PAC TAC PAC TDC, ours begin with PAC PDC PAC TAC PAC TDC
-    assert frame[0::2] == [100 + place for place in range(0, 44, 2)]
-    assert frame[1::2] == [100 + place for place in (39, 41, 43, *range(1, 39, 2))]
+    assert frame[0::2] == [100 + slot for slot in range(0, 44, 2)]
+    assert frame[1::2] == [100 + slot for slot in (39, 41, 43, *range(1, 39, 2))]
 
 
 def test_every_sensor_that_was_there_is_a_finger(tmp_path: Path) -> None:

@@ -139,15 +139,15 @@ def test_a_tape_is_kept_and_forgotten(scripted_board, hello, capsys) -> None:
 
     def run(*words: str, code: int = 0) -> str:
         assert main(["sim", "--sensor-port", port, *words]) == code
-        said = capsys.readouterr()
-        return said.err if code else said.out
+        output = capsys.readouterr()
+        return output.err if code else output.out
 
     assert "0.20 s stored in its flash" in run("press.toml", "--fingers", "2", "--seconds", "0.2", "--keep")
     assert fake.kept == 880
     run("--forget")
     assert fake.keeping == 0
-    told = run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep", code=2)
-    assert "0.3 s of 2 fingers do not fit the board: expected up to 0.2" in told
+    error = run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep", code=2)
+    assert "0.3 s of 2 fingers do not fit the board: expected up to 0.2" in error
     assert "--keep needs a SOURCE" in run("--keep", code=2)
 
 

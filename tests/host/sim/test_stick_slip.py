@@ -41,8 +41,8 @@ def test_its_strength_is_that_of_real_slides_and_a_longer_run_begins_alike() -> 
 def test_a_grasp_is_told_from_touch_to_release() -> None:
     with biotac.open("sim:grasp.toml") as hand:
         hand.stream("events", "raw")
-        told = [m for m in hand.read_batch(20.0).messages if isinstance(m, biotac.Event)]
-    at_s = {kind: [m.t_us / 1e6 for m in told if m.kind == kind] for kind in EventKind}
+        events = [m for m in hand.read_batch(20.0).messages if isinstance(m, biotac.Event)]
+    at_s = {kind: [m.t_us / 1e6 for m in events if m.kind == kind] for kind in EventKind}
     assert 1.5 <= at_s[EventKind.TOUCH][0] <= 1.7
     # 0.1 s after the power came. Letting go at 20 N/s drags the skin: that is told as a slip, too.
     assert [round(s, 2) for s in at_s[EventKind.SLIP] if s < 8.0] == [4.91]

@@ -18,7 +18,7 @@ from ...documents import JSON_BYTES, made_text, parse_json, read_text, write_new
 from ...errors import InputError
 from ...hand.configuration import Configuration
 from ...keep import calibration_file, eeprom
-from ...keep.chip import Chip, parse_place
+from ...keep.chip import Chip, parse_chip
 from ...map import file as map_file
 from ...version import __version__
 from ...wire.identity import serial_text, setting_text
@@ -153,7 +153,7 @@ def _put(args: argparse.Namespace) -> int:
     if args.where.startswith(EEPROM):
         if kind is not KINDS["calibration"]:
             raise InputError(f"{args.file} is a {kind.name}, which no EEPROM holds; expected a calibration")
-        with Chip(*parse_place(args.where.removeprefix(EEPROM))) as chip:
+        with Chip(*parse_chip(args.where.removeprefix(EEPROM))) as chip:
             more = "stored" if eeprom.store(chip, content) else "which it held already"
         say(args, kind.file.to_dict(content), f"{args.where}: {kind.title(content)}, {more}")
         return 0
@@ -194,7 +194,7 @@ def _check_named(args: argparse.Namespace) -> None:
 
 
 def _in_eeprom(where: str) -> Calibration:
-    with Chip(*parse_place(where.removeprefix(EEPROM))) as chip:
+    with Chip(*parse_chip(where.removeprefix(EEPROM))) as chip:
         return eeprom.load(chip)
 
 

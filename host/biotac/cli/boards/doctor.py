@@ -24,7 +24,7 @@ from ...sim.sensor_board import SensorBoard
 from ...version import __version__
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
-from ..outputs import say
+from ..outputs import say, step
 
 EXAMPLE = "biotac doctor --fingers 5"
 PLAYED, PLAYED_S = "press.toml", 60.0
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
     def first_evening(hand: Hand) -> BoardFacts:
         press_s = PRESS_S if has_crystal(hand) and args.sensor_port is None else PLAYED_PRESS_S
-        return measure(hand, seen, tell, seconds=args.seconds, press_s=press_s)
+        return measure(hand, seen, step, seconds=args.seconds, press_s=press_s)
 
     how = {"seconds": args.seconds, "take_link": args.take_link, "by": first_evening if args.bringup else None}
     if args.sensor_port is None:
@@ -77,9 +77,9 @@ def run(args: argparse.Namespace) -> int:
         findings += check(seen, facts)
         bringup_report.write(Path(args.report or "bringup.md"), seen, facts, findings)
     elif args.report is not None:
-        with whole(Path(args.report), overwrite=True) as place:
-            place.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
-    say(args, summary(facts, findings), words(facts, findings))
+        with whole(Path(args.report), overwrite=True) as file:
+            file.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
+    say(args, summary(facts, findings), as_text(facts, findings))
     return 1 if findings else 0
 
 
@@ -90,10 +90,6 @@ def udev_rule(args: argparse.Namespace) -> int:
         text = f"wrote {udev.RULES}; now run sudo udevadm control --reload, and plug the board in again"
     say(args, {"path": str(udev.RULES), "installed": installed, "rule": udev.rule()}, text)
     return 0
-
-
-def tell(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def examine_pair(port: str | None, sensor_port: str, **how: Any) -> Facts:
@@ -147,7 +143,7 @@ def measured(facts: Facts) -> dict[str, Any]:
     return out
 
 
-def words(facts: Facts, findings: list[Finding]) -> str:
+def as_text(facts: Facts, findings: list[Finding]) -> str:
     """The result for people."""
     lines = []
     for finding in findings:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -52,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         values.refuse(args, ("emulated", "backup", "restore"), "is for one board; use only one, it or --all")
     image = read_image(path or find_image())
     kept = None if args.restore is None else read_backup(args.restore)
-    say(f"{image.path}: {note_text(image.note)}")
+    outputs.step(f"{image.path}: {note_text(image.note)}")
     if args.all:
         return run_all(image, args)
     target, loaders = find_board(EMULATED if args.emulated else port)
@@ -69,14 +68,9 @@ def how(args: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         "keep": not args.no_backup,
         "downgrade": args.downgrade,
         "take_link": args.take_link,
-        "say": say,
+        "say": outputs.step,
         "show": lambda done, of: progress.show(f"{done} of {of} blocks"),
     }
-
-
-def say(text: str) -> None:
-    """Print a step on stderr; stdout is for the result."""
-    print(text, file=sys.stderr, flush=True)
 
 
 def run_all(image: Image, args: argparse.Namespace) -> int:
@@ -92,15 +86,15 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
         progress.done()
         results.append(result)
         if result.error is not None:
-            say(f"{result.port}: {result.error}")
+            outputs.step(f"{result.port}: {result.error}")
         elif not args.json:
             print(summary(result.outcome) if result.outcome else f"{result.port} {result.why}")
     if args.json:
-        told = []
+        rows = []
         for result in results:
             done = facts(image, result.outcome) if result.outcome else {"why": result.why}
-            told.append({"port": result.port, "error": result.error and str(result.error), **done})
-        print(json.dumps(told))
+            rows.append({"port": result.port, "error": result.error and str(result.error), **done})
+        print(json.dumps(rows))
     failed = [result.port for result in results if result.error is not None]
     if failed:
         raise FlashError(f"{len(failed)} of {len(results)} boards were not flashed: {', '.join(failed)}; see above")

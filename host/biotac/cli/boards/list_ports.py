@@ -56,13 +56,13 @@ def simulated() -> dict[str, str]:
     found: dict[str, str] = {}
     for process in sorted(Path("/proc").glob("[0-9]*")):
         with suppress(OSError, ValueError):  # it is over, or another user's
-            parts = _words(process)
+            parts = _command_line(process)
             if "biotac" not in "".join(Path(word).name for word in parts[:2]):
                 continue
             ttys = [line.split()[1] for file in (process / "fdinfo").iterdir()
                     for line in file.read_text().splitlines() if line.startswith("tty-index:")]  # fmt: skip
             if Path(parts[0]).name == "biotac-sim":  # the firmware; its parent has the words that were typed
-                parts = _words(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
+                parts = _command_line(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
             names = [Path(word).name for word in parts]
             if "biotac" in names:  # or else it is another program's own
                 command = ["biotac", *parts[names.index("biotac") + 1 :]]
@@ -70,7 +70,7 @@ def simulated() -> dict[str, str]:
     return found
 
 
-def _words(process: Path) -> list[str]:
+def _command_line(process: Path) -> list[str]:
     return (process / "cmdline").read_text(errors="replace").rstrip("\0").split("\0")
 
 
