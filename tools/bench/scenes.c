@@ -59,7 +59,6 @@ static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32
     bt_results(&finger->round, &finger->tare, settings, quantities, &message);
 }
 
-
 SCENE(front_at_rest)
 {
     front_end(&rest_front, rest_lane);
@@ -87,12 +86,10 @@ SCENE(whole_by_lin)
     pressed(&press_lin, &lins, BT_WANT_ALL);
 }
 
-
 SCENE(with_sigma)
 {
     pressed(&press_sigma, settings, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
 }
-
 
 SCENE(all_words)
 {
@@ -137,7 +134,6 @@ SCENE(events_shaken)
     shaken_events.events.risen_count2 = shaken_events.events.fallen_count2 = 1;
     events(&shaken_events);
 }
-
 
 SCENE(events_slipping)
 {
