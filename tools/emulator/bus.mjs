@@ -41,7 +41,7 @@ export class UsbBus {
     this.view = mcu.usbDPRAMView
     this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
     this.written = new Map()
-    this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0, armed_late: 0 }
+    this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0, armed: 0, armed_late: 0, latest_armed_us: 0 }
     this.lateHangs = 0 // chance that RP2040-E15 strikes when one is armed late
     this.holdsOff = true
     this.hungAsleep = false // a hung controller says that the bus is suspended
@@ -234,12 +234,18 @@ export class UsbBus {
     }
     if ((before & ~AVAILABLE) !== (value & ~AVAILABLE)) this.counters.available_not_last++
     const isBulkIn = offset >= CONTROLS + 8 && offset % 8 === 0
-    if (isBulkIn && this.silentAt === null && !this.held() && this.inFrame >= E15_NS) {
-      this.counters.armed_late++
-      if (this.draw() < this.lateHangs) this.hang()
-    }
+    if (isBulkIn && this.silentAt === null && !this.held()) this.#armedIn(this.inFrame)
     this.goOn()
     this.onArmed()
+  }
+
+  #armedIn(nanos) {
+    const { counters } = this
+    counters.armed++
+    counters.latest_armed_us = Math.max(counters.latest_armed_us, nanos / 1000)
+    if (nanos < E15_NS) return
+    counters.armed_late++
+    if (this.draw() < this.lateHangs) this.hang()
   }
 
   #resetBlock() {

@@ -73,6 +73,10 @@ export class Rig {
     const verbs = {
       'stop reading': () => (this.reading = false),
       'go on reading': () => (this.reading = true),
+      'stop reading for (\\d+) ms': (ms) => {
+        this.reading = false
+        this.plan(this.machine.worldNanos / 1e9 + ms / 1e3, 'go on reading')
+      },
       // A main loop that nothing wakes any more: the watchdog's business.
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),

@@ -1,5 +1,6 @@
 // What rp2040js 1.4.1 does right and slowly, done alike and quickly.
 const SRAM = 0x20000000
+const USB = 0x50100000
 const WIDE = 0xe800 // opcodes from here on have another halfword
 
 const extend = (bits) => (value) => (value << bits) >> bits
@@ -27,19 +28,34 @@ function jumping(published) {
 
 let quick = null // made once, of the first core's
 
-/** The core's instructions, and its way to SRAM; what comes after may replace the chip's own ways to memory. */
+/** The core's instructions, and its ways to SRAM and the USB's memory; what comes after may replace the chip's own. */
 export function speedUp(mcu) {
-  const { core, sramView } = mcu
+  const { core, sram, sramView, usbDPRAM, usbDPRAMView, usbCtrl } = mcu
   quick ??= jumping(core.executeInstruction)
   core.executeInstruction = quick
-  const last = sramView.byteLength - 4
+  const last = sram.length - 4
   core.readUint32 = (address) => {
     const at = (address >>> 0) - SRAM
     return at >= 0 && at <= last && (at & 3) === 0 ? sramView.getUint32(at, true) : mcu.readUint32(address)
+  }
+  core.readUint16 = (address) => {
+    const at = (address >>> 0) - SRAM
+    return at >= 0 && at <= last ? sramView.getUint16(at, true) : mcu.readUint16(address)
+  }
+  core.readUint8 = (address) => {
+    const at = (address >>> 0) - SRAM
+    return at >= 0 && at <= last ? sram[at] : mcu.readUint8(address)
   }
   core.writeUint32 = (address, value) => {
     const at = (address >>> 0) - SRAM
     if (at >= 0 && at <= last) sramView.setUint32(at, value, true)
     else mcu.writeUint32(address, value)
+  }
+  const write = mcu.writeUint8.bind(mcu)
+  mcu.writeUint8 = (address, value) => {
+    const at = (address >>> 0) - USB
+    if (at < 0 || at >= usbDPRAM.length) return write(address, value)
+    usbDPRAM[at] = value
+    usbCtrl.DPRAMUpdated(at & ~3, usbDPRAMView.getUint32(at & ~3, true))
   }
 }
