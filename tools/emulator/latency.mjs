@@ -82,7 +82,7 @@ export class Latency {
     const frames = this.us.reduce((sum, count) => sum + count, 0)
     const at = (share) => {
       let left = Math.floor(share * (frames - 1))
-      const found = this.us.findIndex((count) => (left -= count) < 0)
+      const found = this.us.findIndex((count) => count > 0 && (left -= count) < 0)
       return found < 0 ? null : found
     }
     const events = { events: this.events, event_us: this.eventUs }

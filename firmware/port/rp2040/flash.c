@@ -69,6 +69,8 @@ static void back_to_xip(uint32_t primask)
 {
     rom.flush();
     ((rom_action)((uintptr_t)boot2_copy | 1))(); // Thumb
+    (void)USB_SOF_RD; // clears: a frame that began meanwhile would be taken to begin now (data.c, may_arm)
+    usb_starts = usb_starts + 1;
     interrupts_restore(primask);
 }
 

@@ -9,8 +9,8 @@
 // 1 ms for the crystal to start, in units of 256 periods (data sheet 2.16.3).
 #define XOSC_STARTUP_DELAY ((CRYSTAL_MHZ * 1000u + 128u) / 256u)
 
-#define WATCHDOG_US                                                                                          \
-    2000000u // as in boot2.S; longer than an erase: 0.4 s at most on a Pico, a second on some chips
+// As in boot2.S. It is longer than an erase: 0.4 s at most on a Pico, a second on some chips.
+#define WATCHDOG_US 2000000u
 
 AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
 {
