@@ -93,8 +93,7 @@ def test_the_same_scenario_gives_the_same_bytes(board) -> None:
 def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(rig) -> None:
     rig.need("cable")
     hand = rig.open("press.toml?fingers=5&seconds=2")
-    hand.link.board.plan(1.0, "stop reading")
-    hand.link.board.plan(1.5, "go on reading")
+    hand.link.board.plan(1.0, "stop reading for 500 ms")
     frames = hand.read(10)
     status = hand.status()
     assert status.messages_dropped > 0

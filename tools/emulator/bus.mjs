@@ -234,18 +234,14 @@ export class UsbBus {
     }
     if ((before & ~AVAILABLE) !== (value & ~AVAILABLE)) this.counters.available_not_last++
     const isBulkIn = offset >= CONTROLS + 8 && offset % 8 === 0
-    if (isBulkIn && this.silentAt === null && !this.held()) this.#armedIn(this.inFrame)
+    if (isBulkIn && this.silentAt === null && !this.held()) {
+      this.counters.armed++
+      this.counters.latest_armed_us = Math.max(this.counters.latest_armed_us, this.inFrame / 1000)
+      this.counters.armed_late += this.inFrame >= E15_NS ? 1 : 0
+      if (this.inFrame >= E15_NS && this.draw() < this.lateHangs) this.hang()
+    }
     this.goOn()
     this.onArmed()
-  }
-
-  #armedIn(nanos) {
-    const { counters } = this
-    counters.armed++
-    counters.latest_armed_us = Math.max(counters.latest_armed_us, nanos / 1000)
-    if (nanos < E15_NS) return
-    counters.armed_late++
-    if (this.draw() < this.lateHangs) this.hang()
   }
 
   #resetBlock() {

@@ -17,7 +17,6 @@ const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot; in an
 const FINGER_AT = T_US_AT + 4
 const HEAD_BYTES = FINGER_AT + 1
 const SAME_ROUND_US = 200 // t_us is read shortly before the command goes out
-const LONGEST_US = 100_000
 const ROUNDS = 8 // that are remembered: no FRAME is later than that
 
 /** The first bytes of a COBS frame, decoded; shorter when the frame is. */
@@ -37,7 +36,7 @@ export class Latency {
   constructor() {
     this.rounds = [] // [device us of the first slot, of the last electrode]
     this.unfinished = []
-    this.us = new Uint32Array(LONGEST_US + 1) // FRAMEs by their whole us
+    this.us = [] // one a FRAME
     this.arrivals = [] // likewise [t_us, finger, device us with the host]
     this.askedUs = null // when bytes last went to the board
     this.replyUs = 0 // the longest
@@ -79,14 +78,10 @@ export class Latency {
   }
 
   counters() {
-    const frames = this.us.reduce((sum, count) => sum + count, 0)
-    const at = (share) => {
-      let left = Math.floor(share * (frames - 1))
-      const found = this.us.findIndex((count) => count > 0 && (left -= count) < 0)
-      return found < 0 ? null : found
-    }
+    const sorted = Float64Array.from(this.us).sort()
+    const at = (share) => sorted[Math.floor(share * (sorted.length - 1))] ?? null
     const events = { events: this.events, event_us: this.eventUs }
-    return { frames, unmatched: this.unmatched, ...events, reply_us: this.replyUs, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
+    return { frames: sorted.length, unmatched: this.unmatched, ...events, reply_us: this.replyUs, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
   }
 
   #event(start, us) {
@@ -102,6 +97,6 @@ export class Latency {
       this.unmatched++
       return
     }
-    this.us[Math.min(Math.round(us - round[1]), LONGEST_US)]++
+    this.us.push(us - round[1])
   }
 }

@@ -16,7 +16,7 @@ export class Rig {
   constructor({ image, sensors, port, uartPort, hold, lossless }) {
     this.port = port
     this.uartPort = uartPort
-    this.reading = true
+    this.readsFrom = 0 // world ns: the host reads what comes
     this.plugged = true
     this.waiting = hold // for release()
     this.latency = new Latency()
@@ -71,12 +71,7 @@ export class Rig {
   /** Throws an Error for a verb that there is not. */
   act(verb) {
     const verbs = {
-      'stop reading': () => (this.reading = false),
-      'go on reading': () => (this.reading = true),
-      'stop reading for (\\d+) ms': (ms) => {
-        this.reading = false
-        this.plan(this.machine.worldNanos / 1e9 + ms / 1e3, 'go on reading')
-      },
+      'stop reading for (\\d+) ms': (ms) => (this.readsFrom = this.machine.worldNanos + ms * 1e6),
       // A main loop that nothing wakes any more: the watchdog's business.
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
@@ -212,7 +207,7 @@ export class Rig {
         this.latency.received(bytes, machine.time.nanos)
         this.port.put(bytes)
       },
-      canTake: () => this.reading && (this.lossless || this.port.hasRoom),
+      canTake: () => machine.worldNanos >= this.readsFrom && (this.lossless || this.port.hasRoom),
       take: (n) => {
         const bytes = this.port.take(n)
         if (bytes?.length > 0) this.latency.asked(machine.time.nanos)

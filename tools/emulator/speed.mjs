@@ -30,21 +30,13 @@ let quick = null // made once, of the first core's
 
 /** The core's instructions, and its ways to SRAM and the USB's memory; what comes after may replace the chip's own. */
 export function speedUp(mcu) {
-  const { core, sram, sramView, usbDPRAM, usbDPRAMView, usbCtrl } = mcu
+  const { core, sramView, usbDPRAM, usbDPRAMView, usbCtrl } = mcu
   quick ??= jumping(core.executeInstruction)
   core.executeInstruction = quick
-  const last = sram.length - 4
+  const last = sramView.byteLength - 4
   core.readUint32 = (address) => {
     const at = (address >>> 0) - SRAM
     return at >= 0 && at <= last && (at & 3) === 0 ? sramView.getUint32(at, true) : mcu.readUint32(address)
-  }
-  core.readUint16 = (address) => {
-    const at = (address >>> 0) - SRAM
-    return at >= 0 && at <= last ? sramView.getUint16(at, true) : mcu.readUint16(address)
-  }
-  core.readUint8 = (address) => {
-    const at = (address >>> 0) - SRAM
-    return at >= 0 && at <= last ? sram[at] : mcu.readUint8(address)
   }
   core.writeUint32 = (address, value) => {
     const at = (address >>> 0) - SRAM
@@ -53,7 +45,7 @@ export function speedUp(mcu) {
   }
   const write = mcu.writeUint8.bind(mcu)
   mcu.writeUint8 = (address, value) => {
-    const at = (address >>> 0) - USB
+    const at = (address >>> 0) - USB // as published two arrays are made for each byte
     if (at < 0 || at >= usbDPRAM.length) return write(address, value)
     usbDPRAM[at] = value
     usbCtrl.DPRAMUpdated(at & ~3, usbDPRAMView.getUint32(at & ~3, true))

@@ -53,7 +53,7 @@ export class UsbHost {
     this.plugged = true
     this.pulledUp = false // by the program, which so says that it is there
     this.asleep = false
-    this.place = 'detached'
+    this.state = 'detached'
     this.device = {} // what enumeration found
     this.transfers = [] // control transfers to do
     this.failed = []
@@ -69,13 +69,9 @@ export class UsbHost {
     this.#watchPullup()
   }
 
-  get state() {
-    return this.place
-  }
-
-  set state(place) {
-    this.place = place
-    this.bus.sendFrames(!this.asleep && place !== 'detached' && place !== 'reset')
+  #enter(state) {
+    this.state = state
+    this.bus.sendFrames(!this.asleep && state !== 'detached' && state !== 'reset')
   }
 
   /** Some program opens or closes the port: DTR follows. */
@@ -133,7 +129,7 @@ export class UsbHost {
   setAsleep(asleep) {
     if (asleep === this.asleep) return
     this.asleep = asleep
-    this.state = this.place
+    this.#enter(this.state)
     if (asleep) this.bus.abort()
     this.usb.sieStatus = asleep ? this.usb.sieStatus | SUSPENDED : (this.usb.sieStatus & ~SUSPENDED) | RESUMED
     this.usb.sieStatusUpdated()
@@ -158,7 +154,7 @@ export class UsbHost {
     this.second.cancel()
     this.timer.cancel()
     this.transfers = []
-    this.state = 'detached'
+    this.#enter('detached')
     this.pulledUp = false
   }
 
@@ -305,7 +301,7 @@ export class UsbHost {
 
   #attach() {
     if (!this.plugged) return
-    this.state = 'reset'
+    this.#enter('reset')
     this.device = {}
     this.#after(DEBOUNCE_NS, () => {
       this.usb.sieStatus &= ~SUSPENDED
@@ -315,7 +311,7 @@ export class UsbHost {
   }
 
   #enumerate() {
-    this.state = 'addressing'
+    this.#enter('addressing')
     this.#descriptor(DEVICE, 0, 18, () =>
       this.request(0, SET_ADDRESS, ADDRESS, 0, [], () =>
         this.#descriptor(DEVICE, 0, 18, (device) =>
@@ -352,7 +348,7 @@ export class UsbHost {
     this.request(0, SET_CONFIGURATION, all[5], 0, [], () => {
       this.bus.setToggle(this.device.in, false, 0)
       this.bus.setToggle(this.device.out, true, 0)
-      this.state = 'configured'
+      this.#enter('configured')
       this.#tellLines()
     })
   }

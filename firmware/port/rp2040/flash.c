@@ -95,7 +95,6 @@ bool port_flash_erase(bt_port *port, uint32_t sector_offset)
     return true;
 }
 
-// page must not be in flash.
 bool port_flash_program(bt_port *port, uint32_t page_offset, const uint8_t *page)
 {
     if (!usable || page_offset >= BT_KEPT_BYTES) {
@@ -118,9 +117,8 @@ const uint8_t *flash_maps(void)
 }
 
 // Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the
-// serial interface stopped in the middle. The ROM's exit_xip, which leave_xip() calls, makes it serial with a
-// byte a frame both ways (2.8.3.1.3; its flash_init_spi sets CTRLR0, BAUDR and SER), and leaves nothing to be
-// read.
+// serial interface stopped in the middle. leave_xip() makes it serial with a byte a frame both ways, and
+// leaves nothing to be read (2.8.3.1.3; flash_init_spi in the ROM's source sets CTRLR0, BAUDR and SER).
 static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;
