@@ -219,8 +219,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     const bool resumed =
         board.kept != NULL && board.started_by & (BT_FAULT_FLAG_HUNG | BT_FAULT_FLAG_CRASHED);
     gateway->kept = board.kept;
-    if (!resumed) { // the sensors have had power all along
-        port_delay_us(port, BT_POWER_ON_MS * 1000);
+    const uint32_t powered_us = port_now_us(port);
+    if (!resumed && powered_us < BT_POWER_ON_MS * 1000) { // resumed, the sensors have had power all along
+        port_delay_us(port, BT_POWER_ON_MS * 1000 - powered_us);
     }
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);

@@ -16,7 +16,7 @@ typedef struct bt_port bt_port;
 bt_port *port_init(int argc, char **argv);
 
 // ---- time -----------------------------------------------------------------------------------
-uint32_t port_now_us(bt_port *port);
+uint32_t port_now_us(bt_port *port); // since the board's start, and so since its sensors have had power
 
 // Busy wait: a few us between reads, and once the sensors' power-up time.
 void port_delay_us(bt_port *port, uint32_t us);
