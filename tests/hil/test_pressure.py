@@ -109,7 +109,7 @@ def test_fingers_are_calibrated_and_verified_on_board(rig: Rig, seed: int, profi
         pytest.skip(f"{rig.name}: a worn finger's pressure is a new one's, and emulated time is slow")
     hands = navarro.calibrate(seed, profile, board=board, fingers=fingers)
     verified = [one.verified for one in hands.fingers]
-    assert [one.finger for one in verified] == list(fingers)
+    assert [one.fit.finger for one in hands.fingers] == list(fingers)
     for one in verified:
         assert one.force_n == pytest.approx(4.0)
         assert one.board_error <= 0.059 and one.float_error <= 0.059

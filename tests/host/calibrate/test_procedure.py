@@ -140,7 +140,7 @@ def test_a_reference_that_moves_is_not_zeroed() -> None:
     procedure.frames(frames(at, TARE_FRAMES))
     assert procedure.step is Step.LOADS
     with pytest.raises(InputError, match="no torque: expected six axes"):
-        procedure.samples(Samples(moving.t_s, moving.force_n))
+        procedure.samples(Samples(moving.t_s, moving.wrench[:, :3]))
 
 
 # ---- coverage ----------------------------------------------------------------------------------
