@@ -26,6 +26,7 @@ from ..clock import DeviceClock
 from ..clock.host_clock import HostClock
 from ..errors import DeviceLostError, InputError, ReadWarning
 from ..link import Link
+from ..markdown import html_table
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats, join, split
 from ..wire.frames import Frame, StructArray
@@ -176,6 +177,10 @@ class Hand:
 
     def __repr__(self) -> str:
         return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._board.closed else ''}>"
+
+    def _repr_html_(self) -> str:
+        views = [FingerView(self._latest.name(finger), finger, self._latest, self) for finger in self.fingers]
+        return html_table(repr(self), [[view.name, *view._now()] for view in views])
 
     # ---- life ----------------------------------------------------------------------------------
 

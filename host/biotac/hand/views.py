@@ -225,10 +225,13 @@ class FingerView:
         raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
 
     def __repr__(self) -> str:
+        return f"<biotac finger {self.name!r}, chip select {self.finger}: {', '.join(self._now())}>"
+
+    def _now(self) -> list[str]:
         row, age_s, why = self._latest.state(self.finger)
         force = ", ".join(f"{value:.3f}" for value in row["force_n"][0])
-        state = why or f"force ({force}) N, {FrameFlags(int(row['flags'][0]))!r}, {age_s * 1e3:.0f} ms old"
-        return f"<biotac finger {self.name!r}, chip select {self.finger}: {state}>"
+        flags = FrameFlags(int(row["flags"][0]))
+        return [why] if why else [f"force ({force}) N", repr(flags), f"{age_s * 1e3:.0f} ms old"]
 
     def _row(self) -> Any:
         return self._latest.state(self.finger)[0][0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -17,6 +16,7 @@ from ..board.gap import Gap
 from ..core.bands import bands_of
 from ..errors import InputError, RecordingError
 from ..keep.calibration import own_settings
+from ..markdown import html_table
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire, frames_from_wire
@@ -204,7 +204,8 @@ class Recording:
         return f"<biotac.Recording {lines(facts)[0]}, fingers {list(facts['fingers'])}, {len(self.labels)} label(s)>"
 
     def _repr_html_(self) -> str:
-        return "<br>".join(html.escape(line) for line in lines(summary(self)))
+        about, *others = lines(summary(self))
+        return html_table(about, [line.split(": ", 1) for line in others])
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.names)

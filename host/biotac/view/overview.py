@@ -12,11 +12,11 @@ from ..wire import messages_gen as wire
 from ..wire.events import kind_name
 
 BINS = 600
-MARKS = 500  # more is no list that anybody reads
+EVENTS = 3000  # half an hour of touches each second
 
 
 def overview(recording: Recording) -> dict[str, Any]:
-    """``peaks_n``: the largest force of any finger in each of BINS equal times; ``marks``: labels, events and gaps."""
+    """``peaks_n``: the largest force of any finger in each of BINS equal times; ``marks``: labels, gaps, events."""
     begin_us, length_us = recording.begin_us, max(1, recording.end_us - recording.begin_us)
     force_n = np.nan_to_num(np.linalg.norm(recording.frames["force_n"], axis=1))
     peaks = np.zeros(BINS)
@@ -28,11 +28,13 @@ def overview(recording: Recording) -> dict[str, Any]:
     ]
     events = [message for message in recording.messages if isinstance(message, wire.Event)]
     times_us = unwrapped_us(begin_us, [event.t_us for event in events]).tolist()
-    marks += [
-        {"at_s": (t_us - begin_us) / 1e6, "finger": event.finger, "name": kind_name(event).lower()}
-        for event, t_us in zip(events, times_us, strict=True)
-    ]
+    fingers: dict[tuple[int, str], list[int]] = {}  # one mark for what a whole hand feels within a tenth of a second
+    for event, t_us in zip(events, times_us, strict=True):
+        fingers.setdefault(((t_us - begin_us) // 100_000, kind_name(event).lower()), []).append(event.finger)
+    for (tenth, name), felt in list(fingers.items())[:EVENTS]:
+        whose = " ".join(str(finger) for finger in sorted({*felt}))
+        marks.append({"at_s": tenth / 10, "finger": None, "name": f"{name}, finger {whose}"})
     for gap in recording.gaps:
         marks.append({"at_s": ((gap.next_t_us or begin_us) - begin_us) / 1e6, "finger": None, "name": gap.words()})
     marks.sort(key=lambda mark: mark["at_s"])
-    return {"length_s": length_us / 1e6, "peaks_n": np.round(peaks, 2).tolist(), "marks": marks[:MARKS]}
+    return {"length_s": length_us / 1e6, "peaks_n": np.round(peaks, 2).tolist(), "marks": marks}

@@ -15,13 +15,13 @@ from ..core.unroll import unroll
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
-from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray, electrode_signals
 
 #: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing or not used. ``map_um``: the point of
 #: contact on the unrolled skin, across and along, in um; null where it is invalid.
 FRAME_ROW = (
-    "finger", "seq", "t_us", "flags", "tare_state", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un",
-    "torque_mnmm", "map_um",
+    "finger", "seq", "t_us", "flags", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un", "torque_mnmm",
+    "map_um",
 )  # fmt: skip
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
@@ -33,7 +33,6 @@ def frame_rows(batch: Batch) -> list[str]:
     messages, frames = batch.wire, batch.frames
     columns = zip(
         *(frames[name].tolist() for name in ("finger", "seq", "t_us", "flags")),
-        messages["tare_state"].tolist(),
         with_null(signal_q4(messages), wire.INVALID_I32),
         *(with_null(messages[name], wire.INVALID_COUNT) for name in ("pdc", "tac", "tdc")),
         with_null(messages["poc_um"], wire.INVALID_I16),
@@ -58,12 +57,9 @@ def pac_rows(batch: Batch) -> list[str]:
 
 def signal_q4(messages: StructArray) -> NDArray[np.int32]:
     """Signals of FRAME messages in 1/16 count, (n, 19); INVALID_I32 where count or tare is missing, or not used."""
-    counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
-    missing |= (messages["electrodes_out"][:, None] >> np.arange(counts.shape[1], dtype=np.uint32) & 1) != 0
-    signals: NDArray[np.int32] = counts.astype(np.int32) * Q4_PER_COUNT - tare_q4
-    signals[missing] = wire.INVALID_I32
-    return signals
+    out = messages["electrodes_out"][:, None] >> np.arange(len(sensor.ELECTRODE_UM), dtype=np.uint32) & 1
+    signals = np.where(out, np.nan, electrode_signals(messages) * Q4_PER_COUNT)
+    return np.nan_to_num(signals, nan=wire.INVALID_I32).astype(np.int32)
 
 
 def map_um(frames: StructArray) -> list[list[int] | None]:
@@ -94,14 +90,11 @@ def facts() -> dict[str, Any]:
     across, along = unroll(electrodes)
     return {
         "frame_row": FRAME_ROW,
-        "pac_row": PAC_ROW,
         "scales": SCALES,
-        "fingers": sensor.MAX_SENSORS,
         "electrodes": [
             {"name": name, "across_mm": a, "along_mm": b}
             for name, a, b in zip(sensor.ELECTRODE_NAMES, across.tolist(), along.tolist(), strict=True)
         ],
-        "frame_hz": sensor.SLOT_HZ / len(sensor.SLOTS),
         "pac_hz": sensor.SLOT_HZ * sensor.SLOTS.count("PAC") / len(sensor.SLOTS),
         "pac_pa_per_count": sensor.PAC_PA_PER_COUNT,
         "flags": [

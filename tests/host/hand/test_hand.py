@@ -168,6 +168,16 @@ def test_a_board_without_sensors_reads_nothing_and_says_so() -> None:
         assert not hand.ended  # it gave up on the sensors, not on the board
 
 
+def test_a_notebook_shows_fingers_and_completes_their_names() -> None:
+    with biotac.open("sim:press.toml?fingers=2&seconds=2") as hand:
+        hand.read(seconds=2)
+        assert hand._ipython_key_completions_() == ["index", "middle"]
+        assert {"force_n", "poc_mm", "touched", "age_s"} <= set(dir(hand["index"]))
+        shown = hand._repr_html_()
+    assert shown.startswith("&lt;biotac.Hand on sim:press.toml?fingers=2&amp;seconds=2, fingers [0, 1]&gt;<table>")
+    assert shown.count("<tr><td>middle</td><td>force (") == 1 and shown.count("<tr>") == 2
+
+
 def test_nothing_works_after_close_and_it_says_so() -> None:
     hand = biotac.open("sim:drift.toml?seconds=1")
     hand.close()

@@ -35,7 +35,7 @@ def test_info_of_a_recording_says_what_is_in_it(recorded: Path, capsys) -> None:
     assert main(["info", str(recorded)]) == 0
     assert "label, 5.50 s to 6.00 s, finger 1: slip trial=3" in capsys.readouterr().out
     recording = biotac.Recording(recorded)
-    assert "12.0 s" in repr(recording) and "middle, sensor BTSIM" in recording._repr_html_()
+    assert "12.0 s" in repr(recording) and "<td>middle, sensor BTSIM" in recording._repr_html_()
     assert {"index", "middle"} <= set(recording._ipython_key_completions_())
 
 

@@ -23,6 +23,7 @@ from biotac.cli.main import main
 from biotac.hand.opening import shake_hands
 from biotac.recording.replay.link import ReplayLink
 from biotac.recording.replay.playback import Playback
+from biotac.view.overview import overview
 from biotac.view.player import Player
 from biotac.view.rows import FRAME_ROW, facts, frame_rows
 from biotac.view.server import MAX_CONNECTIONS, MAX_PAGES, TOKEN_HEADER
@@ -275,7 +276,7 @@ def test_heartbeats_are_frames_without_signals() -> None:
 def test_words_are_the_contracts() -> None:
     told = facts()
     assert [f["name"] for f in told["flags"]] == [f.name for f in biotac.FrameFlags]
-    assert (told["frame_hz"], told["pac_hz"]) == (100, 2200)
+    assert told["pac_hz"] == 2200
     assert told["tare_reasons"][1]["words"] == "first still frames after power-up or plug-in"
 
 
@@ -361,6 +362,20 @@ def test_a_taken_port_is_told(make_player, view_of, capsys) -> None:
     taken = view_of(lambda: make_player()).server.server_port
     assert main(["view", "sim:press.toml", "--no-browser", "--port", str(taken)]) == 3
     assert "use --port 0 for any free port" in capsys.readouterr().err
+
+
+def test_many_events_hide_no_label(tmp_path: Path) -> None:
+    """A whole hand's events are one mark, and the 500 first marks are not all."""
+    with biotac.open("sim:press.toml?fingers=5&seconds=40") as hand, hand.record(tmp_path / "a.mcap"):
+        hand.stream("results", "events")
+        assert sum(isinstance(m, wire.Event) for batch in hand.batches() for m in batch.messages) > 300
+    recording = biotac.Recording(tmp_path / "a.mcap")
+    for k in range(500):
+        recording.mark(f"note {k}")
+    recording.mark("late", 39.0)
+    marks = overview(recording)["marks"]
+    assert "late" in [mark["name"] for mark in marks]
+    assert len([mark for mark in marks if mark["name"] == "touch, finger 0 1 2 3 4"]) > 10
 
 
 def test_closing_leaves_no_thread_behind(view) -> None:

@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     with biotac.open(args.port) as hand:
         earlier = latched_faults(hand)
         recorder = hand.record(args.out, overwrite=args.force, note=args.note)
+        hand.stream("results", "events")
         with suppress(KeyboardInterrupt):  # the usual way to stop a recording
             for _, recorded_s in batches(hand, args.seconds):
                 size_mb = recorder.path.stat().st_size / 1e6

@@ -13,6 +13,7 @@ const KEYS = [
   ["G", "play again, after the end"],
   ["0 … 4", "show that finger"],
   ["← →", "show the previous or next finger"],
+  ["↑ ↓, Enter", "in the marks: move, go to that time"],
   ["D", "theme: system, light, dark"],
   ["?", "this list"],
   ["Tab, Enter", "move to a button, press it"],
@@ -46,8 +47,9 @@ const THEMES = ["system", "light", "dark"];
 export class ThemeSwitch {
   constructor(changed) {
     this.changed = changed;
+    this.system = matchMedia("(prefers-color-scheme: dark)");
+    this.system.addEventListener("change", () => this.set(this.theme));
     this.set(localStorage.getItem("theme") ?? "system");
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed);
   }
 
   next() {
@@ -57,8 +59,8 @@ export class ThemeSwitch {
   set(theme) {
     this.theme = THEMES.includes(theme) ? theme : "system";
     localStorage.setItem("theme", this.theme);
-    if (this.theme === "system") delete document.documentElement.dataset.theme;
-    else document.documentElement.dataset.theme = this.theme;
+    const isDark = this.theme === "dark" || (this.theme === "system" && this.system.matches);
+    document.documentElement.dataset.theme = isDark ? "dark" : "light";
     byId("theme-words").textContent = this.theme;
     this.changed();
   }

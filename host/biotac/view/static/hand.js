@@ -26,8 +26,7 @@ export class HandRow {
       const canvas = make("canvas");
       canvas.setAttribute("aria-hidden", "true");
       const force = make("span", { className: "force" });
-      const name = make("b", { textContent: String(index) });
-      name.setAttribute("aria-label", `Finger ${index}`);
+      const name = make("b", { innerHTML: `<span class="hidden">Finger </span>${index}` });
       button.append(canvas, name, force);
       button.addEventListener("click", () => this.pick(index));
       this.place.append(button);

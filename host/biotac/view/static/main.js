@@ -5,7 +5,7 @@ import { ThemeSwitch, wireControls } from "./controls.js";
 import { Fingertip } from "./fingertip.js";
 import { HandRow } from "./hand.js";
 import { Model, SPECTRUM_SAMPLES, zoom } from "./model.js";
-import { SpectrogramPlot, SpectrumPlot, TimePlot } from "./plots.js";
+import { SpectrogramPlot, TimePlot, drawSpectrum } from "./plots.js";
 import { Flags, Link, Results, byId, number, showLink, showFaults, showTare, tell } from "./readout.js";
 import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
@@ -23,15 +23,11 @@ class Page {
       new TimePlot(byId("force-plot"), ["x", "y", "z"], ["x", "y", "z"], { least: 1, digits: 1, zero: true }),
       new TimePlot(byId("pdc-plot"), ["pdc"], ["text"], { least: 20, digits: 0, zero: false }),
     ];
-    this.spectrum = new SpectrumPlot(byId("spectrum-plot"));
     this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));
     this.link = new Link();
     this.readMs = 0;
     this.lost = false;
     this.turn = false;
-    this.draws = 0;
-    this.drawsPerS = NaN;
-    this.drawsSinceMs = performance.now();
     this.themes = new ThemeSwitch(() => (this.theme = readTheme()));
     this.stream = new Stream({
       about: (facts) => this.meet(facts),
@@ -163,20 +159,11 @@ class Page {
 
   loop(nowMs) {
     requestAnimationFrame((ms) => this.loop(ms));
-    this.count(nowMs);
     if (!this.model) return;
     const { fingers } = this.model;
     if (!fingers.has(this.shown) && fingers.size) this.shown = Math.min(...fingers.keys());
+    if (!this.frozen) this.draw(nowMs); // which asks for sizes, so before anything is written: that would cost a layout
     if (nowMs - this.readMs >= READ_MS) this.read(nowMs);
-    if (!this.frozen) this.draw(nowMs);
-  }
-
-  count(nowMs) {
-    const passedMs = nowMs - this.drawsSinceMs;
-    if (passedMs < 1000) return;
-    this.drawsPerS = (this.draws * 1000) / passedMs;
-    this.draws = 0;
-    this.drawsSinceMs = nowMs;
   }
 
   draw(nowMs) {
@@ -200,10 +187,9 @@ class Page {
     } else {
       this.hand.draw(fingers, this.theme, this.limit.counts);
       const pascals = finger?.pacIsFull ? amplitudes(finger.pac).map((v) => v * about.pac_pa_per_count) : null;
-      this.spectrum.draw(pascals, about.pac_hz, this.theme);
+      drawSpectrum(byId("spectrum-plot"), pascals, about.pac_hz, this.theme);
       this.spectrogram.draw(finger, about.pac_hz, about.pac_pa_per_count, this.theme);
     }
-    this.draws++;
   }
 
   read(nowMs) {
@@ -211,7 +197,7 @@ class Page {
     this.showState();
     const { fingers, about, health, dropped } = this.model;
     if (health) {
-      this.link.show(health, dropped, this.drawsPerS);
+      this.link.show(health, dropped);
       this.timeline.show(health.position_s);
       this.timeline.draw(this.theme);
       if (health.live) this.timeline.list(health.events.toReversed().map(({ t_us: tUs, finger, name }) => ({ at_s: tUs / 1e6, finger, name })));

@@ -140,36 +140,30 @@ export class TimePlot {
 
 const DECADES = [-2, 3]; // of the amplitude in Pa
 
-export class SpectrumPlot {
-  constructor(canvas) {
-    this.canvas = canvas;
+// values: amplitudes in Pa from 0 to half of rateHz, or null
+export function drawSpectrum(canvas, values, rateHz, theme) {
+  const area = new Area(canvas);
+  const { c } = area;
+  const [low, high] = DECADES;
+  const share = (v) => Math.max(0, Math.min(1, (Math.log10(v) - low) / (high - low)));
+  for (let d = low; d <= high; d++) {
+    area.tick(theme, { y: area.y((d - low) / (high - low)), text: d < 0 ? (10 ** d).toFixed(-d) : String(10 ** d) });
   }
-
-  // values: amplitudes in Pa from 0 to half of rateHz, or null
-  draw(values, rateHz, theme) {
-    const area = new Area(this.canvas);
-    const { c } = area;
-    const [low, high] = DECADES;
-    const share = (v) => Math.max(0, Math.min(1, (Math.log10(v) - low) / (high - low)));
-    for (let d = low; d <= high; d++) {
-      area.tick(theme, { y: area.y((d - low) / (high - low)), text: d < 0 ? (10 ** d).toFixed(-d) : String(10 ** d) });
-    }
-    const top = rateHz / 2;
-    for (let hz = 0; hz <= top; hz += 200) area.tick(theme, { x: area.x(hz / top), text: hz ? String(hz) : "0 Hz" });
-    if (!values) return;
-    c.beginPath();
-    values.forEach((v, k) => c.lineTo(area.x(k / (values.length - 1)), area.y(share(v))));
-    c.strokeStyle = theme.accent;
-    c.lineWidth = 1.5;
-    c.stroke();
-    c.lineTo(area.right, area.bottom);
-    c.lineTo(area.left, area.bottom);
-    c.closePath();
-    c.globalAlpha = 0.18;
-    c.fillStyle = theme.accent;
-    c.fill();
-    c.globalAlpha = 1;
-  }
+  const top = rateHz / 2;
+  for (let hz = 0; hz <= top; hz += 200) area.tick(theme, { x: area.x(hz / top), text: hz ? String(hz) : "0 Hz" });
+  if (!values) return;
+  c.beginPath();
+  values.forEach((v, k) => c.lineTo(area.x(k / (values.length - 1)), area.y(share(v))));
+  c.strokeStyle = theme.accent;
+  c.lineWidth = 1.5;
+  c.stroke();
+  c.lineTo(area.right, area.bottom);
+  c.lineTo(area.left, area.bottom);
+  c.closePath();
+  c.globalAlpha = 0.18;
+  c.fillStyle = theme.accent;
+  c.fill();
+  c.globalAlpha = 1;
 }
 
 // Amplitude over time and frequency: the stronger, the more colour.
@@ -205,12 +199,15 @@ export class SpectrogramPlot {
     this.picture.height = rows;
     const c = this.picture.getContext("2d");
     const image = c.createImageData(COLUMNS, rows);
+    const { data } = image;
     for (const { t, values } of columns) {
       const x = COLUMNS - 1 - Math.round(((endS - t) / HISTORY_S) * COLUMNS);
       if (x < 0) continue;
       values.forEach((v, k) => {
         const share = (Math.log10(v * paPerCount) - low) / (high - low);
-        image.data.set([...colour, 255 * share], 4 * ((rows - 1 - k) * COLUMNS + x)); // which bounds it
+        const at = 4 * ((rows - 1 - k) * COLUMNS + x);
+        [data[at], data[at + 1], data[at + 2]] = colour;
+        data[at + 3] = 255 * share; // which bounds it
       });
     }
     c.putImageData(image, 0, 0);

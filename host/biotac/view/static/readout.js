@@ -140,7 +140,6 @@ const HEALTH = [
   { key: "late", name: "Late slots on the board", warns: true, of: ({ status }) => status.slots_late },
   { key: "boardDropped", name: "Messages dropped by the board", warns: true, of: ({ status }) => status.messages_dropped },
   { key: "dropped", name: "Frames dropped by this page", warns: true, of: (_, dropped) => dropped },
-  { key: "draws", name: "Redraws per second", of: (_, dropped, draws) => draws },
 ];
 
 export class Link {
@@ -148,9 +147,9 @@ export class Link {
     this.values = pairs(byId("health"), HEALTH);
   }
 
-  show(health, dropped, draws) {
+  show(health, dropped) {
     for (const { key, warns, of } of HEALTH) {
-      const value = of(health, dropped, draws);
+      const value = of(health, dropped);
       put(this.values[key], value, 0);
       this.values[key].dataset.kind = warns && value > 0 ? "warn" : "calm";
     }

@@ -20,6 +20,13 @@ export class Timeline {
     this.seek.onchange = () => this.go(Number(this.seek.value));
     byId("pace").onchange = () => command("pace", null, Number(byId("pace").value));
     this.list(facts.marks);
+    byId("marks").onkeydown = (event) => { // one stop for Tab, however many there are
+      const item = event.target.closest("li");
+      const next = { ArrowDown: item ? item.nextSibling : event.target.firstChild, ArrowUp: item?.previousSibling }[event.key];
+      if (!next) return;
+      next.querySelector("button").focus();
+      event.preventDefault();
+    };
   }
 
   async go(atS) {
@@ -68,7 +75,7 @@ export class Timeline {
     byId("marks").replaceChildren(...marks.map(({ at_s: atS, finger, name }) => {
       const item = make("li");
       const text = `${name}${finger === null ? "" : `, finger ${finger}`}`;
-      const what = this.facts ? make("button", { type: "button", textContent: text }) : make("span", { textContent: text });
+      const what = this.facts ? make("button", { type: "button", tabIndex: -1, textContent: text }) : make("span", { textContent: text });
       if (this.facts) what.onclick = () => this.go(Math.max(0, atS - 0.5));
       item.append(make("b", { textContent: clock(atS) }), what);
       return item;
