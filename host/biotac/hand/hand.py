@@ -474,13 +474,15 @@ class Hand:
             raise InputError("nothing is being recorded; call hand.record(...) first")
         return self._recorders[-1].mark(text, number, facts)
 
-    def record(self, path: str | os.PathLike[str], *, overwrite: bool = False, note: str = "") -> Recorder:
+    def record(
+        self, path: str | os.PathLike[str], *, overwrite: bool = False, note: str = "", **facts: str | float
+    ) -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until this hand or the recorder is closed.
 
         Frames that have arrived but not been read yet are not recorded; to have all, call this before ``stream`` or the
         first read. When the board restarts (``reconnect``), a new file is begun (``Recorder.paths``). A program that
         ends without ``close`` loses nothing that has arrived; one that is killed loses up to a second. ``note``
-        becomes a label of the whole recording.
+        and ``facts``, such as subject="S03", trial=7, become a label of the whole recording.
 
         Raises InputError when the file exists and ``overwrite`` is false, when it cannot be written, or when another
         recording of this hand is still open.
@@ -492,8 +494,8 @@ class Hand:
         how = {"overwrite": overwrite, "mid_stream": self._stream.on}
         recorder = Recorder(self._board, self._commands, self.board, self._troubles, Path(path), **how)
         self._recorders[:] = [recorder]
-        if note:
-            recorder.mark(note, None, {}, timed=False)
+        if note or facts:
+            recorder.mark(note, None, facts, timed=False)
         return recorder
 
 

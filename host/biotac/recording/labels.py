@@ -47,7 +47,7 @@ class Label:
 
     def words(self) -> str:
         """The text and the facts in a line."""
-        return printable(" ".join([self.text, *(f"{name}={value}" for name, value in self.facts.items())]))
+        return printable(" ".join([self.text, *(f"{name}={value}" for name, value in self.facts.items())]).strip())
 
 
 def beside(recording: Path) -> Path:
@@ -95,7 +95,7 @@ def in_order(labels: Iterable[Label]) -> list[Label]:
 
 
 def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uint8]) -> NDArray[np.str_]:
-    """The texts that hold at each row (n,), joined by "; ". A point holds at each finger's next row."""
+    """What holds at each row (n,), texts with their facts, joined by "; ". A point holds at each finger's next row."""
     texts = [""]
     code = np.zeros(len(t_us), np.int64)
     for label in labels:
@@ -108,7 +108,7 @@ def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uin
             at = at[np.unique(finger[at], return_index=True)[1]]
         for before in np.unique(code[at]).tolist():
             code[at[code[at] == before]] = len(texts)
-            texts.append("; ".join(filter(None, (texts[before], label.text))))
+            texts.append("; ".join(filter(None, (texts[before], label.words()))))
     made: NDArray[np.str_] = np.array(texts)[code]
     return made
 

@@ -135,8 +135,10 @@ def test_stream_thins_out_for_people(capsys) -> None:
 def test_record_then_check(capsys, tmp_path: Path) -> None:
     out = tmp_path / "a.mcap"
     # all that there is: the last row's own 10 ms count
-    assert main(["record", "sim:press.toml?fingers=2&seconds=2", str(out), "--seconds", "2", "--json"]) == 0
+    assert main(["record", "sim:press.toml?fingers=2&seconds=2", str(out), "--seconds", "2", "--json", "--fact",
+                 "subject=S03", "--fact", "trial=7"]) == 0  # fmt: skip
     assert json.loads(capsys.readouterr().out)["frames_lost"] == 0
+    assert set(biotac.Recording(out).to_pandas()["label"]) == {"subject=S03 trial=7"}
     assert main(["check", str(out), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["good"] is True

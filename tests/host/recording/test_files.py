@@ -72,7 +72,9 @@ def test_a_picture_shows_force_and_labels(recorded: Path, tmp_path: Path) -> Non
     assert picture.shape[:2] == (600, 1200) and len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 20
 
 
-@pytest.mark.parametrize("words", [["--finger", "nose"], ["--fact", "trial"], ["--at", "3", "--until", "2"]])
+@pytest.mark.parametrize(
+    "words", [["--finger", "nose"], ["--fact", "trial"], ["--fact", "finger=3"], ["--at", "3", "--until", "2"]]
+)
 def test_a_label_that_makes_no_sense_is_refused_in_a_line(recorded: Path, capsys, words: list[str]) -> None:
     assert main(["file", "label", str(recorded), "x", *words]) == 2
     assert capsys.readouterr().err.startswith("biotac: ") and len(biotac.Recording(recorded).labels) == 1

@@ -14,7 +14,7 @@ from ..outputs import note, say
 from ..progress import Progress
 from .stream import batches
 
-EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
+EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30 --fact subject=S03 --fact trial=7"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
     parser.add_argument("--seconds", type=values.seconds, help="device time to record at least (default: until Ctrl-C)")
     parser.add_argument("--note", default="", metavar="TEXT", help="a label of the whole recording")
+    parser.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
 
 
@@ -33,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     recorded_s = 0.0
     with biotac.open(args.port) as hand:
         earlier = latched_faults(hand)
-        recorder = hand.record(args.out, overwrite=args.force, note=args.note)
+        recorder = hand.record(args.out, overwrite=args.force, note=args.note, **values.facts(args.fact))
         hand.stream("results", "events")
         with suppress(KeyboardInterrupt):  # the usual way to stop a recording
             for _, recorded_s in batches(hand, args.seconds):

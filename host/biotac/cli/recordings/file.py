@@ -54,13 +54,10 @@ def run_cut(args: argparse.Namespace) -> int:
 
 
 def run_label(args: argparse.Namespace) -> int:
-    facts = dict(fact.split("=", 1) if "=" in fact else (fact, "") for fact in args.fact)
-    if "" in facts.values():
-        raise InputError(f"--fact {args.fact}: expected NAME=VALUE, such as subject=S07")
     recording = load(args.recording, quiet=True)
     finger = int(args.finger) if (args.finger or "").isdecimal() else args.finger
     try:
-        recording.mark(args.text, args.at_s, args.until_s, finger=finger, **facts)
+        recording.mark(args.text, args.at_s, args.until_s, finger=finger, **values.facts(args.fact))
     except KeyError as error:
         raise InputError(str(error.args[0])) from None
     made = len(recording.labels)
