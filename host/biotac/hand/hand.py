@@ -179,7 +179,7 @@ class Hand:
         return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._board.closed else ''}>"
 
     def _repr_html_(self) -> str:
-        views = [FingerView(self._latest.name(finger), finger, self._latest, self) for finger in self.fingers]
+        views = [FingerView(self._latest.name(finger), finger, self._latest, self._go) for finger in self.fingers]
         return html_table(repr(self), [[view.name, *view._now()] for view in views])
 
     # ---- life ----------------------------------------------------------------------------------
