@@ -16,6 +16,7 @@ from biotac.calibrate.press import known_force
 from biotac.calibrate.press.few_shot import Scale, plated, pulled, scale_of
 from biotac.calibrate.press.known_force import Held, angles_deg, of_plate
 from biotac.calibrate.wrench.run import Run, load_run
+from biotac.cli.main import main as gateway
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.map import columns
@@ -143,7 +144,11 @@ def test_the_command_trains_judges_and_keeps(
     files: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "population.json"
-    arguments = ["population", str(files[0]), str(files[1]), "--test", str(files[2]), "--json"]
+    shared = tmp_path / "2.npz"
+    words = ["--share", str(shared), "--plate", "made up", "--licence", "CC0-1.0"]
+    assert gateway(["calibrate", "wrench", str(files[1]), *words]) == 0 and gateway(["check", str(shared)]) == 0
+    capsys.readouterr()
+    arguments = ["population", str(files[0]), str(shared), "--test", str(files[2]), "--json"]
     assert main([*arguments, "--out", str(out), "--source", "made up"]) == 0
     facts = json.loads(capsys.readouterr().out)
     for field in ("rmse_n", "rmse_scale5_n", "sigma_n", "sigma_scale5_n"):
