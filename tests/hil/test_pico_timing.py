@@ -6,6 +6,10 @@ import pytest
 from rig import Rig
 
 import biotac
+from biotac.hand.opening import shake_hands
+from biotac.sim.emulated import EmulatedBoard
+from biotac.sim.loading import load_source
+from biotac.sim.process import SimLink
 
 SECONDS = 3
 SLOT_US = 1e6 / 4400
@@ -49,3 +53,23 @@ def test_every_frames_arrival_is_told_and_none_comes_before_its_round_is_over(ri
     late_us = [us - (t_us + 43 * SLOT_US) for t_us, _, us in arrivals]  # after the command of the round's last slot
     assert min(late_us) > 50  # what the sensor needs before it is read
     assert max(late_us) < 10_000
+
+
+def test_the_core_clocks_the_same_words_as_the_dma(rig: Rig) -> None:
+    """By the setting slots_by_core, for an evening on which the DMA does not do what its data sheet says."""
+    rig.need("counters")
+    told = []
+    for by_core in (0, 1):
+        board = EmulatedBoard("pico", load_source("press.toml", fingers=5, seconds=SECONDS), pace=0.0, hold=True)
+        rig.opened.append(board)
+        with biotac.open(board.path) as hand:
+            hand.board.set_setting(biotac.Setting.SLOTS_BY_CORE, by_core)
+            hand.board.save_settings()
+        board.do("cut power")  # the setting counts from the next start on
+        board.until(1, usb={"state": "configured"})
+        with shake_hands(SimLink("pico", board)) as hand:
+            told.append(hand.read_batch(SECONDS).wire)
+            assert hand.status().slots_late == 0
+            assert (board.counters()["timing"]["interrupt_us"] > SLOT_US / 5) == (by_core == 1)
+    both = [rows[[name for name in rows.dtype.names if name != "t_us"]] for rows in told]
+    assert len(both[0]) > 1000 and (both[0] == both[1]).all()
