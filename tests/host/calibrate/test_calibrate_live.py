@@ -26,14 +26,14 @@ SERIAL = "BTSIM00000000006"
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as the command leaves it."""
     out = tmp_path_factory.mktemp("live") / "calibrated"
-    words = ["--finger", "index", "--reference", "nano17", "--out", str(out)]
-    assert main(["calibrate", "wrench", "--live", "sim:calibrate.toml", *words, "--no-upload"]) == 0
+    options = ["--finger", "index", "--reference", "nano17", "--out", str(out)]
+    assert main(["calibrate", "wrench", "--live", "sim:calibrate.toml", *options, "--no-upload"]) == 0
     return out
 
 
-def fit_again(calibrated: Path, *words: str) -> list[str]:
+def fit_again(calibrated: Path, *options: str) -> list[str]:
     files = [str(calibrated / f"{SERIAL}.mcap"), "--reference", str(calibrated / f"{SERIAL}.csv")]
-    return ["calibrate", "wrench", *files, *words]
+    return ["calibrate", "wrench", *files, *options]
 
 
 def test_it_leaves_recording_reference_report_picture_and_map(calibrated: Path) -> None:

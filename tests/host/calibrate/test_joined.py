@@ -145,7 +145,7 @@ def spoilt(reference: Reference, how: str) -> Reference:
 
 
 @pytest.mark.parametrize(
-    ("how", "words"),
+    ("how", "text"),
     [
         ("another run", r"not aligned: they agree best .* correlate with 0\.\d\d: expected at least 0\.4"),
         ("jumping clock", r"not aligned: the clocks drift by -?\d+ ppm over the run, and parts of it lie \d+ ms off"),
@@ -157,8 +157,8 @@ def spoilt(reference: Reference, how: str) -> Reference:
         ("wandering zero", r"where the board saw no contact the reference is up to \d\.\d\d N"),
     ],
 )
-def test_a_reference_that_does_not_belong_is_refused(how: str, words: str, board: Board, reference: Reference) -> None:
-    with pytest.raises(RecordingError, match=words):
+def test_a_reference_that_does_not_belong_is_refused(how: str, text: str, board: Board, reference: Reference) -> None:
+    with pytest.raises(RecordingError, match=text):
         join("board.mcap", board, spoilt(reference, how))
 
 

@@ -155,7 +155,7 @@ GOOD = course(presses(2, 3.5, 5), noise=1.0)
 
 
 @pytest.mark.parametrize(
-    ("rows", "words"),
+    ("rows", "message"),
     [
         (GOOD[:30], r"finger 0, 30 rows: never at rest: at most 30 untouched rows in a row.*expected 50"),
         (changed(GOOD, noisy), r"never at rest.*the steadiest moved by \d+\.\d+ counts \(limit"),
@@ -177,9 +177,9 @@ GOOD = course(presses(2, 3.5, 5), noise=1.0)
         (course([0.0] * 150 + [3.0] * 300), r"press 1 was not released"),
     ],
 )
-def test_presses_that_cannot_be_used_are_refused_with_a_number(rows: Any, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        ran(rows, 2 if "let go of" in words else 3)
+def test_presses_that_cannot_be_used_are_refused_with_a_number(rows: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        ran(rows, 2 if "let go of" in message else 3)
 
 
 def test_a_minute_in_vain_is_enough() -> None:
@@ -286,7 +286,7 @@ STILL = Rest(REST, 0.6, 50)
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("given", "message"),
     [
         ([held(2, 200), held(3, 300)], "finger 0: 2 presses, expected at least 3"),
         ([held(2, 200), held(np.nan, 300, 2), held(4, 400)], "press 2: the reference is nan N while"),
@@ -297,8 +297,8 @@ STILL = Rest(REST, 0.6, 50)
         ([held(1, 200), held(3, 300), held(6, 400)], r"0.005 to 0.015 N/count, a spread of \d+%, expected at most 50%"),
     ],
 )
-def test_a_fit_that_would_be_wrong_is_refused_with_a_number(given: list[Press], words: str) -> None:
-    with pytest.raises(InputError, match=words):
+def test_a_fit_that_would_be_wrong_is_refused_with_a_number(given: list[Press], message: str) -> None:
+    with pytest.raises(InputError, match=message):
         fit(STILL, given)
 
 
@@ -332,7 +332,7 @@ def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:
 
 
 @pytest.mark.parametrize(
-    ("t_s", "force_n", "words"),
+    ("t_s", "force_n", "message"),
     [
         ([0.0], [1.0], "has 1 rows; expected at least two"),
         ([0.0, 1.0], [1.0, np.nan], "1 of 2 rows with NaN"),
@@ -340,8 +340,8 @@ def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:
         ([0.0, 1.0], [1.0, 3500.0], "forces up to 3500, expected newtons, at most 200"),
     ],
 )
-def test_a_series_that_is_none_is_refused(t_s: list[float], force_n: list[float], words: str) -> None:
-    with pytest.raises(InputError, match=words):
+def test_a_series_that_is_none_is_refused(t_s: list[float], force_n: list[float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
         Series("plate.csv", np.array(t_s), np.array(force_n))
 
 

@@ -234,7 +234,7 @@ def without_one(values: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         (lambda v: v * [1, 1000, 1000, 1000], "forces up to 5000, expected newtons, at most 200"),
         (lambda v: v * [1, 20, 20, 20], "N/count, expected 0.0009 to 0.1; is the reference in newtons, and"),
@@ -247,7 +247,7 @@ def without_one(values: np.ndarray) -> np.ndarray:
     ],
 )
 def test_a_reference_that_is_none_is_refused_with_its_number(
-    pressed: Path, tmp_path: Path, capsys, change: Callable[[np.ndarray], np.ndarray] | None, words: str
+    pressed: Path, tmp_path: Path, capsys, change: Callable[[np.ndarray], np.ndarray] | None, message: str
 ) -> None:
     with (pressed / "plate.csv").open(newline="") as f:
         head, *rows = list(csv.reader(f))
@@ -255,7 +255,7 @@ def test_a_reference_that_is_none_is_refused_with_its_number(
     with path.open("w", newline="") as out:
         csv.writer(out).writerows([head, *change(values).tolist()] if change else [["t_ms", *head[1:]], *rows])
     assert run(pressed, str(path), "--out", str(tmp_path / "out")) == 2
-    assert words in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

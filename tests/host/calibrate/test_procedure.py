@@ -61,9 +61,9 @@ def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> 
     procedure.frames(frames(5900, 600, counts_per_min))
     assert (procedure.step is Step.TARE) == warm
     assert procedure.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
-    words = procedure.take_events()
-    assert words[0] == "warming up: leave the finger alone"
-    assert (words[1:] == [f"warm: {procedure.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
+    lines = procedure.take_events()
+    assert lines[0] == "warming up: leave the finger alone"
+    assert (lines[1:] == [f"warm: {procedure.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
     assert procedure.take_events() == []
 
 
@@ -223,16 +223,16 @@ def walked(
     folder: Path, scenario: str, at_s: float | None = None, error: type[BaseException] = KeyboardInterrupt
 ) -> tuple[Procedure, list[str], Path, Interrupting]:
     path = folder / "walk.mcap"
-    words: list[str] = []
+    lines: list[str] = []
     with biotac.open(f"sim:{scenario}") as hand:
         assert hand.link.source is not None
         reader = Interrupting(hand.link.source, 0)
         reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
         procedure = Procedure(0, reader.nano17.mounting)
-        walk(hand, reader, procedure, path, show=words.append)
+        walk(hand, reader, procedure, path, show=lines.append)
         assert not hand.streaming
         hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
-    return procedure, words, path, reader
+    return procedure, lines, path, reader
 
 
 @pytest.fixture(scope="module")
@@ -241,13 +241,13 @@ def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, lis
 
 
 def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path]) -> None:
-    procedure, words, path = everywhere
+    procedure, lines, path = everywhere
     assert procedure.step is Step.DONE
     assert procedure.coverage.complete and procedure.coverage.missing() == []
-    assert words[0] == "warming up: leave the finger alone"
-    assert words[1].startswith("warm: ")
-    assert words[2] == Step.LOADS.value
-    assert words[-1] == "covered: tip 8/8, pad 8/8, side of E11 8/8, side of E1 8/8"
+    assert lines[0] == "warming up: leave the finger alone"
+    assert lines[1].startswith("warm: ")
+    assert lines[2] == Step.LOADS.value
+    assert lines[-1] == "covered: tip 8/8, pad 8/8, side of E11 8/8, side of E1 8/8"
     assert procedure.zero is not None
     np.testing.assert_allclose(procedure.zero[:3], Nano17().zero[:3], atol=0.01)
     np.testing.assert_allclose(procedure.zero[3:], Nano17().zero[3:], atol=0.05)
@@ -276,21 +276,21 @@ def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedur
 
 
 def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
-    procedure, words, *_ = walked(tmp_path, "calibrate_gaps.toml")
-    assert words[-1] == "the simulated source has ended"
+    procedure, lines, *_ = walked(tmp_path, "calibrate_gaps.toml")
+    assert lines[-1] == "the simulated source has ended"
     assert procedure.coverage.missing() == [
         "side of E11: 0 of 8 cells",
         "tip: no shear to the tip",
         "pad: no shear to the tip",
         "side of E1: no shear to the tip",
     ]
-    assert "missing: side of E11: 0 of 8 cells" in words[-2]
+    assert "missing: side of E11: 0 of 8 cells" in lines[-2]
 
 
 @pytest.mark.parametrize("at_s", [20.0, 150.0])
 def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> None:
-    procedure, words, path, reader = walked(tmp_path, "calibrate.toml", at_s)
-    assert procedure.step is Step.DONE and words[-1] == "stopped by Ctrl-C"
+    procedure, lines, path, reader = walked(tmp_path, "calibrate.toml", at_s)
+    assert procedure.step is Step.DONE and lines[-1] == "stopped by Ctrl-C"
     assert (procedure.zero is None) == (at_s < 100.0)
     recording = Recording(path)
     assert not recording.problems

@@ -52,7 +52,7 @@ def test_a_mounting_turns_by_hand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ('rotation = [[1,0,0],[0,1,0],[0,0,0.9]]\noffset_mm = [0,0,0]\nreads = "force on finger"',
          r"not orthonormal, R R' is off by 0\.19"),
@@ -65,10 +65,10 @@ def test_a_mounting_turns_by_hand() -> None:
         ("rotation = [", "expected TOML with rotation"),
     ],
 )  # fmt: skip
-def test_a_wrong_mounting_is_refused(text: str, words: str, tmp_path: Path) -> None:
+def test_a_wrong_mounting_is_refused(text: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / "mounting.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=message):
         read_mounting(str(path))
 
 
@@ -116,7 +116,7 @@ GOOD = "t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm"
 
 
 @pytest.mark.parametrize(
-    ("header", "change", "words"),
+    ("header", "change", "message"),
     [
         ("t_s,Fx,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "column 'Fx' has no unit"),
         ("t_s,Fx_N,Fy_N,Fz_N,Mx,My,Mz", "", "column 'Mx' has no unit"),
@@ -134,7 +134,7 @@ GOOD = "t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm"
         (GOOD, "one", "1 samples: expected a recording"),
     ],
 )
-def test_a_csv_that_cannot_be_believed_is_refused(header: str, change: str, words: str, tmp_path: Path) -> None:
+def test_a_csv_that_cannot_be_believed_is_refused(header: str, change: str, message: str, tmp_path: Path) -> None:
     rows = np.column_stack([np.arange(N) * 0.002, wrench()])
     if change == "milliseconds":
         rows[:, 0] *= 1000.0
@@ -151,7 +151,7 @@ def test_a_csv_that_cannot_be_believed_is_refused(header: str, change: str, word
     path = written(tmp_path, header, rows)
     if change == "words":
         path.write_text(path.read_text() + "1,2,3,4,5,6,x\n")
-    with pytest.raises(RecordingError, match=words):
+    with pytest.raises(RecordingError, match=message):
         read_reference(str(path), LIN)
 
 

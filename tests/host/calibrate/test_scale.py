@@ -69,8 +69,8 @@ def test_a_rehearsal_finds_what_the_scenario_hides(
     against: str, presses: int, then: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scenario, out = f"{against[2:]}.toml", tmp_path / "own.wrench.json"
-    words = ["calibrate", "press", f"sim:{scenario}?pace=fast", against, "--finger", "index", "--json"]
-    assert main([*words, "--out", str(out)]) == 0
+    argv = ["calibrate", "press", f"sim:{scenario}?pace=fast", against, "--finger", "index", "--json"]
+    assert main([*argv, "--out", str(out)]) == 0
     printed = capsys.readouterr()
     prompts = printed.err.splitlines()
     assert [line.split(" of ")[0] for line in prompts[1:-1:2]] == [str(k + 1) for k in range(presses)]
@@ -101,13 +101,13 @@ def test_a_rehearsal_finds_what_the_scenario_hides(
 
 def test_a_finger_that_the_map_does_not_know_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     # An idle simulated board plays on: not to be over before a busy computer has fitted the map.
-    words = ["calibrate", "press", "sim:fingers.toml?fingers=1&seconds=2400&pace=fast", "--scale", "--finger", "index"]
-    words += ["--presses", "3", "--json"]
-    assert main(words) == 1
+    argv = ["calibrate", "press", "sim:fingers.toml?fingers=1&seconds=2400&pace=fast", "--scale", "--finger", "index"]
+    argv += ["--presses", "3", "--json"]
+    assert main(argv) == 1
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0] and "board" not in facts
     assert "no better than" in facts["why_not"] or "unlike" in facts["why_not"]
-    assert main([*words, "--force"]) == 0
+    assert main([*argv, "--force"]) == 0
     assert json.loads(capsys.readouterr().out)["board"]["frames_bit_for_bit"] > 0
 
 
@@ -117,15 +117,15 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     capsys.readouterr()
     # four presses of the first finger are in it: 2, 3.5, 5 and 4 N; in grams
     grams = ",".join(f"{1000 * force / 9.80665:.2f}" for force in (2.0, 3.5, 5.0, 4.0))
-    words = ["calibrate", "press", str(recording), "--scale", "--finger", "0", "--unit", "g", "--json"]
-    words += ["--readings", grams]
-    assert main(words) == 0
+    argv = ["calibrate", "press", str(recording), "--scale", "--finger", "0", "--unit", "g", "--json"]
+    argv += ["--readings", grams]
+    assert main(argv) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == pytest.approx([2.0, 3.5, 5.0, 4.0], abs=1e-4)
     assert facts["serial"] == "BTSIM00000000001"
-    assert main([*words[:-1], "510,300"]) != 0
+    assert main([*argv[:-1], "510,300"]) != 0
     assert "expected 3 or more" in capsys.readouterr().err
-    assert main(words[:-2]) != 0
+    assert main(argv[:-2]) != 0
     assert "--readings" in capsys.readouterr().err
 
 

@@ -74,7 +74,7 @@ def test_it_waits_until_the_scale_has_settled() -> None:
 
 
 @pytest.mark.parametrize(
-    ("printed", "words"),
+    ("printed", "message"),
     [
         (b"", "no data from the scale in 0.6 s"),
         (b"\x83\xfe\x11\r\n", "is not a weight"),
@@ -88,10 +88,10 @@ def test_it_waits_until_the_scale_has_settled() -> None:
         (b"ST,-00120.0  g\r\n", "while a finger should press"),
     ],
 )
-def test_what_is_no_reading_is_one_line(printed: bytes, words: str) -> None:
+def test_what_is_no_reading_is_one_line(printed: bytes, message: str) -> None:
     with printing([printed]) as port, Scale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
         scale.force_n()
-    assert words in str(refused.value) and "\n" not in str(refused.value)
+    assert message in str(refused.value) and "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("query", ["?baud=fast", "?speed=9600", "?parity=X"])
@@ -113,7 +113,7 @@ def test_a_scale_that_is_unplugged_is_told() -> None:
 
 
 def test_a_calibration_reads_the_scale_at_every_press(capsys: pytest.CaptureFixture[str]) -> None:
-    words = [
+    argv = [
         "calibrate",
         "press",
         "sim:fingers.toml?fingers=1&pace=fast",
@@ -126,7 +126,7 @@ def test_a_calibration_reads_the_scale_at_every_press(capsys: pytest.CaptureFixt
     shown = [b"S S     204.0 g\r\n", b"S S     357.0 g\r\n", b"S S     510.0 g\r\n"]
     with printing(shown) as port:
         assert (
-            main([*words, "--scale", f"{port}?baud=9600"]) == 1
+            main([*argv, "--scale", f"{port}?baud=9600"]) == 1
         )  # the map of a finger poked by a point is not uploaded
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == pytest.approx([0.204 * G, 0.357 * G, 0.510 * G])

@@ -42,13 +42,13 @@ def test_the_plan_is_every_mass_on_every_block() -> None:
 
 
 @pytest.mark.parametrize(
-    ("masses", "tilts", "words"),
+    ("masses", "tilts", "message"),
     [((), (15.0,), "50 to 2000 g"), ((5.0,), (), "masses of 5 g"), ((200.0,), (45.0,), "tilts of 45 deg")],
 )
 def test_weights_that_no_finger_holds_are_refused(
-    masses: tuple[float, ...], tilts: tuple[float, ...], words: str
+    masses: tuple[float, ...], tilts: tuple[float, ...], message: str
 ) -> None:
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=message):
         weights.plan(masses, tilts)
 
 
@@ -66,15 +66,15 @@ def test_a_recording_says_the_same_and_goes_to_no_board(tmp_path: Path, capsys: 
     recording = tmp_path / "weights.mcap"
     assert main(["record", "sim:weights.toml", str(recording)]) == 0
     capsys.readouterr()
-    words = ["calibrate", "press", str(recording), "--weights", "--finger", "0", "--json"]
-    assert main(words) == 0
+    argv = ["calibrate", "press", str(recording), "--weights", "--finger", "0", "--json"]
+    assert main(argv) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["gain"] == pytest.approx(1.05, abs=facts["gain_sigma"]) and not facts["why_not"]
     assert facts["serial"] == "BTSIM00000000003" and "board" not in facts
     assert np.linalg.norm(facts["force_n"], axis=1) == pytest.approx([0.2 * G, 0.5 * G] * 5)
-    assert main([*words, "--masses", "200,500,700"]) != 0  # more than were laid on it
+    assert main([*argv, "--masses", "200,500,700"]) != 0  # more than were laid on it
     assert "press 11" in capsys.readouterr().err
-    assert main([*words, "--save"]) != 0
+    assert main([*argv, "--save"]) != 0
     assert "--save" in capsys.readouterr().err
 
 
@@ -82,11 +82,11 @@ def test_a_plate_corrects_directions_from_all_sides_alone(tmp_path: Path, capsys
     recording = tmp_path / "presses.mcap"
     assert main(["record", "sim:weights.toml", str(recording)]) == 0
     capsys.readouterr()
-    words = ["calibrate", "press", str(recording), "--plate", "--finger", "index", "--json", "--presses"]
-    assert main([*words, "10"]) == 0
+    argv = ["calibrate", "press", str(recording), "--plate", "--finger", "index", "--json", "--presses"]
+    assert main([*argv, "10"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["held_out_deg"] < 2.0 < facts["before_deg"] and not facts["why_not"]
-    assert main([*words, "5"]) != 0
+    assert main([*argv, "5"]) != 0
     assert "roll the finger further to both sides" in capsys.readouterr().err
 
 

@@ -344,7 +344,7 @@ def put(name: str, rows: Any, value: Any, dtype: Any = None) -> Callable[[dict[s
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         (lambda a: {"E": a["E"][:1234], "F": a["F"][:1234]}, rf"1234 rows: expected at least {MIN_ROWS}"),
         (lambda a: {"F": None}, r"holds E, E_base, E_idle: expected E .* and F"),
@@ -377,12 +377,12 @@ def put(name: str, rows: Any, value: Any, dtype: Any = None) -> Callable[[dict[s
     ],
 )
 def test_a_bad_recording_is_refused_with_the_number_that_shows_it(
-    change: Callable[[dict[str, Any]], dict[str, Any]], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: Callable[[dict[str, Any]], dict[str, Any]], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arrays = wrench_run.fields(4000, rests=False)
     arrays |= change(arrays)
     path = wrench_run.save(tmp_path / "bad.npz", {name: array for name, array in arrays.items() if array is not None})
-    with pytest.raises(RecordingError, match=words):
+    with pytest.raises(RecordingError, match=message):
         validate(load_run(path))
     assert main(["calibrate", "wrench", str(path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -426,8 +426,8 @@ def test_calibrate_writes_report_picture_and_map(
     finger: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "new" / "folder"
-    words = ["calibrate", "wrench", str(finger), "--out", str(out), "--json"]
-    assert main(words) == 0
+    argv = ["calibrate", "wrench", str(finger), "--out", str(out), "--json"]
+    assert main(argv) == 0
     facts = json.loads(capsys.readouterr().out)
     assert sorted(Path(p).name for p in facts["written"]) == ["finger.md", "finger.png", "finger.wrench.json"]
     page = (out / "finger.md").read_text(encoding="utf-8")
@@ -438,7 +438,7 @@ def test_calibrate_writes_report_picture_and_map(
     assert (out / "finger.png").read_bytes().startswith(b"\x89PNG")
     assert file.load_fitted(out / "finger.wrench.json").model == facts["model"]
     # a second time it would overwrite, and says so before it works
-    assert main(words) == 2
+    assert main(argv) == 2
     assert "already exists" in capsys.readouterr().err
     assert main(["calibrate", "wrench", str(finger), str(finger), "--out", str(tmp_path / "two")]) == 2
     assert "would be written twice" in capsys.readouterr().err

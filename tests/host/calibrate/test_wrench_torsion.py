@@ -69,7 +69,7 @@ def test_blocks_are_not_regions_of_the_finger(run: Run, arrays: dict[str, Any]) 
 
 
 @pytest.mark.parametrize(
-    ("field", "words"),
+    ("field", "message"),
     [
         (np.arange(FRAMES) % 19, r"field contact names 19 contacts: expected at least 20"),
         (np.arange(FRAMES) / 2.0, r"field contact is float64 \(4000,\): expected \(4000,\) integers"),
@@ -77,9 +77,9 @@ def test_blocks_are_not_regions_of_the_finger(run: Run, arrays: dict[str, Any]) 
     ],
 )
 def test_contacts_that_cannot_be_cut_by_are_refused(
-    field: np.ndarray, words: str, arrays: dict[str, Any], tmp_path: Path
+    field: np.ndarray, message: str, arrays: dict[str, Any], tmp_path: Path
 ) -> None:
-    with pytest.raises(RecordingError, match=words):
+    with pytest.raises(RecordingError, match=message):
         loaded(tmp_path, arrays | {"contact": field})
 
 

@@ -39,8 +39,8 @@ def test_any_name_of_a_file_will_do(recorded: Path, tmp_path: Path, monkeypatch,
         ["lake", "check", f"{name}.lake"],
         ["lake", "sql", "SELECT source FROM recordings", "lake"],
     ]
-    for words in calls:
-        assert main(words) == 0, words
+    for argv in calls:
+        assert main(argv) == 0, argv
     # DuckDB opens no path that is not UTF-8.
     assert main(["lake", "sql", "SELECT count(*) FROM frames", f"{name}.lake"]) == (2 if name == NOT_UTF8 else 0)
     printed = capsys.readouterr()

@@ -87,7 +87,7 @@ def test_what_is_not_known_says_nothing(trained: Trained) -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "message"),
     [
         (lambda t: train(np.zeros((5, 2)), np.zeros(5, int)), "0 slipping"),
         (lambda t: train(np.zeros((5, 2)), np.full(5, 7)), "GripStates, one per round"),
@@ -96,6 +96,6 @@ def test_what_is_not_known_says_nothing(trained: Trained) -> None:
         (lambda t: observations(np.zeros(3, [("force_n", "f8", 3)]), np.zeros((2, 22))), r"pac has shape \(2, 22\)"),
     ],
 )
-def test_bad_input_is_refused_in_words(trained: Trained, call, words: str) -> None:
-    with pytest.raises(InputError, match=words):
+def test_bad_input_is_refused_in_words(trained: Trained, call, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         call(trained)

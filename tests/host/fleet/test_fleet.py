@@ -446,10 +446,10 @@ def test_a_password_keeps_others_out(tmp_path: Path) -> None:
 def test_tls_keeps_others_out(tmp_path: Path) -> None:
     """Certificates by openssl, as host/docs/guides/network.md says."""
     for name in ("board", "other"):
-        words = ["-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
-        words += ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]
+        options = ["-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
+        options += ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]
         files = ["-keyout", str(tmp_path / f"{name}.key"), "-out", str(tmp_path / f"{name}.pem")]
-        subprocess.run(["openssl", "req", *words, *files], check=True, capture_output=True)
+        subprocess.run(["openssl", "req", *options, *files], check=True, capture_output=True)
     board, other = ({"link": {"tls": {"root_ca_certificate": str(tmp_path / f"{n}.pem")}}} for n in ("board", "other"))
     keys = {"listen_private_key": str(tmp_path / "board.key"), "listen_certificate": str(tmp_path / "board.pem")}
     server = {"link": {"tls": keys}}
@@ -461,10 +461,10 @@ def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path
     """kill -9 of `biotac share`, three seconds of nothing, and another one of the same name."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     source = "sim:press.toml?fingers=5&pace=real&seconds=300"
-    words = [sys.executable, "-m", "biotac", "share", source, "--zenoh", "left", "--listen", endpoint]
+    command = [sys.executable, "-m", "biotac", "share", source, "--zenoh", "left", "--listen", endpoint]
 
     def serve() -> subprocess.Popen[str]:
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert process.stdout is not None
         with process.stdout as output:
             assert "is shared" in output.readline()

@@ -119,7 +119,7 @@ def test_a_port_is_opened_once(scripted_board, hello) -> None:
 
 
 @pytest.mark.parametrize(
-    ("port", "words"),
+    ("port", "message"),
     [
         ("/dev/ttyNOWHERE7", r"no port /dev/ttyNOWHERE7; `biotac list`"),
         (os.devnull, "cannot be opened as a serial port"),
@@ -130,8 +130,8 @@ def test_a_port_is_opened_once(scripted_board, hello) -> None:
         ("sim:press.toml?pace=nan", "pace is 'nan', expected real, fast or"),
     ],
 )
-def test_a_port_that_cannot_be_opened_says_why(port: str, words: str) -> None:
-    with pytest.raises(biotac.PortError, match=words):
+def test_a_port_that_cannot_be_opened_says_why(port: str, message: str) -> None:
+    with pytest.raises(biotac.PortError, match=message):
         biotac.open(port)
 
 

@@ -324,10 +324,10 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
         "its map is not base64": [edited | {"map": "?"}],
         'expected "biotac-wrench-map/1"': [[], tree | {"format": "biotac-wrench-map/2"}],
     }
-    for words, every in wrong.items():
+    for message, every in wrong.items():
         for changed in every:
             path.write_text(json.dumps(changed))
-            with pytest.raises(biotac.InputError, match=words):
+            with pytest.raises(biotac.InputError, match=message):
                 map_file.load(path)
     path.write_text(json.dumps(edited | {"provenance": {"note": "mine"}}))
     assert map_file.load(path) == blob

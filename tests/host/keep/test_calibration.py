@@ -59,7 +59,7 @@ def test_a_value_keeps_its_settings_range(k: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "text"),
     [
         ({"force_gain_nn": (1, 2)}, "force_gain_nn has 2 values, expected 3"),
         ({"torque_gain_nn": (1, 2.0)}, "torque_gain_nn is 2.0, expected a whole number"),
@@ -73,8 +73,8 @@ def test_a_value_keeps_its_settings_range(k: int) -> None:
         ({"serial": 5}, "expected up to 16 ASCII"),
     ],
 )
-def test_what_is_no_calibration_is_refused(change: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+def test_what_is_no_calibration_is_refused(change: dict[str, object], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
         replace(ODD, **change)  # type: ignore[arg-type]
 
 
@@ -96,7 +96,7 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "text"),
     [
         (
             {"format": "biotac-calibration/2"},
@@ -116,10 +116,10 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
         ({"provenance": "hand"}, "provenance is not an object"),
     ],
 )
-def test_a_file_that_cannot_be_used_says_why(tmp_path: Path, change: dict[str, object], words: str) -> None:
+def test_a_file_that_cannot_be_used_says_why(tmp_path: Path, change: dict[str, object], text: str) -> None:
     path = tmp_path / "bad.json"
     path.write_text(json.dumps(file.to_dict(ODD) | {"crc32": "edited"} | change))
-    with pytest.raises(biotac.InputError, match=words) as refusal:
+    with pytest.raises(biotac.InputError, match=text) as refusal:
         file.load(path)
     assert str(refusal.value).startswith(f"{path} is not usable: ")
 
@@ -141,8 +141,8 @@ def test_what_is_no_file_at_all(text: str) -> None:
 def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     with pytest.raises(biotac.InputError, match="cannot be read"):
         file.load(tmp_path / "none.json")
-    for path, words in ((tmp_path, "already exists; choose another"), (tmp_path / "no" / "such", "cannot be written")):
-        with pytest.raises(biotac.InputError, match=words):
+    for path, text in ((tmp_path, "already exists; choose another"), (tmp_path / "no" / "such", "cannot be written")):
+        with pytest.raises(biotac.InputError, match=text):
             write_new(path, "")
     (tmp_path / "latin.json").write_bytes(b'{"by": "M\xfcller"}')
     with pytest.raises(biotac.InputError, match=r"is not usable: .* decode"):
@@ -169,7 +169,7 @@ GOOD = eeprom.pack(ODD)[16:]
 
 
 @pytest.mark.parametrize(
-    ("data", "words"),
+    ("data", "text"),
     [
         (b"", "no intact record"),
         (eeprom.pack(ODD)[:-3], "no intact record: its CRC is wrong"),
@@ -183,8 +183,8 @@ GOOD = eeprom.pack(ODD)[16:]
         (sealed(2, 1, b"B\xe4" + GOOD[2:]), "an invalid calibration"),
     ],
 )
-def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
-    with pytest.raises(biotac.InputError, match=words):
+def test_a_record_that_is_none_says_why(data: bytes, text: str) -> None:
+    with pytest.raises(biotac.InputError, match=text):
         eeprom.unpack(data, "it")
 
 
@@ -325,8 +325,8 @@ def test_a_finger_with_a_calibration_and_a_map(port: str, capsys, tmp_path: Path
     assert main([verb, "show", port]) == 0
     shown = capsys.readouterr().out
     assert "finger 0: calibration in force; for any" in shown and "finger 0: wrench map in force; force" in shown
-    for words in (["get", port, str(back)], ["clear", port]):
-        assert main([verb, *words, "--finger", "0"]) == 2
+    for argv in (["get", port, str(back)], ["clear", port]):
+        assert main([verb, *argv, "--finger", "0"]) == 2
         assert "name one: --kind calibration or map" in capsys.readouterr().err
     assert main([verb, "get", port, str(back), "--finger", "0", "--kind", "map"]) == 0
     assert map_file.load(back) == make_map(1)

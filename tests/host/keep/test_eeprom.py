@@ -195,17 +195,17 @@ def test_a_version_of_the_future_is_told(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "words"),
+    ("fault", "message"),
     [
         (FileNotFoundError(errno.ENOENT, "no"), "no I2C bus 1; enable I2C"),
         (PermissionError(errno.EACCES, "no"), r"no permission to open /dev/i2c-1; sudo usermod"),
         (OSError(errno.EBUSY, "busy"), r"/dev/i2c-1 cannot be opened .*busy"),
     ],
 )
-def test_a_bus_that_cannot_be_opened(monkeypatch, fault: OSError, words: str) -> None:
+def test_a_bus_that_cannot_be_opened(monkeypatch, fault: OSError, message: str) -> None:
     wires, _ = wired(monkeypatch, "24c02")
     wires.open_fault = fault
-    with pytest.raises(PortError, match=words):
+    with pytest.raises(PortError, match=message):
         load("24c02")
 
 
@@ -294,7 +294,7 @@ def test_a_port_names_its_fingers_eeproms(port: str, bare: str, places: dict[int
 
 
 @pytest.mark.parametrize(
-    ("port", "words"),
+    ("port", "message"),
     [
         ("spidev:0.0?kalibration=1:0x50:24c02", "option 'kalibration' is unknown; expected spidev:"),
         ("spidev:0.0?calibration=1:0x50", "'1:0x50' names no known EEPROM"),
@@ -302,6 +302,6 @@ def test_a_port_names_its_fingers_eeproms(port: str, bare: str, places: dict[int
         ("spidev:0.0?calibration=1:0x50:24c02,1:0x51:24c02", r"2 EEPROMs for 1 finger\(s\)"),
     ],
 )
-def test_a_port_that_names_them_wrongly(port: str, words: str) -> None:
-    with pytest.raises(PortError, match=words):
+def test_a_port_that_names_them_wrongly(port: str, message: str) -> None:
+    with pytest.raises(PortError, match=message):
         harness.parse(port)

@@ -430,14 +430,14 @@ def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
     many = tmp_path / "many"
     many.mkdir()
     made = copies(biotac.Recording(sources[0]), many, 500, 600.0)
-    words = [sys.executable, "-m", "biotac", "export", *map(str, made), "--lake", str(tmp_path / "lake"), "-j", "2"]
+    command = [sys.executable, "-m", "biotac", "export", *map(str, made), "--lake", str(tmp_path / "lake"), "-j", "2"]
 
     def complete() -> int:
         return len(list((tmp_path / "lake" / lake_folder.RECORDINGS).rglob("*.parquet")))
 
     killed = 0
     for _ in range(10):
-        running = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL)
+        running = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL)
         target = complete() + 30
         while running.poll() is None and complete() < target:
             os.sched_yield()
@@ -446,7 +446,7 @@ def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
             killed += 1
         running.wait()
     assert killed == 10
-    assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
     assert export(made, tmp_path / "once") == 0
     assert hashes(tmp_path / "lake") == hashes(tmp_path / "once")
     assert len(lake_folder.opened(tmp_path / "lake").recordings) == 500

@@ -77,7 +77,7 @@ def test_a_board_is_chosen_by_its_serial_number(number: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("entries", "number", "words"),
+    ("entries", "number", "message"),
     [
         ([], None, r"no board on any USB port; plug one in"),
         ([ONE[1]], "A5XK3RJT", r"no board with serial number A5XK3RJT on any USB port"),
@@ -85,8 +85,8 @@ def test_a_board_is_chosen_by_its_serial_number(number: str) -> None:
         (TWO, None, r"found 2 boards: serial:E660583883200000 on COM3, serial:E6605838831F5B2C on COM10; name one"),
     ],
 )
-def test_what_cannot_be_chosen_is_said_with_what_is_there(entries, number, words: str) -> None:
-    with pytest.raises(biotac.PortError, match=words):
+def test_what_cannot_be_chosen_is_said_with_what_is_there(entries, number, message: str) -> None:
+    with pytest.raises(biotac.PortError, match=message):
         choose(number, entries)
 
 

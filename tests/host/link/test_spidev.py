@@ -173,7 +173,7 @@ def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> Non
 
 
 @pytest.mark.parametrize(
-    ("port", "words"),
+    ("port", "message"),
     [
         ("spidev:", r"'' is not an SPI device; expected BUS\.DEVICE"),
         ("spidev:0", "'0' is not an SPI device"),
@@ -185,8 +185,8 @@ def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> Non
         ("spidev:0.0,0.1,0.2,1.0,1.1,1.2", "6 devices; expected at most 5"),
     ],
 )
-def test_a_bad_port_says_what_is_expected(port: str, words: str) -> None:
-    with pytest.raises(biotac.PortError, match=words):
+def test_a_bad_port_says_what_is_expected(port: str, message: str) -> None:
+    with pytest.raises(biotac.PortError, match=message):
         biotac.open(port)
 
 
@@ -197,14 +197,14 @@ def test_without_spidev_it_names_the_extra(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "words"),
+    ("error", "message"),
     [
         (FileNotFoundError(2, "No such file or directory"), r"no SPI device /dev/spidev0\.1; enable SPI"),
         (PermissionError(13, "Permission denied"), r"no permission to open /dev/spidev0\.1; sudo usermod -aG spi"),
         (OSError(16, "Device or resource busy"), r"/dev/spidev0\.1 cannot be used .*busy"),
     ],
 )
-def test_a_device_that_does_not_open_says_why_and_the_others_are_closed(monkeypatch, error, words) -> None:
+def test_a_device_that_does_not_open_says_why_and_the_others_are_closed(monkeypatch, error, message) -> None:
     opened = []
 
     class Spi:
@@ -221,7 +221,7 @@ def test_a_device_that_does_not_open_says_why_and_the_others_are_closed(monkeypa
     module = ModuleType("spidev")
     monkeypatch.setattr(module, "SpiDev", Spi, raising=False)
     monkeypatch.setitem(sys.modules, "spidev", module)
-    with pytest.raises(biotac.PortError, match=words):
+    with pytest.raises(biotac.PortError, match=message):
         biotac.open("spidev:0.0,0.1")
     assert [spi.closed for spi in opened] == [True]
 

@@ -122,7 +122,7 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         ({"coefficients": [[2**15] * 3]}, "coefficients of OFFSET hold 32768, expected integers -32768 to 32767"),
         ({"coefficients": [[-(2**31) - 40_000] * 3]}, "coefficients of OFFSET hold -2147523648"),
@@ -132,11 +132,11 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
         ({"exponent": (0,)}, "cannot be stored"),
     ],
 )
-def test_what_would_wrap_in_a_blob_is_refused(change: dict, words: str) -> None:
+def test_what_would_wrap_in_a_blob_is_refused(change: dict, message: str) -> None:
     block = BoardBlock(Kind.OFFSET, Gate.ONE, (1, 1, 1), np.ones((1, 3), np.int64))
     assert BoardMap(3, (block,)).blob
     change = {name: np.array(stored) if name == "coefficients" else stored for name, stored in change.items()}
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=message):
         _ = BoardMap(3, (dataclasses.replace(block, **change),)).blob
     for odd in ({"serial": "BT" * 9}, {"serial": "\xfc"}, {"made_s": -1}, {"made_s": 2**32}):
         with pytest.raises(InputError, match="cannot be stored"):
