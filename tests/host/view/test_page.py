@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -422,6 +423,27 @@ def test_the_spectrum_is_numpys(view, open_page) -> None:
         }"""
     )
     assert abs(strongest["hz"] - 300) < 2200 / 128 and strongest["before"] == 0
+
+
+def test_texts_of_marks_never_overprint(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml"))
+    places = page.evaluate("""async () => {
+      const { Finger } = await import('./model.js');
+      const { TimePlot } = await import('./plots.js');
+      const { readTheme } = await import('./colours.js');
+      const finger = new Finger(), marks = [];
+      for (let k = 0; k < 1000; k++) finger.add({ tUs: 1e4 * k, forceN: [0, 0, 0], pdc: 0, mapMm: null });
+      for (const s of [1, 3, 3.1, 3.2, 5, 5.4, 9.5, 9.9]) marks.push({ t_us: 1e6 * s, name: 'a slip' });
+      const places = [], fill = CanvasRenderingContext2D.prototype.fillText;
+      CanvasRenderingContext2D.prototype.fillText = function (text, x) {
+        if (text === 'a slip') places.push([x, x + this.measureText(text).width]);
+      };
+      const force = new TimePlot(document.getElementById('force-plot'), ['x'], ['x'], { least: 1, digits: 1 });
+      force.draw(finger, readTheme(), marks);
+      CanvasRenderingContext2D.prototype.fillText = fill;
+      return [...places.sort(([a], [b]) => a - b), [force.canvas.clientWidth]];
+    }""")
+    assert len(places) >= 4 and all(end < begin for (_, end), (begin, *_) in pairwise(places))
 
 
 def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open_page, touch) -> None:
