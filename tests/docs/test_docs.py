@@ -80,6 +80,10 @@ def test_the_notebook_runs_and_begins_as_the_page_does(tmp_path: Path, monkeypat
     plt.close("all")
 
 
+def test_everyday_tasks_take_at_most_five_lines() -> None:
+    assert [code for code in BLOCKS["everyday.md"] if len(code.splitlines()) > 5] == []
+
+
 def test_there_is_python_to_run_and_commands_to_parse() -> None:
     assert sum(map(len, BLOCKS.values())) >= 8
     assert {page for page, _ in COMMANDS} >= {"quickstart.md", "recording.md", "live_view.md", "robots.md", "cli.md"}
