@@ -144,7 +144,7 @@ def grasped(case: Grip, kept_for: int | None = None) -> list[Outcome]:
 
 @dataclass(frozen=True)
 class Held:
-    """One hold: the rows in which it stands, or in which its temperature begins to move, and is free again."""
+    """One hold: the rows in which it stands and is free again."""
 
     course: Course
     first: int
@@ -178,9 +178,8 @@ def heated(seed: int, sign: int = 1) -> Held:
     script = begun(rng).rest(10)
     script.load(rng.uniform(0.5, 3), rng.uniform(3, 30))
     rate = sign * rng.uniform(0.05, 0.3)
-    script.hold(rng.uniform(0.2, 5))
     first = row(script)
-    script.warm(rate * 20, 20).hold(rng.uniform(1, 10)).load(0, rng.uniform(3, 30))
+    script.hold(rng.uniform(0.2, 5)).warm(rate * 20, 20).hold(rng.uniform(1, 10)).load(0, rng.uniform(3, 30))
     free = row(script)
     return Held(script.rest(20).make(), first, free)
 
@@ -199,18 +198,21 @@ def test_after_a_restart_in_a_grip_no_grasp_is_wrong_without_a_flag() -> None:
     assert not [seed for seed, grasp in enumerate(first) if grasp.silent]
     assert sum(grasp.wrong for grasp in first) <= 0.1 * GRIPS
     assert all(grasp.unsure for grasp in first)
-    # One in ten was not let go clearly enough by then.
-    assert sum(grasps[1].unsure for grasps in found) <= 0.15 * GRIPS
+    for later in (1, 2):
+        assert sum(grasps[later].silent for grasps in found) <= 0.02 * GRIPS  # that drift is not known yet
+        assert sum(grasps[later].unsure for grasps in found) <= 0.01 * GRIPS
     most_n = max(grasp.off_n for grasp in first[:60])
     wrong_by.row("the board starts while it grips: the next grasp", most_n, "TARE_UNSURE", "lets go once, or tares")
 
 
-def test_after_a_hang_in_a_grip_the_tare_goes_on() -> None:
-    found = [grasped(grip(seed, lead_s=30), kept_for=seed % 50) for seed in range(GRIPS)]
+@pytest.mark.parametrize("lead_s", [10, 30])
+def test_after_a_hang_in_a_grip_the_tare_goes_on(lead_s: float) -> None:
+    found = [grasped(grip(seed, lead_s), kept_for=seed % 50) for seed in range(GRIPS)]
     assert sum(grasps[0].wrong for grasps in found) <= 0.01 * GRIPS
     assert not any(grasp.unsure for grasps in found for grasp in grasps)
-    most_n = max(grasps[0].off_n for grasps in found[:60])
-    wrong_by.row("the board hangs in a grip, and goes on with its tare", most_n, "none", "keeps that margin")
+    if lead_s > 10:
+        most_n = max(grasps[0].off_n for grasps in found[:60])
+        wrong_by.row("the board hangs in a grip, and goes on with its tare", most_n, "none", "keeps that margin")
 
 
 def test_pressure_that_hardly_moves_zeroes_no_hold() -> None:

@@ -43,12 +43,6 @@ uint32_t bt_rollback_sweeps(const bt_rollback *rollback);
 #ifndef BT_CDEF
 #include "fixed_point.h"
 
-// The value, moved towards its target by at most step_q16.
-static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
-{
-    return base_q16 + (uint32_t)bt_clamp((int32_t)(target_q16 - base_q16), -step_q16, step_q16);
-}
-
 // The value, moved by step_q16. It stays within 0..full scale, and an unknown one stays unknown.
 static inline uint32_t bt_baseline_moved(uint32_t base_q16, int32_t step_q16)
 {

@@ -10,13 +10,17 @@
 #include <stdint.h>
 
 typedef struct {
-    int32_t rate_q20;     // counts that every electrode gains in a sweep
-    int32_t waiting_q20;  // the rate some seconds ago
-    int32_t sure_q20;     // the rate before that: no load that is seen now was learned in it
-    uint8_t since_commit; // sweeps
-    uint8_t settled;      // sweeps that the tare has had to come to rest
-    int32_t moved_q16;    // sum of what the electrodes followed by in this sweep
-    uint8_t sweeps;       // sweeps it was learned in; saturates
+    int32_t q20;    // counts that every electrode gains in a sweep
+    uint8_t sweeps; // it was learned in; saturates
+} bt_drift_rate;
+
+typedef struct {
+    bt_drift_rate now;
+    bt_drift_rate waiting; // the rate some seconds ago
+    bt_drift_rate sure;    // the rate before that: no load that is seen now was learned in it
+    uint8_t since_commit;  // sweeps
+    uint8_t settled;       // sweeps that the tare has had to come to rest
+    int32_t moved_q16;     // sum of what the electrodes followed by in this sweep
 } bt_drift;
 
 // Learn from a sweep in which the electrodes followed by moved_q16, all of it drift.
@@ -34,7 +38,8 @@ bool bt_drift_known(const bt_drift *drift);
 // The drift of so many sweeps.
 int32_t bt_drift_over(const bt_drift *drift, uint32_t sweeps);
 
-// So many sweeps showed nothing of the drift. Returns what is assumed for them, and reduces the rate.
+// So many sweeps showed nothing of the drift: it goes on at the sure rate. Returns what is assumed for them,
+// and reduces the rate.
 int32_t bt_drift_unseen(bt_drift *drift, uint32_t sweeps);
 
 // The step of every electrode in a sweep, when they are behind by away_q16.

@@ -8,6 +8,9 @@
 #define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
 #define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: an undershoot comes back within seconds
 #define BACK_ROUNDS  400        // and is over after these
+// What all electrodes are away by counts for more than an electrode's own part: drift is shared, noise is
+// not, and following each alone lags a worn finger's worst drift by a count.
+#define SHARED_TIMES 4
 
 // The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count, so the
 // unsigned square fits, and so does the sum over all electrodes.
@@ -89,19 +92,20 @@ static void serve_electrode(bt_tare *tare, unsigned i)
     tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
     uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
     bt_watch_side(&tare->watch, mean_q16, *base_q16);
+    if (!rests(tare)) {
+        return;
+    }
+    int32_t step_q16 = tare->drift_q16;
+    if (tare->held) { // only drift is followed
+        step_q16 = bt_watch_step_q16(&tare->watch, step_q16, mean_q16, *base_q16);
+    } else {
+        int32_t away_q16 = (int32_t)(mean_q16 - *base_q16) + SHARED_TIMES * tare->watch.shared_q16;
+        step_q16 += bt_clamp(away_q16, -BT_SLEW_Q16, BT_SLEW_Q16);
+    }
     uint32_t before_q16 = *base_q16;
-    if (rests(tare) && !tare->held) { // else only drift is followed
-        *base_q16 = bt_baseline_follow(*base_q16, mean_q16, BT_SLEW_Q16);
-    }
-    if (rests(tare)) {
-        int32_t drift_q16 = tare->drift_q16;
-        if (tare->held) {
-            drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, mean_q16, *base_q16);
-        }
-        *base_q16 = bt_baseline_moved(*base_q16, drift_q16);
-        tare->drift.moved_q16 += (int32_t)(*base_q16 - before_q16);
-        bt_adopt_electrode(tare, i);
-    }
+    *base_q16 = bt_baseline_moved(before_q16, step_q16);
+    tare->drift.moved_q16 += (int32_t)(*base_q16 - before_q16);
+    bt_adopt_electrode(tare, i);
 }
 
 static void serve_pressure(bt_tare *tare)
@@ -111,7 +115,8 @@ static void serve_pressure(bt_tare *tare)
         uint32_t before_q16 = tare->base.pdc_q16;
         bool back = tare->age_rounds < BACK_ROUNDS && tare->comes_back_q16 > 0;
         int32_t slew_q16 = mean_q16 < before_q16 ? PDC_SINK_Q16 : back ? PDC_BACK_Q16 : PDC_SLEW_Q16;
-        tare->base.pdc_q16 = bt_baseline_follow(before_q16, mean_q16, slew_q16);
+        int32_t step_q16 = bt_clamp((int32_t)(mean_q16 - before_q16), -slew_q16, slew_q16);
+        tare->base.pdc_q16 = bt_baseline_moved(before_q16, step_q16);
         tare->comes_back_q16 -=
             mean_q16 > before_q16 && back ? (int32_t)(tare->base.pdc_q16 - before_q16) : 0;
         bt_adopt_aim_pressure(tare);

@@ -66,10 +66,10 @@ static void judge_release(bt_tare *tare)
     if (tare->held || verdict == BT_RELEASE_NO) {
         return;
     }
-    // A press from which pressure comes back to the tare began at rest; or else when it ends, pressure will
-    // be far below, and the tare is lost.
+    // A press from which pressure comes back to the tare began at rest. If it stays above, the finger may
+    // still hold what it was tared with; and if that goes, pressure will be far below, and the tare is lost.
     bool back = sweep.witness && tare->release.pdc_peak >= BT_PDC_PRESSED
-                && sweep.above >= -bt_pdc_missing_max(tare->release.pdc_peak);
+                && (int32_t)bt_abs32(sweep.above) <= bt_pdc_missing_max(tare->release.pdc_peak);
     tare->unsure = tare->unsure && (verdict == BT_RELEASE_SHIFT || !(back || tare->let_go));
     if (verdict == BT_RELEASE_SHIFT) {
         bt_adopt_shift(tare);
@@ -111,20 +111,18 @@ static void judge_drift(bt_tare *tare)
     bool touched = tare->held || !rests;
     bool valid = rests || bt_watch_sees(watch, &tare->sweep);
     bool shown = rests ? !tare->witness.flat : tare->witness.moves; // or a load would pass for drift
-    bool level = valid && shown && !tare->partial && bt_watch_level(watch);
+    bool steady = rests ? watch->level_sweeps >= BT_LEVEL_SWEEPS : bt_watch_level(watch);
+    bool level = valid && shown && !tare->partial && steady;
     bool creeps = touched && bt_watch_creeps(watch);
+    watch->follows = level && touched && !(creeps && bt_drift_known(&tare->drift));
     if (level && !creeps) {
         bt_drift_learn(&tare->drift);
-    } else if (!bt_watch_level(watch)) {
-        bt_drift_revert(&tare->drift);
+        bool faint = touched && watch->shared_q16 <= FAINT_Q16 && watch->shared_q16 >= -FAINT_Q16;
+        tare->drift_q16 = bt_drift_step_q16(&tare->drift, faint ? watch->shared_q16 : 0);
+    } else {
+        tare->drift_q16 = bt_drift_unseen(&tare->drift, 1);
     }
     tare->drift.moved_q16 = 0;
-    watch->follows = level && touched && !(creeps && bt_drift_known(&tare->drift));
-    int32_t away_q16 = level && !creeps ? watch->shared_q16 : 0;
-    if (touched && (away_q16 > FAINT_Q16 || away_q16 < -FAINT_Q16)) {
-        away_q16 = 0;
-    }
-    tare->drift_q16 = level ? bt_drift_step_q16(&tare->drift, away_q16) : bt_drift_unseen(&tare->drift, 1);
     tare->drift_q16 += watch->follows ? bt_watch_drifts_q16(watch) : 0;
 }
 

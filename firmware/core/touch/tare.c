@@ -186,14 +186,14 @@ uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base)
 
 void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept)
 {
-    *kept = (bt_tare_kept){tare->base, tare->drift.sure_q20, tare->drift.sweeps, tare->held, tare->unsure};
+    *kept =
+        (bt_tare_kept){tare->base, tare->drift.sure.q20, tare->drift.sure.sweeps, tare->held, tare->unsure};
 }
 
 void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept)
 {
     bt_adopt(tare, &kept->base, BT_TARE_STATE_REST, BT_TARE_REASON_RESTORED);
-    tare->drift.sure_q20 = kept->drift_q20;
-    tare->drift.sweeps = kept->drift_sweeps;
+    tare->drift.sure = (bt_drift_rate){kept->drift_q20, kept->drift_sweeps};
     bt_drift_revert(&tare->drift);
     tare->held = kept->held;
     tare->unsure = kept->unsure;

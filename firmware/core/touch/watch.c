@@ -39,6 +39,7 @@ void bt_watch_pause(bt_watch *watch)
     watch->one_way = false;
     watch->follows = false;
     watch->one_way_q2 = 0;
+    watch->shared_q16 = 0;
 }
 
 void bt_watch_begin(bt_watch *watch)

@@ -331,6 +331,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("electrodes_shifted", state(sensor_fault=wire.SensorFault.TOGETHER), "finger 1"),
     ("electrodes_shorted", frames(shorted), "finger 1: E2 and E9"),
     ("pressure_flat", pressed(20), "finger 1: static pressure moves by 20 counts per newton"),
+    ("pressure_flat", pressed(2), "finger 1: static pressure moves by 2 counts per newton"),
     ("pressure_flat", frames(mark("flags", int(wire.FrameFlags.PDC_FLAT))), "finger 1: static pressure did not follow"),
     ("channel_missing", frames(mark("counts", wire.INVALID_COUNT, 0)), "finger 1: E1"),
     ("channel_missing", frames(mark("tdc", wire.INVALID_COUNT)), "finger 1: TDC"),
