@@ -200,7 +200,7 @@ def test_after_a_restart_in_a_grip_no_grasp_is_wrong_without_a_flag() -> None:
     assert all(grasp.unsure for grasp in first)
     for later in (1, 2):
         assert sum(grasps[later].silent for grasps in found) <= 0.02 * GRIPS  # that drift is not known yet
-        assert sum(grasps[later].unsure for grasps in found) <= 0.01 * GRIPS
+        assert sum(grasps[later].unsure for grasps in found) <= 0.05 * GRIPS
     most_n = max(grasp.off_n for grasp in first[:60])
     wrong_by.row("the board starts while it grips: the next grasp", most_n, "TARE_UNSURE", "lets go once, or tares")
 
