@@ -32,7 +32,7 @@ def test_slots_are_on_time_and_the_bus_rules_kept_while_five_fingers_stream(rig:
 
 
 @pytest.mark.nightly
-def test_an_event_is_with_the_host_within_a_millisecond_of_its_slot(rig: Rig) -> None:
+def test_an_event_is_with_the_host_a_millisecond_after_its_slot_or_in_the_next_usb_frame(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=3")
     events: list[biotac.Event] = []
@@ -41,7 +41,8 @@ def test_an_event_is_with_the_host_within_a_millisecond_of_its_slot(rig: Rig) ->
     seen = hand.link.board.counters()["latency"]  # type: ignore[attr-defined]
     assert {event.kind for event in events} >= {biotac.EventKind.TOUCH} and len(frames) == 1500
     assert seen["events"] >= 5
-    assert seen["event_us"] <= 1000
+    # A packet that comes in the last 260 us of a frame waits for the next one (RP2040-E15; usb/data.c).
+    assert seen["event_us"] <= 1000 + 260
 
 
 def test_every_frames_arrival_is_told_and_none_comes_before_its_round_is_over(rig: Rig) -> None:
