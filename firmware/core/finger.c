@@ -181,11 +181,8 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     finger->silent_rounds = 0;
     // A tare command between two rounds may already have changed the tare.
     finger->tare_unsent = finger->tare.changed;
-    uint32_t alone =
-        bt_health_round(&finger->health, &finger->round, &finger->tare.trigger, &finger->tare.noise);
-    if (alone != 0) {
-        bt_health_alone(&finger->health, alone, may_be_touched(finger));
-    }
+    bt_health_round(&finger->health, &finger->round, &finger->tare.trigger, &finger->tare.noise,
+                    may_be_touched(finger));
     if (finger->health.sensor_fault == BT_SENSOR_FAULT_FROZEN) {
         finger->tare.trigger.without = BT_ALL_ELECTRODES;
     }

@@ -263,7 +263,7 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a fault does: largest error in N, the largest without a new warning, and rounds.
+    """What a fault does: the largest error in N, what of it lasts over SILENT_ROUNDS without a new warning, and rounds.
 
     ``flag_after``: from the beginning to the first warning that the healthy finger lacks, -1: none. ``silent_rounds``:
     the longest stretch of an error of over OFF_N without one.
@@ -296,10 +296,11 @@ def outcome(of: Press, name: str, when: str, model: str, seed: int = 0) -> Outco
         given, np.linalg.norm((rows["force_100un"] - good["force_100un"].astype(float)) / 1e4, axis=1), 0.0
     )
     silent = np.where(new == 0, error, 0.0)
+    lasting = np.lib.stride_tricks.sliding_window_view(silent, SILENT_ROUNDS + 1)
     flagged = np.flatnonzero(new)
     seen = np.bitwise_or.reduce(new)
     last = error[of.free - 100 - begin : of.free - begin]
     return Outcome(
-        float(error.max()), float(silent.max()), longest(silent > OFF_N), int(flagged[0]) if len(flagged) else -1,
-        FrameFlags(int(seen)), float(last.mean()),
+        float(error.max()), float(lasting.min(axis=1).max()), longest(silent > OFF_N),
+        int(flagged[0]) if len(flagged) else -1, FrameFlags(int(seen)), float(last.mean()),
     )  # fmt: skip

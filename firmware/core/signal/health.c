@@ -26,6 +26,7 @@
 
 #define TOGETHER         5u  // counts
 #define TOGETHER_BLIND   25u // while static pressure has not shown that it works
+#define SUDDEN           25u // counts: as no press does, over an electrode or not
 #define WARMED           3   // counts of TDC
 #define PRESSED          12u // counts: static pressure that has moved so far works
 #define TOGETHER_WINDOWS 9   // 14 counts/s: a hot cup does up to 10
@@ -156,11 +157,12 @@ static bool together(bt_health *health, uint32_t noise, uint32_t pressure, int t
     uint32_t mean = along / BT_ELECTRODES;
     uint32_t least = (health->pressure_alive ? TOGETHER : TOGETHER_BLIND) << SUM_BITS;
     uint32_t alike = along + along / 8;
+    bool sudden = health->pressure_alive && mean >= SUDDEN << SUM_BITS;
     bool warmed = tdc - health->anchor_tdc > WARMED || health->anchor_tdc - tdc > WARMED;
     if (warmed || health->moved_windows > TOGETHER_WINDOWS || moves->total > alike + noise) {
         return false;
     }
-    if (mean >= least + pressure / 4 && moves->top < 2 * mean + noise / 8
+    if (mean >= least + pressure / 4 && moves->top < (sudden ? 3 : 2) * mean + noise / 8
         && moves->total < alike + noise / 8) {
         health->sensor_fault = BT_SENSOR_FAULT_TOGETHER;
         return false;
@@ -276,8 +278,8 @@ static void watch_condemned(bt_health *health, const bt_round *round)
             health->anchor.lane[i] = count_q2;
             calm = false;
         }
-        repeats = repeats || count_q2 == health->mean.lane[i];
-        health->mean.lane[i] = count_q2;
+        repeats = repeats || count_q2 == health->mean_anchor.lane[i];
+        health->mean_anchor.lane[i] = count_q2;
     }
     if (!calm) {
         health->calm_windows = 0;
@@ -298,14 +300,6 @@ uint32_t bt_health_back(bt_health *health)
     health->windows = 0;
     memset(health->flips, 0, sizeof health->flips);
     return back;
-}
-
-void bt_health_alone(bt_health *health, uint32_t electrodes, bool touched)
-{
-    health->alone |= electrodes;
-    if (!touched) {
-        condemn(health, electrodes, BT_SENSOR_FAULT_ALONE);
-    }
 }
 
 // ---- a round ---------------------------------------------------------------------------------------
@@ -342,30 +336,40 @@ static BT_NOINLINE uint32_t judge(bt_health *health, const bt_round *round, cons
     if (health->out != 0) {
         watch_condemned(health, round);
     }
-    bt_mean_add(&health->mean, sum, health->judged & 1 ? HALF : 0);
     if (++health->judged % FLIP_WINDOWS == 0) {
         memset(health->flips, 0, sizeof health->flips);
     }
     return lone;
 }
 
+// What is not used has not moved.
+static void leave_out(bt_lanes *now, const bt_lanes *anchor, uint32_t without)
+{
+    for (unsigned i = 0; without >> i != 0; i++) {
+        if (without >> i & 1) {
+            now->lane[i] = anchor->lane[i];
+        }
+    }
+}
+
 static uint32_t turn_of_means(bt_health *health, uint32_t without)
 {
     if (health->judged & 1) {
-        bt_moves_add(&health->mean_moves, &health->mean, &health->mean_anchor, 0, HALF, without);
+        leave_out(&health->mean, &health->mean_anchor, without);
+        bt_moves_add(&health->mean_moves, &health->mean, &health->mean_anchor, 0, HALF);
         return 0;
     }
-    bt_moves_add(&health->mean_moves, &health->mean, &health->mean_anchor, HALF, BT_ELECTRODES, without);
+    bt_moves_add(&health->mean_moves, &health->mean, &health->mean_anchor, HALF, BT_ELECTRODES);
     return health->windows > CLEAN_WINDOWS ? judge_means(health) : 0;
 }
 
-uint32_t bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
-                         const bt_noise *noise)
+void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
+                     const bt_noise *noise, bool touched)
 {
     const bt_lanes *smooth = &trigger->smooth;
     bt_lanes *sum = &health->sum[health->filling];
-    const bt_lanes *before = &health->sum[!health->filling];
-    uint32_t without = trigger->unknown | health->out;
+    bt_lanes *before = &health->sum[!health->filling];
+    uint32_t without = (trigger->unknown | health->out) & BT_ALL_ELECTRODES;
     uint32_t lone = 0;
     uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
@@ -376,10 +380,12 @@ uint32_t bt_health_round(bt_health *health, const bt_round *round, const bt_trig
     switch (++health->rounds) {
     case 1:
         health->same = bt_window_begin(sum, before, smooth) & ~without;
+        bt_mean_add(&health->mean, before, health->judged & 1 ? HALF : 0);
         break;
     case 2:
         bt_window_add(sum, smooth);
-        bt_moves_add(&health->moves, before, &health->anchor, 0, BT_ELECTRODES, without);
+        leave_out(before, &health->anchor, without);
+        bt_moves_add(&health->moves, before, &health->anchor, 0, BT_ELECTRODES);
         break;
     case 3:
         bt_window_add(sum, smooth);
@@ -391,5 +397,8 @@ uint32_t bt_health_round(bt_health *health, const bt_round *round, const bt_trig
         health->filling = !health->filling;
         health->rounds = 0;
     }
-    return lone;
+    health->alone |= lone;
+    if (lone != 0 && !touched) { // else a tip no wider than an electrode may slide over it
+        condemn(health, lone, BT_SENSOR_FAULT_ALONE);
+    }
 }

@@ -9,8 +9,8 @@
 // A condemned electrode is given back at rest, with a new tare, once it has been calm for two seconds.
 //
 // Four rounds are a window. No round pays for everything: while a window fills, the one before is searched
-// for words that repeat in the first round and for moves in the second, its verdict comes in the third, and
-// the fourth is for half of the running means.
+// in the first round for words that repeat, and enters half of the running means; in the second for moves;
+// its verdict comes in the third, and the fourth is for half of the means.
 //
 // Units: counts; a window's sums are in 1/4 count (q2), running means in 1/16 count (q4).
 #ifndef BIOTAC_HEALTH_H
@@ -55,13 +55,9 @@ typedef struct {
 
 void bt_health_reset(bt_health *health);
 
-// End a round: judge its words. Returns the electrodes that moved alone.
-uint32_t bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
-                         const bt_noise *noise);
-
-// What moved alone while nothing touched is broken. A tip no wider than an electrode that slides over it
-// moves it alone, too.
-void bt_health_alone(bt_health *health, uint32_t electrodes, bool touched);
+// End a round: judge its words. `touched`: something may touch the finger.
+void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
+                     const bt_noise *noise, bool touched);
 
 // Returns the electrodes to be used again from the next round on, and forgets that they were condemned. Call
 // it while the finger rests, or while too many are out.

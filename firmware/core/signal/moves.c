@@ -32,21 +32,16 @@ void bt_mean_add(bt_lanes *mean_q4, const bt_lanes *sum_q2, unsigned first)
     }
 }
 
-void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end,
-                  uint32_t without)
+void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end)
 {
     bt_moves sum = first == 0 ? (bt_moves){0} : *moves;
-    unsigned i = first;
-    without >>= first;
+    const uint16_t *a = now->lane + first, *b = anchor->lane + first, *last = now->lane + end;
     do {
-        int32_t move = now->lane[i] - anchor->lane[i];
+        int32_t move = *a++ - *b++;
         uint32_t size = bt_abs32(move);
-        if (!(without & 1)) {
-            sum.total += size;
-            sum.along += move;
-            sum.top = size > sum.top ? size : sum.top;
-        }
-        without >>= 1;
-    } while (++i < end);
+        sum.total += size;
+        sum.along += move;
+        sum.top = size > sum.top ? size : sum.top;
+    } while (a != last);
     *moves = sum;
 }

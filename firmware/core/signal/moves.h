@@ -24,8 +24,7 @@ typedef struct {
     uint32_t top;   // and the largest
 } bt_moves;
 
-// Add electrodes first <= i < end, but for those in `without`. Starts over with the first.
-void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end,
-                  uint32_t without);
+// Add electrodes first <= i < end. Starts over with the first.
+void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end);
 
 #endif

@@ -46,9 +46,10 @@ def check(board: BoardFacts) -> Iterator[Finding]:
         yield from _tare(board, finger)
         yield from _pressure(board, finger)
     for finger in board.present:
-        found = _judge(_channels(board, finger))
-        for code, names in _by_the_board(board.sensors_after[finger]):
-            found.setdefault(code, []).extend(name for name in names if name not in found.get(code, []))
+        found = dict(_by_the_board(board.sensors_after[finger]))
+        if "sensor_frozen" not in found:
+            for code, names in _judge(_channels(board, finger)).items():
+                found[code] = list(dict.fromkeys(names + found.get(code, [])))
         for code, names in found.items():
             if names:
                 yield Finding(code, f"finger {finger}: {', '.join(names)}")
@@ -98,7 +99,7 @@ def _channels(board: BoardFacts, finger: int) -> dict[str, NDArray[np.integer]]:
 
 def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
     """By the finding's code, the names of the channels it is about. A channel has one finding."""
-    codes = ("sensor_frozen", "channel_missing", "channel_railed", "channel_stuck", "electrodes_shorted")
+    codes = ("channel_missing", "channel_railed", "channel_stuck", "electrodes_shorted")
     found: dict[str, list[str]] = {code: [] for code in codes}
     moved: dict[str, NDArray[np.floating]] = {}
     for name, counts in channels.items():
@@ -117,6 +118,4 @@ def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
         for one, two in combinations(moved, 2)
         if np.abs(moved[one] - moved[two]).max() * SAME_SHARE <= np.ptp(moved[one])
     ]
-    if channels and len(found["channel_stuck"]) == len(channels):
-        found["sensor_frozen"], found["channel_stuck"] = ["every channel"], []
     return found

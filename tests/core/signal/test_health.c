@@ -28,10 +28,7 @@ static int begin(void **state)
 
 static void end_round(void)
 {
-    uint32_t alone = bt_health_round(&health, &sampled, &trigger, &noise);
-    if (alone != 0) {
-        bt_health_alone(&health, alone, touched);
-    }
+    bt_health_round(&health, &sampled, &trigger, &noise, touched);
     bt_trigger_leave_out(&trigger, health.out);
 }
 

@@ -144,15 +144,6 @@ def vibration(change: Callable[[np.ndarray], None]) -> Facts:
     return board(pac=rows)
 
 
-def freeze(facts: Facts) -> Facts:
-    """Finger 1 repeats its first round."""
-    assert facts.board is not None
-    for rows in (facts.board.frames[1::2], facts.board.pac[1::2]):
-        for name in {"counts", "pdc", "tac", "tdc", "pac"} & set(rows.dtype.names):
-            rows[name] = rows[name][0]
-    return facts
-
-
 def out(electrode: int, fault: wire.SensorFault) -> Facts:
     return state(electrodes_out=1 << electrode, electrode_fault=fault)
 
@@ -315,7 +306,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("no_tare", state(tare_state=wire.TareState.INIT), "finger 1"),
     ("tare_fault", state(tare_state=wire.TareState.FAULT, tare_age_ms=90_000), "90 s old"),
     ("base_old", frames(mark("flags", int(wire.FrameFlags.BASE_OLD))), "finger 1 has been touched for over a minute"),
-    ("sensor_frozen", freeze(board()), "finger 1: every channel"),
+    ("sensor_frozen", state(sensor_fault=wire.SensorFault.FROZEN), "finger 1: every channel"),
     *(
         ("channel_railed", frames(mark(name, count, column)), f"finger 1: {at}")
         for name, column, at in (("counts", 4, "E5"), ("counts", 18, "E19"), ("pdc", None, "PDC"), ("tdc", None, "TDC"))
