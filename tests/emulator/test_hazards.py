@@ -238,6 +238,8 @@ def begun_anew(board: Board, verb: str, starts: int) -> None:
 def test_the_flash_takes_a_second_to_erase(board: Board) -> None:
     """the watchdog, which runs from boot2 on, waits for two"""
     hand, emulated = board.open("erase in 1000 ms")
+    hand.read(0.1)  # until then time stands still, and the watchdog with it
+    hand.stop()
     hand.board.save_settings()
     seen = emulated.counters()
     assert (seen["flash"]["erases"], seen["watchdog_resets"]) == (1, 0)
