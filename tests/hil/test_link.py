@@ -59,14 +59,15 @@ def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fi
 
 
 @pytest.mark.long
-def test_the_host_has_all_frames_of_a_round_a_millisecond_after_its_last_electrode(rig) -> None:
+def test_the_host_has_all_frames_of_a_round_soon_after_its_last_electrode(rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=4")
     assert len(hand.read(10)) == 5 * 400
     latency = hand.link.board.counters()["latency"]
     assert (latency["frames"], latency["unmatched"]) == (5 * 400, 0)
-    assert latency["p99_us"] <= 1000
-    assert latency["worst_us"] <= 1500  # rounds that bring five TAREs, or STATUS, are longer by those
+    # Up to 260 us of it at the end of a USB frame, in which nothing may be armed (RP2040-E15).
+    assert latency["p99_us"] <= 1000 + 260
+    assert latency["worst_us"] <= 1500 + 260  # rounds that bring five TAREs, or STATUS, are longer by those
 
 
 def test_the_bus_is_driven_by_the_data_sheets_rules(rig) -> None:
@@ -94,7 +95,8 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     rig.need("cable")
     hand = rig.open("press.toml?fingers=5&seconds=2")
     hand.link.board.plan(1.0, "stop reading for 500 ms")
-    frames = hand.read(10)
+    with pytest.warns(biotac.ReadWarning, match="frames were lost on the link"):
+        frames = hand.read(10)
     status = hand.status()
     assert status.messages_dropped > 0
     assert hand.stats.frames_lost > 100  # half a second of five fingers, less what the ring holds
