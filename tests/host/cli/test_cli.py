@@ -6,8 +6,10 @@ import argparse
 import contextlib
 import importlib
 import json
+import os
 import subprocess
 import sys
+import termios
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -147,6 +149,15 @@ def test_record_then_check(capsys, tmp_path: Path) -> None:
     assert wire.EventKind.TOUCH in {m.kind for m in biotac.Recording(out).messages if isinstance(m, wire.Event)}
 
 
+def test_record_counts_what_the_file_holds(capsys, tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    # a board that does not wait for time sends some more until it hears STOP
+    assert main(["record", "sim:press.toml", str(out), "--seconds", "1", "--json"]) == 0
+    frames = json.loads(capsys.readouterr().out)["frames"]
+    assert main(["check", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == frames
+
+
 def test_record_tells_faults_of_its_time_only(capsys, tmp_path: Path) -> None:
     world = tmp_path / "loose.toml"
     world.write_text(
@@ -257,6 +268,11 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
     with simulated(link, "--fingers", "2", "--json") as output:
         port = json.loads(output)["port"]
         assert link.resolve() == Path(port)
+        fd = os.open(port, os.O_RDONLY | os.O_NOCTTY)
+        assert termios.tcgetattr(fd)[6][termios.VMIN] == 1  # a program that sets nothing waits for the first byte
+        os.close(fd)
+        second = run("sim", "press.toml", "--link", str(link))
+        assert (second.returncode, "choose another --link" in second.stderr) == (3, True)
         with biotac.open(str(link)) as hand:
             frames = hand.read(0.2)
         assert len(frames) == 40
