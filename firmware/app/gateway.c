@@ -249,12 +249,16 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     port_alarm_at(port, start_us);
 }
 
+_Static_assert(BT_SLOTS % 4 == 0, "a round's last slot wakes the main loop");
+
 bool bt_gateway_alarm(bt_gateway *gateway)
 {
     port_alarm_at(gateway->port, bt_sampler_alarm(&gateway->sampler));
-    // A turn of the main loop costs more than a slot's work: every second slot wakes it, and a round's last.
+    // A turn of the main loop costs more than a slot's work: every second slot wakes it, or every fourth
+    // while nothing is touched.
     const uint8_t next = gateway->sampler.current.slot;
-    return !gateway->sampler.commanded && (next % 2 != 0 || next == 0);
+    const uint8_t group = atomic_load_explicit(&gateway->in_use, memory_order_relaxed) ? 2 : 4;
+    return !gateway->sampler.commanded && next % group == 0;
 }
 
 static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
@@ -279,6 +283,17 @@ static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
 // A request takes effect a round later than a fast main loop would need, so that every board does it alike.
 #define ASK_AHEAD_ROUNDS 2
 
+// A finger is touched, or holds.
+static bool is_in_use(const bt_session *session)
+{
+    bool in_use = false;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        const bt_finger *finger = &session->finger[f];
+        in_use = in_use || finger->tare.held || (finger->present && bt_tare_touched(&finger->tare));
+    }
+    return in_use;
+}
+
 static void close_round(bt_gateway *gateway)
 {
     bt_session *session = &gateway->session;
@@ -298,6 +313,7 @@ static void close_round(bt_gateway *gateway)
         (void)bt_sampler_ask(&gateway->sampler, ask, gateway->round + ASK_AHEAD_ROUNDS);
     }
     gateway->round_open = false;
+    atomic_store_explicit(&gateway->in_use, is_in_use(session), memory_order_relaxed);
 }
 
 static void take_slot(bt_gateway *gateway, const bt_slot *slot)
@@ -329,12 +345,7 @@ static void take_slot(bt_gateway *gateway, const bt_slot *slot)
 // A hand that holds something must not drop it because a program set an odd baud rate.
 static bool may_leave(const bt_session *session)
 {
-    bool may = bt_settings_get(&session->settings, BT_SETTING_LOADER_BY_TOUCH) != 0;
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        const bt_finger *finger = &session->finger[f];
-        may = may && !finger->tare.held && !(finger->present && bt_tare_touched(&finger->tare));
-    }
-    return may;
+    return bt_settings_get(&session->settings, BT_SETTING_LOADER_BY_TOUCH) != 0 && !is_in_use(session);
 }
 
 // One bufferful per turn: a host that floods a link must not starve the slots, or the other host.

@@ -16,6 +16,7 @@ typedef struct {
     uint32_t round;    // being assembled
     uint32_t dma_late; // of the sampler, as last seen
     bool round_open;
+    atomic_bool in_use;              // as the latest round ended; for the interrupt
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
     bt_kept_tares *kept;             // NULL: the board has no memory for them
 } bt_gateway;
