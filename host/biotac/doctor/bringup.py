@@ -27,7 +27,6 @@ from .leads import crossed
 from .listening import has_crystal, listen
 
 FLASH = {"ef4015": "W25Q16JV", "ef7015": "W25Q16JV-IM"}  # of a Raspberry Pi Pico
-RP2040, REVISION_B2 = 0x0002927, 2  # SYSINFO_CHIP_ID, data sheet 2.20
 ERASE_MAX_US = 400_000  # of a sector, W25Q16JV data sheet
 SUPPLY_MV = (4100, 5500)  # VSYS: 4.40 V at a device's end of USB (USB 2.0, 7.2.2) less a diode; the board's most
 CLOCK_PPM = 650.0  # USB frames are within 500 ppm (USB 2.0, 7.1.12), a crystal within 100, a ms of reading in 20 s 50
@@ -246,8 +245,6 @@ def _board(seen: Bringup) -> Iterator[Finding]:
     flash = bytes(last.flash_id).hex()
     if any(last.flash_id) and flash not in FLASH:
         yield Finding("flash_unknown", f"JEDEC id {flash}; a Pico has {', '.join(FLASH)}")
-    if last.chip_id & 0x0FFFFFFF == RP2040 and last.chip_id >> 28 < REVISION_B2:
-        yield Finding("chip_old", f"chip id 0x{last.chip_id:08X}; from B2 on its first digit is 2")
     if last.slots_dma_late:
         yield Finding("dma_late", f"{last.slots_dma_late} slots were lost; expected none")
     if last.early_faults:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 
-from ..errors import BiotacError, PortError
+from ..errors import BiotacError, CommandRefusedError, PortError
 from ..hand.hand import Hand
 from ..hand.opening import open as open_board
 from ..link.discovery import SERIAL_PREFIX
@@ -58,6 +59,9 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         hand.sync()
     hand.stop()
     batch = join(batches)
+    chip_id = 0
+    with suppress(CommandRefusedError):  # a board that cannot, or a recording
+        chip_id = hand.board.measure().chip_id
     return BoardFacts(
         hello=hand.info,
         sensors=[info for info in infos if any(info.serial)],
@@ -72,6 +76,7 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         clock=hand.clock.now() if has_crystal(hand) else None,
         clock_resets=hand.clock.resets,
         warnings=hand.warnings,
+        chip_id=chip_id,
     )
 
 

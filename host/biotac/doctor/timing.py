@@ -16,12 +16,15 @@ from .facts import BoardFacts, PairFacts, grown
 
 #: A crystal stays within 100 ppm over age and temperature.
 CRYSTAL_PPM = 100.0
+RP2040, REVISION_B2 = 0x0002927, 2  # SYSINFO_CHIP_ID, data sheet 2.20
 #: Slots are timed by the board's own clock: 1 % off cannot be rounding.
 RATE_SHARE = 0.01
 
 
 def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
-    """Restarts, latched faults, late slots, losses on either side, slot rate, clock drift."""
+    """An early chip, restarts, latched faults, late slots, losses on either side, slot rate, clock drift."""
+    if board.chip_id & 0x0FFFFFFF == RP2040 and board.chip_id >> 28 < REVISION_B2:
+        yield Finding("chip_old", f"chip id 0x{board.chip_id:08X}; from B2 on its first digit is 2")
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters restarted and tell nothing

@@ -288,6 +288,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("words_error", grown(0, words_error=5), "5 of 4405 words"),
     ("board_restarted", board(after=message(wire.Status, **AFTER | {"uptime_s": 0})), "up for 0 s"),
     ("board_restarted", board(stats=dataclasses.replace(STATS, disordered=2)), "up for"),
+    ("chip_old", board(chip_id=0x10002927), "0x10002927"),
     ("faults_latched", board(before=message(wire.Status, **BEFORE | {"faults": 9})), "board: STORAGE"),
     (
         "faults_latched",
@@ -375,7 +376,6 @@ def rows(name: str, values: Callable[[np.ndarray], Any]) -> Callable[[Bringup], 
 
 EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
     ("flash_unknown", chip(flash_id=(0xC8, 0x40, 0x15)), "c84015"),
-    ("chip_old", chip(chip_id=0x10002927), "0x10002927"),
     ("dma_late", chip(slots_dma_late=3), "3 slots"),
     ("early_fault", chip(early_faults=2), "2 starts"),
     ("flash_slow", chip(erase_us=400_001), "400 ms"),
