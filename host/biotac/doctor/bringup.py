@@ -82,8 +82,8 @@ def measure(hand: Hand, seen: Bringup, tell: Callable[[str], None], *, seconds: 
     seen.serials = getattr(hand.link.source, "serials", ())
     tell("listening: touch nothing")
     facts = listen(hand, seconds)
-    with suppress(CommandRefusedError):  # firmware or a board that cannot
-        seen.chip.append(hand.board.measure())  # an emulated board's time begins with its stream
+    if facts.chip is not None:
+        seen.chip.append(facts.chip)
     seen.frames = facts.frames
     if facts.present:
         tell(f"press each finger on its pad, slowly and firmly, within {press_s:.0f} s")

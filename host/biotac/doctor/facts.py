@@ -55,7 +55,7 @@ class BoardFacts:
     clock: Fit | None  #: None where the board's time is no clock, as on a simulated board
     clock_resets: int
     warnings: list[HandWarning]
-    chip_id: int = 0  #: of the microcontroller; 0: unknown
+    chip: wire.BoardFacts | None = None  #: None: the board cannot measure itself, or is a recording
 
     @property
     def present(self) -> list[int]:

@@ -59,9 +59,9 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         hand.sync()
     hand.stop()
     batch = join(batches)
-    chip_id = 0
-    with suppress(CommandRefusedError):  # a board that cannot, or a recording
-        chip_id = hand.board.measure().chip_id
+    chip = None
+    with suppress(CommandRefusedError):
+        chip = hand.board.measure()  # after the stream: an emulated board's time begins with it
     return BoardFacts(
         hello=hand.info,
         sensors=[info for info in infos if any(info.serial)],
@@ -76,7 +76,7 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         clock=hand.clock.now() if has_crystal(hand) else None,
         clock_resets=hand.clock.resets,
         warnings=hand.warnings,
-        chip_id=chip_id,
+        chip=chip,
     )
 
 

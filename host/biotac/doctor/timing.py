@@ -23,8 +23,9 @@ RATE_SHARE = 0.01
 
 def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
     """An early chip, restarts, latched faults, late slots, losses on either side, slot rate, clock drift."""
-    if board.chip_id & 0x0FFFFFFF == RP2040 and board.chip_id >> 28 < REVISION_B2:
-        yield Finding("chip_old", f"chip id 0x{board.chip_id:08X}; from B2 on its first digit is 2")
+    chip_id = board.chip.chip_id if board.chip is not None else 0
+    if chip_id & 0x0FFFFFFF == RP2040 and chip_id >> 28 < REVISION_B2:
+        yield Finding("chip_old", f"chip id 0x{chip_id:08X}; from B2 on its first digit is 2")
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters restarted and tell nothing

@@ -288,7 +288,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("words_error", grown(0, words_error=5), "5 of 4405 words"),
     ("board_restarted", board(after=message(wire.Status, **AFTER | {"uptime_s": 0})), "up for 0 s"),
     ("board_restarted", board(stats=dataclasses.replace(STATS, disordered=2)), "up for"),
-    ("chip_old", board(chip_id=0x10002927), "0x10002927"),
+    ("chip_old", board(chip=message(wire.BoardFacts, chip_id=0x10002927)), "0x10002927"),
     ("faults_latched", board(before=message(wire.Status, **BEFORE | {"faults": 9})), "board: STORAGE"),
     (
         "faults_latched",
