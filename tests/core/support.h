@@ -16,6 +16,9 @@
 
 #define LINE_BYTES 4096
 
+// A test, of which no state is left to the next.
+#define TEST(name) static void name(void **state __attribute__((unused)))
+
 // ---- random numbers: xorshift64*, the same on every machine -----------------------------------
 
 static inline uint64_t random_u64(uint64_t *state)

@@ -73,9 +73,8 @@ static void rounds(int n)
     }
 }
 
-static void every_slot_lands_in_its_place(void **state)
+TEST(every_slot_lands_in_its_place)
 {
-    (void)state;
     assert_true(round_without(0));
     for (int i = 0; i < BT_ELECTRODES; i++) {
         assert_int_equal(frame.counts[i], slot_count(electrode_slot(i)));
@@ -91,9 +90,8 @@ static void every_slot_lands_in_its_place(void **state)
     assert_int_equal(pac.t_us, 1000); // PAC comes first
 }
 
-static void a_missing_slot_is_marked_and_never_stale(void **state)
+TEST(a_missing_slot_is_marked_and_never_stale)
 {
-    (void)state;
     rounds(20);
     for (int slot = 0; slot < BT_SLOTS; slot++) {
         assert_true(round_without((uint64_t)1 << slot));
@@ -126,9 +124,8 @@ static void a_missing_slot_is_marked_and_never_stale(void **state)
     }
 }
 
-static void slots_that_never_came_are_missing_too(void **state)
+TEST(slots_that_never_came_are_missing_too)
 {
-    (void)state;
     rounds(1);
     bt_finger_begin(&finger, now_us, &tare_settings);
     (void)bt_finger_put(&finger, 42, 5); // the main loop was late for all others
@@ -141,9 +138,8 @@ static void slots_that_never_came_are_missing_too(void **state)
     assert_true(frame.flags & BT_FRAME_FLAG_FAULT);
 }
 
-static void an_absent_sensor_sends_nothing_and_counts_nothing(void **state)
+TEST(an_absent_sensor_sends_nothing_and_counts_nothing)
 {
-    (void)state;
     rounds(3);
     assert_int_equal(frame.seq, 2);
     for (int k = 0; k < 100; k++) {
@@ -157,9 +153,8 @@ static void an_absent_sensor_sends_nothing_and_counts_nothing(void **state)
     assert_true(finger.present);
 }
 
-static void a_sensor_that_was_away_keeps_its_tare_until_it_is_told_to_be_another(void **state)
+TEST(a_sensor_that_was_away_keeps_its_tare_until_it_is_told_to_be_another)
 {
-    (void)state;
     rounds(20);
     assert_int_equal(frame.tare_state, BT_TARE_STATE_REST);
     for (int away = 1; away <= 1000; away *= 10) {
@@ -176,9 +171,8 @@ static void a_sensor_that_was_away_keeps_its_tare_until_it_is_told_to_be_another
     assert_true(frame.flags & BT_FRAME_FLAG_UNTARED);
 }
 
-static void results_without_a_tare_are_invalid_and_not_zero(void **state)
+TEST(results_without_a_tare_are_invalid_and_not_zero)
 {
-    (void)state;
     rounds(1);
     assert_int_equal(frame.flags, BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_MX_DERIVED
                                       | BT_FRAME_FLAG_FX_WEAK);
@@ -191,9 +185,8 @@ static void results_without_a_tare_are_invalid_and_not_zero(void **state)
     }
 }
 
-static void a_new_tare_is_told_once_with_the_frame_that_first_uses_it(void **state)
+TEST(a_new_tare_is_told_once_with_the_frame_that_first_uses_it)
 {
-    (void)state;
     int told = 0;
     for (int k = 0; k < 50; k++) {
         rounds(1);
@@ -217,9 +210,8 @@ static void a_new_tare_is_told_once_with_the_frame_that_first_uses_it(void **sta
     assert_int_equal(told, 1);
 }
 
-static void a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on(void **state)
+TEST(a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on)
 {
-    (void)state;
     settings.population = false;
     bt_baseline base = {.pdc_q16 = BT_TARE_UNKNOWN};
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -243,9 +235,8 @@ static void a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on(void 
     assert_false(tare_changed);
 }
 
-static void a_railed_electrode_is_flagged_and_three_are_a_fault(void **state)
+TEST(a_railed_electrode_is_flagged_and_three_are_a_fault)
 {
-    (void)state;
     rounds(20);
     for (int railed = 0; railed <= 4; railed++) {
         bt_finger_begin(&finger, now_us, &tare_settings);
@@ -261,9 +252,8 @@ static void a_railed_electrode_is_flagged_and_three_are_a_fault(void **state)
     }
 }
 
-static void a_held_press_is_flagged_by_its_shape_and_age(void **state)
+TEST(a_held_press_is_flagged_by_its_shape_and_age)
 {
-    (void)state;
     rounds(200);
     for (int k = 0; k < 6200; k++) {
         bt_finger_begin(&finger, now_us, &tare_settings);
@@ -286,9 +276,8 @@ static void a_held_press_is_flagged_by_its_shape_and_age(void **state)
     assert_true(frame.flags & BT_FRAME_FLAG_BASE_OLD);
 }
 
-static void seq_wraps_like_any_other_number(void **state)
+TEST(seq_wraps_like_any_other_number)
 {
-    (void)state;
     for (uint32_t k = 0; k < 65536 + 10; k++) {
         rounds(1);
         assert_int_equal(frame.seq, k & 0xFFFF);
@@ -296,9 +285,8 @@ static void seq_wraps_like_any_other_number(void **state)
     }
 }
 
-static void an_electrode_without_a_tare_is_no_signal(void **state)
+TEST(an_electrode_without_a_tare_is_no_signal)
 {
-    (void)state;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
     int32_t e_q4[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -314,9 +302,8 @@ static void an_electrode_without_a_tare_is_no_signal(void **state)
 }
 
 // The host may store a tare before the sensor has said a word.
-static void a_tare_set_before_the_sensor_answers_is_kept(void **state)
+TEST(a_tare_set_before_the_sensor_answers_is_kept)
 {
-    (void)state;
     bt_baseline base;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         base.electrode_q16[i] = (uint32_t)(slot_count(electrode_slot(i)) - 1) << 16;
@@ -331,9 +318,8 @@ static void a_tare_set_before_the_sensor_answers_is_kept(void **state)
     assert_true(tare_changed);
 }
 
-static void a_touch_that_shows_in_a_lost_slot_is_told_in_the_next(void **state)
+TEST(a_touch_that_shows_in_a_lost_slot_is_told_in_the_next)
 {
-    (void)state;
     rounds(50);
     for (int k = 2; k < BT_ELECTRODES; k++) {
         int lost = electrode_slot(k);
@@ -354,9 +340,8 @@ static void a_touch_that_shows_in_a_lost_slot_is_told_in_the_next(void **state)
     }
 }
 
-static void a_move_of_any_electrode_alone_is_one(void **state)
+TEST(a_move_of_any_electrode_alone_is_one)
 {
-    (void)state;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         for (int sign = -1; sign <= 1; sign += 2) {
             bt_finger its;
@@ -427,9 +412,8 @@ static uint32_t shape_flags(const int e_q4[7], bool unread, uint32_t threshold_c
 }
 
 // Of energies in 1/4 count^2, cut to whole ones.
-static void more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise(void **state)
+TEST(more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise)
 {
-    (void)state;
     for (int missing = 0; missing <= 1; missing++) {
         // 21^2 three times is 1323, 330 whole; 36^2 + 4^2 + 2^2 + 1 is 1317, of all 660.
         const int half[7] = {168, 168, 168, -288, -32, -16, -8}, more[7] = {168, 168, 168, -288, -16, 0, 0};
@@ -443,9 +427,8 @@ static void more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_i
     }
 }
 
-static void torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch(void **state)
+TEST(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch)
 {
-    (void)state;
     assert_true(torsion_ok((const int[4]){-240, -240, -240, -240}, 899)); // an energy of 900
     assert_false(torsion_ok((const int[4]){-240, -240, -240, -240}, 900));
     assert_false(torsion_ok((const int[4]){-240, -240, -240, -239}, 0));

@@ -20,9 +20,8 @@ static int64_t rounded(int64_t num, int64_t den)
     return num < 0 ? (int64_t)(0 - quotient) : (int64_t)quotient;
 }
 
-static void halves_go_away_from_zero(void **state)
+TEST(halves_go_away_from_zero)
 {
-    (void)state;
     static const struct {
         int64_t num, den, want;
     } table[] = {
@@ -35,16 +34,14 @@ static void halves_go_away_from_zero(void **state)
     }
 }
 
-static void division_by_one_changes_nothing(void **state)
+TEST(division_by_one_changes_nothing)
 {
-    (void)state;
     assert_int_equal(bt_div_round(INT64_MAX, 1), INT64_MAX);
     assert_int_equal(bt_div_round(INT64_MIN, 1), INT64_MIN);
 }
 
-static void extremes_do_not_wrap(void **state)
+TEST(extremes_do_not_wrap)
 {
-    (void)state;
     static const int64_t ends[] = {INT64_MAX,     INT64_MAX - 1, INT64_MIN,         INT64_MIN + 1,
                                    INT64_MAX / 2, INT64_MIN / 2, INT64_MAX / 2 + 1, INT64_MIN / 2 - 1};
     static const int64_t dens[] = {
@@ -60,9 +57,8 @@ static void extremes_do_not_wrap(void **state)
     assert_int_equal(bt_div_round(INT64_MAX / 2 + 1, INT64_MAX), 1);
 }
 
-static void random_quotients_are_right(void **state)
+TEST(random_quotients_are_right)
 {
-    (void)state;
     uint64_t seed = 2;
     for (int k = 0; k < 200000; k++) {
         int64_t num = (int64_t)(random_u64(&seed) >> random_range(&seed, 0, 60));
@@ -73,9 +69,8 @@ static void random_quotients_are_right(void **state)
     }
 }
 
-static void rounding_is_odd(void **state)
+TEST(rounding_is_odd)
 {
-    (void)state;
     for (int64_t num = 0; num < 3000; num++) {
         for (int64_t den = 1; den < 40; den++) {
             assert_int_equal(bt_div_round(-num, den), -bt_div_round(num, den));
@@ -83,9 +78,8 @@ static void rounding_is_odd(void **state)
     }
 }
 
-static void magnitudes_hold_at_the_ends(void **state)
+TEST(magnitudes_hold_at_the_ends)
 {
-    (void)state;
     assert_true(bt_abs(INT64_MIN) == (uint64_t)1 << 63);
     assert_true(bt_abs(INT64_MAX) == (uint64_t)INT64_MAX);
     assert_true(bt_abs(-1) == 1 && bt_abs(0) == 0);
@@ -114,9 +108,8 @@ static void magnitudes_hold_at_the_ends(void **state)
 }
 
 // The 32-bit helpers against the 64-bit one, which is tested above.
-static void scaling_is_a_rounded_division(void **state)
+TEST(scaling_is_a_rounded_division)
 {
-    (void)state;
     uint64_t seed = 31;
     for (int k = 0; k < 300000; k++) {
         int bits = 1 + k % 7;
@@ -129,9 +122,8 @@ static void scaling_is_a_rounded_division(void **state)
     }
 }
 
-static void small_divisions_round_to_the_nearest(void **state)
+TEST(small_divisions_round_to_the_nearest)
 {
-    (void)state;
     uint64_t seed = 33;
     for (int k = 0; k < 300000; k++) {
         uint32_t den = 1 + (uint32_t)(random_u64(&seed) >> (33 + k % 31));

@@ -21,7 +21,7 @@ def test_a_row_says_what_must_happen_and_who_tries_it(row: dict[str, Any]) -> No
     for test in row.get("tests", []):
         file, name = test.split("::")
         text = (ROOT / file).read_text()
-        assert not name or re.search(rf"^(def |static void |int ){name}\(", text, re.MULTILINE), test
+        assert not name or re.search(rf"^(def |static void |int |TEST\(){name}[()]", text, re.MULTILINE), test
 
 
 def needs(file: Path, function: str) -> set[object]:

@@ -27,23 +27,20 @@ def passes(*command: str) -> str:
     return done.stdout
 
 
-def test_the_firmwares_wire_conforms(tmp_path: Path) -> None:
-    program = tmp_path / "core"
-    sources = sorted(map(str, (ROOT / "firmware/core/wire").glob("*.c")))
-    build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{ROOT / 'firmware/core'}", str(CONFORMING / "core.c")]
-    subprocess.run([*build, *sources, "-o", str(program)], check=True)
+@pytest.mark.parametrize(
+    ("options", "sources"),
+    [
+        ([f"-I{ROOT}/firmware/core"], sorted((ROOT / "firmware/core/wire").glob("*.c"))),
+        (["-DCLIENT", f"-I{ROOT}/firmware/client"], [ROOT / "firmware/client/biotac_client.c"]),
+    ],
+    ids=["firmware", "client"],
+)
+def test_the_wire_in_c_conforms(tmp_path: Path, options: list[str], sources: list[Path]) -> None:
+    program = tmp_path / "wire"
+    build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", *options]
+    subprocess.run([*build, CONFORMING / "core.c", *sources, "-o", program], check=True)
     report = passes(str(program))
     # It encodes in place and frames only: what `frame` asks covers that.
-    assert report.count("not offered") == 1 and "cobs     not offered" in report
-
-
-def test_the_c_clients_wire_conforms(tmp_path: Path) -> None:
-    client = ROOT / "firmware/client"
-    build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-DCLIENT", f"-I{client}"]
-    program = tmp_path / "client"
-    sources = [str(CONFORMING / "core.c"), str(client / "biotac_client.c")]
-    subprocess.run([*build, *sources, "-o", str(program)], check=True)
-    report = passes(str(program))
     assert report.count("not offered") == 1 and "cobs     not offered" in report
 
 

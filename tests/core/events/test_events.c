@@ -123,9 +123,8 @@ static void hold(void)
     its.count = 0;
 }
 
-static void touch_and_lift_are_told_in_the_slot_that_shows_them(void **state)
+TEST(touch_and_lift_are_told_in_the_slot_that_shows_them)
 {
-    (void)state;
     play(300);
     assert_int_equal(its.count, 0);
     const uint32_t pressed_us = its.t_us;
@@ -147,9 +146,8 @@ static void touch_and_lift_are_told_in_the_slot_that_shows_them(void **state)
     assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
 }
 
-static void what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift(void **state)
+TEST(what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift)
 {
-    (void)state;
     play(300);
     its.load = 200;
     play(20);
@@ -163,9 +161,8 @@ static void what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift(voi
 }
 
 // The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
-static void touches_in_quick_succession_are_all_told(void **state)
+TEST(touches_in_quick_succession_are_all_told)
 {
-    (void)state;
     play(300);
     for (int k = 0; k < 10; k++) {
         its.load = 200;
@@ -177,9 +174,8 @@ static void touches_in_quick_succession_are_all_told(void **state)
     assert_int_equal(told(BT_EVENT_KIND_LIFT), 10);
 }
 
-static void pressure_that_stays_is_no_lift(void **state)
+TEST(pressure_that_stays_is_no_lift)
 {
-    (void)state;
     hold();
     its.load = 0;
     play(20);
@@ -190,12 +186,11 @@ static void pressure_that_stays_is_no_lift(void **state)
 }
 
 // A swing of 120 to 220 Hz: both ways of it take up to 4 ms to be seen.
-static void a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds(void **state)
+TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
 {
-    (void)state;
     int told_late = 0, onset_off = 0;
     for (int k = 0; k < 200; k++) {
-        (void)new_course(state);
+        (void)new_course(NULL);
         its.seed = (uint64_t)(100 + k);
         its.pac_sigma = 5;
         hold();
@@ -216,9 +211,8 @@ static void a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds(voi
     assert_in_range(onset_off, 0, 10);
 }
 
-static void held_for_ten_minutes_in_noise_nothing_is_told(void **state)
+TEST(held_for_ten_minutes_in_noise_nothing_is_told)
 {
-    (void)state;
     its.pac_sigma = 5;
     its.sigma = 1.5;
     hold();
@@ -226,9 +220,8 @@ static void held_for_ten_minutes_in_noise_nothing_is_told(void **state)
     assert_int_equal(its.count, 0);
 }
 
-static void a_resting_worn_finger_tells_nothing(void **state)
+TEST(a_resting_worn_finger_tells_nothing)
 {
-    (void)state;
     its.pac_sigma = 5;
     its.sigma = 5;
     play(6000);
@@ -236,9 +229,8 @@ static void a_resting_worn_finger_tells_nothing(void **state)
 }
 
 // An arm that hums: what was there at rest is no slip later.
-static void noise_at_rest_raises_what_it_takes(void **state)
+TEST(noise_at_rest_raises_what_it_takes)
 {
-    (void)state;
     play(300);
     shaken(600, 20, 150);
     its.count = 0;
@@ -250,9 +242,8 @@ static void noise_at_rest_raises_what_it_takes(void **state)
     assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
 }
 
-static void a_glitch_is_no_event(void **state)
+TEST(a_glitch_is_no_event)
 {
-    (void)state;
     hold();
     for (int k = 0; k < 50; k++) {
         its.pac[k % BT_PAC_PER_FRAME] = k % 2 ? 1500 : -1500;
@@ -263,9 +254,8 @@ static void a_glitch_is_no_event(void **state)
     assert_int_equal(its.count, 0);
 }
 
-static void a_light_tap_on_what_is_held_is_a_jolt_and_no_slip(void **state)
+TEST(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip)
 {
-    (void)state;
     hold();
     for (int i = 6; i < BT_PAC_PER_FRAME; i++) {
         its.pac[i] = 28 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
@@ -292,9 +282,8 @@ static void squeezed(int rounds, double counts_per_s)
     memset(its.pac, 0, sizeof its.pac);
 }
 
-static void squeezing_harder_is_no_slip(void **state)
+TEST(squeezing_harder_is_no_slip)
 {
-    (void)state;
     hold();
     for (int n_s = 1; n_s <= 5; n_s++) {
         squeezed(50, 98.6 * 100 * n_s);
@@ -304,9 +293,8 @@ static void squeezing_harder_is_no_slip(void **state)
 }
 
 // What skin that is dragged along does before it slides: all of one sign, as a squeeze, and steeper.
-static void a_steep_pull_is_a_slip(void **state)
+TEST(a_steep_pull_is_a_slip)
 {
-    (void)state;
     hold();
     for (int i = 0; i < 5 * BT_PAC_PER_FRAME; i++) {
         its.pac[i % BT_PAC_PER_FRAME] = 15 * i;
@@ -318,9 +306,8 @@ static void a_steep_pull_is_a_slip(void **state)
     assert_in_range(first(BT_EVENT_KIND_SLIP)->onset_us, 3500000 + 15000, 3500000 + 30000);
 }
 
-static void a_landing_is_no_slip(void **state)
+TEST(a_landing_is_no_slip)
 {
-    (void)state;
     play(300);
     its.load = 120;
     its.pdc = PDC_REST + 60;
@@ -332,9 +319,8 @@ static void a_landing_is_no_slip(void **state)
     assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
 }
 
-static void nobody_slips_untouched(void **state)
+TEST(nobody_slips_untouched)
 {
-    (void)state;
     play(300);
     shaken(20, 200, 130);
     assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
@@ -342,9 +328,8 @@ static void nobody_slips_untouched(void **state)
 }
 
 // The slip is over in the PAC slot behind the word that showed the release.
-static void a_slip_ends_with_the_hold(void **state)
+TEST(a_slip_ends_with_the_hold)
 {
-    (void)state;
     hold();
     shaken(10, 100, 150);
     assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
@@ -355,9 +340,8 @@ static void a_slip_ends_with_the_hold(void **state)
     assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
 }
 
-static void missing_words_are_no_event(void **state)
+TEST(missing_words_are_no_event)
 {
-    (void)state;
     hold();
     for (int k = 0; k < 40; k++) {
         its.good_until = k % 3 ? BT_SLOTS : k;
@@ -367,9 +351,8 @@ static void missing_words_are_no_event(void **state)
 }
 
 // The widest words there are: nothing wraps (the sanitizers look on), and each begun slip ends.
-static void the_rails_do_not_wrap(void **state)
+TEST(the_rails_do_not_wrap)
 {
-    (void)state;
     play(300);
     for (int k = 0; k < 400; k++) {
         its.load = k % 40 < 30 ? 4000 : 0;
@@ -386,9 +369,8 @@ static void the_rails_do_not_wrap(void **state)
 }
 
 // One stretch of samples, by hand: against what was read eight samples before, at a level of 100.
-static void evidence_is_the_sum_of_squares_of_each_way_less_the_noise(void **state)
+TEST(evidence_is_the_sum_of_squares_of_each_way_less_the_noise)
 {
-    (void)state;
     static const int change[8] = {0, 5, 30, -40, 1, -20, 0, 10};
     uint16_t pac[BT_PAC_PER_FRAME];
     bt_events events;
@@ -415,9 +397,8 @@ static void evidence_is_the_sum_of_squares_of_each_way_less_the_noise(void **sta
 }
 
 // Eight samples into a round its predecessors are the last of the round before, still in their places.
-static void a_round_is_compared_with_the_one_before_it(void **state)
+TEST(a_round_is_compared_with_the_one_before_it)
 {
-    (void)state;
     uint16_t pac[BT_PAC_PER_FRAME];
     bt_events events;
     bt_events_reset(&events);
@@ -434,9 +415,8 @@ static void a_round_is_compared_with_the_one_before_it(void **state)
 }
 
 // The pressure alone may be what is felt first; the finger is let go of all the same.
-static void a_touch_that_no_electrode_shows_ends(void **state)
+TEST(a_touch_that_no_electrode_shows_ends)
 {
-    (void)state;
     bt_events events;
     bt_events_reset(&events);
     const bt_tare tare = {.threshold_count2 = SETTING_COUNT2};

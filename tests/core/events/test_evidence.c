@@ -45,26 +45,25 @@ static uint32_t shaken(uint32_t risen_count2, uint32_t fallen_count2)
     return told;
 }
 
-static void a_slip_goes_both_ways_by_more_than_twenty_levels(void **state)
+TEST(a_slip_goes_both_ways_by_more_than_twenty_levels)
 {
     static const struct {
         uint32_t risen, fallen, told;
     } cases[] = {{2000, 2001, 0}, {2001, 2000, 0}, {2001, 2001, TOLD(SLIP)}};
     for (int k = 0; k < 3; k++) {
-        (void)held(state);
+        (void)held(NULL);
         events.jolt_raised = true;
         assert_int_equal(shaken(cases[k].risen, cases[k].fallen), cases[k].told);
         assert_int_equal(events.slipping, cases[k].told != 0);
-        (void)held(state);
+        (void)held(NULL);
         events.touched = false;
         tare.state = BT_TARE_STATE_REST;
         assert_int_equal(shaken(cases[k].risen, cases[k].fallen), TOLD(JOLT)); // nobody slips untouched
     }
 }
 
-static void a_jolt_is_more_than_25_levels_and_told_once(void **state)
+TEST(a_jolt_is_more_than_25_levels_and_told_once)
 {
-    (void)state;
     assert_int_equal(shaken(2500, 0), 0);
     assert_int_equal(shaken(1250, 1250), 0);
     assert_int_equal(shaken(2501, 0), TOLD(JOLT));
@@ -76,9 +75,8 @@ static void a_jolt_is_more_than_25_levels_and_told_once(void **state)
     assert_int_equal(shaken(2501, 0), TOLD(JOLT));
 }
 
-static void evidence_is_no_more_than_a_hundred_levels_of_each_side(void **state)
+TEST(evidence_is_no_more_than_a_hundred_levels_of_each_side)
 {
-    (void)state;
     events.landing = true; // no slip yet
     events.touch_began = events.now;
     events.risen_count2 = events.fallen_count2 = 10000 + TOLL;
@@ -91,14 +89,14 @@ static void evidence_is_no_more_than_a_hundred_levels_of_each_side(void **state)
 }
 
 // Where the other side shakes already, nothing was passed over as noise before the first word.
-static void a_side_begins_at_the_first_sample_that_moved_its_way(void **state)
+TEST(a_side_begins_at_the_first_sample_that_moved_its_way)
 {
     static const uint16_t words[8] = {BT_INVALID_COUNT, 2000, 2100, 2000, 1900, 2100, 1900, 2000};
     memcpy(pac + 8, words, sizeof words);
     events.risen_count2 = 1;
     (void)stretch();
     assert_int_equal(events.fall_began, 100000 + 4);
-    (void)held(state);
+    (void)held(NULL);
     memcpy(pac + 8, words, sizeof words);
     events.fallen_count2 = 1;
     (void)stretch();
@@ -106,9 +104,8 @@ static void a_side_begins_at_the_first_sample_that_moved_its_way(void **state)
 }
 
 // A stretch of changes, none of them below the noise; twelve levels are the most of a sample.
-static void while_it_slips_both_sides_are_one(void **state)
+TEST(while_it_slips_both_sides_are_one)
 {
-    (void)state;
     static const int change[8] = {30, -34, 35, -100, 10, -20, 0, 5};
     events.slipping = true;
     events.risen_count2 = 3000;
@@ -121,7 +118,7 @@ static void while_it_slips_both_sides_are_one(void **state)
     assert_int_equal(events.risen_count2, 3700 + all - 8 * LEVEL);
     assert_int_equal(events.fallen_count2, 0);
     assert_int_equal(events.round_sum_count2, all);
-    (void)held(state);
+    (void)held(NULL);
     events.slipping = true;
     events.risen_count2 = 20000 + 800;
     (void)stretch();
@@ -138,7 +135,7 @@ static void while_it_slips_both_sides_are_one(void **state)
     assert_int_equal(stretch(), 0);
 }
 
-static void what_was_told_of_shakes_on_until_it_is_over(void **state)
+TEST(what_was_told_of_shakes_on_until_it_is_over)
 {
     static const struct {
         bool jolt_raised, landing, touched, one;
@@ -148,7 +145,7 @@ static void what_was_told_of_shakes_on_until_it_is_over(void **state)
                  {false, true, true, false},
                  {false, false, false, false}};
     for (int k = 0; k < 5; k++) {
-        (void)held(state);
+        (void)held(NULL);
         tare.state = BT_TARE_STATE_REST;
         events.touch_began = events.now;
         events.jolt_raised = cases[k].jolt_raised;
@@ -162,11 +159,11 @@ static void what_was_told_of_shakes_on_until_it_is_over(void **state)
 }
 
 // The sample that begins it, be it ever so small.
-static void each_side_begins_with_its_first_change(void **state)
+TEST(each_side_begins_with_its_first_change)
 {
     static const int change[2][8] = {{60, 5, -1, -50}, {-60, -5, 1, 50}};
     for (int side = 0; side < 2; side++) {
-        (void)held(state);
+        (void)held(NULL);
         for (int k = 0; k < 8; k++) {
             pac[8 + k] = (uint16_t)(2000 + change[side][k]);
         }
@@ -177,18 +174,17 @@ static void each_side_begins_with_its_first_change(void **state)
 }
 
 // For a tenth of a second after a touch, and as long as it shakes for a second, it lands.
-static void what_has_just_been_touched_lands(void **state)
+TEST(what_has_just_been_touched_lands)
 {
-    (void)state;
     for (uint32_t since = 219; since <= 220; since++) {
-        (void)held(state);
+        (void)held(NULL);
         events.landing = true;
         events.touch_began = events.now + 8 - since;
         (void)stretch(); // does not shake
         assert_int_equal(events.landing, since < 220);
     }
     for (uint32_t since = 2199; since <= 2200; since++) {
-        (void)held(state);
+        (void)held(NULL);
         events.landing = true;
         events.touch_began = events.now + 8 - since;
         assert_int_equal(shaken(2001, 2001), since < 2200 ? TOLD(JOLT) : TOLD(JOLT) | TOLD(SLIP));
@@ -197,10 +193,10 @@ static void what_has_just_been_touched_lands(void **state)
 }
 
 // A drag: the last sample of a stretch has changed by 75 counts, for 44 samples.
-static void a_drag_is_a_slip_of_one_sign(void **state)
+TEST(a_drag_is_a_slip_of_one_sign)
 {
     for (int change = 74; change <= 75; change++) {
-        (void)held(state);
+        (void)held(NULL);
         for (int round = 0; round < 6; round++) {
             for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
                 pac[k] = (uint16_t)(k < 8 ? 2000 : 2000 + change);
@@ -212,7 +208,7 @@ static void a_drag_is_a_slip_of_one_sign(void **state)
         }
         assert_true(change < 75 || events.slip_began == events.now - 1);
     }
-    (void)held(state);
+    (void)held(NULL);
     events.jolt_raised = true;
     events.dragged = 43;
     assert_int_equal(shaken(100, 0), 0);
@@ -221,14 +217,14 @@ static void a_drag_is_a_slip_of_one_sign(void **state)
 }
 
 // Rise and fall within 18 samples are one vibration, which began with the earlier; else with the later.
-static void a_slip_began_with_its_vibration(void **state)
+TEST(a_slip_began_with_its_vibration)
 {
     static const struct {
         int32_t fall_after_rise;
         bool with_rise;
     } cases[] = {{18, true}, {19, false}, {1, true}, {-1, false}, {-18, false}, {-19, true}};
     for (int k = 0; k < 6; k++) {
-        (void)held(state);
+        (void)held(NULL);
         events.jolt_raised = true;
         events.rise_began = 99000;
         events.fall_began = 99000 + (uint32_t)cases[k].fall_after_rise;
@@ -237,9 +233,8 @@ static void a_slip_began_with_its_vibration(void **state)
     }
 }
 
-static void noise_is_half_a_level_and_no_more(void **state)
+TEST(noise_is_half_a_level_and_no_more)
 {
-    (void)state;
     events.level_count2 = 98;
     pac[12] = 2007; // 49
     (void)stretch();
@@ -248,7 +243,7 @@ static void noise_is_half_a_level_and_no_more(void **state)
     (void)stretch();
     assert_int_equal(events.risen_count2, 400 - 2 * 49);
     assert_int_equal(events.shake_began, events.now - 2);
-    (void)held(state);
+    (void)held(NULL);
     events.level_count2 = 98;
     pac[12] = 2008;
     (void)stretch();
@@ -265,9 +260,8 @@ static void noise_is_half_a_level_and_no_more(void **state)
 }
 
 // A round that was begun late is compared within itself.
-static void a_first_stretch_that_was_missed_is_no_change(void **state)
+TEST(a_first_stretch_that_was_missed_is_no_change)
 {
-    (void)state;
     for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
         pac[k] = (uint16_t)(k < 8 ? 2000 + k : k < 16 ? 2003 + k - 8 : 3000);
     }
@@ -281,11 +275,11 @@ static void a_first_stretch_that_was_missed_is_no_change(void **state)
 }
 
 // A mean over 64 rounds at rest; a level is two of its 22 samples.
-static void the_level_is_the_noise_at_rest(void **state)
+TEST(the_level_is_the_noise_at_rest)
 {
     for (int rest = 0; rest < 2; rest++) {
         for (int touched = 0; touched < 2; touched++) {
-            (void)held(state);
+            (void)held(NULL);
             tare.state = rest ? BT_TARE_STATE_REST : BT_TARE_STATE_INIT;
             events.touched = touched;
             uint32_t noise = events.noise_count2;
@@ -318,10 +312,10 @@ static uint8_t slot_of(unsigned electrode)
     return BT_SLOTS;
 }
 
-static void the_strongest_electrode_is_watched_until_half_is_gone(void **state)
+TEST(the_strongest_electrode_is_watched_until_half_is_gone)
 {
     for (unsigned strong = 0; strong < BT_ELECTRODES; strong++) {
-        (void)held(state);
+        (void)held(NULL);
         events.touched = false;
         tare.threshold_count2 = 200;
         for (unsigned i = 0; i < BT_ELECTRODES; i++) {
@@ -369,9 +363,8 @@ static bt_msg_event message(uint8_t event)
     return msg;
 }
 
-static void an_onset_is_told_in_samples_of_2200_a_second(void **state)
+TEST(an_onset_is_told_in_samples_of_2200_a_second)
 {
-    (void)state;
     events.energy_count2 = 77;
     for (uint32_t ago = 0; ago < 500; ago++) {
         events.shake_began = events.slip_began = events.now - 1 - ago;

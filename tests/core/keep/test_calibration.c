@@ -78,9 +78,8 @@ static void initial_values(int32_t value[BT_CALIBRATION_VALUES])
     }
 }
 
-static void without_one_the_settings_hold_and_are_told(void **state)
+TEST(without_one_the_settings_hold_and_are_told)
 {
-    (void)state;
     int32_t initial[BT_CALIBRATION_VALUES];
     initial_values(initial);
     bt_msg_calibration msg = get(3);
@@ -90,9 +89,8 @@ static void without_one_the_settings_hold_and_are_told(void **state)
     assert_int_equal(get(3).value[3], 77);
 }
 
-static void one_finger_has_its_own_and_the_others_the_settings(void **state)
+TEST(one_finger_has_its_own_and_the_others_the_settings)
 {
-    (void)state;
     int32_t initial[BT_CALIBRATION_VALUES];
     initial_values(initial);
     plug(2, SENSOR);
@@ -118,9 +116,8 @@ static void one_finger_has_its_own_and_the_others_the_settings(void **state)
     assert_works_by(2, initial);
 }
 
-static void another_sensors_is_refused_unless_it_is_forced(void **state)
+TEST(another_sensors_is_refused_unless_it_is_forced)
 {
-    (void)state;
     plug(1, SENSOR);
     assert_int_equal(set_error(1, "BTEMU00000000043", values), BT_ERROR_OTHER_SENSOR);
     assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OTHER_SENSOR); // none is there
@@ -133,9 +130,8 @@ static void another_sensors_is_refused_unless_it_is_forced(void **state)
     assert_int_equal(host_error(&session, BT_GET_CALIBRATION_ID, "\1\5", 2), BT_ERROR_NO_SUCH_FINGER);
 }
 
-static void every_value_keeps_its_settings_range(void **state)
+TEST(every_value_keeps_its_settings_range)
 {
-    (void)state;
     int32_t initial[BT_CALIBRATION_VALUES];
     initial_values(initial);
     for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
@@ -167,9 +163,8 @@ static void unplug(int f, int rounds)
     }
 }
 
-static void nothing_changes_while_streaming(void **state)
+TEST(nothing_changes_while_streaming)
 {
-    (void)state;
     plug(0, SENSOR);
     assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
     host_round(&session, 1, 2000);
@@ -189,9 +184,8 @@ static void nothing_changes_while_streaming(void **state)
     assert_memory_equal(get(0).value, values, sizeof values); // it is kept
 }
 
-static void a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none(void **state)
+TEST(a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none)
 {
-    (void)state;
     plug(0, SENSOR);
     plug(1, SENSOR);
     assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
@@ -222,9 +216,8 @@ static void a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none(
     assert_int_equal(session.finger[0].quantities, wanted); // for the right sensor, when it is back
 }
 
-static void every_end_of_a_stream_counts(void **state)
+TEST(every_end_of_a_stream_counts)
 {
-    (void)state;
     for (int way = 0; way < 4; way++) {
         plug(0, SENSOR);
         assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
@@ -263,9 +256,8 @@ static uint8_t save(void)
     return host_error(&session, BT_SAVE_SETTINGS_ID, "\7", 1);
 }
 
-static void only_what_has_changed_is_stored(void **state)
+TEST(only_what_has_changed_is_stored)
 {
-    (void)state;
     static const bt_board_actions actions = {
         .save_settings = keep_settings, .save_calibration = save_calibration, .save_map = keep_no_map};
     bt_session_use_board(&session, &actions);
@@ -282,9 +274,8 @@ static void only_what_has_changed_is_stored(void **state)
     assert_int_equal(save(), BT_ERROR_NOT_STORED); // it is tried again
 }
 
-static void a_record_is_read_back_and_a_strange_one_passed_over(void **state)
+TEST(a_record_is_read_back_and_a_strange_one_passed_over)
 {
-    (void)state;
     bt_calibration out = {.present = true, .made_s = 0xFEDCBA98}, back;
     uint8_t record[BT_CALIBRATION_RECORD_BYTES + 1];
     memcpy(out.serial, SENSOR, sizeof out.serial);

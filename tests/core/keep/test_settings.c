@@ -3,9 +3,8 @@
 
 #include "keep/settings.h"
 
-static void settings_come_back_and_others_keep_their_defaults(void **state)
+TEST(settings_come_back_and_others_keep_their_defaults)
 {
-    (void)state;
     bt_settings settings, back;
     uint8_t record[BT_SETTINGS_RECORD_BYTES + 7];
     bt_settings_reset(&settings);

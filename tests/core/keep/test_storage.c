@@ -84,9 +84,8 @@ static int stored(uint16_t id)
     return version;
 }
 
-static void a_new_flash_holds_nothing(void **state)
+TEST(a_new_flash_holds_nothing)
 {
-    (void)state;
     assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
     memset(bytes_of_flash, 0, sizeof bytes_of_flash); // nor does one that is full of something else
     assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
@@ -94,9 +93,8 @@ static void a_new_flash_holds_nothing(void **state)
     assert_int_equal(stored(BT_RECORD_SETTINGS), 1);
 }
 
-static void the_latest_record_of_each_id_is_found_over_many_writes(void **state)
+TEST(the_latest_record_of_each_id_is_found_over_many_writes)
 {
-    (void)state;
     int last[BT_STORAGE_IDS + 1] = {0};
     for (int number = 1; number < 1000; number++) {
         uint16_t id = (uint16_t)random_range(&nor.seed, 1, BT_STORAGE_IDS);
@@ -110,9 +108,8 @@ static void the_latest_record_of_each_id_is_found_over_many_writes(void **state)
     assert_in_range(nor.erases, 1000 / (16 * TIMES - 1), 1000 / (16 * TIMES - 12));
 }
 
-static void a_damaged_page_is_told(void **state)
+TEST(a_damaged_page_is_told)
 {
-    (void)state;
     assert_false(bt_storage_damaged(&flash)); // nothing was ever saved
     for (int number = 1; number <= SAVES; number++) {
         assert_true(write_one(1, number));
@@ -135,18 +132,16 @@ static void a_damaged_page_is_told(void **state)
     assert_true(bt_storage_damaged(&flash));
 }
 
-static void the_same_again_wears_nothing(void **state)
+TEST(the_same_again_wears_nothing)
 {
-    (void)state;
     assert_true(write_one(1, 5));
     nor.bytes_left = 1000;
     assert_true(write_one(1, 5));
     assert_int_equal(nor.bytes_left, 1000);
 }
 
-static void what_does_not_fit_is_refused(void **state)
+TEST(what_does_not_fit_is_refused)
 {
-    (void)state;
     uint8_t data[BT_STORAGE_MAX_BYTES + 1] = {0};
     assert_false(bt_storage_write(&flash, 1, 0, data, sizeof data));
     assert_false(bt_storage_write(&flash, 0, 0, data, 1));
@@ -154,9 +149,8 @@ static void what_does_not_fit_is_refused(void **state)
     assert_true(bt_storage_write(&flash, 1, 0, data, BT_STORAGE_MAX_BYTES));
 }
 
-static void generations_may_wrap(void **state)
+TEST(generations_may_wrap)
 {
-    (void)state;
     assert_true(write_one(1, 0));
     // The sector in use claims generation 2^32 - 1; its CRC follows from its own bytes by a second CRC-32.
     uint8_t *page = bytes_of_flash;
@@ -225,25 +219,22 @@ static void cut_everywhere(void)
     assert_in_range(nor.erases, 3, 1000000);
 }
 
-static void a_cut_at_any_byte_leaves_the_old_record_or_the_new(void **state)
+TEST(a_cut_at_any_byte_leaves_the_old_record_or_the_new)
 {
-    (void)state;
     cuts = 0;
     cut_everywhere();
     // Every save programs a page at least; two change the sector, which erases one and programs two more.
     assert_true(cuts >= ((SAVES - 1) * BT_FLASH_PAGE_BYTES + 2 * SECTOR) / STRIDE);
 }
 
-static void nor_does_the_order_within_a_page_matter(void **state)
+TEST(nor_does_the_order_within_a_page_matter)
 {
-    (void)state;
     nor.backwards = true;
     cut_everywhere();
 }
 
-static void nor_do_half_done_bytes(void **state)
+TEST(nor_do_half_done_bytes)
 {
-    (void)state;
     nor.ragged = true;
     cut_everywhere();
 }
@@ -328,9 +319,8 @@ static void assert_old_then_new(int number)
     }
 }
 
-static void each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new(void **state)
+TEST(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new)
 {
-    (void)state;
     static uint8_t before[2 * SECTOR];
     save_all(0);
     for (int number = 1; number <= ALL_CUTS; number++) {
@@ -345,9 +335,8 @@ static void each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new(void **s
 }
 
 // Cells of a sector that is erased, or of a page that is programmed, are done in no order: seed 17.
-static void so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails(void **state)
+TEST(so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails)
 {
-    (void)state;
     static uint8_t before[2 * SECTOR];
     int at = 0, within = 0;
     nor.seed = 17;
@@ -372,9 +361,8 @@ static void so_it_is_before_every_operation_and_wherever_inside_of_one_power_fai
     assert_in_range(within, 150 * TIMES, 1000 * TIMES);
 }
 
-static void no_more_is_read_than_there_is_or_there_is_room_for(void **state)
+TEST(no_more_is_read_than_there_is_or_there_is_room_for)
 {
-    (void)state;
     uint8_t data[BT_STORAGE_MAX_BYTES], out[BT_STORAGE_MAX_BYTES];
     uint16_t version;
     memset(data, 0x5A, sizeof data);

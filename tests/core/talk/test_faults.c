@@ -41,9 +41,8 @@ static void rounds(int n)
     }
 }
 
-static void a_good_finger_has_none_and_nor_has_one_that_never_was_there(void **state)
+TEST(a_good_finger_has_none_and_nor_has_one_that_never_was_there)
 {
-    (void)state;
     rounds(300);
     bt_msg_status msg = status();
     assert_int_equal(msg.faults, 0);
@@ -52,9 +51,8 @@ static void a_good_finger_has_none_and_nor_has_one_that_never_was_there(void **s
     }
 }
 
-static void a_round_that_lacks_a_word_is_told_until_it_is_cleared(void **state)
+TEST(a_round_that_lacks_a_word_is_told_until_it_is_cleared)
 {
-    (void)state;
     const uint8_t streams[] = {0, BT_STREAM_FLAG_FRAMES};
     for (int k = 0; k < 2; k++) { // nobody needs to stream for it
         assert_int_equal(start(streams[k], 1 << FINGER, 0), BT_ERROR_OK);
@@ -71,9 +69,8 @@ static void a_round_that_lacks_a_word_is_told_until_it_is_cleared(void **state)
     }
 }
 
-static void what_came_after_the_host_looked_stays(void **state)
+TEST(what_came_after_the_host_looked_stays)
 {
-    (void)state;
     rounds(100);
     uint32_t before = status().finger_faults[FINGER];
     one_round_without_an_electrode();
@@ -82,9 +79,8 @@ static void what_came_after_the_host_looked_stays(void **state)
                      BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_ELECTRODE_OUT);
 }
 
-static void what_goes_on_is_set_again(void **state)
+TEST(what_goes_on_is_set_again)
 {
-    (void)state;
     rounds(100);
     host_round(&session, 0, 0); // away: one round of silence is enough to doubt who is there
     assert_true(status().finger_faults[FINGER] & BT_FRAME_FLAG_SENSOR_UNSURE);
@@ -93,9 +89,8 @@ static void what_goes_on_is_set_again(void **state)
     assert_true(status().finger_faults[FINGER] & BT_FRAME_FLAG_SENSOR_UNSURE);
 }
 
-static void a_tare_that_is_lost_is_one_but_none_yet_is_not(void **state)
+TEST(a_tare_that_is_lost_is_one_but_none_yet_is_not)
 {
-    (void)state;
     rounds(3);
     assert_int_equal(session.finger[FINGER].tare.tared, false);
     assert_int_equal(status().finger_faults[FINGER], 0);
@@ -107,9 +102,8 @@ static void a_tare_that_is_lost_is_one_but_none_yet_is_not(void **state)
     assert_int_equal(status().finger_faults[FINGER], BT_FRAME_FLAG_UNTARED);
 }
 
-static void the_link_and_the_host_have_faults_of_their_own(void **state)
+TEST(the_link_and_the_host_have_faults_of_their_own)
 {
-    (void)state;
     uint8_t garbage[] = {7, 1, 2, 3, 4, 5, 6, 0};
     bt_session_receive(&session, 0, garbage, sizeof garbage, 0);
     assert_int_equal(status().faults, BT_FAULT_FLAG_LINK_DAMAGED);

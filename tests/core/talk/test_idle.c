@@ -66,11 +66,11 @@ static uint16_t frame_seq_at(int k)
 
 // ---- the period ------------------------------------------------------------------------------------
 
-static void heartbeats_come_in_their_period(void **state)
+TEST(heartbeats_come_in_their_period)
 {
     static const int32_t periods_ms[] = {20, 29, 30, 100, 250, 1000, 60000};
     for (int p = 0; p < 7; p++) {
-        (void)an_idle_session(state);
+        (void)an_idle_session(NULL);
         set_setting(BT_SETTING_IDLE_PERIOD_MS, periods_ms[p]);
         play_level(50, 2000);
         assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
@@ -90,9 +90,8 @@ static void heartbeats_come_in_their_period(void **state)
     }
 }
 
-static void a_start_is_answered_with_a_frame_at_every_phase(void **state)
+TEST(a_start_is_answered_with_a_frame_at_every_phase)
 {
-    (void)state;
     play_level(50, 2000);
     for (int phase = 0; phase < 40; phase++) {
         assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
@@ -112,9 +111,8 @@ static void a_start_is_answered_with_a_frame_at_every_phase(void **state)
     }
 }
 
-static void a_finger_without_a_tare_is_idle_too(void **state)
+TEST(a_finger_without_a_tare_is_idle_too)
 {
-    (void)state;
     assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
     host_forget();
     play_level(16, 2000); // two still sweeps make the first tare
@@ -132,9 +130,8 @@ static void a_finger_without_a_tare_is_idle_too(void **state)
 
 // ---- what ends the silence -------------------------------------------------------------------------
 
-static void a_rest_that_has_moved_beyond_noise_is_shown(void **state)
+TEST(a_rest_that_has_moved_beyond_noise_is_shown)
 {
-    (void)state;
     play_level(50, 2000);
     assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
     host_forget();
@@ -167,9 +164,8 @@ static void a_rest_that_has_moved_beyond_noise_is_shown(void **state)
     assert_int_equal(frames, 1 + 40 / 8);
 }
 
-static void the_energy_of_a_heartbeat_is_that_of_its_round(void **state)
+TEST(the_energy_of_a_heartbeat_is_that_of_its_round)
 {
-    (void)state;
     uint64_t seed = 91;
     uint16_t electrode[BT_ELECTRODES];
     play_level(50, 2000);
@@ -191,11 +187,10 @@ static void the_energy_of_a_heartbeat_is_that_of_its_round(void **state)
     }
 }
 
-static void asking_for_frames_at_rest_ends_the_silence_with_its_account(void **state)
+TEST(asking_for_frames_at_rest_ends_the_silence_with_its_account)
 {
-    (void)state;
     for (int phase = 1; phase < 10; phase++) {
-        (void)an_idle_session(state);
+        (void)an_idle_session(NULL);
         play_level(50, 2000);
         assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
         play_level(1 + phase, 2000);
@@ -210,9 +205,8 @@ static void asking_for_frames_at_rest_ends_the_silence_with_its_account(void **s
     }
 }
 
-static void a_lost_heartbeat_is_a_gap(void **state)
+TEST(a_lost_heartbeat_is_a_gap)
 {
-    (void)state;
     play_level(50, 2000);
     assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
     host_forget();
@@ -230,9 +224,8 @@ static void a_lost_heartbeat_is_a_gap(void **state)
 
 // ---- subscriptions ---------------------------------------------------------------------------------
 
-static void unknown_fingers_are_refused_and_change_nothing(void **state)
+TEST(unknown_fingers_are_refused_and_change_nothing)
 {
-    (void)state;
     for (int fingers = 0; fingers < 256; fingers++) {
         for (int quantities = 0; quantities < 256; quantities++) {
             uint8_t before[BT_MAX_FINGERS];
@@ -249,9 +242,9 @@ static void unknown_fingers_are_refused_and_change_nothing(void **state)
     }
 }
 
-static void at_first_everything_but_sigmas_and_touches_is_sent(void **state)
+TEST(at_first_everything_but_sigmas_and_touches_is_sent)
 {
-    (void)new_session(state);
+    (void)new_session(NULL);
     assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
     host_forget();
     play_level(40, 2000);
@@ -287,12 +280,11 @@ static size_t bytes_of(emulated_finger *finger, int rounds)
     return bytes_written;
 }
 
-static void rest_takes_a_fifth_of_the_bytes_of_contact_at_most(void **state)
+TEST(rest_takes_a_fifth_of_the_bytes_of_contact_at_most)
 {
-    (void)state;
     static const double glitches[] = {0, 0.005}; // the worst sensor there is
     for (int k = 0; k < 2; k++) {
-        (void)new_session(state);
+        (void)new_session(NULL);
         emulated_finger finger;
         finger_init(&finger);
         finger.sigma = k == 0 ? 1.5 : 5;

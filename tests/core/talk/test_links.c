@@ -65,9 +65,8 @@ static unsigned frames_go_to(void)
     return host.message[0].link;
 }
 
-static void who_streams_with_a_keep_alive_keeps_the_link(void **state)
+TEST(who_streams_with_a_keep_alive_keeps_the_link)
 {
-    (void)state;
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
     for (int id = 0x80; id < 0xC0; id++) { // whatever a host may say
         uint8_t payload[BT_FRAME_MAX_BYTES] = {1};
@@ -96,9 +95,8 @@ static void who_streams_with_a_keep_alive_keeps_the_link(void **state)
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
 }
 
-static void a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told(void **state)
+TEST(a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told)
 {
-    (void)state;
     assert_int_equal(subscribe_at(USB, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(stream_at(USB, 0), BT_ERROR_OK);
     assert_int_equal(ask(UART, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // every program begins with it
@@ -109,9 +107,8 @@ static void a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told(vo
     assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST); // not what the other one chose
 }
 
-static void the_next_program_at_a_port_does_not_inherit_a_subscription(void **state)
+TEST(the_next_program_at_a_port_does_not_inherit_a_subscription)
 {
-    (void)state;
     uint8_t payload[BT_HELLO_REQUEST_BYTES] = {1};
     assert_int_equal(subscribe_at(UART, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(stream_at(UART, 100), BT_ERROR_OK);
@@ -123,9 +120,8 @@ static void the_next_program_at_a_port_does_not_inherit_a_subscription(void **st
     assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST);
 }
 
-static void the_link_can_be_taken_and_is_kept_until_the_taker_is_silent(void **state)
+TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
 {
-    (void)state;
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
     assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
     assert_int_equal(take_at(USB, 0), BT_ERROR_OUT_OF_RANGE);
@@ -143,9 +139,8 @@ static void the_link_can_be_taken_and_is_kept_until_the_taker_is_silent(void **s
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
 }
 
-static void a_host_that_only_holds_keeps_the_link_until_its_hold_lapses(void **state)
+TEST(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses)
 {
-    (void)state;
     assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\3\1", 2), BT_ERROR_LINK_BUSY);
     for (int k = 0; k < 30; k++) { // a chatty neighbour does not keep alive what a dead controller held
@@ -159,9 +154,8 @@ static void a_host_that_only_holds_keeps_the_link_until_its_hold_lapses(void **s
 }
 
 // A controller streams and holds; at the other port programs come and go, and say anything.
-static void a_controller_does_not_notice_what_happens_at_the_other_port(void **state)
+TEST(a_controller_does_not_notice_what_happens_at_the_other_port)
 {
-    (void)state;
     uint32_t draw = 12345;
     assert_int_equal(stream_at(UART, 200), BT_ERROR_OK);
     assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
@@ -194,9 +188,8 @@ static void a_controller_does_not_notice_what_happens_at_the_other_port(void **s
 
 // Both controllers want the link, and take it in turns while a finger is held; the other's port opens and
 // closes.
-static void a_link_that_is_taken_in_turns_tells_both_and_lets_go_of_nothing(void **state)
+TEST(a_link_that_is_taken_in_turns_tells_both_and_lets_go_of_nothing)
 {
-    (void)state;
     uint32_t draw = 777;
     unsigned owner = UART;
     assert_int_equal(stream_at(owner, 200), BT_ERROR_OK);

@@ -4,9 +4,8 @@
 
 // ---- from the host and back ---------------------------------------------------------------------------
 
-static void a_map_of_any_size_comes_back_as_it_was_sent(void **state)
+TEST(a_map_of_any_size_comes_back_as_it_was_sent)
 {
-    (void)state;
     for (int blocks = 1; blocks <= 7; blocks++) {
         size_t bytes = make_map(blob, (uint32_t)blocks, blocks, SENSOR);
         assert_int_equal(upload(2, blob, bytes), BT_ERROR_OK);
@@ -21,9 +20,8 @@ static void a_map_of_any_size_comes_back_as_it_was_sent(void **state)
     assert_int_equal(host_error(&session, BT_READ_MAP_ID, "\1\5\0\0", 4), BT_ERROR_NO_SUCH_FINGER);
 }
 
-static void parts_may_come_in_any_order_and_more_than_once(void **state)
+TEST(parts_may_come_in_any_order_and_more_than_once)
 {
-    (void)state;
     uint64_t seed = 1;
     size_t bytes = make_big_map(blob, 1), parts = parts_of(bytes);
     uint32_t crc32 = bt_crc32(blob, bytes);
@@ -44,9 +42,8 @@ static void parts_may_come_in_any_order_and_more_than_once(void **state)
     assert_has(3, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
 }
 
-static void what_is_no_map_or_damaged_never_holds_and_the_old_one_stays(void **state)
+TEST(what_is_no_map_or_damaged_never_holds_and_the_old_one_stays)
 {
-    (void)state;
     size_t old = make_map(other, 1, 3, ""), bytes = make_map(blob, 2, 6, "");
     uint32_t crc32 = bt_crc32(blob, bytes);
     assert_int_equal(upload(0, other, old), BT_ERROR_OK);
@@ -86,9 +83,8 @@ static void what_is_no_map_or_damaged_never_holds_and_the_old_one_stays(void **s
     assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
 }
 
-static void a_part_that_differs_from_what_is_there_is_refused_and_does_no_harm(void **state)
+TEST(a_part_that_differs_from_what_is_there_is_refused_and_does_no_harm)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 4, ""), strange = make_map(other, 2, 4, "");
     write_all(0, blob, bytes);
     for (size_t part = 0; part < parts_of(bytes); part++) {
@@ -100,9 +96,8 @@ static void a_part_that_differs_from_what_is_there_is_refused_and_does_no_harm(v
 
 // ---- in the wrong moment ------------------------------------------------------------------------------
 
-static void nothing_is_written_that_was_not_begun(void **state)
+TEST(nothing_is_written_that_was_not_begun)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, "");
     uint32_t crc32 = bt_crc32(blob, bytes);
     assert_int_equal(write_part(0, blob, bytes, 0), BT_ERROR_NOT_BEGUN);
@@ -116,9 +111,8 @@ static void nothing_is_written_that_was_not_begun(void **state)
     assert_int_equal(programs, 0);
 }
 
-static void what_is_out_of_range_is_refused(void **state)
+TEST(what_is_out_of_range_is_refused)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 3, "");
     assert_int_equal(begin(5, 24, 0), BT_ERROR_NO_SUCH_FINGER);
     assert_int_equal(begin(0, 0, 0), BT_ERROR_OUT_OF_RANGE);
@@ -135,9 +129,8 @@ static void what_is_out_of_range_is_refused(void **state)
     assert_true(erases == 0 && programs == 0);
 }
 
-static void nothing_changes_while_streaming(void **state)
+TEST(nothing_changes_while_streaming)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, ""), more = make_map(other, 2, 4, "");
     assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
     write_all(1, other, more);
@@ -156,9 +149,8 @@ static void nothing_changes_while_streaming(void **state)
     assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
 }
 
-static void every_way_out_ends_an_upload(void **state)
+TEST(every_way_out_ends_an_upload)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, "");
     for (int way = 0; way < 4; way++) {
         write_all(0, blob, bytes);
@@ -177,9 +169,8 @@ static void every_way_out_ends_an_upload(void **state)
     }
 }
 
-static void a_board_without_room_says_so(void **state)
+TEST(a_board_without_room_says_so)
 {
-    (void)state;
     (void)new_session(NULL);
     assert_int_equal(begin(0, 24, 0), BT_ERROR_NOT_HERE);
     assert_int_equal(end(0, 0), BT_ERROR_NOT_HERE);
@@ -188,9 +179,8 @@ static void a_board_without_room_says_so(void **state)
 
 // ---- whose it is --------------------------------------------------------------------------------------
 
-static void another_sensors_is_refused_unless_it_is_for_any(void **state)
+TEST(another_sensors_is_refused_unless_it_is_for_any)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, "BTEMU00000000043");
     assert_int_equal(upload(2, blob, bytes), BT_ERROR_OTHER_SENSOR);
     assert_int_equal(end(2, bt_crc32(blob, bytes)), BT_ERROR_OTHER_SENSOR); // said again
@@ -202,9 +192,8 @@ static void another_sensors_is_refused_unless_it_is_for_any(void **state)
     assert_has(2, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
 }
 
-static void another_sensor_has_not_the_map_but_not_while_streaming(void **state)
+TEST(another_sensor_has_not_the_map_but_not_while_streaming)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, SENSOR);
     assert_int_equal(upload(2, blob, bytes), BT_ERROR_OK);
     host_round(&session, 1 << 2, 2000);
@@ -219,9 +208,8 @@ static void another_sensor_has_not_the_map_but_not_while_streaming(void **state)
     assert_has(2, blob, bytes, BT_CALIBRATION_STATE_OTHER_SENSOR);
 }
 
-static void a_map_is_not_whole_until_its_last_byte_has_come(void **state)
+TEST(a_map_is_not_whole_until_its_last_byte_has_come)
 {
-    (void)state;
     memset(blob, 0xFF, sizeof blob); // as flash reads where nothing was written: the CRC cannot tell
     for (size_t over = 1; over < PART; over++) { // bytes of the last part
         size_t bytes = 2 * PART + over;

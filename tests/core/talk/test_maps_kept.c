@@ -1,9 +1,8 @@
 // What is kept of wrench maps, over the slots of a small flash.
 #include "map_board.h"
 
-static void what_was_not_saved_is_gone_at_the_next_boot(void **state)
+TEST(what_was_not_saved_is_gone_at_the_next_boot)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, ""), more = make_map(other, 2, 5, "");
     assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
     assert_int_equal(save(), BT_ERROR_OK);
@@ -21,9 +20,8 @@ static void what_was_not_saved_is_gone_at_the_next_boot(void **state)
     assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
 }
 
-static void a_record_that_cannot_be_is_no_map(void **state)
+TEST(a_record_that_cannot_be_is_no_map)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 2, "");
     assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
     assert_int_equal(save(), BT_ERROR_OK);
@@ -57,9 +55,8 @@ static void a_record_that_cannot_be_is_no_map(void **state)
     assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
 }
 
-static void flash_that_takes_nothing_is_told_and_passed_by(void **state)
+TEST(flash_that_takes_nothing_is_told_and_passed_by)
 {
-    (void)state;
     size_t bytes = make_map(blob, 1, 3, ""), more = make_map(other, 2, 3, "");
     assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
     uint8_t before = session.map[0].place.slot;
@@ -93,9 +90,8 @@ static void flash_that_takes_nothing_is_told_and_passed_by(void **state)
     refused_finger = 0xFF;
 }
 
-static void there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored(void **state)
+TEST(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored)
 {
-    (void)state;
     for (uint32_t turn = 0; turn < 4; turn++) {
         for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
             size_t bytes = make_map(blob, 10 * turn + f, 2, "");
@@ -113,9 +109,8 @@ static void there_is_room_for_one_more_when_every_finger_has_another_than_it_has
 
 // Uploads, broken off or not, clears, saves and boots at random: what is in force and what is stored is what
 // it should be, byte for byte, every time. numbers: of the map that a finger has and has stored; 0: none.
-static void whatever_happens_nothing_that_is_kept_is_written_to(void **state)
+TEST(whatever_happens_nothing_that_is_kept_is_written_to)
 {
-    (void)state;
     uint64_t seed = 7;
     uint32_t has[BT_MAX_FINGERS] = {0}, stored[BT_MAX_FINGERS] = {0};
     for (uint32_t number = 1; number < 3000; number++) {
@@ -151,9 +146,8 @@ static void whatever_happens_nothing_that_is_kept_is_written_to(void **state)
 }
 
 // What comes back says whether the board's start is to be told as damaged storage.
-static void a_stored_map_that_cannot_be_used_is_said_so(void **state)
+TEST(a_stored_map_that_cannot_be_used_is_said_so)
 {
-    (void)state;
     uint8_t packed[BT_MAP_RECORD_BYTES];
     size_t bytes = make_map(blob, 1, 2, "");
     assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
@@ -184,9 +178,8 @@ static void a_stored_map_that_cannot_be_used_is_said_so(void **state)
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
 }
 
-static void slots_that_nobody_has_anything_in_are_free(void **state)
+TEST(slots_that_nobody_has_anything_in_are_free)
 {
-    (void)state;
     bt_finger_map none[BT_MAX_FINGERS];
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger_map_reset(&none[f]);

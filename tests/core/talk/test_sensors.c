@@ -5,9 +5,8 @@
 
 #include <math.h>
 
-static void each_finger_has_its_own_flags_of_who_is_there(void **state)
+TEST(each_finger_has_its_own_flags_of_who_is_there)
 {
-    (void)state;
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         session.unsure = (uint8_t)(1u << f);
         session.other = session.refused = (uint8_t)(1u << (f + 1) % BT_MAX_FINGERS);
@@ -22,9 +21,8 @@ static void each_finger_has_its_own_flags_of_who_is_there(void **state)
     }
 }
 
-static void another_sensor_has_nothing_of_the_one_before(void **state)
+TEST(another_sensor_has_nothing_of_the_one_before)
 {
-    (void)state;
     static const uint8_t one[BT_SERIAL_BYTES] = "BT-1", two[BT_SERIAL_BYTES] = "BT-2";
     bt_sensors_answer(&session, 2, one);
     for (int k = 0; k < 100; k++) {
@@ -36,9 +34,8 @@ static void another_sensor_has_nothing_of_the_one_before(void **state)
     assert_false(session.finger[2].tare.tared);
 }
 
-static void a_sensor_that_is_unplugged_is_not_present(void **state)
+TEST(a_sensor_that_is_unplugged_is_not_present)
 {
-    (void)state;
     static const uint8_t ask[2] = {1, 2};
     for (int known = 0; known <= 1; known++) {
         for (int silent = BT_UNPLUGGED_ROUNDS - 1; silent <= BT_UNPLUGGED_ROUNDS; silent++) {
@@ -54,9 +51,8 @@ static void a_sensor_that_is_unplugged_is_not_present(void **state)
     }
 }
 
-static void a_point_is_that_of_what_is_read_now(void **state)
+TEST(a_point_is_that_of_what_is_read_now)
 {
-    (void)state;
     static const uint8_t ask[2] = {1, 2};
     bt_msg_point point;
     for (int k = 0; k < 60; k++) {
@@ -83,9 +79,8 @@ static void word_comes(bool good)
 }
 
 // 22 words in a row that did not come.
-static void who_is_silent_for_half_a_round_is_in_doubt(void **state)
+TEST(who_is_silent_for_half_a_round_is_in_doubt)
 {
-    (void)state;
     static const uint8_t serial[BT_SERIAL_BYTES] = "BT-1";
     bt_sensors_answer(&session, 2, serial);
     for (int k = 0; k < 200; k++) {
@@ -104,9 +99,8 @@ static void who_is_silent_for_half_a_round_is_in_doubt(void **state)
 }
 
 // Every tenth round at first, then every hundredth; anew when it is back from a silence.
-static void who_does_not_say_who_it_is_is_asked_again(void **state)
+TEST(who_does_not_say_who_it_is_is_asked_again)
 {
-    (void)state;
     int last = -1, times = 0;
     bt_sensors_doubt(&session, 2);
     for (int k = 0; k < 1000; k++) {
@@ -133,9 +127,8 @@ static void who_does_not_say_who_it_is_is_asked_again(void **state)
     assert_int_equal(bt_sensors_to_ask(&session), 0); // so it was there all along
 }
 
-static void a_tares_age_is_told_in_milliseconds(void **state)
+TEST(a_tares_age_is_told_in_milliseconds)
 {
-    (void)state;
     static const uint8_t ask[2] = {1, 2};
     while (!session.finger[2].tare.tared) {
         host_round(&session, 1 << 2, 2000);
@@ -149,9 +142,8 @@ static void a_tares_age_is_told_in_milliseconds(void **state)
 }
 
 // Who may be another sensor than the one whose calibration is in force has no results.
-static void who_is_refused_has_no_results(void **state)
+TEST(who_is_refused_has_no_results)
 {
-    (void)state;
     for (int k = 0; k < 60; k++) {
         host_round(&session, 1 << 2, 2000);
     }
@@ -173,9 +165,8 @@ static void who_is_refused_has_no_results(void **state)
 
 // Two sensors changed while they stream, for ones of other calibrations; then one of them for one of the
 // same.
-static void a_refused_finger_stays_so_whatever_becomes_of_the_others(void **state)
+TEST(a_refused_finger_stays_so_whatever_becomes_of_the_others)
 {
-    (void)state;
     static const uint8_t serial[3][BT_SERIAL_BYTES] = {"BT-1", "BT-2", "BT-3"};
     for (unsigned f = 1; f <= 3; f += 2) {
         bt_sensors_answer(&session, f, serial[0]);

@@ -74,9 +74,8 @@ static void tare(void)
 }
 
 // Later than 9 ms, for all fingers and fifty rounds; counted for who asked.
-static void sigma_goes_first(void **state)
+TEST(sigma_goes_first)
 {
-    (void)state;
     tare();
     all_late(9000);
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
@@ -97,9 +96,8 @@ static void sigma_goes_first(void **state)
 }
 
 // Later than 11 ms a map's last wrench stands for the next, for a tenth of a second.
-static void then_a_map_is_not_computed_but_its_wrench_repeated(void **state)
+TEST(then_a_map_is_not_computed_but_its_wrench_repeated)
 {
-    (void)state;
     all_late(11001);
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_REPEATED); // nothing is tared yet
     all_late(0);
@@ -140,9 +138,8 @@ static void then_a_map_is_not_computed_but_its_wrench_repeated(void **state)
 }
 
 // Later than 22 ms there is no FRAME; the next one says so, once.
-static void whole_frames_go_last(void **state)
+TEST(whole_frames_go_last)
 {
-    (void)state;
     tare();
     all_late(22000);
     (void)frame_of(1990);
@@ -160,9 +157,8 @@ static void whole_frames_go_last(void **state)
     assert_int_equal(session.scheduler.sheds.frames, 2);
 }
 
-static void who_went_without_comes_first_in_the_next_round(void **state)
+TEST(who_went_without_comes_first_in_the_next_round)
 {
-    (void)state;
     tare();
     late_us[1] = 22001; // finger 3
     round_of(1990);
@@ -180,9 +176,8 @@ static void who_went_without_comes_first_in_the_next_round(void **state)
 }
 
 // One that never said who it is cannot be told from the next one: a quarter of a second of silence ends it.
-static void who_is_not_known_is_forgotten_when_it_is_unplugged(void **state)
+TEST(who_is_not_known_is_forgotten_when_it_is_unplugged)
 {
-    (void)state;
     tare();
     plug(3, SENSOR);
     for (int k = 1; k < BT_UNPLUGGED_ROUNDS; k++) {

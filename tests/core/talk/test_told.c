@@ -46,9 +46,8 @@ static void rest(void)
     host_forget();
 }
 
-static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
+TEST(who_subscribes_is_told_in_the_slot_that_shows_it)
 {
-    (void)state;
     rest();
     subscribe(1 << 3, BT_QUANTITY_FLAG_EVENTS | BT_QUANTITY_FLAG_TOUCH);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 0 | 1 << 3, 0), BT_ERROR_OK);
@@ -93,9 +92,8 @@ static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
     assert_int_equal(event.kind, BT_EVENT_KIND_LIFT);
 }
 
-static void nobody_is_told_who_did_not_ask_or_does_not_stream(void **state)
+TEST(nobody_is_told_who_did_not_ask_or_does_not_stream)
 {
-    (void)state;
     static const uint8_t none[BT_SLOTS];
     rest();
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 0x1F, 0), BT_ERROR_OK); // not subscribed
@@ -110,9 +108,8 @@ static void nobody_is_told_who_did_not_ask_or_does_not_stream(void **state)
     assert_memory_equal(session.events_due, none, sizeof none);
 }
 
-static void they_come_with_pac_alone_and_end_with_the_subscription(void **state)
+TEST(they_come_with_pac_alone_and_end_with_the_subscription)
 {
-    (void)state;
     static const uint8_t none[BT_SLOTS];
     rest();
     subscribe(1 << 0, BT_QUANTITY_FLAG_EVENTS);

@@ -1,0 +1,187 @@
+// What commands do: to settings, which keep their ranges, and to the board, which saves, restarts and tries a
+// bus rate.
+#include "fake_board.h"
+#include "fake_host.h"
+
+static uint8_t set_error(uint8_t setting, int32_t value)
+{
+    uint8_t payload[BT_SET_SETTING_BYTES];
+    bt_msg_set_setting msg = {.req_id = 77, .setting = setting, .value = value};
+    bt_msg_set_setting_pack(&msg, payload);
+    const received_message *message = host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload);
+    if (message->id == BT_REPLY_ID) {
+        return message->payload[2];
+    }
+    assert_int_equal(message->id, BT_SETTING_ID);
+    assert_memory_equal(message->payload, payload, sizeof payload); // as it was asked for
+    return BT_ERROR_OK;
+}
+
+static int32_t get(uint8_t setting)
+{
+    uint8_t payload[2] = {5, setting};
+    const received_message *message = host_ask(&session, BT_GET_SETTING_ID, payload, 2);
+    bt_msg_setting value;
+    assert_int_equal(message->id, BT_SETTING_ID);
+    bt_msg_setting_unpack(&value, message->payload);
+    assert_true(value.req_id == 5 && value.setting == setting);
+    return value.value;
+}
+
+TEST(settings_hold_their_ranges_and_refused_values_change_nothing)
+{
+    for (int k = 0; k < BT_SETTINGS; k++) {
+        const bt_setting_spec *spec = &bt_setting_specs[k];
+        assert_int_equal(get(spec->id), spec->initial);
+        assert_int_equal(set_error(spec->id, spec->min), BT_ERROR_OK);
+        assert_int_equal(set_error(spec->id, spec->min - 1), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_error(spec->id, INT32_MIN), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(get(spec->id), spec->min);
+        assert_int_equal(set_error(spec->id, spec->max), BT_ERROR_OK);
+        assert_int_equal(set_error(spec->id, spec->max + 1), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_error(spec->id, INT32_MAX), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(get(spec->id), spec->max);
+    }
+    assert_int_equal(set_error(0, 1), BT_ERROR_UNKNOWN_SETTING);
+}
+
+static bt_settings saved;
+static int saves, reboots, into_bootloader;
+
+static uint8_t save(void *context, const bt_settings *settings)
+{
+    (void)context;
+    saved = *settings;
+    saves++;
+    return BT_ERROR_OK;
+}
+
+static uint8_t reboot(void *context, bool bootloader)
+{
+    (void)context;
+    reboots++;
+    into_bootloader = bootloader;
+    return BT_ERROR_OK;
+}
+
+static uint8_t save_error(void)
+{
+    return host_error(&session, BT_SAVE_SETTINGS_ID, "\5", 1);
+}
+
+static uint8_t reboot_error(uint32_t magic)
+{
+    uint8_t payload[BT_REBOOT_BOOTLOADER_BYTES];
+    bt_msg_reboot_bootloader msg = {.req_id = 1, .magic = magic};
+    bt_msg_reboot_bootloader_pack(&msg, payload);
+    return host_error(&session, BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload);
+}
+
+TEST(a_board_saves_all_or_says_that_it_cannot)
+{
+    saves = 0;
+    for (int missing = 3; missing >= 0; missing--) {
+        const bt_board_actions actions = {
+            .save_settings = missing == 1 ? NULL : save,
+            .save_calibration = missing == 2 ? NULL : keep_calibration,
+            .save_map = missing == 3 ? NULL : keep_no_map,
+        };
+        bt_session_use_board(&session, &actions);
+        assert_int_equal(set_error(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
+        assert_int_equal(save_error(), missing == 0 ? BT_ERROR_OK : BT_ERROR_NOT_HERE);
+    }
+    assert_true(saves == 1 && bt_settings_get(&saved, BT_SETTING_IDLE_PERIOD_MS) == 250);
+}
+
+TEST(a_board_leaves_for_a_magic_number_alone)
+{
+    static const bt_board_actions actions = {.reboot = reboot};
+    assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_NOT_HERE);
+    bt_session_use_board(&session, &actions);
+    reboots = 0;
+    assert_int_equal(reboot_error(0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(reboot_error(0xB0071DE4), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(reboots, 0);
+    assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_OK);
+    assert_true(reboots == 1 && into_bootloader);
+    assert_int_equal(reboot_error(BT_RESTART_MAGIC), BT_ERROR_OK);
+    assert_true(reboots == 2 && !into_bootloader);
+}
+
+static uint16_t bus_khz = 4464;
+
+static void set_bus_rate(void *context, uint16_t khz)
+{
+    (void)context;
+    bus_khz = khz == 0 ? 4464 : khz;
+}
+
+static void measure(void *context, bt_msg_board_facts *facts)
+{
+    (void)context;
+    facts->bus_khz = bus_khz;
+}
+
+// A rate that is only a trial must not outlive whoever tries it: words would come damaged, with good parity
+// some.
+TEST(a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port)
+{
+    static const uint8_t at_6_mhz[BT_SET_BUS_RATE_BYTES] = {1, 6000 & 0xFF, 6000 >> 8};
+    static const bt_board_actions actions = {.measure = measure, .set_bus_rate = set_bus_rate};
+    assert_int_equal(host_error(&session, BT_SET_BUS_RATE_ID, at_6_mhz, sizeof at_6_mhz), BT_ERROR_NOT_HERE);
+    bt_session_use_board(&session, &actions);
+    for (int way = 0; way < 3; way++) {
+        const received_message *answer = host_ask(&session, BT_SET_BUS_RATE_ID, at_6_mhz, sizeof at_6_mhz);
+        assert_true(bus_khz == 6000 && answer->id == BT_BOARD_FACTS_ID);
+        if (way == 0) {
+            assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
+            assert_int_equal(bus_khz, 4464);
+            assert_int_equal(stop(), BT_ERROR_OK);
+        } else if (way == 1) {
+            assert_int_equal(stop(), BT_ERROR_OK);
+        } else {
+            bt_session_link_down(&session, 0);
+        }
+        assert_int_equal(bus_khz, 4464);
+    }
+}
+
+TEST(a_hold_lapses_after_so_many_milliseconds_of_silence)
+{
+    assert_int_equal(set_error(BT_SETTING_HOLD_TIMEOUT_MS, 700), BT_ERROR_OK);
+    assert_int_equal(host_error(&session, BT_HOLD_ID, "\1\4", 2), BT_ERROR_OK); // finger 2, at 0 us
+    bt_session_tick(&session, 700000);
+    assert_true(session.finger[2].tare.held);
+    bt_session_tick(&session, 700001);
+    assert_false(session.finger[2].tare.held);
+}
+
+TEST(a_tare_from_the_host_is_told_as_it_was_sent)
+{
+    uint8_t payload[BT_TARE_SET_BYTES];
+    bt_msg_tare_set sent = {.req_id = 1, .finger = 2, .pdc_tare_q4 = 20001};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        sent.tare_q4[i] = (uint16_t)(40003 + 7 * i);
+    }
+    bt_msg_tare_set_pack(&sent, payload);
+    assert_int_equal(host_error(&session, BT_TARE_SET_ID, payload, sizeof payload), BT_ERROR_OK);
+    const bt_tare *tare = &session.finger[2].tare;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(bt_tare_q4(tare->base.electrode_q16[i]), sent.tare_q4[i]);
+    }
+    assert_int_equal(bt_tare_q4(tare->base.pdc_q16), sent.pdc_tare_q4);
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_session)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(settings_hold_their_ranges_and_refused_values_change_nothing),
+        T(a_board_saves_all_or_says_that_it_cannot),
+        T(a_board_leaves_for_a_magic_number_alone),
+        T(a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port),
+        T(a_hold_lapses_after_so_many_milliseconds_of_silence),
+        T(a_tare_from_the_host_is_told_as_it_was_sent),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
