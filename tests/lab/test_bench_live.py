@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
-import pytest
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.decoder import Decoder
 from biotac.wire.dtypes_gen import DTYPES
-from biotac.wire.framing import encode
 from biotac_lab.bench import flood, live
 
 
@@ -35,22 +31,3 @@ def test_what_was_asked_is_judged() -> None:
     taken = {(50_000, live.OURS): [live.Round(0.002, 99.0, 200.0, 61.0)],
              (50_000, live.PYSERIAL): [live.Round(0.0, 50.0, 90.0, 100.0)]}  # fmt: skip
     assert [row[3] for row in live.report(taken, 1.0)[1].rows] == ["NOT met", "met", "NOT met"]
-
-
-def test_without_cobs_it_says_what_to_install(monkeypatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "cobs", None)
-    with pytest.raises(live.InputError, match="biotac-lab"):
-        live.measure()
-
-
-def test_answers_wait_their_turn_behind_a_frame_that_is_half_sent() -> None:
-    near, far = os.pipe()
-    board = flood.Board.__new__(flood.Board)
-    board._master, board._decoder = near, Decoder()
-    os.write(far, encode(wire.Ping.ID, wire.Ping(9).pack()))
-    half = flood.frames(1)[0][50:]
-    ring = bytearray(half)
-    assert board.serve(ring) is False
-    os.close(near)
-    os.close(far)
-    assert ring == half + encode(wire.Reply.ID, wire.Reply(9, wire.Ping.ID, 0).pack())

@@ -92,13 +92,6 @@ def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board
     np.testing.assert_allclose(joined.run.counts - joined.run.tare, board.e[: len(joined.run.counts)], atol=1e-9)
 
 
-def test_three_axes_are_enough_for_force(board: Board, reference: Reference) -> None:
-    samples = replace(reference.samples, wrench=reference.samples.wrench[:, :3])
-    joined = join("board.mcap", board, replace(reference, samples=samples))
-    assert joined.run.truth.shape[1] == 3
-    assert np.isnan(joined.on_skin_share)
-
-
 def test_a_reference_of_a_tenth_of_the_rate(
     recorded: tuple[Recording, Source], board: Board, reference: Reference
 ) -> None:
@@ -184,17 +177,13 @@ def test_a_repeated_press_is_not_a_clear_peak() -> None:
         align("x", t_s, load, t_s[:5000] + 3.0, load[:5000])
 
 
-def test_fingers_and_serials() -> None:
+def test_a_finger_is_chosen_among_several() -> None:
     assert choose_finger("rec", [2], None) == 2
     with pytest.raises(InputError, match="holds fingers 0, 2: expected one; choose it with --finger"):
         choose_finger("rec", [0, 2], None)
     with pytest.raises(InputError, match="holds fingers 0, 2, not 1"):
         choose_finger("rec", [0, 2], 1)
-    check_serial("rec", "BTA", "BTA")
     check_serial("rec", "", "BTA")
-    check_serial("rec", "BTB", "BTA", force=True)
-    with pytest.raises(InputError, match="rec is of sensor BTB, but this is BTA: expected the same"):
-        check_serial("rec", "BTB", "BTA")
 
 
 def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:

@@ -17,9 +17,6 @@ from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Pres
 from biotac.calibrate.press.force_source import MAX_LAG_ROWS, ROW_DTYPE, Series, check_alignment
 from biotac.calibrate.press.guide import ask_forces
 from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
-from biotac.wire import messages_gen as wire
-from biotac.wire.frames import Q4_PER_COUNT
-from biotac.wire.native import ffi, lib
 
 K = 0.0125  # N per count
 REST = 1300.0
@@ -66,20 +63,6 @@ def its_fit(rows: Any) -> Fit:
 # ---- formulas ----------------------------------------------------------------------------------
 
 
-def test_the_filter_is_the_papers_by_hand() -> None:
-    def filtered(words: list[int], filter_milli: int) -> list[float]:
-        pressure = ffi.new("bt_pressure *", {"filter_milli": filter_milli})
-        found = []
-        for word in words:
-            lib.bt_pressure_add(pressure, word)
-            found.append(lib.bt_pressure_filtered_q4(pressure) / Q4_PER_COUNT)
-        return found
-
-    assert filtered([100, 200, 200, 60], 500) == [100, 150, 175, 117.5]
-    assert filtered([100, 200], 1000) == [100, 200]
-    assert filtered([100, wire.INVALID_COUNT, 300, 400], 500) == [100, wire.INVALID_COUNT / Q4_PER_COUNT, 300, 350]
-
-
 def test_k_is_the_pseudo_inverse() -> None:
     above, force = np.array([100.0, 200.0, 300.0]), np.array([1.0, 2.2, 2.9])
     # By hand: sum P F / sum P^2 = (100 + 440 + 870) / (1 + 4 + 9) / 1e4
@@ -90,8 +73,7 @@ def test_k_is_the_pseudo_inverse() -> None:
 # ---- plateaus ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.0, 3.0])
-@pytest.mark.parametrize("k", [0.009, 0.016])
+@pytest.mark.parametrize(("noise", "k"), [(0.0, 0.009), (3.0, 0.016)])
 def test_three_presses_give_k(noise: float, k: float) -> None:
     fitted = its_fit(course(presses(2, 3.5, 5), k=k, noise=noise))
     # A mean of n noisy counts: 3 sigma of 3 * 50 rows of filtered noise, against the rms of what was pressed.
@@ -109,7 +91,7 @@ def test_ramps_are_left_out_and_would_bias_k() -> None:
     assert biased > 1.03 * K  # what the course is made of shows it
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 300, 10_000])
+@pytest.mark.parametrize("chunk", [1, 300])
 def test_how_rows_are_cut_makes_no_difference(chunk: int) -> None:
     rows = np.concatenate([course(presses(2, 3.5, 5), finger=f, noise=1.0, seed=f) for f in range(2)])
     rows["t_us"][len(rows) // 2 :] += len(rows) // 2 * ROUND_US
@@ -166,7 +148,6 @@ GOOD = course(presses(2, 3.5, 5), noise=1.0)
             r"press 1 of 3 never came: pressure rose by at most 0\.0 counts, expected 20; press harder",
         ),
         (course(presses(0.1, 0.1, 0.1)), r"press 1 of 3 never came: pressure rose by at most 8\.0 counts"),
-        (course(presses(2, 3.5)), r"press 3 of 3 never came"),
         (course(presses(2, 3.5, 5, hold=20)), r"press 1 of 3 has no plateau: at most \d+ held rows in a row"),
         (
             course([0.0] * 150 + list(np.linspace(0, 20, 900))),
@@ -191,33 +172,6 @@ def test_a_minute_in_vain_is_enough() -> None:
 
 
 # ---- the sequence --------------------------------------------------------------------------------
-
-
-def test_the_steps_name_finger_press_and_force_in_turn() -> None:
-    procedure = Procedure([3, 1], [2.0, 4.0])
-    seen: list[Step | None] = [procedure.step]
-    at_us = 0
-    for finger in (3, 1):
-        rows = course(presses(2, 4), finger=finger)
-        rows["t_us"] += at_us
-        at_us = int(rows["t_us"][-1]) + ROUND_US
-        for k in range(len(rows)):
-            procedure.feed(rows[k : k + 1])
-            if procedure.step != seen[-1]:
-                seen.append(procedure.step)
-    wanted = [
-        (finger, phase, number, force)
-        for finger in (3, 1)
-        for phase, number, force in (
-            (Phase.REST, 1, 2.0),
-            (Phase.PRESS, 1, 2.0),
-            (Phase.RELEASE, 1, 2.0),
-            (Phase.PRESS, 2, 4.0),
-            (Phase.RELEASE, 2, 4.0),
-        )
-    ]
-    assert seen[-1] is None and procedure.done
-    assert [(s.finger, s.phase, s.press, s.force_n) for s in seen[:-1] if s] == wanted
 
 
 def test_another_fingers_press_is_not_taken_for_this_ones() -> None:
@@ -250,7 +204,7 @@ def test_who_presses_faster_than_they_type_is_asked_for_every_press_once() -> No
     assert typed == [10.0, 20.0, 30.0]
 
 
-@pytest.mark.parametrize(("fingers", "forces"), [([], [2.0]), ([1, 1], [2.0]), ([0], []), ([0], [0.0]), ([0], [500.0])])
+@pytest.mark.parametrize(("fingers", "forces"), [([1, 1], [2.0]), ([0], []), ([0], [500.0])])
 def test_no_sequence_without_fingers_or_forces(fingers: list[int], forces: list[float]) -> None:
     with pytest.raises(InputError, match="expected"):
         Procedure(fingers, forces)
@@ -291,9 +245,7 @@ STILL = Rest(REST, 0.6, 50)
         ([held(2, 200), held(3, 300)], "finger 0: 2 presses, expected at least 3"),
         ([held(2, 200), held(np.nan, 300, 2), held(4, 400)], "press 2: the reference is nan N while"),
         ([held(2000, 200), held(3000, 300), held(4000, 400)], r"K is 10 N/count.*is the reference in newtons,"),
-        ([held(0.002, 200), held(0.003, 300), held(0.004, 400)], r"K is 1e-05 N/count, expected 0.0009 to 0.1"),
         ([held(-2, 200), held(3, 300), held(4, 400)], "the reference is -2 N while pressure is 200 counts above rest"),
-        ([held(0, 200), held(3, 300), held(4, 400)], "the reference is 0 N while"),
         ([held(1, 200), held(3, 300), held(6, 400)], r"0.005 to 0.015 N/count, a spread of \d+%, expected at most 50%"),
     ],
 )
@@ -352,7 +304,7 @@ def test_a_series_is_straight_between_and_unknown_outside() -> None:
     assert np.isnan(got[[0, 3]]).all() and got[1:3].tolist() == [0.0, 1.0]
 
 
-@pytest.mark.parametrize("lag", [-12, 0, 5, 20])
+@pytest.mark.parametrize("lag", [-12, 20])
 def test_the_lag_is_found(lag: int) -> None:
     force = np.array(presses(2, 3.5, 5))
     above = np.roll(force, lag) / K
@@ -368,17 +320,3 @@ def test_forces_of_another_run_or_clock_are_refused_with_their_lag_or_correlatio
 
 
 # ---- report --------------------------------------------------------------------------------------
-
-
-def test_the_table_has_k_and_p0_and_the_errors() -> None:
-    fitted = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
-    from biotac import Calibration
-
-    verified = verify(fitted, with_board_force(held(3.0, 303), fitted.gain_nn))
-    outcome = pressure.Outcome({0: fitted}, {0: Calibration(serial="BTX")}, verified={0: verified})
-    head, line = pressure.lines(outcome)
-    assert head.split() == ["finger", "sensor", "K", "N/count", "P0", "count", "fit", "force", "N", "board", "N",
-                            "error", "float64"]  # fmt: skip
-    assert line.split() == ["0", "BTX", "0.010000", "1300.0", "0.00%", "3.000", "3.030", "1.00%", "1.00%"]
-    (facts,) = pressure.facts(outcome)
-    assert (facts["pressure_gain_nn"], facts["verification"]["board_error"]) == (10_000_000, 0.01)

@@ -11,12 +11,11 @@ import biotac
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.mounting import LIN
 from biotac.calibrate.reference.samples import Reference, Samples
-from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
+from biotac.calibrate.wrench.coverage import REGIONS, Coverage
 from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording.reader import Recording
-from biotac.sim.loading import load_source
 from biotac.sim.nano17 import Nano17, Nano17Reader
 from biotac.wire.frames import FRAME_DTYPE
 from biotac.wire.messages_gen import FrameFlags
@@ -51,9 +50,7 @@ def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, s
 # ---- warm-up and tare --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("counts_per_min", "warm"), [(0.0, True), (19.0, True), (-19.0, True), (21.0, False), (-40.0, False)]
-)
+@pytest.mark.parametrize(("counts_per_min", "warm"), [(-19.0, True), (21.0, False)])
 def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> None:
     procedure = Procedure(0, LIN)
     procedure.frames(frames(0, 5900, counts_per_min))
@@ -150,8 +147,6 @@ def test_a_reference_that_moves_is_not_zeroed() -> None:
     ("point", "region"),
     [
         ((R, 0.0, 0.0), "tip"),
-        ((3.0, 0.0, -np.sqrt(R**2 - 9.0)), "tip"),
-        ((-8.0, 0.0, -R), "pad"),
         ((-8.0, R * np.sin(0.5), -R * np.cos(0.5)), "pad"),
         ((-2.0, R * np.sin(0.9), -R * np.cos(0.9)), "side of E11"),
         ((-15.0, -R * np.sin(0.9), -R * np.cos(0.9)), "side of E1"),
@@ -163,17 +158,6 @@ def test_regions(point: tuple[float, float, float], region: str) -> None:
     touched = [name for name, cells in zip(REGIONS, coverage.cells, strict=True) if cells]
     assert touched == [region]
     assert coverage.cells.sum() == 1
-
-
-def test_every_cell_can_be_reached_and_no_other_is_named() -> None:
-    x, angle = np.meshgrid(np.linspace(-15.9, 5.0, 200), np.linspace(-1.5, 1.5, 200))
-    radius = np.sqrt(R**2 - np.maximum(x, 0.0) ** 2)
-    point = np.column_stack([x.ravel(), (radius * np.sin(angle)).ravel(), (-radius * np.cos(angle)).ravel()])
-    normal = point * np.column_stack([point[:, 0] > 0, np.ones((len(point), 2))]) / R
-    region, cell = cell_of(point, normal)
-    assert set(zip(region.tolist(), cell.tolist(), strict=True)) == {
-        (r, c) for r in range(len(REGIONS)) for c in range(CELLS_PER_REGION)
-    }
 
 
 def test_ways_and_forces_by_hand() -> None:
@@ -210,6 +194,7 @@ class Interrupting(Nano17Reader):
 
     at_s = 0.0
     error: type[BaseException] = KeyboardInterrupt
+    source_s = 0.0  # how long its board's source is
     last_s = 0.0  # up to which it was read: where no time passes, seconds of it come at once
 
     def read(self, board_s: float) -> Samples:
@@ -227,6 +212,7 @@ def walked(
     with biotac.open(f"sim:{scenario}") as hand:
         assert hand.link.source is not None
         reader = Interrupting(hand.link.source, 0)
+        reader.source_s = len(hand.link.source.samples) / 100.0
         reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
         procedure = Procedure(0, reader.nano17.mounting)
         walk(hand, reader, procedure, path, show=lines.append)
@@ -236,12 +222,12 @@ def walked(
 
 
 @pytest.fixture(scope="module")
-def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Path]:
-    return walked(tmp_path_factory.mktemp("walk"), "calibrate.toml")[:3]
+def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Path, Interrupting]:
+    return walked(tmp_path_factory.mktemp("walk"), "calibrate.toml")
 
 
-def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path]) -> None:
-    procedure, lines, path = everywhere
+def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path, Interrupting]) -> None:
+    procedure, lines, path, reader = everywhere
     assert procedure.step is Step.DONE
     assert procedure.coverage.complete and procedure.coverage.missing() == []
     assert lines[0] == "warming up: leave the finger alone"
@@ -254,10 +240,12 @@ def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Path
     recording = Recording(path)
     assert not recording.problems
     # it ended by itself, before the script did
-    assert (recording.end_us - recording.begin_us) / 1e6 < 0.9 * len(load_source("calibrate.toml").samples) / 100.0
+    assert (recording.end_us - recording.begin_us) / 1e6 < 0.9 * reader.source_s
 
 
-def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedure, list[str], Path]) -> None:
+def test_what_was_walked_can_be_fitted_from_its_files(
+    everywhere: tuple[Procedure, list[str], Path, Interrupting],
+) -> None:
     path, beside = everywhere[2], everywhere[2].with_suffix(".csv")
     reference = beside, read_csv(beside)
     loaded = load(path, reference, serial="BTSIM00000000006")
@@ -275,6 +263,7 @@ def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedur
         load(path)
 
 
+@pytest.mark.nightly  # a whole procedure; that something is missing is said by day when Ctrl-C ends one
 def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
     procedure, lines, *_ = walked(tmp_path, "calibrate_gaps.toml")
     assert lines[-1] == "the simulated source has ended"
@@ -287,24 +276,25 @@ def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
     assert "missing: side of E11: 0 of 8 cells" in lines[-2]
 
 
-@pytest.mark.parametrize("at_s", [20.0, 150.0])
-def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> None:
-    procedure, lines, path, reader = walked(tmp_path, "calibrate.toml", at_s)
-    assert procedure.step is Step.DONE and lines[-1] == "stopped by Ctrl-C"
-    assert (procedure.zero is None) == (at_s < 100.0)
+SHORT = "calibrate.toml?seconds=140"
+
+
+def test_ctrl_c_ends_it_and_keeps_everything(tmp_path: Path) -> None:
+    procedure, lines, path, reader = walked(tmp_path, SHORT, 130.0)
+    assert procedure.step is Step.DONE and procedure.zero is not None
+    assert lines[-1] == "stopped by Ctrl-C" and lines[-2].startswith("missing: ")
     recording = Recording(path)
     assert not recording.problems
-    assert (recording.end_us - recording.begin_us) / 1e6 >= at_s  # to the last byte that came
-    reference = read_csv(path.with_suffix(".csv")) if at_s > 100.0 else None
-    if reference is not None:
-        assert abs(reader.last_s - np.ptp(reference.samples.t_s)) < 0.05
+    assert (recording.end_us - recording.begin_us) / 1e6 >= 130.0  # to the last byte that came
+    reference = read_csv(path.with_suffix(".csv"))
+    assert abs(reader.last_s - np.ptp(reference.samples.t_s)) < 0.05
 
 
 def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
     with pytest.raises(DeviceLostError):
-        walked(tmp_path, "calibrate.toml", 150.0, DeviceLostError)
+        walked(tmp_path, SHORT, 130.0, DeviceLostError)
     again = Reference("again", read_csv(tmp_path / "walk.csv").samples, LIN)
-    assert len(again.samples) > 140 * 500
+    assert len(again.samples) > 120 * 500
     assert not Recording(tmp_path / "walk.mcap").problems
     with pytest.raises(InputError, match="already exists; choose another name"):
-        walked(tmp_path, "calibrate.toml")
+        walked(tmp_path, SHORT)

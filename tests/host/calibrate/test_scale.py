@@ -16,7 +16,6 @@ from biotac.calibrate.press.few_shot import scaled
 from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
 from biotac.core.geometry import RADIUS_MM
-from biotac.errors import InputError
 from biotac.map.file import load_fitted
 from biotac.sim.loading import bundled_scenario
 from biotac.sim.physics import Finger, States
@@ -127,10 +126,3 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     assert "expected 3 or more" in capsys.readouterr().err
     assert main(argv[:-2]) != 0
     assert "--readings" in capsys.readouterr().err
-
-
-def test_too_few_presses_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["calibrate", "press", "sim:fingers.toml", "--scale", "--finger", "0", "--presses", "2"]) != 0
-    assert "expected 3 or more" in capsys.readouterr().err
-    with pytest.raises(InputError):
-        population_map.load(Path("nowhere.json"))

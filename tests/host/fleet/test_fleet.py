@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import json
-import os
 import random
-import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from free_port import free_port
 from maps import make_map
 
 import biotac
 from biotac.cli.main import main
-from biotac.errors import CommandRefusedError, DeviceLostError, InputError, PortError, WireVersionError
-from biotac.fleet import network, rights, zenoh_link
+from biotac.errors import CommandRefusedError, DeviceLostError, PortError
+from biotac.fleet import network, rights
 from biotac.fleet.share import Share
 from biotac.view.serving import Viewing
 from biotac.wire import messages_gen as wire
@@ -125,23 +124,28 @@ def test_who_may_command_is_said_and_kept_to(shared, capsys) -> None:
             writer.board.set_map(1, make_map(1))  # for which the board's stream has to stand still
             assert reader.board.get_map(1) is not None
             writer.board.clear_map(1)
-            with pytest.raises(
-                PortError, match=r"only one program may write at a time \(now .+\); open without write=yes"
-            ):
+            with pytest.raises(PortError, match=r"only one program may write at a time \(now .+\); open without"):
                 biotac.open(shared.port("&write=yes"))
             assert main(["list", "--zenoh", shared.endpoint, "--json"]) == 0
             (listed,) = json.loads(capsys.readouterr().out)["zenoh"]
             assert listed["port"] == "zenoh:left" and listed["writer"] == shared.share.writer
             until(writer, 20)  # it streams again
-    gone = threading.Event()
     for _ in range(1000):
         if shared.share.writer is None:
-            gone.set()
             break
         shared.hand.status()
-    assert gone.is_set()
+    assert shared.share.writer is None
     with biotac.open(shared.port("&write=yes")) as writer:
         writer.board.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, 1000)
+
+
+def refused(session: Any, message: Any, secret: bytes | None = None) -> bool:
+    """Whether a command of a client of its own is answered with NOT_HERE."""
+    payload = encode(message.ID, message.pack())[:-1]
+    (reply,) = session.get(network.key("left", "command"), payload=payload, attachment=secret)
+    opened = open_frame(reply.ok.payload.to_bytes()[:-1])
+    assert opened is not None
+    return wire.Reply.unpack(opened[1]) == wire.Reply(message.req_id, message.ID, wire.Error.NOT_HERE)
 
 
 def test_the_sharing_side_enforces_it(shared) -> None:
@@ -149,21 +153,10 @@ def test_the_sharing_side_enforces_it(shared) -> None:
     before = shared.hand.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2)
     change = wire.SetSetting(9, wire.Setting.CONTACT_ENERGY_COUNT2, before + 5)
     with shared.client() as session, biotac.open(shared.port("&write=yes")) as writer:
-        stop = encode(wire.Stop.ID, wire.Stop(9).pack())[:-1]  # each reader's own affair, not to be done to all
-        (reply,) = session.get(network.key("left", "command"), payload=stop)
-        refused = open_frame(reply.ok.payload.to_bytes()[:-1])
-        assert refused is not None
-        assert wire.Reply.unpack(refused[1]) == wire.Reply(9, wire.Stop.ID, wire.Error.NOT_HERE)
+        assert refused(session, wire.Stop(9))  # each reader's own affair, not to be done to all
         until(writer, 20)
         for secret in (b"", b"\0" * 32, network.signature(b"", 1, encode(change.ID, change.pack())[:-1])):
-            replies = list(
-                session.get(
-                    network.key("left", "command"), payload=encode(change.ID, change.pack())[:-1], attachment=secret
-                )
-            )
-            (answer,) = [open_frame(reply.ok.payload.to_bytes()[:-1]) for reply in replies]
-            assert answer is not None
-            assert wire.Reply.unpack(answer[1]) == wire.Reply(9, change.ID, wire.Error.NOT_HERE)
+            assert refused(session, change, secret)
         for payload in (b"", b"\0", b"no frame", encode(0x89, b"")[:-1]):
             list(session.get(network.key("left", "command"), payload=payload, timeout=0.2))
     assert shared.hand.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
@@ -193,32 +186,6 @@ def test_a_stranger_gets_no_secret_and_blocks_nobody(shared) -> None:
             declared.undeclare()
 
 
-def test_nothing_leaves_this_computer_without_a_configuration(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.delenv("ZENOH_CONFIG", raising=False)
-    for endpoint in ("tcp/0.0.0.0:7447", "tcp/192.0.2.1:7447", "tls/[::]:7447", "udp/example.org:7447", "nonsense"):
-        for what in ("connect", "listen"):
-            with pytest.raises(InputError, match="leaves this computer"):
-                network.open_session("left", **{what: endpoint})
-    with closing(network.open_session("left")) as session:
-        assert session.zid()
-        assert {address for address in listening_at() if address != LOOPBACK_HEX} == set()
-
-
-LOOPBACK_HEX = "0100007F"
-
-
-def listening_at() -> set[str]:
-    """IPv4 and IPv6 addresses at which this process listens for TCP, as the kernel writes them."""
-    inodes = {os.readlink(fd) for fd in Path("/proc/self/fd").iterdir() if fd.exists()}
-    found = set()
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/self/net/{table}").read_text().splitlines()[1:]:
-            _, local, _, state, *_, inode = line.split()[:10]
-            if state == "0A" and f"socket:[{inode}]" in inodes:
-                found.add(local.partition(":")[0])
-    return found
-
-
 def test_a_client_is_written_from_the_page(shared) -> None:
     """host/docs/guides/network.md and SPEC.md are all it needs: Zenoh, cobs and zlib, nothing of ours."""
     import struct
@@ -230,18 +197,10 @@ def test_a_client_is_written_from_the_page(shared) -> None:
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([shared.endpoint]))
-    batches: list[bytes] = []
-    enough = threading.Event()
-
-    def take(sample: zenoh.Sample) -> None:
-        batches.append(sample.payload.to_bytes())
-        if len(batches) >= 50:
-            enough.set()
-
     with zenoh.open(config) as session:
         (info,) = [json.loads(reply.ok.payload.to_bytes()) for reply in session.get("biotac/left/info") if reply.ok]
-        subscriber = session.declare_subscriber(f"biotac/left/wire/{info['epoch']}", take)
-        assert enough.wait(30)
+        subscriber = session.declare_subscriber(f"biotac/left/wire/{info['epoch']}")
+        batches = [subscriber.recv().payload.to_bytes() for _ in range(50)]
         subscriber.undeclare()
     numbers = [struct.unpack_from("<Q", batch)[0] for batch in batches]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
@@ -260,12 +219,11 @@ def garbage(draw: random.Random) -> bytes:
     return draw.choice([noise, cut, message, message, of_its_length, of_its_length, (message + b"\0") * 1000])
 
 
-@pytest.mark.parametrize("tries", [150, pytest.param(1500, marks=pytest.mark.nightly)])
-def test_what_means_nothing_is_left_alone(shared, capfd, tries: int) -> None:
+def test_what_means_nothing_is_left_alone(shared, capfd) -> None:
     """At every key that is asked, and no claim of somebody who is not there."""
-    before, draw = shared.hand.board.settings(), random.Random(tries)
+    before, draw = shared.hand.board.settings(), random.Random(1)
     with shared.client() as session:
-        for _ in range(tries):
+        for _ in range(150):
             what = draw.choice(["command", "command", "claim", "info"])
             secret = draw.choice([None, b"", draw.randbytes(32)])
             list(session.get(network.key("left", what), payload=garbage(draw), attachment=secret, timeout=5.0))
@@ -290,15 +248,8 @@ def test_batches_that_are_not_the_boards_are_left_alone(shared) -> None:
             session.put(key, data)
         for _ in range(20):
             session.put(key, network.NUMBER.pack(2**63) + draw.randbytes(draw.choice([1, 300, 5 << 20])))
-        rows = 0
-        seen: dict[int, int] = {}
-        for batch in hand.batches():
-            for finger, seq in zip(batch.frames["finger"].tolist(), batch.seq.tolist(), strict=True):
-                assert seq > seen.get(finger, -1)
-                seen[finger] = seq
-            rows += len(batch.frames)
-            if rows > 200:
-                break
+        rows = hand.read(1.0)
+        assert all((np.diff(rows["seq"][rows["finger"] == finger].astype(int)) > 0).all() for finger in hand.fingers)
         assert hand.link.batches_lost == hand.stats.disordered == 0
         assert hand.stats.frames_lost <= shared.hand.stats.frames_lost
 
@@ -342,20 +293,6 @@ def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monk
         assert slow.link.batches_lost == lost  # and it goes on
 
 
-def test_round_trips_include_the_network(shared, monkeypatch) -> None:
-    """A network of 60 ms: the clock's round trip, and so its bounds, are no shorter."""
-    real = zenoh_link.ZenohLink._ask
-
-    def far(self: Any, *args: Any) -> None:
-        time.sleep(0.06)
-        real(self, *args)
-
-    monkeypatch.setattr(zenoh_link.ZenohLink, "_ask", far)
-    with biotac.open(shared.port()) as hand:
-        hand.sync()
-        assert hand.clock.quickest_round_trip_s >= 0.06
-
-
 def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
     with shared.client() as session, pytest.raises(PortError, match="choose another name"):
         Share(shared.hand, session, "left")
@@ -372,13 +309,15 @@ def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
         assert len(output) == 1 and cure in output[0]
 
 
-def test_another_wire_version_is_5() -> None:
-    sharing = Shared("old")
-    with sharing.stack:
-        sharing.hand._board.reader.hello = replace(sharing.hand.info, wire_major=wire.WIRE_MAJOR + 1)
-        with pytest.raises(WireVersionError) as error:
-            biotac.open(sharing.port())
-        assert error.value.exit_code == 5
+def next_gap(hand: biotac.Hand) -> biotac.Gap:
+    return next(m for batch in hand.batches() for m in batch.messages if isinstance(m, biotac.Gap))
+
+
+def recorded_gap(path: Path, frames: int) -> biotac.Gap:
+    """Between a recording and the one that goes on with it, each of at least so many frames."""
+    first, second = biotac.Recording(path), biotac.Recording(path.with_suffix(".2.mcap"))
+    assert len(first.frames) >= frames <= len(second.frames)
+    return (first.gaps + second.gaps)[0]
 
 
 def test_a_board_that_is_taken_off_is_lost_and_found_again(tmp_path: Path) -> None:
@@ -391,74 +330,15 @@ def test_a_board_that_is_taken_off_is_lost_and_found_again(tmp_path: Path) -> No
         with pytest.raises(DeviceLostError, match="is no longer shared"):
             until(without, 10_000)
         sharing.start()
-        gaps: list[Any] = []
-        for batch in hand.batches():
-            gaps += [m for m in batch.messages if isinstance(m, biotac.Gap)]
-            if gaps:
-                break
-        assert gaps[0].reason == "rebooted"  # another process, so another boot
+        assert next_gap(hand).reason == "rebooted"  # another process, so another boot
         until(hand, 20)
-    first, second = biotac.Recording(tmp_path / "a.mcap"), biotac.Recording(tmp_path / "a.2.mcap")
-    assert len(first.frames) >= 20 <= len(second.frames)
-    gap = (first.gaps + second.gaps)[0]
+    gap = recorded_gap(tmp_path / "a.mcap", 20)
     assert gap.back_at_ns > gap.lost_at_ns > 0  # of stated length
 
 
-def reached(folder: Path, endpoint: str, of_server: Any, of_clients: list[Any]) -> list[bool]:
-    """Who gets through to a board's program, each with Zenoh's own configuration or, for None, without."""
-
-    def file(name: str, transport: Any) -> Path | None:
-        if transport is None:
-            return None
-        path = folder / f"{name}.json5"
-        path.write_text(json.dumps({"transport": transport}))
-        return path
-
-    seen = []
-    with closing(network.open_session("left", listen=endpoint, config=file("server", of_server))) as server:
-        here = server.declare_queryable(network.key("left", "info"), lambda query: query.reply(query.key_expr, b"{}"))
-        for k, transport in enumerate(of_clients):
-            try:
-                with closing(network.open_session("t", connect=endpoint, config=file(f"{k}", transport))) as session:
-                    seen.append(any(reply.ok for reply in session.get(network.key("left", "info"), timeout=1.0)))
-            except PortError as error:
-                assert "password or a certificate" in str(error)
-                seen.append(False)
-        here.undeclare()
-    return seen
-
-
-def free_port() -> int:
-    with closing(socket.socket()) as free:
-        free.bind(("127.0.0.1", 0))
-        number: int = free.getsockname()[1]
-        return number
-
-
-def test_a_password_keeps_others_out(tmp_path: Path) -> None:
-    (tmp_path / "users").write_text("lab:good\n")
-    good, bad = ({"auth": {"usrpwd": {"user": "lab", "password": word}}} for word in ("good", "bad"))
-    server = {"auth": {"usrpwd": {"user": "lab", "password": "good", "dictionary_file": str(tmp_path / "users")}}}
-    assert reached(tmp_path, f"tcp/127.0.0.1:{free_port()}", server, [good, bad, None]) == [True, False, False]
-
-
 @pytest.mark.nightly
-def test_tls_keeps_others_out(tmp_path: Path) -> None:
-    """Certificates by openssl, as host/docs/guides/network.md says."""
-    for name in ("board", "other"):
-        options = ["-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
-        options += ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]
-        files = ["-keyout", str(tmp_path / f"{name}.key"), "-out", str(tmp_path / f"{name}.pem")]
-        subprocess.run(["openssl", "req", *options, *files], check=True, capture_output=True)
-    board, other = ({"link": {"tls": {"root_ca_certificate": str(tmp_path / f"{n}.pem")}}} for n in ("board", "other"))
-    keys = {"listen_private_key": str(tmp_path / "board.key"), "listen_certificate": str(tmp_path / "board.pem")}
-    server = {"link": {"tls": keys}}
-    assert reached(tmp_path, f"tls/localhost:{free_port()}", server, [board, other, None]) == [True, False, False]
-
-
-@pytest.mark.nightly
-def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path) -> None:
-    """kill -9 of `biotac share`, three seconds of nothing, and another one of the same name."""
+def test_a_gateway_that_is_killed_leaves_a_gap(tmp_path: Path) -> None:
+    """kill -9 of `biotac share`, and another one of the same name."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     source = "sim:press.toml?fingers=5&pace=real&seconds=300"
     command = [sys.executable, "-m", "biotac", "share", source, "--zenoh", "left", "--listen", endpoint]
@@ -470,36 +350,19 @@ def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path
             assert "is shared" in output.readline()
         return process
 
-    away_s = 3.0
-    with ExitStack() as stack:
-        serving = serve()
-        port = f"zenoh:left?connect={endpoint}"
-        hands = [stack.enter_context(biotac.open(port, reconnect=True)) for _ in range(3)]
-        for k, hand in enumerate(hands):
-            hand.record(tmp_path / f"{k}.mcap")
-            hand.stream()
-            hand.stream()
-        while any(hand.stats.frames < 200 for hand in hands):
-            time.sleep(0.05)
+    serving = serve()
+    with biotac.open(f"zenoh:left?connect={endpoint}", reconnect=True) as hand:
+        hand.record(tmp_path / "a.mcap")
+        until(hand, 200)
         killed_ns = time.time_ns()
         serving.kill()
         serving.wait()
-        time.sleep(away_s)
         serving = serve()
-        stack.callback(serving.wait)
-        stack.callback(serving.terminate)
         back_ns = time.time_ns()
-        while any(hand.stats.gaps == 0 for hand in hands):
-            time.sleep(0.05)
-        seen = [hand.stats.frames for hand in hands]
-        while any(hand.stats.frames < before + 200 for hand, before in zip(hands, seen, strict=True)):
-            time.sleep(0.05)
-        assert all(hand.link.batches_lost == 0 for hand in hands)
-    for k in range(3):
-        first, second = biotac.Recording(tmp_path / f"{k}.mcap"), biotac.Recording(tmp_path / f"{k}.2.mcap")
-        assert len(first.frames) >= 200 <= len(second.frames)
-        (gap,) = {(gap.lost_at_ns, gap.back_at_ns) for gap in first.gaps + second.gaps}
-        assert killed_ns < gap[0] < gap[1] and gap[1] > back_ns  # by this computer's clock
-        print(
-            f"reader {k}: {(gap[0] - killed_ns) / 1e9:.2f} s after the kill, a gap of {(gap[1] - gap[0]) / 1e9:.2f} s"
-        )
+        next_gap(hand)
+        until(hand, 200)
+        assert hand.link.batches_lost == 0
+    serving.terminate()
+    serving.wait()
+    gap = recorded_gap(tmp_path / "a.mcap", 200)
+    assert killed_ns < gap.lost_at_ns < gap.back_at_ns > back_ns  # by this computer's clock

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from kept_board import boot, serial_of
 from maps import make_map
@@ -64,23 +63,15 @@ def test_a_value_keeps_its_settings_range(k: int) -> None:
         ({"force_gain_nn": (1, 2)}, "force_gain_nn has 2 values, expected 3"),
         ({"torque_gain_nn": (1, 2.0)}, "torque_gain_nn is 2.0, expected a whole number"),
         ({"poc_weights": True}, "poc_weights is True, expected a whole number"),
-        ({"thermal_gain_milli": "5"}, "thermal_gain_milli is '5', expected a whole number"),
         ({"made_s": 2**32}, "expected seconds since 1970"),
-        ({"made_s": -1}, "expected seconds since 1970"),
         ({"serial": "BT" + 15 * "0"}, "expected up to 16 ASCII"),
         ({"serial": "BTä"}, "expected up to 16 ASCII"),
         ({"serial": "BT\n"}, "expected up to 16 ASCII"),
-        ({"serial": 5}, "expected up to 16 ASCII"),
     ],
 )
 def test_what_is_no_calibration_is_refused(change: dict[str, object], text: str) -> None:
     with pytest.raises(ValueError, match=text):
         replace(ODD, **change)  # type: ignore[arg-type]
-
-
-def test_numpy_integers_are_whole_numbers() -> None:
-    gains = np.array([5, 6, 7])
-    assert Calibration(force_gain_nn=tuple(gains)) == Calibration(force_gain_nn=(5, 6, 7))  # type: ignore[arg-type]
 
 
 # ---- file --------------------------------------------------------------------------------------
@@ -98,21 +89,15 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (
-            {"format": "biotac-calibration/2"},
-            'it has "format": "biotac-calibration/2", expected "biotac-calibration/1"',
-        ),
+        ({"format": "biotac-calibration/2"}, 'expected "biotac-calibration/1"'),
         ({"crc32": "0f0f0f0f"}, r'"crc32": "0f0f0f0f", but its content has "\w{8}": it is damaged'),
         ({"crc32": None}, 'if you edited it, write "crc32": "edited"'),
         ({"gain": 1}, "key 'gain' is unknown; expected"),
         ({"made_s": None}, "made_s is None, expected a whole number"),
         ({"poc_weights": 1}, "poc_weights is 1, expected one of ABS_N2, COMPRESS_N1, COMPRESS_N2"),
-        ({"poc_weights": ["ABS_N2"]}, "poc_weights is"),
         ({"force_gain_nn": {"x": 1, "y": 2}}, "expected an object with x, y, z"),
         ({"torque_gain_nn": [1, 2]}, "expected an object with y, z"),
         ({"force_gain_nn": {"x": 1, "y": 2, "z": 100_000_001}}, "force_gain_z_nn is 100000001, expected -100000000"),
-        ({"thermal_gain_milli": 0.5}, "thermal_gain_milli is 0.5, expected a whole"),
-        ({"pressure_gain_nn": -1}, "pressure_gain_nn is -1, expected 0 to 100000000"),
         ({"provenance": "hand"}, "provenance is not an object"),
     ],
 )
@@ -132,7 +117,7 @@ def test_every_key_but_provenance_must_be_there(key: str) -> None:
         file.from_dict(tree)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "5", "{", '{"format": NaN}', "[" * 100_000, "\x00"])
+@pytest.mark.parametrize("text", ["", "[]", '{"format": NaN}', "[" * 100_000])
 def test_what_is_no_file_at_all(text: str) -> None:
     with pytest.raises(biotac.InputError, match=r"it is not usable: .* expected a calibration, as"):
         file.loads(text, "it")
@@ -175,11 +160,9 @@ GOOD = eeprom.pack(ODD)[16:]
         (eeprom.pack(ODD)[:-3], "no intact record: its CRC is wrong"),
         (eeprom.pack(ODD) + b"\0", "no intact record"),
         (sealed(1, 1, GOOD), "a record other than a calibration"),
-        (sealed(7, 1, GOOD), "a record other than a calibration"),
         (sealed(2, 2, GOOD), "a newer format"),
         (sealed(2, 1, GOOD[:-4]), "a value out of range"),
         (sealed(2, 1, b""), "a cleared calibration"),
-        (sealed(2, 1, GOOD[:20] + b"\7" + GOOD[21:]), "a value out of range"),
         (sealed(2, 1, b"B\xe4" + GOOD[2:]), "an invalid calibration"),
     ],
 )

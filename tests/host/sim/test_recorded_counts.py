@@ -103,18 +103,14 @@ def cell(name: str, value: float, kind: type = float) -> Callable[[dict[str, np.
     [
         (lambda f: f.pop("E"), "expected a field E"),
         (lambda f: f.update(E=f["E"][:, :18]), "field E has shape (7, 18): expected (n, 19)"),
-        (lambda f: f.update(E=f["E"][0]), "field E has shape (19,)"),
         (lambda f: f.update(E=f["E"][:0]), "field E has shape (0, 19)"),
         (lambda f: f.update(PDC=f["PDC"][:6]), "field PDC has shape (6,): expected (7,)"),
-        (lambda f: f.update(PDC=f["PDC"][:, None]), "field PDC has shape (7, 1): expected (7,)"),
-        (lambda f: f.update(PAC=f["PAC"][:, :21]), "field PAC has shape (7, 21): expected (7, 22)"),
         (cell("E", 4096), "field E row 3 holds 4096"),
         (cell("TDC", -1), "field TDC row 3 holds -1"),
         (cell("PAC", np.nan), "field PAC row 3 holds nan"),
         (cell("E", 3000.5), "field E row 3 holds 3000.5"),
         (lambda f: f.update(E=f["E"].astype(str)), "field E holds <U"),
         (cell("F", np.inf), "field F"),
-        (lambda f: f.update(F=f["F"][:, :2]), "field F"),
         (lambda f: f.update(E_base=f["E_base"] + 2000), "field E_base row"),
     ],
 )
@@ -230,10 +226,8 @@ def edited(row: int, column: int, value: float) -> list[list[float]]:
         ([], "nothing after 'Begin File'"),
         (edited(50, 6, 4096), "line 56 holds 4096"),
         (edited(50, 6, float("nan")), "line 56 is"),
-        (edited(50, 7, 2), "line 56 is"),
         ([*btd_lines(), [1.0, 2, 3]], "line 138 is '1.000000 2 3'"),
         ([line[:9] for line in btd_lines()], "line 6 is"),
-        ([line[:4] for line in btd_lines()], "line 6 is"),
         ([[*line[:4], 0, 1, 0, 1, 0, 1] for line in btd_lines()], "no value has good parity"),
         (btd_lines(1)[:40], "no complete frame among 1"),
     ],
@@ -254,13 +248,6 @@ def test_a_btd_without_its_begin_line_or_with_cut_compression_is_refused(tmp_pat
         load_source(path)
     path.write_bytes(b"not gzip")
     with pytest.raises(InputError, match="cannot be read"):
-        load_source(path)
-
-
-def test_text_in_a_btd_line_is_named(tmp_path: Path) -> None:
-    path = write_btd(tmp_path / "a.btd", btd_lines())
-    path.write_bytes(path.read_bytes().replace(b"0.000227 ", b"0.0002x7 ", 1))
-    with pytest.raises(InputError, match=r"line 7 is '0\.0002x7"):
         load_source(path)
 
 

@@ -80,9 +80,10 @@ def rows_of(source: Any) -> list[tuple[int, ...]]:
 
 
 @pytest.mark.parametrize(
-    "facts", [{}, {"room": 3 * 44, "serve": 50}, {"deaf_to": 5}], ids=["roomy", "full", "a part lost"]
+    ("fingers", "facts"),
+    [(1, {}), (5, {"room": 3 * 44, "serve": 50}), (5, {"deaf_to": 5})],
+    ids=["roomy", "full", "a part lost"],
 )
-@pytest.mark.parametrize("fingers", [1, 5])
 def test_the_whole_tape_is_there_in_order(scripted_board, hello, facts: dict[str, int], fingers: int) -> None:
     fake = FakeSensorBoard(hello, **facts)
     source = load_source("press.toml", fingers=fingers, seconds=0.2)
