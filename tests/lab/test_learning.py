@@ -19,28 +19,14 @@ def test_a_net_follows_what_can_be_learnt_and_not_the_noise() -> None:
     x = rng.normal(size=(400, 4))
     curve = np.column_stack([np.sin(x[:, 0]) + x[:, 1], 3.0 * x[:, 2]])
     noisy = curve + rng.normal(0.0, 0.1, curve.shape)
-    net = nets.train(x[:300], noisy[:300], (x[300:], noisy[300:]), units=10)
+    net = nets.train(x[:300], noisy[:300], (x[300:], noisy[300:]), units=10, steps=100)
     new = rng.normal(size=(500, 4)) * 0.7
     wanted = np.column_stack([np.sin(new[:, 0]) + new[:, 1], 3.0 * new[:, 2]])
     assert np.sqrt(((net(new) - wanted) ** 2).mean()) < 0.1, "less than the noise that it saw"
     only_noise = rng.normal(size=(400, 1))
-    of_noise = nets.train(x[:300], only_noise[:300], (x[300:], only_noise[300:]), units=10)
+    of_noise = nets.train(x[:300], only_noise[:300], (x[300:], only_noise[300:]), units=10, steps=100)
     assert of_noise(new).std() < 0.5
     assert (nets.train(x, noisy, seed=1, steps=5)(new) == nets.train(x, noisy, seed=1, steps=5)(new)).all()
-
-
-def test_nonsense_is_refused_and_missing_rows_stay_missing() -> None:
-    rng = np.random.default_rng(4)
-    x, t = rng.normal(size=(40, 5)), rng.normal(size=(40, 1))
-    net = nets.train(x, t, steps=3)
-    with pytest.raises(InputError, match=r"inputs \(40, 5\) and targets \(39, 1\): expected"):
-        nets.train(x, t[:-1])
-    x[3, 2] = np.nan
-    with pytest.raises(InputError, match="contain NaN or infinity: expected finite numbers"):
-        nets.train(x, t)
-    assert np.isnan(net(x)).any(axis=1).nonzero()[0].tolist() == [3]
-    with pytest.raises(InputError, match=r"expected \(n, 5\), as in training"):
-        net(x[:, :4])
 
 
 def test_reductions_keep_what_they_say() -> None:
@@ -63,24 +49,6 @@ def test_splits_keep_groups_whole_and_the_paper_s_shares() -> None:
     assert np.sum(parts, axis=0).tolist() == [1] * len(groups)
     assert [len(np.unique(groups[part])) for part in parts] == [140, 30, 30]
     assert sum(len(set(groups[a]) & set(groups[b])) for a, b in ((parts[0], parts[1]), (parts[0], parts[2]))) == 0
-
-
-def test_deciding_together() -> None:
-    outputs = np.array([[0.6, 0.4], [0.2, 0.8], [0.9, 0.1]])
-    assert roc.decide(outputs).tolist() == [0, 1, 0]
-    assert roc.decide(outputs, np.array([7, 7, 3])).tolist() == [1, 1, 0]
-
-
-def test_a_trajectory_is_read_at_shares_of_its_own_largest_signal() -> None:
-    rows = stimulate(Finger(1), (2, 2, 1, 1), seed=1, frames=9)
-    above = rows.counts - rows.tare
-    found, press = roc.trajectories(above, rows.tare, rows.stimulation)
-    assert found.shape == (30, 3 * 17) and press.tolist() == list(range(30))
-    shapes = roc.shape(above, rows.tare)
-    assert any((found[4, -17:] == row).all() for row in shapes[rows.stimulation == 4]), "the last is a row of the press"
-    np.testing.assert_allclose(found[:, 34 + 2], [shapes[rows.stimulation == k, 2].max() for k in range(30)])
-    with pytest.raises(InputError, match="rows of a press are not consecutive"):
-        roc.trajectories(above, rows.tare, np.arange(len(rows)) % 7)
 
 
 def test_four_probes_are_told_apart_where_places_are_many() -> None:
@@ -109,7 +77,7 @@ def test_force_by_nets_of_classes_and_of_one() -> None:
     def held_out(kinds: np.ndarray | None) -> np.ndarray:
         def predict(training: np.ndarray, test: np.ndarray) -> np.ndarray:
             of = None if kinds is None else kinds[training]
-            trained = force.train(x[training], truth[training], groups[training], of, steps=100)
+            trained = force.train(x[training], truth[training], groups[training], of, steps=40)
             return trained(x[test], None if kinds is None else kinds[test])
 
         return force.cross_validated(x, groups, 2, predict)
@@ -122,19 +90,12 @@ def test_force_by_nets_of_classes_and_of_one() -> None:
         trained(x, kind)
 
 
-def test_classes_of_the_paper() -> None:
-    d, large = np.array([13.9, 14.0, 3.0, 20.0]), np.array([False, False, True, True])
-    assert [force.CLASSES[c] for c in force.classes(d, large)] == [
-        "rear, small", "forward, small", "rear, large", "forward, large",
-    ]  # fmt: skip
-
-
 def test_directions_of_edges() -> None:
     assert np.degrees(edge.turn(np.radians([179.0, 10.0]), np.radians([1.0, 100.0]))) == pytest.approx([-2.0, -90.0])
     counts, tare, angle = press_bars(Finger(1), 400, seed=1)
     seen = edge.columns(counts - tare, tare)
     assert seen.shape == (400, 57) and angle.min() >= 0.0 and angle.max() < np.pi
-    net = edge.train(seen[:340], angle[:340], steps=100)
+    net = edge.train(seen[:340], angle[:340], steps=50)
     off = np.degrees(edge.turn(net(seen[340:]), angle[340:]))
     assert np.median(np.abs(off)) < 22.5, "half of what guessing gives; the experiment trains on more"
 

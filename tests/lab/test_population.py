@@ -107,12 +107,6 @@ def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
     )
 
 
-def test_a_scale_on_the_map_is_the_scale_on_its_forces(prior: Population, runs: list[Run]) -> None:
-    scale, new = Scale(1.1, -0.07), runs[2]
-    there = scale.on(prior).force(new.counts, new.tare)
-    assert np.allclose(there, scale.applied(prior.force(new.counts, new.tare)), atol=1e-9)
-
-
 @pytest.mark.parametrize(("said_z", "shown"), [([1.0, -2.0, 3.0], [1.0, 2.0, 3.0]), ([1.0, 2.0, 3.0], [0, 2, 3])])
 def test_presses_that_say_nothing_are_refused(said_z: list[float], shown: list[float]) -> None:
     felt_n = np.column_stack([np.zeros(len(said_z)), np.zeros(len(said_z)), said_z])

@@ -11,7 +11,6 @@ from biotac.sim import physics
 from biotac.sim.physics import Finger, Footprints, States
 from biotac_lab.learn import probes
 from biotac_lab.learn.probes import BAR, PROBES, footprints
-from biotac_lab.learn.stimulations import TILTS_DEG, stimulate
 
 VENTER = np.array([[-8.0, 0.0, -surface.RADIUS_MM]])
 
@@ -44,13 +43,6 @@ def test_slenderness_is_near_hertz_s_own_integrals() -> None:
         k, e = special.ellipk(e2), special.ellipe(e2)
         ratio = (slender**2 * e - k) / (k - e)
         assert ratio ** (2.0 / 3.0) == pytest.approx(slender, rel=0.03)
-
-
-def test_a_flat_lies_along_the_cylinder_and_a_sharper_tip_is_smaller() -> None:
-    prints = [footprints(probe, VENTER, np.array([5.0])) for probe in PROBES]
-    assert np.abs(prints[-1].along[0]) == pytest.approx([1.0, 0.0, 0.0])
-    areas = [touch.long_mm[0] * touch.short_mm[0] for touch in prints]
-    assert areas == sorted(areas)
 
 
 def test_a_bar_lies_as_it_is_turned() -> None:
@@ -92,18 +84,3 @@ def test_two_contacts_add_squeeze_and_volume_and_nothing_adds_nothing() -> None:
     np.testing.assert_array_equal(both, probes.counts_of(finger, [(other, None), (one, None)]))
     parts = [physics.deform(state)[1] for state in (one, other)]
     assert (both != finger.counts(one)).any() and (parts[0] + parts[1] != 0).any()
-
-
-def test_the_data_set_is_what_the_paper_describes() -> None:
-    finger = Finger(3)
-    touch = stimulate(finger, (4, 3, 2, 1), seed=5, frames=8)
-    assert len(touch) == (4 + 3 + 2 + 1) * 5 * 8
-    assert np.bincount(touch.probe).tolist() == [n * 40 for n in (4, 3, 2, 1)]
-    assert [len(np.unique(touch.probe[touch.contact == k])) for k in range(10)] == [1] * 10
-    size = np.linalg.norm(touch.force_n, axis=1)
-    peaks = [touch.normal_n[touch.stimulation == k].max() for k in range(50)]
-    assert min(peaks) > 28.0 and max(peaks) <= 40.0
-    tilt = np.degrees(np.arccos(touch.normal_n / size)).reshape(10, len(TILTS_DEG), 8)
-    assert tilt[:, 0].max() < 15.0 < 20.0 < tilt[:, 1:].min()
-    np.testing.assert_array_equal(touch.counts, stimulate(Finger(3), (4, 3, 2, 1), seed=5, frames=8).counts)
-    assert (touch.where(touch.probe == 2).contact == touch.contact[touch.probe == 2]).all()

@@ -41,12 +41,8 @@ def test_only_changes_count() -> None:
 def test_what_cannot_be_described_is_refused() -> None:
     with pytest.raises(InputError, match="at least 22"):
         texture.energies(np.zeros(21))
-    with pytest.raises(InputError, match="flatten"):
-        texture.energies(np.zeros((3, 22)))
     with pytest.raises(InputError, match="1 samples are not finite"):
         texture.energies([np.nan, *range(30)])
-    with pytest.raises(InputError, match="expected \\(n, 6\\)"):
-        texture.describe(np.zeros((3, 5)))
     with pytest.raises(InputError, match="none of 2 rounds"):
         texture.describe(np.full((2, 6), np.nan))
 

@@ -174,14 +174,6 @@ def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None
                 assert same(got.astype(kind_of), wanted.astype(kind_of)), column.name
 
 
-def test_units_stand_at_the_end_of_flat_names(recorded, tmp_path) -> None:
-    export(recorded, tmp_path / "a.csv")
-    names = (tmp_path / "a.csv").read_text().partition("\n")[0].split(",")
-    assert {"force_x_n", "torque_z_nmm", "poc_y_mm", "force_sigma_z_n", "poc_sigma_mm", "counts_E1", "tare_E19"} <= set(
-        names
-    )
-
-
 def test_parquet_says_units_and_frames(recorded, tmp_path) -> None:
     assert export(recorded, tmp_path / "a.parquet") == 0
     for kind, columns, wanted_of in KINDS:

@@ -198,22 +198,26 @@ def test_dask_writes_the_same_bytes(sources, lake, tmp_path, capsys) -> None:
     assert hashes(tmp_path / "dask") == hashes(lake)
 
 
-@pytest.mark.parametrize("at", [0, 3, 7, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2, 4, 5, 6))])
-def test_killed_at_any_rename_nothing_is_twice_or_missing(
-    sources, lake, tmp_path, capsys, monkeypatch, at: int
-) -> None:
-    """As kill -9 leaves it: no handler runs between two renames."""
+def kill_at(monkeypatch: pytest.MonkeyPatch, rename: int) -> None:
+    """From this rename of an export on, as kill -9 leaves it: no handler runs between two."""
     real, renames = os.replace, []
 
-    def killed(source: Any, target: Any) -> None:
-        if len(renames) == at:
+    def counted(source: Any, target: Any) -> None:
+        if len(renames) == rename:
             raise SystemExit
         renames.append(target)
         real(source, target)
 
+    monkeypatch.setattr("biotac.lake.writing.os.replace", counted)
+
+
+@pytest.mark.parametrize("at", [0, 3, 7, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2, 4, 5, 6))])
+def test_killed_at_any_rename_nothing_is_twice_or_missing(
+    sources, lake, tmp_path, capsys, monkeypatch, at: int
+) -> None:
     folder = tmp_path / "lake"
     assert export(sources[1:2], folder) == 0
-    monkeypatch.setattr("biotac.lake.writing.os.replace", killed)
+    kill_at(monkeypatch, at)
     monkeypatch.setattr("biotac.lake.folder.whole", nothing_written)
     with pytest.raises(SystemExit):
         export(sources, folder)
@@ -247,18 +251,10 @@ def test_what_was_written_but_not_listed_is_written_again(sources, lake, tmp_pat
 
 def test_a_recording_killed_while_it_is_replaced_is_in_no_answer(sources, tmp_path, capsys, monkeypatch) -> None:
     """New files beside the old facts would be rows that these do not describe."""
-    real, done = os.replace, []
-
-    def killed(source: Any, target: Any) -> None:
-        if len(done) == 2:
-            raise SystemExit
-        done.append(target)
-        real(source, target)
-
     folder = tmp_path / "lake"
     assert export(sources[:2], folder) == 0
     whole = hashes(folder)
-    monkeypatch.setattr("biotac.lake.writing.os.replace", killed)
+    kill_at(monkeypatch, 2)
     with pytest.raises(SystemExit):
         export(sources[1:2], folder, "--force")
     monkeypatch.undo()

@@ -104,11 +104,9 @@ def test_a_full_board_is_left_alone_until_the_gateway_has_power(scripted_board, 
     board.close()
 
 
-def test_faults_are_set_and_refused(scripted_board, hello) -> None:
+def test_a_fault_of_no_finger_is_refused(scripted_board, hello) -> None:
     fake = FakeSensorBoard(hello)
     board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
-    board.fault(2, wire.EmuFault.STUCK_LOW)
-    assert fake.faults == {2: 0xFFFD}
     with pytest.raises(CommandRefusedError, match="NO_SUCH_FINGER"):
         board.fault(5, wire.EmuFault.NONE)
     board.close()
