@@ -205,14 +205,6 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
 # ---- boards, recordings ------------------------------------------------------------------------
 
 
-def test_another_sensors_calibration_is_refused_in_words() -> None:
-    with biotac.open("sim:press.toml") as hand:
-        with pytest.raises(biotac.CommandRefusedError, match=r"SetCalibration: OTHER_SENSOR .*plug that sensor in"):
-            hand.board.set_calibration(0, ODD)
-        with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
-            hand.board.calibration(5)
-
-
 @pytest.fixture
 def two_gains(tmp_path: Path) -> Path:
     """A recording of two fingers, one with the board's settings and one with its own."""
