@@ -11,6 +11,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -22,7 +23,6 @@ from typing import Any
 
 import pytest
 from board_behind_proxy import BoardBehindProxy
-from free_port import free_port
 
 import biotac
 from biotac.board.gap import JUMP_US
@@ -341,7 +341,9 @@ class Served:
     """The board, shared on this computer by a program of its own."""
 
     def __init__(self, board: BoardBehindProxy) -> None:
-        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
         words = ["share", str(board.path), "--zenoh", "left", "--listen", endpoint]
         self._process = subprocess.Popen([sys.executable, "-m", "biotac", *words], stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None

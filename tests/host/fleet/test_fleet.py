@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import socket
 import subprocess
 import sys
 import threading
@@ -15,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from free_port import free_port
 from maps import make_map
 
 import biotac
@@ -28,6 +28,13 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode, open_frame
 
 pytest.importorskip("zenoh")
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as free:
+        free.bind(("127.0.0.1", 0))
+        number: int = free.getsockname()[1]
+        return number
 
 
 class Shared:
