@@ -330,28 +330,6 @@ static void torsion_is_summed_as_the_others_are(void **state)
     }
 }
 
-// Each of its 19 coefficients stands where SPEC.md has it: the fourth of four behind the block's triples.
-static void torsions_coefficients_are_behind_the_triples(void **state)
-{
-    (void)state;
-    static blob its;
-    for (uint32_t column = 0; column < BT_ELECTRODES; column++) {
-        bt_map map;
-        uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
-        int32_t force[3], torque[3], torsion;
-        one_block(&its, 7, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 1, 0);
-        bytes_of(&its)[24 + 2 + 6] = 4; // exponent of torsion alone
-        ((half_word *)its.word)[FIRST + 3 * 20 + 4 * column + 3] = 4;
-        assert_int_equal(opened(&its, &map), BT_ERROR_OK);
-        set(counts, 3000);
-        set(tare_q4, 48000);
-        counts[column] = 3100; // e = 400 / 4
-        bt_map_wrench(&map, counts, tare_q4, 0, force, torque, &torsion);
-        assert_int_equal(torsion, 400 * 4 / 16);
-        assert_true(force[0] == 0 && force[2] == 0 && torque[0] == 0 && torque[2] == 0);
-    }
-}
-
 #define T(name) cmocka_unit_test(name)
 int main(void)
 {
@@ -365,7 +343,6 @@ int main(void)
         T(results_saturate_with_their_sign),
         T(torque_is_the_second_three_and_only_where_there_is_one),
         T(torsion_is_summed_as_the_others_are),
-        T(torsions_coefficients_are_behind_the_triples),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,7 +3,6 @@
 #include "keep/settings.h"
 #include "map/population.h"
 #include "map/population_gen.h"
-#include "signal/signals.h"
 #include "solve/solve.h"
 #include "solve/wrench.h"
 #include "support.h"
@@ -24,34 +23,6 @@ static void the_map_is_as_it_is_opened(void **state)
                 && map.gates == its->gates && map.serial == its->serial && map.blocks == its->blocks
                 && map.coefficients == its->coefficients);
     assert_false(bt_map_needs_pdc(its));
-}
-
-// By the map alone.
-static void force_of(const uint16_t counts[BT_ELECTRODES], uint16_t tare_q4, int32_t force_100un[3])
-{
-    uint16_t tares_q4[BT_ELECTRODES];
-    int32_t e_q4[BT_ELECTRODES];
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        tares_q4[i] = tare_q4;
-    }
-    bt_signals_q4(counts, tares_q4, e_q4);
-    bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
-}
-
-static void rest_is_no_force(void **state)
-{
-    (void)state;
-    for (uint32_t count = 0; count <= BT_FULL_SCALE_COUNT; count += 5) {
-        uint16_t counts[BT_ELECTRODES];
-        int32_t force[3];
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            counts[i] = (uint16_t)count;
-        }
-        force_of(counts, (uint16_t)(16 * count), force);
-        for (int d = 0; d < 3; d++) {
-            assert_int_equal(force[d], 0);
-        }
-    }
 }
 
 // Every choice of extremes that a sign pattern makes; the sanitizer looks for what the bounds missed.
@@ -83,51 +54,9 @@ static void extremes_do_not_overflow(void **state)
     }
 }
 
-static void a_missing_electrode_counts_as_rest(void **state)
-{
-    (void)state;
-    uint16_t counts[BT_ELECTRODES];
-    int32_t missing[3], still[3];
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        counts[i] = (uint16_t)(2600 - 11 * i);
-    }
-    counts[4] = BT_INVALID_COUNT;
-    force_of(counts, 16 * 2800, missing);
-    counts[4] = 2800;
-    force_of(counts, 16 * 2800, still);
-    for (int d = 0; d < 3; d++) {
-        assert_int_equal(missing[d], still[d]);
-    }
-}
-
 // The map is symmetric, its rounding is not: half up. Of each of four gated blocks half a unit that is met by
 // a gate of at most 2.9 2^13 and divided by 2^6 or more; of six blocks a unit at most.
 #define ROUNDED_100UN (2 * (4 * 186 + 6))
-
-static void a_mirrored_finger_feels_the_mirrored_force(void **state)
-{
-    (void)state;
-    uint32_t seed = 7;
-    int32_t most = 0;
-    for (int k = 0; k < 500; k++) {
-        uint16_t counts[BT_ELECTRODES], other[BT_ELECTRODES];
-        int32_t force[3], image[3];
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            seed = seed * 1664525u + 1013904223u;
-            counts[i] = (uint16_t)(2900 - (seed >> 16) % 900);
-        }
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            other[i] = counts[mirror[i]];
-        }
-        force_of(counts, 16 * 2800, force);
-        force_of(other, 16 * 2800, image);
-        assert_in_range(force[0] - image[0] + ROUNDED_100UN, 0, 2 * ROUNDED_100UN);
-        assert_in_range(force[1] + image[1] + ROUNDED_100UN, 0, 2 * ROUNDED_100UN);
-        assert_in_range(force[2] - image[2] + ROUNDED_100UN, 0, 2 * ROUNDED_100UN);
-        most = force[2] > most ? force[2] : most;
-    }
-    assert_true(most > 10 * ROUNDED_100UN);
-}
 
 static void signals_of(const int32_t e[BT_ELECTRODES], int eighths, int32_t e_q4[BT_ELECTRODES])
 {
@@ -316,10 +245,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_map_is_as_it_is_opened),
-        cmocka_unit_test(rest_is_no_force),
         cmocka_unit_test(extremes_do_not_overflow),
-        cmocka_unit_test(a_missing_electrode_counts_as_rest),
-        cmocka_unit_test(a_mirrored_finger_feels_the_mirrored_force),
         cmocka_unit_test(the_likeness_is_what_it_is_defined_as),
         cmocka_unit_test(a_mirrored_finger_is_as_like),
         cmocka_unit_test(a_poke_presses_in_along_the_skins_normal),

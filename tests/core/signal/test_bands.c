@@ -110,39 +110,6 @@ static void are_octaves(void **state)
 
 // ---- ends of the range -------------------------------------------------------------------------
 
-static void have_room_for_any_words(void **state)
-{
-    (void)state;
-    for (int half = 1; half < 200; half++) { // waves from end to end of the range, of every length
-        (void)anew(NULL);
-        for (int k = 0; k < SAMPLES; k++) {
-            pac[k] = k / half % 2 ? BT_FULL_SCALE_COUNT : 0;
-        }
-        run();
-        for (int k = 0; k < ROUNDS; k++) {
-            for (int band = 0; band < BT_BANDS; band++) {
-                assert_true(energy_q4[k][band] / 16.0 <= 22 * 2560.0 * 2560.0); // 10/16 of the range
-            }
-        }
-    }
-}
-
-static void of_what_does_not_change_are_nothing(void **state)
-{
-    (void)state;
-    for (int count = 0; count <= BT_FULL_SCALE_COUNT; count += 273) {
-        (void)anew(NULL);
-        for (int k = 0; k < SAMPLES; k++) {
-            pac[k] = (uint16_t)count;
-        }
-        run();
-        for (int band = 0; band < BT_BANDS; band++) {
-            assert_int_equal(energy_q4[0][band], 0);
-            assert_int_equal(energy_q4[ROUNDS - 1][band], 0);
-        }
-    }
-}
-
 // ---- lost words --------------------------------------------------------------------------------
 
 static void hold_the_last_good_word_for_a_lost_one(void **state)
@@ -186,8 +153,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(are_what_six_smoothers_take_away, anew),
         cmocka_unit_test_setup(are_octaves, anew),
-        cmocka_unit_test_setup(have_room_for_any_words, anew),
-        cmocka_unit_test_setup(of_what_does_not_change_are_nothing, anew),
         cmocka_unit_test_setup(hold_the_last_good_word_for_a_lost_one, anew),
         cmocka_unit_test_setup(of_no_good_word_are_invalid_and_begin_with_the_first, anew),
     };

@@ -94,13 +94,14 @@ static spread monte_carlo(const double e[BT_ELECTRODES], int weights, double sig
                     {sqrt(variance[3]), sqrt(variance[4]), sqrt(variance[5])}};
 }
 
-static void sigmas_are_those_of_a_monte_carlo(int weights)
+static void sigmas_are_those_of_a_monte_carlo(void **state)
 {
+    (void)state;
     static const int noises[] = {2, 6, 16};
     for (int middle = 0; middle < BT_ELECTRODES; middle++) {
-        for (int k = 0; k < 3; k++) {
+        for (int weights = 0; weights < 3; weights++) {
             double e[BT_ELECTRODES];
-            int sigma = noises[k];
+            int sigma = noises[(weights + middle) % 3];
             press(middle, e);
             bt_msg_frame msg = sigmas(e, weights, (uint32_t)(19 * sigma * sigma));
             spread want = monte_carlo(e, weights, sigma, 71 + (uint64_t)middle);
@@ -119,24 +120,6 @@ static void sigmas_are_those_of_a_monte_carlo(int weights)
             }
         }
     }
-}
-
-static void sigmas_of_squared_weights(void **state)
-{
-    (void)state;
-    sigmas_are_those_of_a_monte_carlo(BT_POC_WEIGHTS_ABS_N2);
-}
-
-static void sigmas_of_compression(void **state)
-{
-    (void)state;
-    sigmas_are_those_of_a_monte_carlo(BT_POC_WEIGHTS_COMPRESS_N1);
-}
-
-static void sigmas_of_squared_compression(void **state)
-{
-    (void)state;
-    sigmas_are_those_of_a_monte_carlo(BT_POC_WEIGHTS_COMPRESS_N2);
 }
 
 // The header's formula in double, of the published point and of what e is rounded to.
@@ -234,26 +217,6 @@ static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
     }
 }
 
-// On the seam between tip and cylinder, x = 0: the cylinder's.
-static void a_point_on_the_seam_is_one_on_the_cylinder(void **state)
-{
-    (void)state;
-    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_COMPRESS_N1);
-    for (int16_t x = -1; x <= 1; x++) {
-        double e[BT_ELECTRODES];
-        int32_t e_q4[BT_ELECTRODES];
-        bt_msg_frame msg = {.poc_um = {x, 0, -BT_CORE_RADIUS_UM}};
-        press(9, e);
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            e_q4[i] = (int32_t)lround(16 * e[i]);
-        }
-        bt_sigma_unknown(&msg);
-        bt_sigma(e_q4, &settings, 400, &msg);
-        const double want = first_order_um(e, BT_POC_WEIGHTS_COMPRESS_N1, msg.poc_um, sqrt(400 / 19.0));
-        assert_true(fabs(msg.poc_sigma_um - want) < 0.5 + want / 100);
-    }
-}
-
 // ---- the ends --------------------------------------------------------------------------------------
 
 static void what_is_not_known_is_marked(void **state)
@@ -310,22 +273,6 @@ static void sigmas_saturate_below_the_mark(void **state)
     bt_sigma(e_q4, &settings, BT_SETTING_CONTACT_ENERGY_COUNT2_MAX, &msg);
     assert_int_equal(msg.force_sigma_100un[0], 65534); // 0.1 N a count
     assert_true(msg.force_sigma_100un[1] < 65534);
-}
-
-static void a_forces_sigma_is_rounded_to_the_nearest(void **state)
-{
-    (void)state;
-    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
-    for (uint32_t noise = 19; noise < 19 * 200; noise += 7) {
-        int32_t e_q4[BT_ELECTRODES] = {0};
-        bt_msg_frame msg = {.poc_um = {BT_INVALID_I16}};
-        bt_sigma_unknown(&msg);
-        bt_sigma(e_q4, &settings, noise, &msg);
-        for (int d = 0; d < 3; d++) {
-            double want = settings.force_per_count_100un_q16[d] / 65536.0 * bt_sigma_count_q8(noise) / 256;
-            assert_true(fabs(msg.force_sigma_100un[d] - want) <= 0.5);
-        }
-    }
 }
 
 static void only_what_is_asked_for_has_a_sigma(void **state)
@@ -388,16 +335,12 @@ static void the_noise_is_that_of_nineteen_electrodes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sigmas_of_squared_weights),
-        cmocka_unit_test(sigmas_of_compression),
-        cmocka_unit_test(sigmas_of_squared_compression),
+        cmocka_unit_test(sigmas_are_those_of_a_monte_carlo),
         cmocka_unit_test(sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range),
         cmocka_unit_test(one_electrodes_sigma_is_the_root_of_its_share),
         cmocka_unit_test(a_point_of_one_electrode_is_where_it_is),
-        cmocka_unit_test(a_point_on_the_seam_is_one_on_the_cylinder),
         cmocka_unit_test(what_is_not_known_is_marked),
         cmocka_unit_test(sigmas_saturate_below_the_mark),
-        cmocka_unit_test(a_forces_sigma_is_rounded_to_the_nearest),
         cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
         cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
     };

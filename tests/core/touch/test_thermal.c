@@ -103,14 +103,6 @@ static void assert_followed(const emulated_finger *finger, const bt_baseline *fr
     }
 }
 
-static void a_gain_is_the_nearest_in_q16(void **state)
-{
-    (void)state;
-    for (int milli = -5000; milli <= 5000; milli++) {
-        assert_true(fabs(bt_thermal_gain_q16(milli) / 65536.0 - milli / 1000.0) <= 0.5 / 65536);
-    }
-}
-
 static void the_tare_follows_the_temperature_in_contact(void **state)
 {
     (void)state;
@@ -159,31 +151,6 @@ static void the_ends_of_gain_and_temperature_are_bounded(void **state)
                 warm_rounds(&finger, SWEEP);
             }
             assert_followed(&finger, &base, gain, step, 99);
-        }
-    }
-}
-
-static void each_electrode_follows_once_in_a_sweep_and_three_in_a_round(void **state)
-{
-    (void)state;
-    emulated_finger finger = held_finger(500);
-    tdc_now = T0 + 80;
-    warm_rounds(&finger, SWEEP);
-    for (int sweep = 0; sweep < 5; sweep++) {
-        int times[BT_ELECTRODES] = {0};
-        for (int round = 0; round < SWEEP; round++) {
-            bt_baseline before = finger.tare.base;
-            int in_round = 0;
-            warm_round(&finger);
-            for (int i = 0; i < BT_ELECTRODES; i++) {
-                bool follows = moved(&finger, &before, i) != 0;
-                times[i] += follows;
-                in_round += follows;
-            }
-            assert_true(in_round <= 3);
-        }
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            assert_int_equal(times[i], 1);
         }
     }
 }
@@ -308,21 +275,6 @@ static void nothing_leaks_into_the_next_contact(void **state)
     }
 }
 
-static void a_tare_from_the_host_ends_the_following_at_once(void **state)
-{
-    (void)state;
-    for (int phase = 0; phase < SWEEP; phase++) {
-        emulated_finger finger = held_finger(500);
-        tdc_now = T0 + 90;
-        warm_rounds(&finger, 3 * SWEEP + phase);
-        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
-        bt_baseline base = finger.tare.base;
-        warm_rounds(&finger, 50);
-        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-        assert_memory_equal(&finger.tare.base, &base, sizeof base);
-    }
-}
-
 // ---- faults ----------------------------------------------------------------------------------------
 
 static void fault_round(emulated_finger *finger)
@@ -378,16 +330,13 @@ static void warmth_before_a_fault_is_not_added_after_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_gain_is_the_nearest_in_q16),
         cmocka_unit_test(the_tare_follows_the_temperature_in_contact),
         cmocka_unit_test(the_ends_of_gain_and_temperature_are_bounded),
-        cmocka_unit_test(each_electrode_follows_once_in_a_sweep_and_three_in_a_round),
         cmocka_unit_test(nothing_follows_at_rest_or_without_a_gain),
         cmocka_unit_test(a_missing_or_railed_temperature_holds),
         cmocka_unit_test(a_first_temperature_in_contact_moves_nothing),
         cmocka_unit_test(a_degree_is_flagged_in_contact_alone),
         cmocka_unit_test(nothing_leaks_into_the_next_contact),
-        cmocka_unit_test(a_tare_from_the_host_ends_the_following_at_once),
         cmocka_unit_test(a_fault_in_contact_never_adds_a_step_twice),
         cmocka_unit_test(warmth_before_a_fault_is_not_added_after_it),
     };

@@ -40,15 +40,6 @@ static int32_t resumed(hold one)
     return bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
 }
 
-static void what_all_electrodes_share_is_followed_by_its_mean(void **state)
-{
-    (void)state;
-    // A 19th in q16 is cut.
-    assert_in_range(resumed(after_even(8, 0)), COUNT_Q16 * 0.998, COUNT_Q16);
-    assert_in_range(-resumed(after_even(-8, 0)), COUNT_Q16 * 0.998, COUNT_Q16);
-    assert_int_equal(resumed(after_even(0, 0)), 0);
-}
-
 static void what_is_no_drift_is_not_followed(void **state)
 {
     (void)state;
@@ -75,48 +66,10 @@ static void what_is_no_drift_is_not_followed(void **state)
     assert_int_equal(resumed(waits), 0);
 }
 
-static void the_sweep_under_way_counts_from_there(void **state)
-{
-    (void)state;
-    hold one = after_even(8, 0);
-    one.watch.side = 5;
-    one.watch.away_q3 = 100;
-    one.watch.shared_q16 = 1000;
-    (void)bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
-    assert_int_equal(one.watch.side, 0);
-    assert_int_equal(one.watch.away_q3, 0);
-    assert_int_equal(one.watch.shared_q16, 0);
-    one = after_even(8, 11 * 8); // a load: nothing was followed
-    one.watch.side = 5;
-    (void)bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
-    assert_int_equal(one.watch.side, 5);
-}
-
-static void what_is_watched_are_the_means_of_lanes_that_are_known(void **state)
-{
-    (void)state;
-    bt_watch watch = {.wait_sweeps = 3};
-    bt_sweep sweep = {0};
-    for (unsigned lane = 0; lane < BT_LANES; lane++) {
-        sweep.mean_q3.lane[lane] = (uint16_t)(20000 + 100 * lane);
-    }
-    for (unsigned gone = 0; gone < BT_LANES; gone++) {
-        bt_watch_take(&watch, &sweep, 1u << gone);
-        for (unsigned lane = 0; lane < BT_LANES; lane++) {
-            uint32_t one = lane == BT_LANE_PDC ? watch.base.pdc_q16 : watch.base.electrode_q16[lane];
-            assert_int_equal(one, lane == gone ? BT_TARE_UNKNOWN : (20000 + 100 * lane) << 13);
-        }
-    }
-    assert_int_equal(watch.wait_sweeps, 0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_all_electrodes_share_is_followed_by_its_mean),
         cmocka_unit_test(what_is_no_drift_is_not_followed),
-        cmocka_unit_test(the_sweep_under_way_counts_from_there),
-        cmocka_unit_test(what_is_watched_are_the_means_of_lanes_that_are_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
