@@ -102,14 +102,6 @@ static inline void course_commands(uint8_t index, const emulated_finger *finger,
     }
 }
 
-static inline uint8_t subscribe(uint8_t fingers, uint8_t quantities)
-{
-    uint8_t payload[BT_SUBSCRIBE_BYTES];
-    bt_msg_subscribe msg = {.req_id = 6, .fingers = fingers, .quantities = quantities};
-    bt_msg_subscribe_pack(&msg, payload);
-    return host_error(&session, BT_SUBSCRIBE_ID, payload, sizeof payload);
-}
-
 // The whole course. room, unless NULL, is called before each round: links can be full.
 static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log, void (*room)(int k))
 {

@@ -155,4 +155,36 @@ static inline uint8_t stop(void)
     return host_error(&session, BT_STOP_ID, "\x08", 1);
 }
 
+static inline uint8_t subscribe(uint8_t fingers, uint8_t quantities)
+{
+    const uint8_t payload[BT_SUBSCRIBE_BYTES] = {6, fingers, quantities};
+    return host_error(&session, BT_SUBSCRIBE_ID, payload, sizeof payload);
+}
+
+// The error; OK when the setting came back as it was asked for.
+static inline uint8_t set_setting(uint8_t setting, int32_t value)
+{
+    uint8_t payload[BT_SET_SETTING_BYTES];
+    bt_msg_set_setting msg = {.req_id = 77, .setting = setting, .value = value};
+    bt_msg_set_setting_pack(&msg, payload);
+    const received_message *message = host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload);
+    if (message->id == BT_REPLY_ID) {
+        return message->payload[2];
+    }
+    assert_int_equal(message->id, BT_SETTING_ID);
+    assert_memory_equal(message->payload, payload, sizeof payload);
+    return BT_ERROR_OK;
+}
+
+#define SENSOR "BTEMU00000000042" // 16 bytes, as the sensor says it
+
+// That finger's sensor says that it is this one; "": there is none.
+static inline void plug(uint8_t finger, const char *serial)
+{
+    bt_sensor_info *info = &session.info[finger];
+    memset(info, 0, sizeof *info);
+    info->present = serial[0] != 0;
+    memcpy(info->serial, serial, strlen(serial));
+}
+
 #endif

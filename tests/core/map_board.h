@@ -6,8 +6,7 @@
 #include "fake_host.h"
 #include "map_blob.h"
 
-#define SENSOR "BTEMU00000000042"
-#define PART   ((uint16_t)BT_MAP_PART_BYTES)
+#define PART ((uint16_t)BT_MAP_PART_BYTES)
 
 // ---- flash: the slots, and one record a finger ---------------------------------------------------------
 
@@ -64,23 +63,19 @@ static const bt_board_actions actions = {.save_settings = keep_settings,
                                          .save_map = save_map,
                                          .maps = &map_flash};
 
-static inline void plug(uint8_t finger, const char *serial)
-{
-    bt_sensor_info *info = &session.info[finger];
-    memset(info, 0, sizeof *info);
-    info->present = serial[0] != 0;
-    memcpy(info->serial, serial, strlen(serial));
-}
+static bool stored_maps_are_good;
 
 static inline void power_on(void)
 {
+    stored_maps_are_good = true;
     (void)new_session(NULL);
     bt_session_use_board(&session, &actions);
     plug(2, SENSOR);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         uint8_t bytes[BT_MAP_RECORD_BYTES];
         size_t n = bt_map_place_pack(&record[f], bytes);
-        bt_finger_map_load(&session.map[f], &map_flash, f, BT_MAP_RECORD_VERSION, bytes, n);
+        bool good = bt_finger_map_load(&session.map[f], &map_flash, f, BT_MAP_RECORD_VERSION, bytes, n);
+        stored_maps_are_good = stored_maps_are_good && (good || n == 0);
     }
     bt_session_use_settings(&session);
 }

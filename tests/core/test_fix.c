@@ -34,12 +34,6 @@ TEST(halves_go_away_from_zero)
     }
 }
 
-TEST(division_by_one_changes_nothing)
-{
-    assert_int_equal(bt_div_round(INT64_MAX, 1), INT64_MAX);
-    assert_int_equal(bt_div_round(INT64_MIN, 1), INT64_MIN);
-}
-
 TEST(extremes_do_not_wrap)
 {
     static const int64_t ends[] = {INT64_MAX,     INT64_MAX - 1, INT64_MIN,         INT64_MIN + 1,
@@ -51,10 +45,6 @@ TEST(extremes_do_not_wrap)
             assert_int_equal(bt_div_round(ends[n], dens[d]), rounded(ends[n], dens[d]));
         }
     }
-    assert_int_equal(bt_div_round(INT64_MAX, INT64_MAX), 1);
-    assert_int_equal(bt_div_round(INT64_MIN, INT64_MAX), -1);
-    assert_int_equal(bt_div_round(INT64_MAX / 2, INT64_MAX), 0); // one below half
-    assert_int_equal(bt_div_round(INT64_MAX / 2 + 1, INT64_MAX), 1);
 }
 
 TEST(random_quotients_are_right)
@@ -66,15 +56,6 @@ TEST(random_quotients_are_right)
         num = random_u64(&seed) & 1 ? num : -num;
         den = k % 3 ? den : den / 2 + 1; // even ones have halves
         assert_int_equal(bt_div_round(num, den), rounded(num, den));
-    }
-}
-
-TEST(rounding_is_odd)
-{
-    for (int64_t num = 0; num < 3000; num++) {
-        for (int64_t den = 1; den < 40; den++) {
-            assert_int_equal(bt_div_round(-num, den), -bt_div_round(num, den));
-        }
     }
 }
 
@@ -91,17 +72,7 @@ TEST(magnitudes_hold_at_the_ends)
     }
     for (int32_t value = -9; value <= 9; value++) {
         assert_int_equal(bt_clamp(value, -5, 7), value < -5 ? -5 : value > 7 ? 7 : value);
-        assert_int_equal(bt_abs32(value), abs(value));
-        assert_int_equal(bt_with_sign(9, value), value < 0 ? -9 : 9);
     }
-    assert_int_equal(bt_bit_length(0), 0);
-    for (int bits = 1; bits <= 32; bits++) {
-        assert_int_equal(bt_bit_length(1u << (bits - 1)), bits);
-        assert_int_equal(bt_bit_length(UINT32_MAX >> (32 - bits)), bits);
-    }
-    assert_true(bt_abs32(INT32_MIN) == (uint32_t)1 << 31 && bt_abs32(-1) == 1 && bt_abs32(0) == 0);
-    assert_int_equal(bt_with_sign(7, -1), -7);
-    assert_int_equal(bt_with_sign(7, 0), 7);
     assert_int_equal(bt_shift_down(-1, 3), -1);
     assert_int_equal(bt_shift_down(-8, 3), -1);
     assert_int_equal(bt_shift_down(-9, 3), -2);
@@ -137,10 +108,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(halves_go_away_from_zero),
-        cmocka_unit_test(division_by_one_changes_nothing),
         cmocka_unit_test(extremes_do_not_wrap),
         cmocka_unit_test(random_quotients_are_right),
-        cmocka_unit_test(rounding_is_odd),
         cmocka_unit_test(magnitudes_hold_at_the_ends),
         cmocka_unit_test(scaling_is_a_rounded_division),
         cmocka_unit_test(small_divisions_round_to_the_nearest),

@@ -3,17 +3,16 @@
 #include "failing_flash.h"
 #include "support.h"
 
-#include "keep/calibration.h"
 #include "keep/storage.h"
 #include "wire/little_endian.h"
 
 #ifndef SECTOR // tests/CMakeLists.txt has it again for a chip with larger ones
 #define SECTOR BT_FLASH_SECTOR_BYTES
 #endif
-#define TIMES     (SECTOR / BT_FLASH_SECTOR_BYTES)
-#define STRIDE    (TIMES == 1 ? 1 : 13) // bytes from one cut to the next; operations are cut one by one
-#define NEIGHBOUR 7                     // another record that must outlive everything
-#define SAVES     (40 * TIMES)          // over two changes of sector
+#define TIMES      (SECTOR / BT_FLASH_SECTOR_BYTES)
+#define STRIDE     (TIMES == 1 ? 1 : 13) // bytes from one cut to the next; operations are cut one by one
+#define NEIGHBOURS 5                     // other records, which must outlive everything
+#define SAVES      (40 * TIMES)          // over two changes of sector
 
 static uint8_t bytes_of_flash[2 * SECTOR];
 static failing_flash nor;
@@ -175,190 +174,86 @@ TEST(generations_may_wrap)
 
 // ---- power cuts ----------------------------------------------------------------------------------------
 
-// Save `number` with power failing after `cut` bytes. True when it was through before that.
-static bool save_with_cut(int number, long cut)
-{
-    nor.bytes_left = cut;
-    if (setjmp(nor.power_fails) != 0) {
-        nor.bytes_left = -1;
-        return false;
-    }
-    assert_true(write_one(BT_RECORD_SETTINGS, number));
-    nor.bytes_left = -1;
-    return true;
-}
-
-static int cuts;
-
-static void cut_everywhere(void)
-{
-    static uint8_t before[2 * SECTOR];
-    assert_true(write_one(NEIGHBOUR, 77));
-    assert_true(write_one(BT_RECORD_SETTINGS, 0));
-    for (int number = 1; number < SAVES; number++) {
-        memcpy(before, bytes_of_flash, sizeof before);
-        for (long cut = 0; !save_with_cut(number, cut); cut += STRIDE) {
-            cuts++;
-            int found = stored(BT_RECORD_SETTINGS);
-            assert_true(found == number - 1 || found == number);
-            assert_int_equal(stored(NEIGHBOUR), 77);
-            // What the cut left behind is no obstacle, and neither is a second cut in the next save.
-            uint8_t after_cut[2 * SECTOR];
-            memcpy(after_cut, bytes_of_flash, sizeof after_cut);
-            (void)save_with_cut(500, (long)random_range(&nor.seed, 0, 5000));
-            int again = stored(BT_RECORD_SETTINGS);
-            assert_true(again == found || again == 500);
-            memcpy(bytes_of_flash, after_cut, sizeof after_cut);
-            assert_true(write_one(BT_RECORD_SETTINGS, 999));
-            assert_int_equal(stored(BT_RECORD_SETTINGS), 999);
-            assert_int_equal(stored(NEIGHBOUR), 77);
-            memcpy(bytes_of_flash, before, sizeof before);
-        }
-        assert_int_equal(stored(BT_RECORD_SETTINGS), number);
-    }
-    assert_in_range(nor.erases, 3, 1000000);
-}
-
-TEST(a_cut_at_any_byte_leaves_the_old_record_or_the_new)
-{
-    cuts = 0;
-    cut_everywhere();
-    // Every save programs a page at least; two change the sector, which erases one and programs two more.
-    assert_true(cuts >= ((SAVES - 1) * BT_FLASH_PAGE_BYTES + 2 * SECTOR) / STRIDE);
-}
-
-TEST(nor_does_the_order_within_a_page_matter)
-{
-    nor.backwards = true;
-    cut_everywhere();
-}
-
-TEST(nor_do_half_done_bytes)
-{
-    nor.ragged = true;
-    cut_everywhere();
-}
-
-// ---- all that a board saves ----------------------------------------------------------------------------
-
-#define FINGERS  5
-#define ALL_CUTS (5 * TIMES) // saves of settings and five calibrations that are cut; sectors change twice
-
-// Settings and calibrations that tell which save they are of.
-static void save_all(int number)
-{
-    uint8_t settings_record[BT_SETTINGS_RECORD_BYTES], record[BT_CALIBRATION_RECORD_BYTES];
-    bt_settings settings;
-    bt_settings_reset(&settings);
-    assert_int_equal(bt_settings_set(&settings, BT_SETTING_IDLE_PERIOD_MS, 100 + number), BT_ERROR_OK);
-    bt_settings_pack(&settings, settings_record);
-    assert_true(bt_storage_write(&flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, settings_record,
-                                 sizeof settings_record));
-    for (int f = 0; f < FINGERS; f++) {
-        bt_calibration its = {.present = true, .made_s = (uint32_t)(1000 * f + number)};
-        for (int k = 1; k < BT_CALIBRATION_VALUES; k++) {
-            its.value[k] = 100 * f + 10 * k - number;
-        }
-        size_t bytes = bt_calibration_pack(&its, record);
-        assert_true(bt_storage_write(&flash, (uint16_t)(BT_RECORD_CALIBRATION + f),
-                                     BT_CALIBRATION_RECORD_VERSION, record, bytes));
-    }
-}
-
-static int stored_settings(void)
-{
-    uint8_t record[BT_STORAGE_MAX_BYTES];
-    uint16_t version;
-    bt_settings settings;
-    bt_settings_reset(&settings);
-    int bytes = bt_storage_read(&flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
-    assert_int_equal(bytes, BT_SETTINGS_RECORD_BYTES);
-    bt_settings_unpack(&settings, version, record, (size_t)bytes);
-    return bt_settings_get(&settings, BT_SETTING_IDLE_PERIOD_MS) - 100;
-}
-
-static int stored_calibration(int f)
-{
-    uint8_t record[BT_STORAGE_MAX_BYTES];
-    uint16_t version;
-    bt_calibration its;
-    int bytes =
-        bt_storage_read(&flash, (uint16_t)(BT_RECORD_CALIBRATION + f), &version, record, sizeof record);
-    assert_int_equal(bytes, BT_CALIBRATION_RECORD_BYTES);
-    bt_calibration_unpack(&its, version, record, (size_t)bytes);
-    assert_true(its.present);
-    int number = (int)its.made_s - 1000 * f;
-    for (int k = 1; k < BT_CALIBRATION_VALUES; k++) {
-        assert_int_equal(its.value[k], 100 * f + 10 * k - number);
-    }
-    return number;
-}
-
-// `left` counts down to the cut.
-static bool save_all_with_cut(int number, long *left, long cut)
+// Save `number`; power fails when `left` has counted down from `cut`. True when it was through before that.
+static bool save_with_cut(int number, long *left, long cut)
 {
     *left = cut;
     if (setjmp(nor.power_fails) != 0) {
         *left = -1;
         return false;
     }
-    save_all(number);
+    assert_true(write_one(BT_RECORD_SETTINGS, number));
     *left = -1;
     return true;
 }
 
-// They are written one after the other: where the old one begins, the rest is old.
-static void assert_old_then_new(int number)
+static void assert_neighbours_are_whole(void)
 {
-    int found = stored_settings();
-    assert_true(found == number || found == number - 1);
-    for (int f = 0; f < FINGERS; f++) {
-        int next = stored_calibration(f);
-        assert_true(next == found || (found == number && next == number - 1));
-        found = next;
+    for (uint16_t id = BT_RECORD_CALIBRATION; id < BT_RECORD_CALIBRATION + NEIGHBOURS; id++) {
+        assert_int_equal(stored(id), 77 + id);
     }
 }
 
-TEST(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new)
+// Returns how many cuts there were.
+static int cut_everywhere(long *left, long stride)
 {
     static uint8_t before[2 * SECTOR];
-    save_all(0);
-    for (int number = 1; number <= ALL_CUTS; number++) {
+    int cuts = 0;
+    for (uint16_t id = BT_RECORD_CALIBRATION; id < BT_RECORD_CALIBRATION + NEIGHBOURS; id++) {
+        assert_true(write_one(id, 77 + id));
+    }
+    assert_true(write_one(BT_RECORD_SETTINGS, 0));
+    for (int number = 1; number < SAVES; number++) {
         memcpy(before, bytes_of_flash, sizeof before);
-        for (long cut = 0; !save_all_with_cut(number, &nor.bytes_left, cut); cut += STRIDE) {
-            assert_old_then_new(number);
+        for (long cut = 0; !save_with_cut(number, left, cut); cut += stride) {
+            cuts++;
+            int found = stored(BT_RECORD_SETTINGS);
+            assert_true(found == number - 1 || found == number);
+            assert_neighbours_are_whole();
+            // What the cut left behind is no obstacle, and neither is a second cut in the next save.
+            uint8_t after_cut[2 * SECTOR];
+            memcpy(after_cut, bytes_of_flash, sizeof after_cut);
+            (void)save_with_cut(500, &nor.bytes_left, (long)random_range(&nor.seed, 0, 5000));
+            int again = stored(BT_RECORD_SETTINGS);
+            assert_true(again == found || again == 500);
+            memcpy(bytes_of_flash, after_cut, sizeof after_cut);
+            assert_true(write_one(BT_RECORD_SETTINGS, 999));
+            assert_int_equal(stored(BT_RECORD_SETTINGS), 999);
+            assert_neighbours_are_whole();
             memcpy(bytes_of_flash, before, sizeof before);
         }
-        assert_int_equal(stored_calibration(FINGERS - 1), number);
+        assert_int_equal(stored(BT_RECORD_SETTINGS), number);
     }
-    assert_true(nor.erases > 2 * SECTOR / STRIDE); // a cut at every byte of two erases, at least
+    assert_in_range(nor.erases, 3, 1000000);
+    return cuts;
 }
 
-// Cells of a sector that is erased, or of a page that is programmed, are done in no order: seed 17.
-TEST(so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails)
+TEST(a_cut_at_any_byte_leaves_the_old_record_or_the_new)
 {
-    static uint8_t before[2 * SECTOR];
-    int at = 0, within = 0;
-    nor.seed = 17;
-    save_all(0);
-    for (int number = 1; number <= 2 * ALL_CUTS; number++) {
-        memcpy(before, bytes_of_flash, sizeof before);
-        for (int turn = 0; turn < 4; turn++) {
-            nor.inside = turn > 0;
-            memcpy(bytes_of_flash, before, sizeof before);
-            for (long cut = 0; !save_all_with_cut(number, &nor.operations_left, cut); cut++) {
-                *(nor.inside ? &within : &at) += 1;
-                assert_old_then_new(number);
-                save_all(number); // what the cut left behind is no obstacle
-                assert_int_equal(stored_settings(), number);
-                assert_int_equal(stored_calibration(FINGERS - 1), number);
-                memcpy(bytes_of_flash, before, sizeof before);
-            }
-        }
+    // Every save programs a page at least; two change the sector, which erases one and programs more.
+    assert_true(cut_everywhere(&nor.bytes_left, STRIDE)
+                >= ((SAVES - 1) * BT_FLASH_PAGE_BYTES + 2 * SECTOR) / STRIDE);
+}
+
+TEST(nor_does_the_order_within_a_page_matter)
+{
+    nor.backwards = true;
+    (void)cut_everywhere(&nor.bytes_left, STRIDE);
+}
+
+TEST(nor_do_half_done_bytes)
+{
+    nor.ragged = true;
+    (void)cut_everywhere(&nor.bytes_left, STRIDE);
+}
+
+// Cells of a sector that is erased, or of a page that is programmed, are done in no order.
+TEST(nor_where_and_how_an_operation_is_cut)
+{
+    for (int turn = 0; turn < 4; turn++) {
+        nor.inside = turn > 0;
+        assert_true(cut_everywhere(&nor.operations_left, 1) >= SAVES);
     }
-    print_message("settings and calibrations: power cut before %d operations, inside %d\n", at, within);
-    assert_in_range(at, 50 * TIMES, 1000 * TIMES);
-    assert_in_range(within, 150 * TIMES, 1000 * TIMES);
 }
 
 TEST(no_more_is_read_than_there_is_or_there_is_room_for)
@@ -392,8 +287,7 @@ int main(void)
         T(a_cut_at_any_byte_leaves_the_old_record_or_the_new),
         T(nor_does_the_order_within_a_page_matter),
         T(nor_do_half_done_bytes),
-        T(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new),
-        T(so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails),
+        T(nor_where_and_how_an_operation_is_cut),
         T(no_more_is_read_than_there_is_or_there_is_room_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

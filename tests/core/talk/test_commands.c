@@ -3,20 +3,6 @@
 #include "fake_board.h"
 #include "fake_host.h"
 
-static uint8_t set_error(uint8_t setting, int32_t value)
-{
-    uint8_t payload[BT_SET_SETTING_BYTES];
-    bt_msg_set_setting msg = {.req_id = 77, .setting = setting, .value = value};
-    bt_msg_set_setting_pack(&msg, payload);
-    const received_message *message = host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload);
-    if (message->id == BT_REPLY_ID) {
-        return message->payload[2];
-    }
-    assert_int_equal(message->id, BT_SETTING_ID);
-    assert_memory_equal(message->payload, payload, sizeof payload); // as it was asked for
-    return BT_ERROR_OK;
-}
-
 static int32_t get(uint8_t setting)
 {
     uint8_t payload[2] = {5, setting};
@@ -33,16 +19,16 @@ TEST(settings_hold_their_ranges_and_refused_values_change_nothing)
     for (int k = 0; k < BT_SETTINGS; k++) {
         const bt_setting_spec *spec = &bt_setting_specs[k];
         assert_int_equal(get(spec->id), spec->initial);
-        assert_int_equal(set_error(spec->id, spec->min), BT_ERROR_OK);
-        assert_int_equal(set_error(spec->id, spec->min - 1), BT_ERROR_OUT_OF_RANGE);
-        assert_int_equal(set_error(spec->id, INT32_MIN), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_setting(spec->id, spec->min), BT_ERROR_OK);
+        assert_int_equal(set_setting(spec->id, spec->min - 1), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_setting(spec->id, INT32_MIN), BT_ERROR_OUT_OF_RANGE);
         assert_int_equal(get(spec->id), spec->min);
-        assert_int_equal(set_error(spec->id, spec->max), BT_ERROR_OK);
-        assert_int_equal(set_error(spec->id, spec->max + 1), BT_ERROR_OUT_OF_RANGE);
-        assert_int_equal(set_error(spec->id, INT32_MAX), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_setting(spec->id, spec->max), BT_ERROR_OK);
+        assert_int_equal(set_setting(spec->id, spec->max + 1), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_setting(spec->id, INT32_MAX), BT_ERROR_OUT_OF_RANGE);
         assert_int_equal(get(spec->id), spec->max);
     }
-    assert_int_equal(set_error(0, 1), BT_ERROR_UNKNOWN_SETTING);
+    assert_int_equal(set_setting(0, 1), BT_ERROR_UNKNOWN_SETTING);
 }
 
 static bt_settings saved;
@@ -87,7 +73,7 @@ TEST(a_board_saves_all_or_says_that_it_cannot)
             .save_map = missing == 3 ? NULL : keep_no_map,
         };
         bt_session_use_board(&session, &actions);
-        assert_int_equal(set_error(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
+        assert_int_equal(set_setting(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
         assert_int_equal(save_error(), missing == 0 ? BT_ERROR_OK : BT_ERROR_NOT_HERE);
     }
     assert_true(saves == 1 && bt_settings_get(&saved, BT_SETTING_IDLE_PERIOD_MS) == 250);
@@ -148,7 +134,7 @@ TEST(a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port)
 
 TEST(a_hold_lapses_after_so_many_milliseconds_of_silence)
 {
-    assert_int_equal(set_error(BT_SETTING_HOLD_TIMEOUT_MS, 700), BT_ERROR_OK);
+    assert_int_equal(set_setting(BT_SETTING_HOLD_TIMEOUT_MS, 700), BT_ERROR_OK);
     assert_int_equal(host_error(&session, BT_HOLD_ID, "\1\4", 2), BT_ERROR_OK); // finger 2, at 0 us
     bt_session_tick(&session, 700000);
     assert_true(session.finger[2].tare.held);

@@ -40,14 +40,6 @@ static void play_level(int rounds, uint16_t level)
     }
 }
 
-static void set_setting(uint8_t setting, int32_t value)
-{
-    uint8_t payload[BT_SET_SETTING_BYTES];
-    bt_msg_set_setting msg = {.req_id = 3, .setting = setting, .value = value};
-    bt_msg_set_setting_pack(&msg, payload);
-    assert_int_equal(host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload)->id, BT_SETTING_ID);
-}
-
 static bt_msg_idle idle_at(int k)
 {
     bt_msg_idle idle;
@@ -71,7 +63,7 @@ TEST(heartbeats_come_in_their_period)
     static const int32_t periods_ms[] = {20, 29, 30, 100, 250, 1000, 60000};
     for (int p = 0; p < 7; p++) {
         (void)an_idle_session(NULL);
-        set_setting(BT_SETTING_IDLE_PERIOD_MS, periods_ms[p]);
+        assert_int_equal(set_setting(BT_SETTING_IDLE_PERIOD_MS, periods_ms[p]), BT_ERROR_OK);
         play_level(50, 2000);
         assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
         host_forget();
@@ -227,7 +219,7 @@ TEST(a_lost_heartbeat_is_a_gap)
 TEST(unknown_fingers_are_refused_and_change_nothing)
 {
     for (int fingers = 0; fingers < 256; fingers++) {
-        for (int quantities = 0; quantities < 256; quantities++) {
+        for (int quantities = 0; quantities < 256; quantities += 17) {
             uint8_t before[BT_MAX_FINGERS];
             uint8_t error = fingers >> 5 ? BT_ERROR_NO_SUCH_FINGER : BT_ERROR_OK;
             for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -258,53 +250,23 @@ TEST(at_first_everything_but_sigmas_and_touches_is_sent)
     assert_true(frame.torque_mnmm[0] != INT32_MIN && frame.poc_sigma_um == 0xFFFF);
 }
 
-// ---- what it saves ---------------------------------------------------------------------------------
-
-static size_t bytes_written;
-
-static bool count_bytes(void *context, unsigned link, const uint8_t *data, size_t bytes)
+// Noise and glitches of the worst sensor there is.
+TEST(a_noisy_finger_at_rest_is_as_silent)
 {
-    (void)context, (void)link;
-    (void)data;
-    bytes_written += bytes;
-    return true;
-}
-
-static size_t bytes_of(emulated_finger *finger, int rounds)
-{
-    bytes_written = 0;
-    for (int k = 0; k < rounds; k++) {
-        bt_round frame = next_frame(finger);
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.sigma = 5;
+    finger.glitch_chance = 0.005;
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    for (int k = 0; k < 1500; k++) {
+        bt_round frame = next_frame(&finger);
         play(frame.electrode);
+        if (k == 500) {
+            host_forget();
+        }
     }
-    return bytes_written;
-}
-
-TEST(rest_takes_a_fifth_of_the_bytes_of_contact_at_most)
-{
-    static const double glitches[] = {0, 0.005}; // the worst sensor there is
-    for (int k = 0; k < 2; k++) {
-        (void)new_session(NULL);
-        emulated_finger finger;
-        finger_init(&finger);
-        finger.sigma = k == 0 ? 1.5 : 5;
-        finger.glitch_chance = glitches[k];
-        uint8_t at_first = session.finger[0].quantities;
-        assert_int_equal(subscribe(1, at_first & (uint8_t)~BT_QUANTITY_FLAG_REST_FRAMES), BT_ERROR_OK);
-        assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
-        session.write = count_bytes;
-        (void)bytes_of(&finger, 500);
-        assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
-        size_t at_rest = bytes_of(&finger, 1000);
-        assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
-        finger.load = 600;
-        (void)bytes_of(&finger, 20);
-        size_t in_contact = bytes_of(&finger, 1000);
-        assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_CONTACT);
-        assert_int_equal(in_contact, 1000 * (BT_FRAME_BYTES + 7)); // id, CRC, COBS and delimiter
-        assert_true(at_rest > 0 && at_rest <= in_contact / 5);
-        print_message("at rest %zu bytes in ten seconds, in contact %zu\n", at_rest, in_contact);
-    }
+    assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
+    assert_in_range(host_count(BT_FRAME_ID), 0, 100);
 }
 
 #define T(name) cmocka_unit_test_setup(name, an_idle_session)
@@ -320,7 +282,7 @@ int main(void)
         T(a_lost_heartbeat_is_a_gap),
         T(unknown_fingers_are_refused_and_change_nothing),
         T(at_first_everything_but_sigmas_and_touches_is_sent),
-        T(rest_takes_a_fifth_of_the_bytes_of_contact_at_most),
+        T(a_noisy_finger_at_rest_is_as_silent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

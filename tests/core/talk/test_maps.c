@@ -129,26 +129,6 @@ TEST(what_is_out_of_range_is_refused)
     assert_true(erases == 0 && programs == 0);
 }
 
-TEST(nothing_changes_while_streaming)
-{
-    size_t bytes = make_map(blob, 1, 2, ""), more = make_map(other, 2, 4, "");
-    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
-    write_all(1, other, more);
-    int before = programs;
-    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
-    assert_int_equal(begin(0, (uint16_t)bytes, 0), BT_ERROR_BUSY);
-    assert_int_equal(write_part(1, other, more, 0), BT_ERROR_BUSY);
-    assert_int_equal(end(1, bt_crc32(other, more)), BT_ERROR_BUSY);
-    assert_int_equal(clear(0), BT_ERROR_BUSY);
-    assert_int_equal(programs, before);
-    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE); // asking is allowed
-    assert_int_equal(stop(), BT_ERROR_OK);
-    assert_int_equal(end(1, bt_crc32(other, more)), BT_ERROR_NOT_BEGUN);
-    assert_int_equal(clear(0), BT_ERROR_OK);
-    assert_int_equal(clear(0), BT_ERROR_OK); // harmless twice
-    assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
-}
-
 TEST(every_way_out_ends_an_upload)
 {
     size_t bytes = make_map(blob, 1, 2, "");
@@ -167,14 +147,6 @@ TEST(every_way_out_ends_an_upload)
         assert_int_equal(end(0, bt_crc32(blob, bytes)), BT_ERROR_NOT_BEGUN);
         assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
     }
-}
-
-TEST(a_board_without_room_says_so)
-{
-    (void)new_session(NULL);
-    assert_int_equal(begin(0, 24, 0), BT_ERROR_NOT_HERE);
-    assert_int_equal(end(0, 0), BT_ERROR_NOT_HERE);
-    assert_int_equal(info(0).state, BT_CALIBRATION_STATE_NONE);
 }
 
 // ---- whose it is --------------------------------------------------------------------------------------
@@ -233,9 +205,7 @@ int main(void)
         T(a_part_that_differs_from_what_is_there_is_refused_and_does_no_harm),
         T(nothing_is_written_that_was_not_begun),
         T(what_is_out_of_range_is_refused),
-        T(nothing_changes_while_streaming),
         T(every_way_out_ends_an_upload),
-        T(a_board_without_room_says_so),
         T(another_sensors_is_refused_unless_it_is_for_any),
         T(another_sensor_has_not_the_map_but_not_while_streaming),
         T(a_map_is_not_whole_until_its_last_byte_has_come),

@@ -1,25 +1,6 @@
 // What is kept of wrench maps, over the slots of a small flash.
 #include "map_board.h"
 
-TEST(what_was_not_saved_is_gone_at_the_next_boot)
-{
-    size_t bytes = make_map(blob, 1, 2, ""), more = make_map(other, 2, 5, "");
-    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
-    assert_int_equal(save(), BT_ERROR_OK);
-    assert_int_equal(upload(0, other, more), BT_ERROR_OK);
-    assert_int_equal(upload(1, other, more), BT_ERROR_OK);
-    power_on();
-    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
-    assert_has(1, NULL, 0, BT_CALIBRATION_STATE_NONE);
-    assert_int_equal(clear(0), BT_ERROR_OK);
-    power_on();
-    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
-    assert_int_equal(clear(0), BT_ERROR_OK);
-    assert_int_equal(save(), BT_ERROR_OK);
-    power_on();
-    assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
-}
-
 TEST(a_record_that_cannot_be_is_no_map)
 {
     size_t bytes = make_map(blob, 1, 2, "");
@@ -36,6 +17,7 @@ TEST(a_record_that_cannot_be_is_no_map)
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
         record[0] = bad[k];
         power_on();
+        assert_false(stored_maps_are_good); // which is told as damaged storage
         assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
     }
     // A record of a later version is not understood, but its slot is not written to either.
@@ -52,7 +34,13 @@ TEST(a_record_that_cannot_be_is_no_map)
     }
     record[0] = good;
     power_on();
+    assert_true(stored_maps_are_good);
     assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+    slots[good.slot * (size_t)BT_MAP_SLOT_BYTES + bytes - 1] ^= 1;
+    power_on();
+    assert_false(stored_maps_are_good);
+    assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
+    assert_int_equal(session.map[0].stored_slot, good.slot); // it is not written to
 }
 
 TEST(flash_that_takes_nothing_is_told_and_passed_by)
@@ -145,61 +133,41 @@ TEST(whatever_happens_nothing_that_is_kept_is_written_to)
     }
 }
 
-// What comes back says whether the board's start is to be told as damaged storage.
-TEST(a_stored_map_that_cannot_be_used_is_said_so)
+// One that is in force and whose flash has gone leaves none when another cannot be had.
+TEST(a_map_whose_flash_is_gone_is_none)
 {
-    uint8_t packed[BT_MAP_RECORD_BYTES];
     size_t bytes = make_map(blob, 1, 2, "");
     assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
-    const bt_map_place place = session.map[0].place;
-    bt_finger_map its;
-    (void)bt_map_place_pack(&place, packed);
-    assert_true(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    bt_finger_map map = session.map[0];
+    const bt_map_place place = map.place;
     slots[place.slot * (size_t)BT_MAP_SLOT_BYTES + bytes - 1] ^= 1;
-    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
-    assert_int_equal(its.place.bytes, 0);
-    assert_int_equal(its.stored_slot, place.slot);
-    // One that is in force and whose flash has gone leaves none when another cannot be had.
-    its.place = place;
-    assert_int_equal(bt_finger_map_use(&its, &map_flash, 0, &place, NULL), BT_ERROR_NOT_WHOLE);
-    assert_int_equal(its.place.bytes, 0);
-    assert_true(its.map.axes == 0 && its.map.blocks == NULL);
-    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed));
-    for (size_t bytes = 0; bytes <= 5; bytes++) { // of a later version, the slot is all that is to be known
-        assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, bytes));
-        assert_int_equal(its.stored_slot, bytes < 4 ? BT_MAP_SLOTS : place.slot);
-    }
-    bt_put_u32(packed + 4, 0); // none is stored, as is right
-    assert_true(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
-    assert_true(its.place.bytes == 0 && its.map.axes == 0);
-    bt_put_u32(packed + 4, BT_MAP_MAX_BYTES + 1);
-    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
-    bt_put_u32(packed, BT_MAP_SLOTS);
-    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    assert_int_equal(bt_finger_map_use(&map, &map_flash, 0, &place, NULL), BT_ERROR_NOT_WHOLE);
+    assert_true(map.place.bytes == 0 && map.map.axes == 0 && map.map.blocks == NULL);
 }
 
-TEST(slots_that_nobody_has_anything_in_are_free)
+// Of a record of a later version, the slot is all that is to be known.
+TEST(a_record_cut_short_is_no_map_and_one_of_none_is_right)
 {
-    bt_finger_map none[BT_MAX_FINGERS];
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_finger_map_reset(&none[f]);
+    bt_finger_map map;
+    uint8_t packed[BT_MAP_RECORD_BYTES] = {3}; // a slot, and no bytes
+    for (size_t bytes = 0; bytes <= 5; bytes++) {
+        assert_false(bt_finger_map_load(&map, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, bytes));
+        assert_int_equal(map.stored_slot, bytes < 4 ? BT_MAP_SLOTS : 3);
     }
-    for (uint8_t slot = 0; slot < BT_MAP_SLOTS; slot++) {
-        assert_int_equal(bt_map_free_slot(&map_flash, none, slot), (slot + 1) % BT_MAP_SLOTS);
-    }
+    assert_true(bt_finger_map_load(&map, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    assert_true(map.place.bytes == 0 && map.map.axes == 0);
 }
 
 #define T(name) cmocka_unit_test_setup(name, new_board)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        T(what_was_not_saved_is_gone_at_the_next_boot),
         T(a_record_that_cannot_be_is_no_map),
         T(flash_that_takes_nothing_is_told_and_passed_by),
         T(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored),
         T(whatever_happens_nothing_that_is_kept_is_written_to),
-        T(a_stored_map_that_cannot_be_used_is_said_so),
-        T(slots_that_nobody_has_anything_in_are_free),
+        T(a_map_whose_flash_is_gone_is_none),
+        T(a_record_cut_short_is_no_map_and_one_of_none_is_right),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,13 +14,6 @@ static uint32_t clock_us(void *context)
     return ON_TIME + late_us[asked++ % BT_MAX_FINGERS];
 }
 
-static void subscribe(uint8_t quantities)
-{
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        session.finger[f].quantities = quantities;
-    }
-}
-
 static const uint8_t fingers = 1 << 1 | 1 << 3;
 
 // A round; the k-th FRAME of it is late_us[k] late.
@@ -60,7 +53,7 @@ static int new_stream(void **state)
     assert_int_equal(upload(3, other, make_map(other, 2, 5, "")), BT_ERROR_OK);
     session.board.now_us = clock_us;
     all_late(0);
-    subscribe(ALL);
+    assert_int_equal(subscribe(0x1F, ALL), BT_ERROR_OK);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, fingers, 0), BT_ERROR_OK);
     return 0;
 }
@@ -89,7 +82,7 @@ TEST(sigma_goes_first)
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
     assert_int_equal(session.scheduler.sheds.sigma, 100);
     all_late(9001);
-    subscribe(ALL & ~BT_QUANTITY_FLAG_SIGMA);
+    assert_int_equal(subscribe(0x1F, ALL & ~BT_QUANTITY_FLAG_SIGMA), BT_ERROR_OK);
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
     assert_int_equal(session.scheduler.sheds.sigma, 100);
     assert_true(session.scheduler.sheds.wrench == 0 && session.scheduler.sheds.frames == 0);
@@ -125,12 +118,12 @@ TEST(then_a_map_is_not_computed_but_its_wrench_repeated)
     assert_int_equal(again.wrench_age_ms, 0);
     assert_int_not_equal(again.force_100un[2], fresh.force_100un[2]);
     // Who did not ask for it has none.
-    subscribe(ALL & ~BT_QUANTITY_FLAG_FORCE);
+    assert_int_equal(subscribe(0x1F, ALL & ~BT_QUANTITY_FLAG_FORCE), BT_ERROR_OK);
     bt_msg_frame less = frame_of(1988);
     assert_true(less.flags & BT_FRAME_FLAG_REPEATED && less.flags & BT_FRAME_FLAG_NOT_ASKED);
     assert_int_equal(less.force_100un[2], BT_INVALID_I32);
     assert_memory_equal(less.torque_mnmm, again.torque_mnmm, sizeof again.torque_mnmm);
-    subscribe(ALL & ~BT_QUANTITY_FLAG_TORQUE);
+    assert_int_equal(subscribe(0x1F, ALL & ~BT_QUANTITY_FLAG_TORQUE), BT_ERROR_OK);
     less = frame_of(1988);
     assert_true(less.flags & BT_FRAME_FLAG_REPEATED && less.flags & BT_FRAME_FLAG_NOT_ASKED);
     assert_int_equal(less.torque_mnmm[1], BT_INVALID_I32);

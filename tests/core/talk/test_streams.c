@@ -129,20 +129,6 @@ TEST(a_closed_port_ends_the_stream_and_half_a_command)
     assert_int_equal(host.message[0].payload[0], 0x31);
 }
 
-TEST(replies_leave_in_the_order_of_the_commands)
-{
-    uint8_t stream[2000];
-    size_t bytes = 0;
-    for (uint8_t req_id = 1; req_id <= 100; req_id++) {
-        bytes += bt_frame_encode(BT_PING_ID, &req_id, 1, stream + bytes);
-    }
-    bt_session_receive(&session, 0, stream, bytes, 0);
-    assert_int_equal(host.count, 100);
-    for (int k = 0; k < 100; k++) {
-        assert_int_equal(host.message[k].payload[0], k + 1);
-    }
-}
-
 #define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
@@ -154,7 +140,6 @@ int main(void)
         T(status_comes_in_its_period_and_with_every_present_sensor),
         T(frames_that_find_no_room_are_dropped_whole_and_counted),
         T(a_closed_port_ends_the_stream_and_half_a_command),
-        T(replies_leave_in_the_order_of_the_commands),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

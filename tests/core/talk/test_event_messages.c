@@ -1,14 +1,6 @@
 // EVENTs of a session: who gets them, when, and that nobody pays who does not ask.
 #include "../fake_host.h"
 
-static void subscribe(uint8_t fingers, uint8_t quantities)
-{
-    uint8_t payload[BT_SUBSCRIBE_BYTES];
-    bt_msg_subscribe msg = {.req_id = 3, .fingers = fingers, .quantities = quantities};
-    bt_msg_subscribe_pack(&msg, payload);
-    assert_int_equal(host_error(&session, BT_SUBSCRIBE_ID, payload, sizeof payload), BT_ERROR_OK);
-}
-
 static uint32_t t_us;
 
 // A round of finger 0 and 3, electrodes at `count`; returns the slot in which the first EVENT came, or
@@ -49,7 +41,7 @@ static void rest(void)
 TEST(who_subscribes_is_told_in_the_slot_that_shows_it)
 {
     rest();
-    subscribe(1 << 3, BT_QUANTITY_FLAG_EVENTS | BT_QUANTITY_FLAG_TOUCH);
+    assert_int_equal(subscribe(1 << 3, BT_QUANTITY_FLAG_EVENTS | BT_QUANTITY_FLAG_TOUCH), BT_ERROR_OK);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 0 | 1 << 3, 0), BT_ERROR_OK);
     host_forget();
     (void)played(3000);
@@ -101,7 +93,7 @@ TEST(nobody_is_told_who_did_not_ask_or_does_not_stream)
     assert_int_equal(host_count(BT_EVENT_ID), 0);
     assert_memory_equal(session.events_due, none, sizeof none); // so no slot looks for any
     play(100, 3000);
-    subscribe(0x1F, BT_QUANTITY_FLAG_EVENTS);
+    assert_int_equal(subscribe(0x1F, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(start(BT_STREAM_FLAG_STATUS, 0x1F, 0), BT_ERROR_OK); // streams nothing they come with
     play(20, 2900);
     assert_int_equal(host_count(BT_EVENT_ID), 0);
@@ -112,12 +104,12 @@ TEST(they_come_with_pac_alone_and_end_with_the_subscription)
 {
     static const uint8_t none[BT_SLOTS];
     rest();
-    subscribe(1 << 0, BT_QUANTITY_FLAG_EVENTS);
+    assert_int_equal(subscribe(1 << 0, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(start(BT_STREAM_FLAG_PAC, 1 << 0, 0), BT_ERROR_OK);
     host_forget();
     play(5, 2900);
     assert_int_equal(host_count(BT_EVENT_ID), 1);
-    subscribe(1 << 0, 0);
+    assert_int_equal(subscribe(1 << 0, 0), BT_ERROR_OK);
     host_forget();
     play(100, 3000);
     assert_int_equal(host_count(BT_EVENT_ID), 0);
