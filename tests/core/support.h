@@ -85,13 +85,6 @@ static inline bool next_line(FILE *file, char line[LINE_BYTES])
     (void)fclose(file);
     return false;
 }
-
-// The rest of line when it begins with word and a space, else NULL.
-static inline const char *after_word(const char *line, const char *word)
-{
-    size_t length = strlen(word);
-    return strncmp(line, word, length) == 0 && line[length] == ' ' ? line + length + 1 : NULL;
-}
 #endif
 
 #endif

@@ -285,6 +285,20 @@ TEST(seq_wraps_like_any_other_number)
     }
 }
 
+TEST(an_electrode_without_a_tare_is_no_signal)
+{
+    uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+    int32_t e_q4[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        counts[i] = i == 5 ? BT_INVALID_COUNT : 3000;
+        tare_q4[i] = i == 4 ? BT_INVALID_COUNT : 3001 * 16;
+    }
+    bt_signals_q4(counts, tare_q4, e_q4);
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(e_q4[i], i == 4 || i == 5 ? 0 : -16);
+    }
+}
+
 // The host may store a tare before the sensor has said a word.
 TEST(a_tare_set_before_the_sensor_answers_is_kept)
 {
@@ -436,6 +450,7 @@ int main(void)
         T(a_railed_electrode_is_flagged_and_three_are_a_fault),
         T(a_held_press_is_flagged_by_its_shape_and_age),
         T(seq_wraps_like_any_other_number),
+        T(an_electrode_without_a_tare_is_no_signal),
         T(a_tare_set_before_the_sensor_answers_is_kept),
         T(a_touch_that_shows_in_a_lost_slot_is_told_in_the_next),
         T(a_move_of_any_electrode_alone_is_one),

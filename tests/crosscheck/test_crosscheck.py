@@ -37,7 +37,7 @@ def frames(n: int, settings: dict[Setting, int], seed: int = 1) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("gain_nn", [0, 1, 57, 111, 700, -2_262_234, 100_000_000, -100_000_000])
+@pytest.mark.parametrize("gain_nn", [0, 1, 111, -2_262_234, 100_000_000])
 @pytest.mark.parametrize("weights", [0, 1, 2])
 def test_what_a_board_sends_is_never_called_wrong(gain_nn: int, weights: int) -> None:
     settings = default_settings() | dict.fromkeys((*TORQUE, *FORCE), gain_nn) | {Setting.POC_WEIGHTS: weights}

@@ -32,7 +32,7 @@ def frames(settings: dict[Setting, int], seed: int = 1) -> Any:
 
 
 @pytest.mark.parametrize("gain_nn", [0, 1, 10_000_000, 99_999_999])
-@pytest.mark.parametrize("milli", [10, 333, 500, 999, 1000])
+@pytest.mark.parametrize("milli", [10, 333, 1000])
 def test_what_a_board_sends_is_never_called_wrong(gain_nn: int, milli: int) -> None:
     settings = default_settings() | {GAIN: gain_nn, FILTER: milli}
     outcome = CrossCheck()
@@ -50,38 +50,26 @@ SETTINGS = default_settings() | {GAIN: 12_345_678, FILTER: 500}
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "words"),
+    ("field", "row", "off_by", "value", "words"),
     [
-        ("pressure_force_100un", 1, "force from pressure off by 0.0"),
-        ("pressure_force_100un", -1, "force from pressure off by"),
-        ("pdc_filtered_q4", 3, "filtered pressure off by"),
-        ("pdc_filtered_q4", -3, "filtered pressure off by"),
+        ("pressure_force_100un", 280, 1, None, "force from pressure off by 0.0"),
+        ("pressure_force_100un", 280, -1, None, "force from pressure off by"),
+        ("pdc_filtered_q4", 280, 3, None, "filtered pressure off by"),
+        ("pdc_filtered_q4", 280, -3, None, "filtered pressure off by"),
+        # Zero or stale for invalid, and the reverse; a word is missing at 305, and railed at 320.
+        ("pressure_force_100un", 280, 0, wire.INVALID_I32, "force from pressure is valid on one side only"),
+        ("pressure_force_100un", 305, 0, 0, "force from pressure is valid on one side only"),
+        ("pdc_filtered_q4", 280, 0, wire.INVALID_COUNT, "filtered pressure is valid on one side only"),
+        ("pdc_filtered_q4", 305, 0, 16 * 1326, "filtered pressure is valid on one side only"),
+        ("pdc_filtered_q4", 320, 0, 0, "filtered pressure is valid on one side only"),
     ],
 )
-def test_one_wrong_digit_is_found(field: str, value: int, words: str) -> None:
+def test_one_wrong_number_is_found(field: str, row: int, off_by: int, value: int | None, words: str) -> None:
     sent = frames(SETTINGS)
-    sent[field][280] = int(sent[field][280]) + value
+    sent[field][row] = int(sent[field][row]) + off_by if value is None else value
     outcome = CrossCheck()
     outcome.add(sent, SETTINGS)
     assert outcome.violations >= 1
-    assert any(finding.startswith("finger 0 frame 280 ") and words in finding for finding in outcome.findings)
-
-
-@pytest.mark.parametrize(
-    ("field", "row", "value", "words"),
-    [
-        ("pressure_force_100un", 280, wire.INVALID_I32, "force from pressure is valid on one side only"),
-        ("pressure_force_100un", 305, 0, "force from pressure is valid on one side only"),  # a word is missing there
-        ("pdc_filtered_q4", 280, wire.INVALID_COUNT, "filtered pressure is valid on one side only"),
-        ("pdc_filtered_q4", 305, 16 * 1326, "filtered pressure is valid on one side only"),
-        ("pdc_filtered_q4", 320, 0, "filtered pressure is valid on one side only"),  # railed
-    ],
-)
-def test_zero_or_stale_for_invalid_is_found(field: str, row: int, value: int, words: str) -> None:
-    sent = frames(SETTINGS)
-    sent[field][row] = value
-    outcome = CrossCheck()
-    outcome.add(sent, SETTINGS)
     assert any(finding.startswith(f"finger 0 frame {row} ") and words in finding for finding in outcome.findings)
 
 

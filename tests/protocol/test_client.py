@@ -38,11 +38,15 @@ def test_it_is_small_and_needs_nothing(tmp_path: Path, speed: str) -> None:
     assert needed.split() == []  # no heap, no libc
 
 
-def test_the_example_prints_the_frames_that_python_reads(tmp_path: Path) -> None:
-    program = tmp_path / "example"
-    sources = [str(CLIENT / name) for name in ("example.c", "biotac_client.c")]
-    build = ["cc", "-std=gnu11", *WARNINGS, "-fsanitize=address,undefined", *sources, "-o", str(program)]
-    subprocess.run(build, check=True)
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("client") / "example"
+    build = ["cc", "-std=gnu11", *WARNINGS, "-fsanitize=address,undefined"]
+    subprocess.run([*build, CLIENT / "example.c", CLIENT / "biotac_client.c", "-o", made], check=True)
+    return made
+
+
+def test_the_example_prints_the_frames_that_python_reads(program: Path) -> None:
     assert len((CLIENT / "example.c").read_text().splitlines()) <= 60
     source = load_source("press.toml", fingers=2, seconds=30.0)
     board = start_board("posix", source, pace=1.0)
@@ -103,13 +107,8 @@ def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -
     for words in (["-S", "firmware", "--preset", "f405"], ["--build", "build/f405"]):
         subprocess.run(["cmake", *words], cwd=CLIENT.parents[1], check=True, capture_output=True)
     board = start_board("posix", load_source("press.toml", fingers=2, seconds=60.0), pace=1.0)
-    command = [
-        "qemu-system-arm",
-        "-M",
-        "netduinoplus2",
-        "-kernel",
-        str(CLIENT.parents[1] / "build/f405/f405-client.elf"),
-    ]
+    image = str(CLIENT.parents[1] / "build/f405/f405-client.elf")
+    command = ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", image]
     command += ["-display", "none", "-monitor", "none", "-serial", "null", "-serial", "null"]
     command += ["-serial", board.path, "-semihosting-config", "enable=on,target=native"]
     try:
@@ -127,10 +126,6 @@ def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -
     assert set(forces) <= published
 
 
-def test_what_is_on_no_port_is_said_in_words(tmp_path: Path) -> None:
-    program = tmp_path / "example"
-    subprocess.run(
-        ["cc", "-std=gnu11", str(CLIENT / "example.c"), str(CLIENT / "biotac_client.c"), "-o", str(program)], check=True
-    )
+def test_what_is_on_no_port_is_said_in_words(program: Path) -> None:
     done = subprocess.run([str(program), "/dev/null", "1"], capture_output=True, text=True, check=False)
     assert done.returncode == 2 and "usage: example PORT FRAMES" in done.stderr

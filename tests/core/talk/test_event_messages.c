@@ -38,55 +38,48 @@ static void rest(void)
     host_forget();
 }
 
+// The payload of the only message with this id.
+static const uint8_t *only(uint8_t id)
+{
+    const uint8_t *payload = NULL;
+    assert_int_equal(host_count(id), 1);
+    for (int k = 0; k < host.count; k++) {
+        payload = host.message[k].id == id ? host.message[k].payload : payload;
+    }
+    return payload;
+}
+
+static const uint8_t none[BT_SLOTS];
+
 TEST(who_subscribes_is_told_in_the_slot_that_shows_it)
 {
+    bt_msg_event event;
+    bt_msg_touch touch;
+    uint8_t due[BT_SLOTS];
     rest();
     assert_int_equal(subscribe(1 << 3, BT_QUANTITY_FLAG_EVENTS | BT_QUANTITY_FLAG_TOUCH), BT_ERROR_OK);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 0 | 1 << 3, 0), BT_ERROR_OK);
-    host_forget();
     (void)played(3000);
-    uint8_t due[BT_SLOTS];
     memcpy(due, session.events_due, sizeof due);
     host_forget();
     uint8_t slot = played(2900);
     slot = slot == BT_SLOTS ? played(2900) : slot; // a far word waits for its second
-    assert_in_range(slot, 0, BT_SLOTS - 1);
-    assert_int_equal(host_count(BT_EVENT_ID), 1);
-    assert_int_equal(host_count(BT_TOUCH_ID), 1);
-    bt_msg_event event = {0};
-    bt_msg_touch touch = {0};
-    for (int k = 0; k < host.count; k++) {
-        if (host.message[k].id == BT_EVENT_ID) {
-            bt_msg_event_unpack(&event, host.message[k].payload);
-        } else if (host.message[k].id == BT_TOUCH_ID) {
-            bt_msg_touch_unpack(&touch, host.message[k].payload);
-        }
-    }
-    assert_int_equal(event.kind, BT_EVENT_KIND_TOUCH);
-    assert_int_equal(event.finger, 3);
-    assert_int_equal(event.slot, slot);
-    assert_int_equal(event.slot, touch.slot);
-    assert_int_equal(event.seq, touch.seq);
-    assert_int_equal(event.t_us, touch.t_us);
+    bt_msg_event_unpack(&event, only(BT_EVENT_ID));
+    bt_msg_touch_unpack(&touch, only(BT_TOUCH_ID));
+    assert_true(event.kind == BT_EVENT_KIND_TOUCH && event.finger == 3);
+    assert_true(event.slot == slot && event.slot == touch.slot);
+    assert_true(event.seq == touch.seq && event.t_us == touch.t_us);
     play(10, 2900);
-    uint8_t watched = session.finger[3].events.watched;
-    assert_int_equal(session.events_due[watched], 1 << 3);
+    assert_int_equal(session.events_due[session.finger[3].events.watched], 1 << 3);
     host_forget();
     play(2, 3000);
     assert_memory_equal(session.events_due, due, sizeof due); // nothing more to be watched
-    assert_int_equal(host_count(BT_EVENT_ID), 1);
-    bt_msg_event_unpack(&event, host.message[0].payload);
-    for (int k = 0; k < host.count; k++) {
-        if (host.message[k].id == BT_EVENT_ID) {
-            bt_msg_event_unpack(&event, host.message[k].payload);
-        }
-    }
+    bt_msg_event_unpack(&event, only(BT_EVENT_ID));
     assert_int_equal(event.kind, BT_EVENT_KIND_LIFT);
 }
 
 TEST(nobody_is_told_who_did_not_ask_or_does_not_stream)
 {
-    static const uint8_t none[BT_SLOTS];
     rest();
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 0x1F, 0), BT_ERROR_OK); // not subscribed
     play(20, 2900);
@@ -102,7 +95,6 @@ TEST(nobody_is_told_who_did_not_ask_or_does_not_stream)
 
 TEST(they_come_with_pac_alone_and_end_with_the_subscription)
 {
-    static const uint8_t none[BT_SLOTS];
     rest();
     assert_int_equal(subscribe(1 << 0, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(start(BT_STREAM_FLAG_PAC, 1 << 0, 0), BT_ERROR_OK);
