@@ -77,7 +77,7 @@ def test_a_healthy_finger_is_never_condemned(seed: int) -> None:
     assert not condemned(random_courses.make(recipe).run(pdc=recipe.pdc)).any()
 
 
-@pytest.mark.parametrize("hours", [0.5, pytest.param(20.0, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("hours", [0.25, pytest.param(20.0, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("life", ["new", "worn", "warming"])
 def test_a_long_life_of_presses_condemns_nothing_and_pressure_is_not_flat(life: str, hours: float) -> None:
     """The same half hour of presses again and again, with noise of its own each time."""

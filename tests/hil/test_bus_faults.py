@@ -68,11 +68,13 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, 
     assert np.count_nonzero(np.diff(of(faulty, 1)["t_us"]) == 2 * 10_000) == 1
 
 
+@pytest.mark.long
 def test_an_error_word_is_kept_for_the_user(play) -> None:
     _, status = play(hurt_by("error_word"))
     assert status[1].last_error_word == 0xA52D
 
 
+@pytest.mark.long
 def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     frames, _ = play(hurt_by("bad_parity", "E5"))
     faulty = of(frames, 1)
@@ -124,6 +126,7 @@ def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
     assert hand.stats.frames_lost == 0
 
 
+@pytest.mark.long
 def test_only_the_named_fingers_are_streamed(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
     hand.stream("force", fingers=[1, 4])
@@ -145,6 +148,7 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
         assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
 
 
+@pytest.mark.long
 def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
     board = rig.on_a_pty("press.toml", pace=1.0)
     with biotac.open(board.path) as hand:

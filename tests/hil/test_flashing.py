@@ -213,7 +213,7 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> N
 
 
 CUTS = [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1]
-BY_DAY = (1, SECTOR + 100, -1)
+BY_DAY = (SECTOR + 100, -1)
 
 
 @pytest.mark.parametrize("cut", [pytest.param(cut, marks=() if cut in BY_DAY else pytest.mark.long) for cut in CUTS])

@@ -32,8 +32,6 @@ SNAPSHOT = """() => {
   };
 }"""
 
-FIVE = "() => document.querySelectorAll('.finger').length === 5"
-
 
 def until(page: Any, condition: str, argument: Any = None) -> None:
     page.wait_for_function(condition, arg=argument)
@@ -86,10 +84,7 @@ def test_numbers_are_those_of_the_frame_with_that_number(view, open_page) -> Non
 
 def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     path = tmp_path / "press.mcap"
-    with biotac.open("sim:press.toml?seconds=6") as hand:
-        recorder = hand.record(path)
-        hand.read(60)
-        recorder.close()
+    record_all("sim:press.toml?seconds=6", path)
     recording = biotac.Recording(path)
     page = open_page(view(str(path), again=False))
     link_is(page, "playing")
@@ -111,8 +106,7 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
 
 def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, tmp_path) -> None:
     path = tmp_path / "press.mcap"
-    with biotac.open("sim:press.toml?seconds=60&fingers=2") as hand, hand.record(path):
-        hand.read(61)
+    record_all("sim:press.toml?seconds=60&fingers=2", path)
     biotac.Recording(path).mark("slip", 40.0)
     page = open_page(view(str(path)))
     link_is(page, "playing")
@@ -144,9 +138,9 @@ def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, t
     assert download.value.suggested_filename == "biotac.png"
 
 
-def test_five_fingers_are_a_hand_and_each_can_be_picked(view, open_page) -> None:
+def test_five_fingers_are_a_hand_on_every_screen_and_each_can_be_picked(view, open_page) -> None:
     page = open_page(view("sim:drift.toml?fingers=5"))
-    until(page, FIVE)
+    until(page, "() => document.querySelectorAll('.finger').length === 5")
     pick = "() => [...document.querySelectorAll('.finger[aria-pressed=true]')].map(b => b.dataset.finger).join()"
     shows = "f => [shown.textContent, numbers.dataset.finger].every((seen) => seen === f)"
     for act, finger in (
@@ -159,6 +153,13 @@ def test_five_fingers_are_a_hand_and_each_can_be_picked(view, open_page) -> None
         until(page, shows, finger)
         assert page.evaluate(pick) == finger
     until(page, "() => Number(document.querySelector('[data-key=framesPerS]').dataset.value) > 0")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    for place in (".finger[data-finger='0']", ".finger[data-finger='4']", "[data-key=framesPerS]", "#health", "#link"):
+        box = page.locator(place).bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] <= 800, place
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 1280, place
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 360
 
 
 def test_tare_by_button_and_by_key(view, open_page) -> None:
@@ -172,17 +173,19 @@ def test_tare_by_button_and_by_key(view, open_page) -> None:
     told(page, "Tared fingers 0, 1.")
 
 
-def test_a_refused_command_says_why(make_player, view_of, open_page, touch) -> None:
+def test_a_refused_command_says_why_and_moves_nothing(make_player, view_of, open_page, touch) -> None:
     player = make_player()
-    player.refusal = biotac.CommandRefusedError("the board refused TareNow: NOT_STILL (release the finger)")
+    player.refusal = biotac.CommandRefusedError("finger 1: NOT_STILL " + "(release the finger, and more words) " * 4)
     player.script.put(touch)
     page = open_page(view_of(lambda: player), expect="409")
     link_is(page, "live")
     page.wait_for_selector(".finger")
     page.keyboard.press("1")
+    before = page.locator("main").bounding_box()
     page.keyboard.press("t")
     told(page, "NOT_STILL")
     assert page.get_attribute("#told", "data-kind") == "bad"
+    assert page.locator("main").bounding_box() == before
     assert player.commands == [("tare", 1)]
 
 
@@ -386,13 +389,7 @@ def test_keys_are_listed_and_do_nothing_behind_the_list(make_player, view_of, op
     assert player.commands == [("tare", None)]
 
 
-def test_nothing_hangs_over_a_phones_edge(view, open_page) -> None:
-    page = open_page(view("sim:drift.toml?fingers=5"), viewport={"width": 360, "height": 740})
-    until(page, FIVE)
-    assert page.evaluate("() => document.documentElement.scrollWidth") <= 360
-
-
-def test_the_spectrum_is_numpys(view, open_page) -> None:
+def test_the_spectrum_is_numpys_and_texts_of_marks_never_overprint(view, open_page) -> None:
     page = open_page(view("sim:drift.toml"))
     samples = np.random.default_rng(5).normal(2000, 30, 1024) + 40 * np.sin(np.arange(1024) * 0.9)
     seen = page.evaluate("async (s) => [...(await import('./spectrum.js')).amplitudes(s)]", samples.tolist())
@@ -423,10 +420,7 @@ def test_the_spectrum_is_numpys(view, open_page) -> None:
         }"""
     )
     assert abs(strongest["hz"] - 300) < 2200 / 128 and strongest["before"] == 0
-
-
-def test_texts_of_marks_never_overprint(view, open_page) -> None:
-    page = open_page(view("sim:drift.toml"))
+    # Texts of marks never overprint.
     places = page.evaluate("""async () => {
       const { Finger } = await import('./model.js');
       const { TimePlot } = await import('./plots.js');
@@ -473,16 +467,6 @@ def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open
         assert page.evaluate(pixel, [across, along + 0.6]) == [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
 
 
-def test_five_fingers_and_the_link_are_seen_at_once_on_a_small_screen(view, open_page) -> None:
-    page = open_page(view("sim:drift.toml?fingers=5"))
-    page.set_viewport_size({"width": 1280, "height": 800})
-    until(page, FIVE)
-    for place in (".finger[data-finger='0']", ".finger[data-finger='4']", "[data-key=framesPerS]", "#health", "#link"):
-        box = page.locator(place).bounding_box()
-        assert box["y"] >= 0 and box["y"] + box["height"] <= 800, place
-        assert box["x"] >= 0 and box["x"] + box["width"] <= 1280, place
-
-
 @pytest.mark.parametrize(("contact", "heavy"), [(biotac.FrameFlags.CONTACT, "600"), (biotac.FrameFlags(0), "400")])
 def test_without_contact_numbers_are_dim_and_notices_are_apart(
     make_player, view_of, open_page, touch, contact: biotac.FrameFlags, heavy: str
@@ -498,15 +482,3 @@ def test_without_contact_numbers_are_dim_and_notices_are_apart(
     named = "place => [...document.querySelectorAll(`${place} li`)].map(e => e.dataset.flag).sort().join()"
     assert page.evaluate(named, "#flags") == "FAULT"
     assert page.evaluate(named, "#notices").replace("CONTACT,", "") == "FX_WEAK,MX_DERIVED"
-
-
-def test_nothing_moves_when_a_command_is_refused(make_player, view_of, open_page, touch) -> None:
-    player = make_player()
-    player.refusal = biotac.CommandRefusedError("finger 0: " + "the signals move too much to tare, and more words " * 4)
-    player.script.put(touch)
-    page = open_page(view_of(lambda: player), expect="409")
-    page.wait_for_selector(".finger")
-    before = page.locator("main").bounding_box()
-    page.click("#tare")
-    until(page, "() => told.dataset.kind === 'bad'")
-    assert page.locator("main").bounding_box() == before
