@@ -1,9 +1,8 @@
 // A wrench map's blob at the door.
 #include "map_words.h"
 
-static void a_blob_is_read_where_it_lies(void **state)
+TEST(a_blob_is_read_where_it_lies)
 {
-    (void)state;
     static blob its;
     bt_map map;
     one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_X, 2, -7);
@@ -24,9 +23,8 @@ static void assert_refused(blob *its, uint8_t error)
     assert_int_equal(map.axes, 0);
 }
 
-static void every_byte_of_the_head_is_judged(void **state)
+TEST(every_byte_of_the_head_is_judged)
 {
-    (void)state;
     static const struct {
         int at;
         uint8_t value, error;
@@ -66,9 +64,8 @@ static void every_byte_of_the_head_is_judged(void **state)
     }
 }
 
-static void every_length_but_one_is_refused(void **state)
+TEST(every_length_but_one_is_refused)
 {
-    (void)state;
     static blob its; // of zeros, no map at all
     bt_map map;
     assert_int_equal(bt_map_open(&map, bytes_of(&its), BT_MAP_HEADER_BYTES - 1), BT_ERROR_BAD_LENGTH);
@@ -87,9 +84,8 @@ static void every_length_but_one_is_refused(void **state)
     assert_int_equal(bt_map_open(&map, bytes_of(&its) + 2, 4 * its.words), BT_ERROR_OUT_OF_RANGE);
 }
 
-static void a_block_comes_once(void **state)
+TEST(a_block_comes_once)
 {
-    (void)state;
     static blob its;
     bt_map map;
     for (uint32_t second = 0; second < BT_MAP_GATES; second++) {
@@ -120,9 +116,8 @@ static void spread(blob *its, uint32_t kind, uint32_t axis, uint32_t first, int3
 #define SIGNAL           (4095 << 2)
 #define CONDUCTANCE      (3 << 13)
 
-static void coefficients_are_bounded_sum_by_sum(void **state)
+TEST(coefficients_are_bounded_sum_by_sum)
 {
-    (void)state;
     static const int32_t most[BT_MAP_KINDS] = {[BT_MAP_KIND_SIGNAL] = LINE_MAX(SIGNAL),
                                                [BT_MAP_KIND_COMPRESSION] = LINE_MAX(SIGNAL),
                                                [BT_MAP_KIND_BULGE] = LINE_MAX(SIGNAL),
@@ -151,9 +146,8 @@ static void coefficients_are_bounded_sum_by_sum(void **state)
 }
 
 // Every row may be small enough, and what they come to together not: 19 of (row >> 16) + 1 times a factor.
-static void rows_are_bounded_together(void **state)
+TEST(rows_are_bounded_together)
 {
-    (void)state;
     static blob its;
     bt_map map;
     for (uint32_t axis = 0; axis < 7; axis++) {
@@ -169,9 +163,8 @@ static void rows_are_bounded_together(void **state)
 }
 
 // Two blocks of 2^30 fit, a third does not.
-static void blocks_are_bounded_together(void **state)
+TEST(blocks_are_bounded_together)
 {
-    (void)state;
     static blob its;
     for (uint32_t count = 2; count <= 3; count++) {
         bt_map map;

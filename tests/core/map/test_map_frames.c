@@ -52,9 +52,8 @@ static void mixed_map(blob *its, bt_map *map, uint32_t axes)
     assert_int_equal(opened(its, map), BT_ERROR_OK);
 }
 
-static void a_mapped_frame_has_the_maps_force_and_says_so(void **state)
+TEST(a_mapped_frame_has_the_maps_force_and_says_so)
 {
-    (void)state;
     static blob its;
     bt_map map;
     emulated_finger finger = pressed();
@@ -93,9 +92,8 @@ static void a_mapped_frame_has_the_maps_force_and_says_so(void **state)
     }
 }
 
-static void without_pressure_a_map_that_needs_it_gives_nothing(void **state)
+TEST(without_pressure_a_map_that_needs_it_gives_nothing)
 {
-    (void)state;
     static blob its;
     bt_map map;
     emulated_finger finger = pressed();
@@ -124,9 +122,8 @@ static void without_pressure_a_map_that_needs_it_gives_nothing(void **state)
                          BT_INVALID_I32);
 }
 
-static void what_is_not_asked_for_changes_nothing_that_is(void **state)
+TEST(what_is_not_asked_for_changes_nothing_that_is)
 {
-    (void)state;
     static blob its;
     bt_map map;
     emulated_finger finger = pressed();

@@ -20,9 +20,8 @@ static void set(uint16_t values[BT_ELECTRODES], uint16_t value)
     }
 }
 
-static void a_sum_worked_by_hand(void **state)
+TEST(a_sum_worked_by_hand)
 {
-    (void)state;
     static blob its;
     bt_map map;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
@@ -53,9 +52,8 @@ static void a_sum_worked_by_hand(void **state)
 }
 
 // Each pair once: of two electrodes that move, what stands beside their product is what comes out.
-static void every_pair_has_a_place_in_the_ring(void **state)
+TEST(every_pair_has_a_place_in_the_ring)
 {
-    (void)state;
     static blob its;
     bt_map map;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
@@ -74,9 +72,8 @@ static void every_pair_has_a_place_in_the_ring(void **state)
     }
 }
 
-static void an_offset_and_pressure_stand_alone(void **state)
+TEST(an_offset_and_pressure_stand_alone)
 {
-    (void)state;
     static blob its;
     bt_map map;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
@@ -100,9 +97,8 @@ static void an_offset_and_pressure_stand_alone(void **state)
 
 // u = G(c)/G(t) - 1 of every count at some tares, against the real number: within half a unit of 2^-13 and
 // 0.52 units times u. Every divisor's reciprocal is among them.
-static void conductance_is_right_at_every_count(void **state)
+TEST(conductance_is_right_at_every_count)
 {
-    (void)state;
     static blob its;
     bt_map map;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
@@ -130,9 +126,8 @@ static void conductance_is_right_at_every_count(void **state)
 }
 
 // A block of 2^27 times its gate, cut by 2^15 and over 2^12, is the gate in 2^-13; against the real centroid.
-static void gates_are_the_compressions_centroid(void **state)
+TEST(gates_are_the_compressions_centroid)
 {
-    (void)state;
     static blob its;
     uint64_t seed = 12;
     double reached[BT_MAP_GATES] = {0};
@@ -186,9 +181,8 @@ static void gates_are_the_compressions_centroid(void **state)
 }
 
 // All bits of every sum in use: a map at its bounds, all counts at one end or the other. Sanitizers watch.
-static void no_count_overflows_a_map_at_its_bounds(void **state)
+TEST(no_count_overflows_a_map_at_its_bounds)
 {
-    (void)state;
     static blob its;
     uint64_t seed = 5;
     static const uint16_t ends[] = {0, 1, 4090, 4095, BT_INVALID_COUNT};
@@ -238,9 +232,8 @@ static void no_count_overflows_a_map_at_its_bounds(void **state)
     }
 }
 
-static void results_saturate_with_their_sign(void **state)
+TEST(results_saturate_with_their_sign)
 {
-    (void)state;
     static blob its;
     bt_map map;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
@@ -258,9 +251,8 @@ static void results_saturate_with_their_sign(void **state)
     assert_true(torque[2] == -BT_MAP_RESULT_MAX && torsion == BT_MAP_RESULT_MAX);
 }
 
-static void torque_is_the_second_three_and_only_where_there_is_one(void **state)
+TEST(torque_is_the_second_three_and_only_where_there_is_one)
 {
-    (void)state;
     static blob its;
     bt_map map;
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
@@ -293,9 +285,8 @@ static void torque_is_the_second_three_and_only_where_there_is_one(void **state)
 
 // The same columns in all seven axes give one and the same number seven times, whatever the kind: torsion's
 // rows are summed apart from the others'.
-static void torsion_is_summed_as_the_others_are(void **state)
+TEST(torsion_is_summed_as_the_others_are)
 {
-    (void)state;
     static blob its;
     uint64_t seed = 21;
     for (uint32_t k = 0; k < BT_MAP_KINDS * BT_MAP_GATES; k++) {

@@ -1,6 +1,7 @@
 // The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and what is unlike
 // the training goes along the normals.
 #include "keep/settings.h"
+#include "map/complete.h"
 #include "map/population.h"
 #include "map/population_gen.h"
 #include "solve/solve.h"
@@ -13,9 +14,8 @@ static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7,
                                               0,  1,  2,  3,  4,  5,  16, 17, 18};
 
 // The map that the firmware carries is one that it would take from a host, which proves its sums' bounds.
-static void the_map_is_as_it_is_opened(void **state)
+TEST(the_map_is_as_it_is_opened)
 {
-    (void)state;
     bt_map map;
     const bt_map *its = &bt_population;
     assert_int_equal(bt_map_open(&map, its->serial - 4, BT_POPULATION_BYTES), BT_ERROR_OK);
@@ -26,9 +26,8 @@ static void the_map_is_as_it_is_opened(void **state)
 }
 
 // Every choice of extremes that a sign pattern makes; the sanitizer looks for what the bounds missed.
-static void extremes_do_not_overflow(void **state)
+TEST(extremes_do_not_overflow)
 {
-    (void)state;
     static const uint16_t tares_q4[] = {0, 16, 800, 32000, 65440, 65520};
     uint32_t seed = 1;
     for (int k = 0; k < 60000; k++) {
@@ -70,9 +69,8 @@ static const int32_t plate[BT_ELECTRODES] = {300, 0, 100, 300, 100, 300, -100, -
                                              300, 0, 100, 300, 100, 300, -800, 0,    100};
 
 // As it is defined, by division: how far the map is off the normals, and how much of 1024 counts is there.
-static void the_likeness_is_what_it_is_defined_as(void **state)
+TEST(the_likeness_is_what_it_is_defined_as)
 {
-    (void)state;
     uint32_t seed = 5;
     int mixed = 0;
     for (int k = 0; k < 20000; k++) {
@@ -123,9 +121,8 @@ static void the_likeness_is_what_it_is_defined_as(void **state)
     assert_true(at_rest.share == 0 && at_rest.outside && at_rest.strength_100un == 0);
 }
 
-static void a_mirrored_finger_is_as_like(void **state)
+TEST(a_mirrored_finger_is_as_like)
 {
-    (void)state;
     uint32_t seed = 9;
     for (int k = 0; k < 5000; k++) {
         int32_t e_q4[BT_ELECTRODES], image_q4[BT_ELECTRODES], force[3], mirrored[3];
@@ -159,9 +156,8 @@ static uint32_t published(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un
 
 // Nothing in the training is like a point that presses on one electrode or between two; the skin's normal
 // there, at most 45 degrees off, is what is known.
-static void a_poke_presses_in_along_the_skins_normal(void **state)
+TEST(a_poke_presses_in_along_the_skins_normal)
 {
-    (void)state;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         for (int other = 0; other < BT_ELECTRODES; other++) {
             const int16_t *r = bt_electrode_um[i], *s = bt_electrode_um[other];
@@ -187,9 +183,8 @@ static void a_poke_presses_in_along_the_skins_normal(void **state)
 }
 
 // Whoever gave one axis a gain of his own means Lin's force by his gains, on all axes.
-static void any_gain_of_ones_own_takes_the_population_away(void **state)
+TEST(any_gain_of_ones_own_takes_the_population_away)
 {
-    (void)state;
     static const uint8_t gains[] = {BT_SETTING_FORCE_GAIN_X_NN, BT_SETTING_FORCE_GAIN_Y_NN,
                                     BT_SETTING_FORCE_GAIN_Z_NN};
     bt_settings all;
@@ -206,9 +201,8 @@ static void any_gain_of_ones_own_takes_the_population_away(void **state)
 }
 
 // A plate that touches, one between, and one that presses: along the normals, some of both, the map's.
-static void sigma_is_mixed_as_force_is(void **state)
+TEST(sigma_is_mixed_as_force_is)
 {
-    (void)state;
     static const int eighths[] = {3, 5, 8};
     uint16_t sigma[3][3];
     for (int k = 0; k < 3; k++) {
@@ -231,14 +225,29 @@ static void sigma_is_mixed_as_force_is(void **state)
 }
 
 // Where nothing is compressed, no direction is known: the contact is beyond the electrodes.
-static void what_only_bulges_is_outside(void **state)
+TEST(what_only_bulges_is_outside)
 {
-    (void)state;
     int32_t e_q4[BT_ELECTRODES], force[3];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         e_q4[i] = i % 2 == 0 ? 16 * 200 : -16 * 12;
     }
     assert_true(published(e_q4, force) & BT_FRAME_FLAG_OUTSIDE);
+}
+
+// Whatever its neighbours say: a count that a live electrode can have.
+TEST(an_electrode_that_is_estimated_stays_in_its_range)
+{
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int up = 0; up <= 1; up++) {
+            uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES], completed[BT_ELECTRODES];
+            for (int k = 0; k < BT_ELECTRODES; k++) {
+                counts[k] = up ? 4089 : 1;
+                tare_q4[k] = k == i ? (up ? 16 * 4085 : 16 * 5) : 16 * 2000;
+            }
+            bt_complete(counts, tare_q4, 1u << i, completed);
+            assert_in_range(completed[i], 1, 4089);
+        }
+    }
 }
 
 int main(void)
@@ -252,6 +261,7 @@ int main(void)
         cmocka_unit_test(any_gain_of_ones_own_takes_the_population_away),
         cmocka_unit_test(sigma_is_mixed_as_force_is),
         cmocka_unit_test(what_only_bulges_is_outside),
+        cmocka_unit_test(an_electrode_that_is_estimated_stays_in_its_range),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

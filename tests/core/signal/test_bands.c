@@ -60,9 +60,8 @@ static void smoothed(double *in, int n, int apart, int worth, double energy[ROUN
     memcpy(in, out, (size_t)n * sizeof *in);
 }
 
-static void are_what_six_smoothers_take_away(void **state)
+TEST(are_what_six_smoothers_take_away)
 {
-    (void)state;
     static double line[SAMPLES], energy[BT_BANDS][ROUNDS];
     uint64_t seed = 5;
     for (int k = 0; k < SAMPLES; k++) { // steps, and noise that grows to the whole range
@@ -89,9 +88,8 @@ static void are_what_six_smoothers_take_away(void **state)
     }
 }
 
-static void are_octaves(void **state)
+TEST(are_octaves)
 {
-    (void)state;
     static const double hz[BT_BANDS] = {18, 36, 72, 147, 309, 800};
     for (int band = 0; band < BT_BANDS; band++) {
         (void)anew(NULL);
@@ -112,9 +110,8 @@ static void are_octaves(void **state)
 
 // ---- lost words --------------------------------------------------------------------------------
 
-static void hold_the_last_good_word_for_a_lost_one(void **state)
+TEST(hold_the_last_good_word_for_a_lost_one)
 {
-    (void)state;
     uint32_t lossy[BT_BANDS], held[BT_BANDS];
     sine(100, 300);
     uint16_t round[BT_PAC_PER_FRAME];
@@ -131,9 +128,8 @@ static void hold_the_last_good_word_for_a_lost_one(void **state)
     assert_memory_equal(lossy, held, sizeof held);
 }
 
-static void of_no_good_word_are_invalid_and_begin_with_the_first(void **state)
+TEST(of_no_good_word_are_invalid_and_begin_with_the_first)
 {
-    (void)state;
     uint16_t round[BT_PAC_PER_FRAME];
     uint32_t energy[BT_BANDS];
     memset(round, 0xFF, sizeof round);

@@ -45,9 +45,8 @@ static void comes_back(bt_silence *silence, uint32_t gap_us, unsigned sweeps)
     }
 }
 
-static void rounds_that_are_lost_are_no_silence(void **state)
+TEST(rounds_that_are_lost_are_no_silence)
 {
-    (void)state;
     bt_silence silence = on_time();
     assert_false(next(&silence, ROUND_US + SWEEP_US - 1, 1));
     for (unsigned round = 0; round < 10; round++) {
@@ -56,9 +55,8 @@ static void rounds_that_are_lost_are_no_silence(void **state)
     assert_int_equal(silence.sweeps, 0);
 }
 
-static void a_silence_is_counted_in_whole_sweeps_and_told_once(void **state)
+TEST(a_silence_is_counted_in_whole_sweeps_and_told_once)
 {
-    (void)state;
     const struct {
         uint32_t gap_us;
         unsigned sweeps;
@@ -69,26 +67,23 @@ static void a_silence_is_counted_in_whole_sweeps_and_told_once(void **state)
     }
 }
 
-static void one_after_another_is_counted_alone(void **state)
+TEST(one_after_another_is_counted_alone)
 {
-    (void)state;
     bt_silence silence = on_time();
     comes_back(&silence, ROUND_US + 10 * SWEEP_US, 10);
     comes_back(&silence, ROUND_US + 3 * SWEEP_US, 3);
 }
 
-static void one_in_the_middle_of_coming_back_adds_to_it(void **state)
+TEST(one_in_the_middle_of_coming_back_adds_to_it)
 {
-    (void)state;
     bt_silence silence = on_time();
     assert_false(next(&silence, ROUND_US + 10 * SWEEP_US, 1));
     assert_false(next(&silence, ROUND_US, 1));
     comes_back(&silence, ROUND_US + 3 * SWEEP_US, 13); // and its sums are the later rounds' alone
 }
 
-static void what_does_not_fit_stays_at_its_largest(void **state)
+TEST(what_does_not_fit_stays_at_its_largest)
 {
-    (void)state;
     bt_silence silence = on_time();
     assert_false(next(&silence, ROUND_US + 50000 * SWEEP_US, 1));
     comes_back(&silence, ROUND_US + 50000 * SWEEP_US, UINT16_MAX);

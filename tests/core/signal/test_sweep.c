@@ -39,9 +39,8 @@ static void random_lanes(uint64_t *seed, bt_lanes *smooth)
     }
 }
 
-static void every_mean_is_that_of_its_last_eight_rounds(void **state)
+TEST(every_mean_is_that_of_its_last_eight_rounds)
 {
-    (void)state;
     uint64_t seed = 61;
     bt_sweep sweep;
     bt_lanes smooth;
@@ -63,9 +62,8 @@ static void every_mean_is_that_of_its_last_eight_rounds(void **state)
     assert_true(closed > 1000);
 }
 
-static void a_lane_met_at_any_phase_has_its_first_word_for_what_was_before(void **state)
+TEST(a_lane_met_at_any_phase_has_its_first_word_for_what_was_before)
 {
-    (void)state;
     uint64_t seed = 62;
     for (int at = 1; at < 3 * ROUNDS; at++) {
         for (unsigned lane = 0; lane < BT_LANES; lane++) {
@@ -105,9 +103,8 @@ static void a_sweep_of(bt_sweep *sweep, const bt_lanes *smooth)
     }
 }
 
-static void still_sweeps_are_counted_and_saturate(void **state)
+TEST(still_sweeps_are_counted_and_saturate)
 {
-    (void)state;
     bt_sweep sweep;
     bt_lanes smooth;
     for (int i = 0; i < BT_LANES; i++) {
@@ -123,9 +120,8 @@ static void still_sweeps_are_counted_and_saturate(void **state)
     assert_int_equal(sweep.still_sweeps, 1);
 }
 
-static void any_mean_that_leaves_the_span_ends_the_stillness(void **state)
+TEST(any_mean_that_leaves_the_span_ends_the_stillness)
 {
-    (void)state;
     for (unsigned lane = 0; lane < BT_LANES; lane++) {
         for (int change = -30; change <= 30; change++) {
             bt_sweep sweep;
@@ -157,9 +153,8 @@ static void any_mean_that_leaves_the_span_ends_the_stillness(void **state)
 
 // ---- in the machine --------------------------------------------------------------------------------
 
-static void the_machine_serves_the_means_of_what_the_gate_let_through(void **state)
+TEST(the_machine_serves_the_means_of_what_the_gate_let_through)
 {
-    (void)state;
     uint64_t seed = 63;
     emulated_finger finger;
     finger_init(&finger);

@@ -53,9 +53,8 @@ static uint32_t round_energy(bt_trigger *trigger, int32_t limit, const uint16_t 
 
 // ---- glitches --------------------------------------------------------------------------------------
 
-static void lone_glitches_of_any_size_reach_neither_energy_nor_means(void **state)
+TEST(lone_glitches_of_any_size_reach_neither_energy_nor_means)
 {
-    (void)state;
     uint16_t rest[BT_ELECTRODES], word[BT_ELECTRODES];
     bt_sweep sweep;
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -80,9 +79,8 @@ static void lone_glitches_of_any_size_reach_neither_energy_nor_means(void **stat
     assert_int_equal(round_energy(&trigger, LIMIT, word), 24 * 24);
 }
 
-static void a_jump_and_a_gap_are_forgotten(void **state)
+TEST(a_jump_and_a_gap_are_forgotten)
 {
-    (void)state;
     static const uint16_t gaps[] = {BT_INVALID_COUNT, 0, 4090, 4095};
     emulated_finger resting = resting_finger();
     for (int k = 0; k < 4; k++) {
@@ -105,9 +103,8 @@ static void a_jump_and_a_gap_are_forgotten(void **state)
 
 // ---- touches ---------------------------------------------------------------------------------------
 
-static void the_slot_told_is_that_in_which_the_sum_passes_the_threshold(void **state)
+TEST(the_slot_told_is_that_in_which_the_sum_passes_the_threshold)
 {
-    (void)state;
     uint64_t seed = 42;
     int seen[BT_ELECTRODES + 1] = {0};
     emulated_finger resting = resting_finger();
@@ -136,9 +133,8 @@ static void the_slot_told_is_that_in_which_the_sum_passes_the_threshold(void **s
     }
 }
 
-static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
+TEST(pressure_opens_the_gate_and_leaves_the_energy_alone)
 {
-    (void)state;
     emulated_finger resting = resting_finger();
     for (int above = -12; above <= 300; above++) {
         emulated_finger finger = resting;
@@ -159,9 +155,8 @@ static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
 }
 
 // What is above by as much as it may be is no touch, nor is what uses up all room; one more of either is.
-static void the_edges_of_pressure_and_room_are_no_touch(void **state)
+TEST(the_edges_of_pressure_and_room_are_no_touch)
 {
-    (void)state;
     uint16_t counts[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         counts[i] = 2000;
@@ -187,9 +182,8 @@ static void the_edges_of_pressure_and_room_are_no_touch(void **state)
     }
 }
 
-static void pressure_without_a_known_rest_opens_nothing(void **state)
+TEST(pressure_without_a_known_rest_opens_nothing)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     bt_baseline base = finger.tare.base;
     base.pdc_q16 = BT_TARE_UNKNOWN;
@@ -203,9 +197,8 @@ static void pressure_without_a_known_rest_opens_nothing(void **state)
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
 }
 
-static void the_gate_stays_shut_where_nobody_rests(void **state)
+TEST(the_gate_stays_shut_where_nobody_rests)
 {
-    (void)state;
     uint64_t seed = 44;
     emulated_finger init, contact = touched_finger(400, 0), fault = resting_finger();
     finger_init(&init);
@@ -233,11 +226,25 @@ static void the_gate_stays_shut_where_nobody_rests(void **state)
     }
 }
 
+TEST(an_electrode_that_is_left_out_is_not_used)
+{
+    uint16_t rest[BT_ELECTRODES], word[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        rest[i] = 2000;
+        word[i] = i == 4 ? 1000 : i == 7 ? 1980 : 2000;
+    }
+    bt_trigger trigger = rested_trigger(rest);
+    bt_trigger_leave_out(&trigger, 1u << 4);
+    for (int round = 0; round < 3; round++) {
+        assert_int_equal(round_energy(&trigger, LIMIT, word), 400); // of E8 alone
+        assert_int_equal(trigger.without, 1u << 4);
+    }
+}
+
 // ---- the energy ------------------------------------------------------------------------------------
 
-static void the_energy_is_the_brute_force_sum_of_squares(void **state)
+TEST(the_energy_is_the_brute_force_sum_of_squares)
 {
-    (void)state;
     static const uint16_t bad[] = {BT_INVALID_COUNT, 0, 4090, 4095};
     uint64_t seed = 45;
     uint16_t rest[BT_ELECTRODES], word[BT_ELECTRODES];
@@ -270,9 +277,8 @@ static void the_energy_is_the_brute_force_sum_of_squares(void **state)
     }
 }
 
-static void the_ends_of_the_range_do_not_overflow(void **state)
+TEST(the_ends_of_the_range_do_not_overflow)
 {
-    (void)state;
     static const int32_t limits[] = {50, 1000, 3 * BT_SETTING_CONTACT_ENERGY_COUNT2_MAX};
     uint16_t low[BT_ELECTRODES], high[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -305,6 +311,7 @@ int main(void)
         cmocka_unit_test(the_edges_of_pressure_and_room_are_no_touch),
         cmocka_unit_test(pressure_without_a_known_rest_opens_nothing),
         cmocka_unit_test(the_gate_stays_shut_where_nobody_rests),
+        cmocka_unit_test(an_electrode_that_is_left_out_is_not_used),
         cmocka_unit_test(the_energy_is_the_brute_force_sum_of_squares),
         cmocka_unit_test(the_ends_of_the_range_do_not_overflow),
     };

@@ -141,9 +141,8 @@ static gains_nn random_gains(uint64_t *seed)
 static const gains_nn largest_gains = {{BT_GAIN_MAX_NN, -BT_GAIN_MAX_NN, BT_GAIN_MAX_NN},
                                        {-BT_GAIN_MAX_NN, BT_GAIN_MAX_NN}};
 
-static void single_electrodes_at_every_size(void **state)
+TEST(single_electrodes_at_every_size)
 {
-    (void)state;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         for (int32_t size = 1; size <= BT_E_MAX_Q4; size = size * 2 + (size % 3 == 0)) {
             int32_t e[BT_ELECTRODES] = {0};
@@ -156,9 +155,8 @@ static void single_electrodes_at_every_size(void **state)
     }
 }
 
-static void all_electrodes_equal(void **state)
+TEST(all_electrodes_equal)
 {
-    (void)state;
     for (int32_t size = -BT_E_MAX_Q4; size <= BT_E_MAX_Q4; size += size > -40 && size < 40 ? 1 : 7) {
         int32_t e[BT_ELECTRODES];
         for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -169,9 +167,8 @@ static void all_electrodes_equal(void **state)
     }
 }
 
-static void corners_of_the_box(void **state)
+TEST(corners_of_the_box)
 {
-    (void)state;
     uint64_t seed = 5;
     for (int k = 0; k < 30000; k++) {
         // Corners, then corners with zeros among them; the first two are all down and all up.
@@ -185,9 +182,8 @@ static void corners_of_the_box(void **state)
     }
 }
 
-static void corners_that_make_every_sum_largest(void **state)
+TEST(corners_that_make_every_sum_largest)
 {
-    (void)state;
     for (int d = 0; d < 3; d++) {
         for (int up = -1; up <= 1; up += 2) {
             int32_t by_normal[BT_ELECTRODES], by_arm[BT_ELECTRODES], by_place[BT_ELECTRODES];
@@ -204,9 +200,8 @@ static void corners_that_make_every_sum_largest(void **state)
 }
 
 // n = 1: E10 (1299 um) and E17 (-2800 um) reach every whole number between them.
-static void contacts_at_the_seam(void **state)
+TEST(contacts_at_the_seam)
 {
-    (void)state;
     int hits[7] = {0};
     for (int32_t a = 1; a <= BT_E_MAX_Q4; a++) {
         for (int64_t want = -3; want <= 3; want++) {
@@ -223,9 +218,8 @@ static void contacts_at_the_seam(void **state)
     }
 }
 
-static void random_frames_in_all_sizes(void **state)
+TEST(random_frames_in_all_sizes)
 {
-    (void)state;
     static const int32_t sizes[7] = {1, 16, 80, 800, 8000, 32000, BT_E_MAX_Q4};
     uint64_t seed = 8;
     for (int k = 0; k < 200000; k++) {
@@ -241,9 +235,8 @@ static void random_frames_in_all_sizes(void **state)
 }
 
 // The bounds above are what can be proved frame by frame; this is what the headers promise.
-static void the_worst_of_all_is_within_what_is_promised(void **state)
+TEST(the_worst_of_all_is_within_what_is_promised)
 {
-    (void)state;
     print_message("worst: PoC %.4f um, force %.5f mN, torque y,z %.4f mN*mm\n", worst.poc_um, worst.force_mn,
                   worst.torque_yz_mnmm);
     assert_true(worst.poc_um <= 1.1);

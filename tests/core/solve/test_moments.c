@@ -23,9 +23,8 @@ static void draw_signals(uint64_t *seed, int k, int32_t e_q4[BT_ELECTRODES])
 }
 
 // Each part that is cut loses less than one unit, and x behind the seam is cut twice.
-static void moments_of_squares_lose_only_what_is_cut(void **state)
+TEST(moments_of_squares_lose_only_what_is_cut)
 {
-    (void)state;
     static const int64_t lost[3] = {3, 2, 2};
     uint64_t seed = 41;
     for (int k = 0; k < 200000; k++) {
@@ -49,9 +48,8 @@ static void moments_of_squares_lose_only_what_is_cut(void **state)
     }
 }
 
-static void linear_moments_are_exact_or_cut_once(void **state)
+TEST(linear_moments_are_exact_or_cut_once)
 {
-    (void)state;
     uint64_t seed = 42;
     int halves[2] = {0};
     for (int k = 0; k < 200000; k++) {
@@ -88,9 +86,8 @@ static void check_ratio(int64_t backward, uint32_t total, int bits, int64_t off)
 }
 
 // On both sides of every value of x at which it rounds the other way.
-static void x_on_the_cylinder_is_correctly_rounded(void **state)
+TEST(x_on_the_cylinder_is_correctly_rounded)
 {
-    (void)state;
     static const struct {
         int bits;
         int64_t off, first, last; // totals

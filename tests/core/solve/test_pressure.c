@@ -22,9 +22,8 @@ static bt_pressure with_filter(int32_t filter_milli)
 // Eq 3 in double over random words, steps over the whole range among them. Each step is rounded to 1/256
 // count, and of an error alpha is forgotten with each word, so it stays below 1/512 / alpha; publishing adds
 // 1/32.
-static void the_filter_is_the_papers_within_its_rounding(void **state)
+TEST(the_filter_is_the_papers_within_its_rounding)
 {
-    (void)state;
     static const int alphas[] = {10, 37, 100, 333, 500, 501, 750, 999, 1000};
     uint64_t seed = 2015;
     for (size_t a = 0; a < sizeof alphas / sizeof *alphas; a++) {
@@ -43,9 +42,8 @@ static void the_filter_is_the_papers_within_its_rounding(void **state)
     }
 }
 
-static void a_missing_or_railed_word_is_invalid_and_the_next_begins_anew(void **state)
+TEST(a_missing_or_railed_word_is_invalid_and_the_next_begins_anew)
 {
-    (void)state;
     static const uint16_t bad[] = {BT_INVALID_COUNT, 0, BT_RAIL_COUNT, BT_FULL_SCALE_COUNT};
     for (int b = 0; b < 4; b++) {
         bt_pressure pressure = with_filter(500);
@@ -64,9 +62,8 @@ static void assert_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_nn
     assert_int_equal(bt_pressure_force(filtered_q4, tare_q4, gain_nn), (int32_t)roundl(exact));
 }
 
-static void the_force_is_the_exact_product_rounded_once(void **state)
+TEST(the_force_is_the_exact_product_rounded_once)
 {
-    (void)state;
     static const uint16_t ends[] = {0, 1, 16, 21216, 21217, BT_E_MAX_Q4 - 1, BT_E_MAX_Q4};
     for (int f = 0; f < 7; f++) {
         for (int t = 0; t < 7; t++) {
@@ -83,9 +80,8 @@ static void the_force_is_the_exact_product_rounded_once(void **state)
     }
 }
 
-static void without_pressure_or_rest_or_a_gain_there_is_no_force(void **state)
+TEST(without_pressure_or_rest_or_a_gain_there_is_no_force)
 {
-    (void)state;
     assert_int_equal(bt_pressure_force(BT_INVALID_COUNT, 16, GAIN_NN), INT32_MIN);
     assert_int_equal(bt_pressure_force(16, BT_INVALID_COUNT, GAIN_NN), INT32_MIN);
     assert_int_equal(bt_pressure_force(16 * 1050, 16 * 1000, 0), INT32_MIN);

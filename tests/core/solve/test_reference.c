@@ -23,9 +23,8 @@ static lin2013_result run(const double e[BT_ELECTRODES], int weights)
     return result;
 }
 
-static void two_points_of_contact_worked_by_hand(void **state)
+TEST(two_points_of_contact_worked_by_hand)
 {
-    (void)state;
     // E17 and E18, twice as strong: both at y = 0, z = -5.08; x = (-2.8 - 4 * 9.8) / 5 for n = 2.
     double e[BT_ELECTRODES] = {[16] = -10, [17] = -20};
     lin2013_result result = run(e, BT_POC_WEIGHTS_ABS_N2);
@@ -41,9 +40,8 @@ static void two_points_of_contact_worked_by_hand(void **state)
     assert_near(run(e, BT_POC_WEIGHTS_COMPRESS_N2).poc_mm[0], -9.8);
 }
 
-static void force_sums_worked_by_hand(void **state)
+TEST(force_sums_worked_by_hand)
 {
-    (void)state;
     double e[BT_ELECTRODES];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         e[i] = -1;
@@ -82,9 +80,8 @@ static results kernel(const int32_t e_q4[BT_ELECTRODES], int weights)
     return out;
 }
 
-static void mirrored_signals_give_exactly_mirrored_results(void **state)
+TEST(mirrored_signals_give_exactly_mirrored_results)
 {
-    (void)state;
     // E1..E6 mirror E11..E16, E8 mirrors E9, the rest lies in the plane of symmetry.
     static const int mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7, 9,
                                               0,  1,  2,  3,  4,  5,  16, 17, 18};
@@ -116,9 +113,8 @@ static void mirrored_signals_give_exactly_mirrored_results(void **state)
 }
 
 // Whatever is asked for is what comes with everything; the rest is marked, never left or made up.
-static void what_nobody_wants_is_invalid(void **state)
+TEST(what_nobody_wants_is_invalid)
 {
-    (void)state;
     uint64_t seed = 10;
     for (int k = 0; k < 3000; k++) {
         int32_t e[BT_ELECTRODES];
@@ -142,9 +138,8 @@ static void what_nobody_wants_is_invalid(void **state)
 }
 
 // Nothing, or nothing that is compressed; one sixteenth of a count is enough for an answer.
-static void without_weight_there_is_no_point_of_contact(void **state)
+TEST(without_weight_there_is_no_point_of_contact)
 {
-    (void)state;
     for (int weights = 0; weights <= 2; weights++) {
         for (int bulge = 0; bulge <= 1; bulge++) {
             int32_t e[BT_ELECTRODES] = {[4] = bulge, [9] = bulge * BT_E_MAX_Q4};

@@ -94,9 +94,8 @@ static spread monte_carlo(const double e[BT_ELECTRODES], int weights, double sig
                     {sqrt(variance[3]), sqrt(variance[4]), sqrt(variance[5])}};
 }
 
-static void sigmas_are_those_of_a_monte_carlo(void **state)
+TEST(sigmas_are_those_of_a_monte_carlo)
 {
-    (void)state;
     static const int noises[] = {2, 6, 16};
     for (int middle = 0; middle < BT_ELECTRODES; middle++) {
         for (int weights = 0; weights < 3; weights++) {
@@ -150,9 +149,8 @@ static double first_order_um(const double e[BT_ELECTRODES], int weights, const i
     return sigma * sqrt(along / (total * total) + across * pow(BT_CORE_RADIUS_UM / lever, 2));
 }
 
-static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void **state)
+TEST(sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range)
 {
-    (void)state;
     static const int counts[] = {30, 300, 3000, 8000};
     uint64_t seed = 5;
     double off[3] = {0};
@@ -187,9 +185,8 @@ static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void
 }
 
 // Whatever its noise, the point stays where the electrode is.
-static void a_point_of_one_electrode_is_where_it_is(void **state)
+TEST(a_point_of_one_electrode_is_where_it_is)
 {
-    (void)state;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         for (int weights = 0; weights < 3; weights++) {
             double e[BT_ELECTRODES] = {0};
@@ -199,9 +196,8 @@ static void a_point_of_one_electrode_is_where_it_is(void **state)
     }
 }
 
-static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
+TEST(one_electrodes_sigma_is_the_root_of_its_share)
 {
-    (void)state;
     for (uint64_t noise = 1; noise < UINT32_MAX; noise += 1 + noise / 97) {
         uint64_t got = bt_sigma_count_q8((uint32_t)noise);
         uint64_t square = noise * (65536 / 19); // the share is cut to 1/65536 and the root to a whole number
@@ -219,9 +215,8 @@ static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
 
 // ---- the ends --------------------------------------------------------------------------------------
 
-static void what_is_not_known_is_marked(void **state)
+TEST(what_is_not_known_is_marked)
 {
-    (void)state;
     double e[BT_ELECTRODES];
     press(9, e);
     bt_msg_frame msg = sigmas(e, BT_POC_WEIGHTS_ABS_N2, 0); // noise not measured yet
@@ -252,9 +247,8 @@ static void what_is_not_known_is_marked(void **state)
     assert_int_equal(msg.poc_sigma_um, 0xFFFF);
 }
 
-static void sigmas_saturate_below_the_mark(void **state)
+TEST(sigmas_saturate_below_the_mark)
 {
-    (void)state;
     double e[BT_ELECTRODES] = {0};
     e[1] = -1;
     e[15] = -1;
@@ -275,9 +269,21 @@ static void sigmas_saturate_below_the_mark(void **state)
     assert_true(msg.force_sigma_100un[1] < 65534);
 }
 
-static void only_what_is_asked_for_has_a_sigma(void **state)
+// It comes from other fingers, and is there before.
+TEST(noise_leaves_the_sigma_of_the_population_alone)
 {
-    (void)state;
+    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
+    int32_t e_q4[BT_ELECTRODES] = {[16] = -16 * 500};
+    bt_msg_frame msg = {.poc_um = {BT_INVALID_I16}, .force_sigma_100un = {700, 700, 700}};
+    settings.population = true;
+    bt_sigma(e_q4, &settings, 400, &msg);
+    for (int d = 0; d < 3; d++) {
+        assert_int_equal(msg.force_sigma_100un[d], 700);
+    }
+}
+
+TEST(only_what_is_asked_for_has_a_sigma)
+{
     bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
     emulated_finger finger;
     finger_init(&finger);
@@ -301,9 +307,8 @@ static void only_what_is_asked_for_has_a_sigma(void **state)
 
 // ---- the noise -------------------------------------------------------------------------------------
 
-static void the_noise_is_that_of_nineteen_electrodes(void **state)
+TEST(the_noise_is_that_of_nineteen_electrodes)
 {
-    (void)state;
     // An electrode's eight rounds end with a word whose distance from their mean holds 7/8 sigma^2; a
     // sweep adds 8/7 of nineteen. Sixteen sweeps are a plain mean: 16 * 19 independent squares a finger.
     // Rounding to counts adds 1/12. Up to sigma 4 the trigger holds back one word in 40,000.
@@ -341,6 +346,7 @@ int main(void)
         cmocka_unit_test(a_point_of_one_electrode_is_where_it_is),
         cmocka_unit_test(what_is_not_known_is_marked),
         cmocka_unit_test(sigmas_saturate_below_the_mark),
+        cmocka_unit_test(noise_leaves_the_sigma_of_the_population_alone),
         cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
         cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
     };

@@ -82,9 +82,8 @@ static void check_linear(const int32_t e_q4[BT_ELECTRODES])
     assert_true(sums.z <= (int64_t)BT_E_MAX_Q4 * BT_SUMS_Z_UM);
 }
 
-static void linear_sums_are_those_over_table_1(void **state)
+TEST(linear_sums_are_those_over_table_1)
 {
-    (void)state;
     over_all_frames(check_linear, -BT_E_MAX_Q4, BT_E_MAX_Q4);
 }
 
@@ -126,9 +125,8 @@ static void check_split(const int32_t v[BT_ELECTRODES])
     check_split_by(v, 9, 0);
 }
 
-static void split_sums_are_those_over_table_1(void **state)
+TEST(split_sums_are_those_over_table_1)
 {
-    (void)state;
     over_all_frames(check_split, 0, WEIGHT_MAX);
 }
 
@@ -144,9 +142,8 @@ static void check_force(const int32_t e_q4[BT_ELECTRODES])
     }
 }
 
-static void force_sums_are_those_over_table_1(void **state)
+TEST(force_sums_are_those_over_table_1)
 {
-    (void)state;
     over_all_frames(check_force, -BT_E_MAX_Q4, BT_E_MAX_Q4);
     int64_t largest = 0;
     for (int d = 0; d < 3; d++) {
@@ -178,9 +175,8 @@ static void check_torque(const int32_t e_q4[BT_ELECTRODES])
     }
 }
 
-static void torque_sums_are_those_over_table_1_to_their_rounding(void **state)
+TEST(torque_sums_are_those_over_table_1_to_their_rounding)
 {
-    (void)state;
     over_all_frames(check_torque, -BT_E_MAX_Q4, BT_E_MAX_Q4);
     const int32_t whole = 1 << BT_SUMS_ARM_BITS; // of so much nothing is cut
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -197,9 +193,8 @@ static void torque_sums_are_those_over_table_1_to_their_rounding(void **state)
 
 // ---- Table 1 -------------------------------------------------------------------------------------------
 
-static void an_arm_is_the_place_times_the_normal(void **state)
+TEST(an_arm_is_the_place_times_the_normal)
 {
-    (void)state;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         const int16_t *r = bt_electrode_um[i], *n = bt_normal_milli[i];
         for (int d = 0; d < 3; d++) {
@@ -210,9 +205,8 @@ static void an_arm_is_the_place_times_the_normal(void **state)
 }
 
 // So no weighted mean of them lies above the axis, or on it: a point of contact always has a direction.
-static void no_electrode_is_above_the_one_nearest_to_the_axis(void **state)
+TEST(no_electrode_is_above_the_one_nearest_to_the_axis)
 {
-    (void)state;
     int highest_um = INT16_MIN, farthest_um = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         highest_um = bt_electrode_um[i][2] > highest_um ? bt_electrode_um[i][2] : highest_um;

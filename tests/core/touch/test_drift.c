@@ -37,9 +37,8 @@ static void press(emulated_finger *finger, double load, double pdc_load)
 
 // ---- at rest -----------------------------------------------------------------------------------
 
-static void the_tare_of_a_worn_finger_does_not_lag_behind_its_drift(void **state)
+TEST(the_tare_of_a_worn_finger_does_not_lag_behind_its_drift)
 {
-    (void)state;
     for (uint64_t seed = 1; seed <= 4; seed++) {
         emulated_finger finger = worn_finger(seed, seed % 2 ? WORST_PER_S : -WORST_PER_S, 20);
         double sum = 0;
@@ -54,9 +53,8 @@ static void the_tare_of_a_worn_finger_does_not_lag_behind_its_drift(void **state
 }
 
 // Pressure that is missing, or that does not move in a press, would let a slow load pass for drift.
-static void without_pressure_nothing_is_learned(void **state)
+TEST(without_pressure_nothing_is_learned)
 {
-    (void)state;
     for (int flat = 0; flat <= 1; flat++) {
         emulated_finger finger;
         finger_init(&finger);
@@ -68,9 +66,8 @@ static void without_pressure_nothing_is_learned(void **state)
     }
 }
 
-static void a_slow_load_is_not_learned(void **state)
+TEST(a_slow_load_is_not_learned)
 {
-    (void)state;
     emulated_finger finger = worn_finger(1, 0, 20);
     for (int k = 0; finger.tare.state == BT_TARE_STATE_REST; k++) {
         assert_true(k < 10 * FRAMES_PER_S);
@@ -84,9 +81,8 @@ static void a_slow_load_is_not_learned(void **state)
 
 // ---- in a touch --------------------------------------------------------------------------------
 
-static void a_hold_drifts_on(void **state)
+TEST(a_hold_drifts_on)
 {
-    (void)state;
     for (uint64_t seed = 1; seed <= 4; seed++) {
         emulated_finger finger = worn_finger(seed, seed % 2 ? WORST_PER_S : -WORST_PER_S, 20);
         press(&finger, 400, 300);
@@ -105,9 +101,8 @@ static double loading(int i)
     return 0.82 + 0.34 * (7 * i % BT_ELECTRODES) / (BT_ELECTRODES - 1);
 }
 
-static void an_hour_of_hold_keeps_a_force_down_to_the_noise(void **state)
+TEST(an_hour_of_hold_keeps_a_force_down_to_the_noise)
 {
-    (void)state;
     for (int worn = 0; worn < 2; worn++) {
         emulated_finger finger;
         finger_init(&finger);
@@ -145,9 +140,8 @@ static void an_hour_of_hold_keeps_a_force_down_to_the_noise(void **state)
 }
 
 // A finger that the host says holds something follows, untouched, each electrode's own drift.
-static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
+TEST(what_is_held_at_rest_follows_each_electrodes_own_drift)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     run_seconds(&finger, 20);
@@ -175,9 +169,8 @@ static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
     }
 }
 
-static void drift_that_stops_in_a_hold_is_found_out(void **state)
+TEST(drift_that_stops_in_a_hold_is_found_out)
 {
-    (void)state;
     emulated_finger finger = worn_finger(3, WORST_PER_S, 20);
     press(&finger, 400, 300);
     double stopped = finger.drift_per_s * finger.t_s;
@@ -194,9 +187,8 @@ static void drift_that_stops_in_a_hold_is_found_out(void **state)
 
 // ---- in a silence ------------------------------------------------------------------------------
 
-static void a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it(void **state)
+TEST(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it)
 {
-    (void)state;
     for (uint64_t seed = 1; seed <= 6; seed++) {
         emulated_finger finger = worn_finger(seed, seed % 2 ? WORST_PER_S : -WORST_PER_S, 20);
         press(&finger, 400, 300);
@@ -215,9 +207,8 @@ static void a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it(void
 }
 
 // Whose drift was not known before: what all its electrodes have moved by in the silence.
-static void a_hold_of_unknown_drift_follows_a_silence_too(void **state)
+TEST(a_hold_of_unknown_drift_follows_a_silence_too)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     run_seconds(&finger, 1);
@@ -231,9 +222,8 @@ static void a_hold_of_unknown_drift_follows_a_silence_too(void **state)
     assert_true(fabs(shared_error(&finger) - before) < 0.5);
 }
 
-static void a_load_that_changed_in_a_silence_is_no_drift(void **state)
+TEST(a_load_that_changed_in_a_silence_is_no_drift)
 {
-    (void)state;
     emulated_finger finger = worn_finger(1, WORST_PER_S, 20);
     press(&finger, 400, 300);
     run_seconds(&finger, 5);
@@ -247,9 +237,8 @@ static void a_load_that_changed_in_a_silence_is_no_drift(void **state)
 
 // ---- temperature -------------------------------------------------------------------------------
 
-static void what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch(void **state)
+TEST(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch)
 {
-    (void)state;
     const double tdc_per_s = 0.4;
     emulated_finger finger;
     finger_init(&finger);
@@ -269,9 +258,8 @@ static void what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch(void **stat
 }
 
 // Nothing drifted before: a silence and a fault leave a hold's tare as it was, to the last bit.
-static void a_hold_without_drift_stays_as_it_is(void **state)
+TEST(a_hold_without_drift_stays_as_it_is)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     run_seconds(&finger, 20);

@@ -2,9 +2,8 @@
 #include "emulated_finger.h"
 
 // A snapshot every three sweeps; five of them back, where there are so many.
-static void a_touch_goes_back_to_what_was_a_second_ago(void **state)
+TEST(a_touch_goes_back_to_what_was_a_second_ago)
 {
-    (void)state;
     bt_rollback rollback;
     bt_baseline base = {.pdc_q16 = 7000};
     memset(&rollback, 0xFF, sizeof rollback);

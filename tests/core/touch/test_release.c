@@ -28,9 +28,8 @@ static bt_witness asked(bt_witness witness, uint32_t uneven_count2, int32_t abov
     return witness;
 }
 
-static void pressure_is_a_witness_once_a_press_has_moved_it(void **state)
+TEST(pressure_is_a_witness_once_a_press_has_moved_it)
 {
-    (void)state;
     const bt_witness unproven = {0}, moves = {.moves = true}, flat = {.flat = true};
     for (int k = 0; k < 3; k++) {
         bt_witness before = k == 0 ? unproven : k == 1 ? moves : flat;

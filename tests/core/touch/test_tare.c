@@ -4,9 +4,8 @@
 
 // ---- start -------------------------------------------------------------------------------------
 
-static void the_first_tare_needs_two_still_sweeps(void **state)
+TEST(the_first_tare_needs_two_still_sweeps)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
@@ -22,9 +21,8 @@ static void the_first_tare_needs_two_still_sweeps(void **state)
     assert_false(finger.tare.changed);
 }
 
-static void nothing_is_tared_while_one_electrode_moves(void **state)
+TEST(nothing_is_tared_while_one_electrode_moves)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     for (int k = 0; k < 1000; k++) {
@@ -36,9 +34,8 @@ static void nothing_is_tared_while_one_electrode_moves(void **state)
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 32), 16, 32);
 }
 
-static void a_restored_tare_carries_a_grip_over_a_reset(void **state)
+TEST(a_restored_tare_carries_a_grip_over_a_reset)
 {
-    (void)state;
     for (int held = 0; held < 2; held++) {
         emulated_finger before, finger;
         bt_tare_kept kept;
@@ -59,9 +56,8 @@ static void a_restored_tare_carries_a_grip_over_a_reset(void **state)
     }
 }
 
-static void one_missing_pressure_word_does_not_forget_the_pressure_at_rest(void **state)
+TEST(one_missing_pressure_word_does_not_forget_the_pressure_at_rest)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
@@ -74,9 +70,8 @@ static void one_missing_pressure_word_does_not_forget_the_pressure_at_rest(void 
 
 // ---- contact -----------------------------------------------------------------------------------
 
-static void three_frames_over_the_threshold_make_a_contact_and_two_do_not(void **state)
+TEST(three_frames_over_the_threshold_make_a_contact_and_two_do_not)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     for (int burst = 1; burst <= 2; burst++) {
         for (int gap = 0; gap < 50; gap++) {
@@ -92,9 +87,8 @@ static void three_frames_over_the_threshold_make_a_contact_and_two_do_not(void *
     assert_int_equal(run_until(&finger, BT_TARE_STATE_CONTACT, 10), 4);
 }
 
-static void pressure_alone_makes_a_contact(void **state)
+TEST(pressure_alone_makes_a_contact)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     finger.pdc_load = 6;
     run_frames(&finger, 100);
@@ -107,9 +101,8 @@ static void pressure_alone_makes_a_contact(void **state)
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
 }
 
-static void without_pressure_the_tare_is_frozen_in_contact(void **state)
+TEST(without_pressure_the_tare_is_frozen_in_contact)
 {
-    (void)state;
     emulated_finger finger = touched_finger(400, 100);
     finger.has_pdc = false;
     bt_baseline before = finger.tare.base;
@@ -122,9 +115,8 @@ static void without_pressure_the_tare_is_frozen_in_contact(void **state)
 
 // ---- release -----------------------------------------------------------------------------------
 
-static void a_clean_release_is_tared_after_two_calm_sweeps(void **state)
+TEST(a_clean_release_is_tared_after_two_calm_sweeps)
 {
-    (void)state;
     emulated_finger finger = touched_finger(400, 100);
     run_seconds(&finger, 3);
     finger.load = 0;
@@ -137,9 +129,8 @@ static void a_clean_release_is_tared_after_two_calm_sweeps(void **state)
     assert_true(tare_error(&finger) < 0.01);
 }
 
-static void residue_is_tared_once_the_pressure_is_back_and_nothing_moves(void **state)
+TEST(residue_is_tared_once_the_pressure_is_back_and_nothing_moves)
 {
-    (void)state;
     emulated_finger finger = touched_finger(400, 300);
     run_seconds(&finger, 3);
     finger.load = 45; // 2,025 count^2 of 160,000; and a 50th of the pressure
@@ -149,9 +140,8 @@ static void residue_is_tared_once_the_pressure_is_back_and_nothing_moves(void **
     assert_true(fabs(share_kept(&finger, 45)) < 0.01);
 }
 
-static void more_energy_than_residue_is_a_hold(void **state)
+TEST(more_energy_than_residue_is_a_hold)
 {
-    (void)state;
     // With the pressure back; with a pressure that no press of that size leaves; and without one.
     static const int pdc[] = {0, 24, -1};
     for (int k = 0; k < 3; k++) {
@@ -167,9 +157,8 @@ static void more_energy_than_residue_is_a_hold(void **state)
     }
 }
 
-static void residue_that_moves_is_a_hold(void **state)
+TEST(residue_that_moves_is_a_hold)
 {
-    (void)state;
     emulated_finger finger = touched_finger(400, 0);
     for (int k = 0; k < 2000; k++) { // a rub: 45 +- 30 counts at 4 Hz
         finger.load = 45 + 30 * sin(2 * 3.14159265 * 4 * k / FRAMES_PER_S);
@@ -178,9 +167,8 @@ static void residue_that_moves_is_a_hold(void **state)
     }
 }
 
-static void pressure_keeps_a_held_object_from_being_tared(void **state)
+TEST(pressure_keeps_a_held_object_from_being_tared)
 {
-    (void)state;
     static const double loads[] = {30, 40, 60}; // 900 to 3,600 count^2; what is less is pressure alone
     for (int k = 0; k < 3; k++) {
         emulated_finger finger = touched_finger(loads[k], 9);

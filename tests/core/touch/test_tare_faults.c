@@ -3,9 +3,8 @@
 
 // ---- fault -------------------------------------------------------------------------------------
 
-static void railed_electrodes_are_never_tared(void **state)
+TEST(railed_electrodes_are_never_tared)
 {
-    (void)state;
     static const uint16_t ends[] = {0, 4090, 4095, BT_INVALID_COUNT};
     for (int k = 0; k < 4; k++) {
         emulated_finger finger;
@@ -25,9 +24,8 @@ static void railed_electrodes_are_never_tared(void **state)
     }
 }
 
-static void a_fault_freezes_the_tare_and_leaves_things_as_they_were(void **state)
+TEST(a_fault_freezes_the_tare_and_leaves_things_as_they_were)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     bt_baseline before = finger.tare.base;
     for (int k = 0; k < 300; k++) {
@@ -41,9 +39,8 @@ static void a_fault_freezes_the_tare_and_leaves_things_as_they_were(void **state
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
 }
 
-static void lost_words_at_rest_are_no_touch(void **state)
+TEST(lost_words_at_rest_are_no_touch)
 {
-    (void)state;
     for (int words = 1; words <= BT_ELECTRODES; words++) {
         emulated_finger finger = resting_finger();
         for (int k = 0; k < 200; k++) {
@@ -56,9 +53,8 @@ static void lost_words_at_rest_are_no_touch(void **state)
     }
 }
 
-static void a_touch_that_began_in_a_fault_is_found_by_its_tare(void **state)
+TEST(a_touch_that_began_in_a_fault_is_found_by_its_tare)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     for (int k = 0; k < 50; k++) {
         bt_round frame = frame_without(&finger, 0, 9, BT_INVALID_COUNT);
@@ -69,9 +65,8 @@ static void a_touch_that_began_in_a_fault_is_found_by_its_tare(void **state)
     assert_true(share_kept(&finger, finger.load) > 0.99);
 }
 
-static void a_first_word_in_a_faulty_round_is_met_once_the_fault_clears(void **state)
+TEST(a_first_word_in_a_faulty_round_is_met_once_the_fault_clears)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     finger.has_pdc = false;
@@ -92,9 +87,8 @@ static void a_first_word_in_a_faulty_round_is_met_once_the_fault_clears(void **s
     assert_true(tare_error(&finger) == 0);
 }
 
-static void one_faulty_frame_starts_the_history_over(void **state)
+TEST(one_faulty_frame_starts_the_history_over)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     bt_round frame = frame_without(&finger, 0, 3, 4095);
     (void)feed(&finger, &frame);
@@ -106,9 +100,8 @@ static void one_faulty_frame_starts_the_history_over(void **state)
 
 // ---- host commands -----------------------------------------------------------------------------
 
-static void tare_now_is_refused_while_the_signals_move(void **state)
+TEST(tare_now_is_refused_while_the_signals_move)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     for (int k = 0; k < 40; k++) {
         finger.load += 30;
@@ -131,9 +124,8 @@ static void tare_now_is_refused_while_the_signals_move(void **state)
     assert_true(fabs(share_kept(&finger, finger.load)) < 0.001);
 }
 
-static void published_tares_round_half_away_from_zero(void **state)
+TEST(published_tares_round_half_away_from_zero)
 {
-    (void)state;
     assert_int_equal(bt_tare_q4(0), 0);
     assert_int_equal(bt_tare_q4(2047), 0);
     assert_int_equal(bt_tare_q4(2048), 1);
@@ -141,9 +133,8 @@ static void published_tares_round_half_away_from_zero(void **state)
 }
 
 // Skin undershoots after a press, so a light touch soon after may begin below the pressure at rest.
-static void a_held_load_is_kept_while_the_pressure_undershoots(void **state)
+TEST(a_held_load_is_kept_while_the_pressure_undershoots)
 {
-    (void)state;
     for (int below = 0; below <= 5; below++) {
         emulated_finger finger = touched_finger(1500, -below);
         run_seconds(&finger, 30);
@@ -152,9 +143,8 @@ static void a_held_load_is_kept_while_the_pressure_undershoots(void **state)
     }
 }
 
-static void an_electrode_that_was_railed_is_never_tared_at_its_end(void **state)
+TEST(an_electrode_that_was_railed_is_never_tared_at_its_end)
 {
-    (void)state;
     static const uint16_t ends[] = {0, 4095};
     for (int k = 0; k < 2; k++) {
         emulated_finger finger;
@@ -173,9 +163,8 @@ static void an_electrode_that_was_railed_is_never_tared_at_its_end(void **state)
 
 // Eight phases of a sweep: in one of them the verdict comes right after the release, when the pressure has
 // fallen and the means of eight rounds still are those of the press.
-static void a_sudden_release_never_tares_the_press(void **state)
+TEST(a_sudden_release_never_tares_the_press)
 {
-    (void)state;
     for (int phase = 0; phase < 4 * BT_SWEEP_ROUNDS; phase++) {
         // A press; or one so light that only the pressure sees it (225 count^2), of which the electrodes may
         // keep what counts as calm, but the pressure no more than what counts as quiet.
@@ -192,9 +181,8 @@ static void a_sudden_release_never_tares_the_press(void **state)
 
 // Light loads are seen by the pressure long before the electrodes; one lost word is no reason to think that
 // there is none.
-static void one_lost_pressure_word_does_not_end_a_light_contact(void **state)
+TEST(one_lost_pressure_word_does_not_end_a_light_contact)
 {
-    (void)state;
     for (int phase = 0; phase < 2 * BT_SWEEP_ROUNDS; phase++) {
         emulated_finger finger = touched_finger(15, 40); // 225 count^2
         run_frames(&finger, 50 + phase);
@@ -207,9 +195,8 @@ static void one_lost_pressure_word_does_not_end_a_light_contact(void **state)
     }
 }
 
-static void pressure_that_moves_is_no_reason_to_refuse_tare_now(void **state)
+TEST(pressure_that_moves_is_no_reason_to_refuse_tare_now)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     finger.pdc_load = -50; // no touch
     run_frames(&finger, 3);
@@ -217,9 +204,8 @@ static void pressure_that_moves_is_no_reason_to_refuse_tare_now(void **state)
 }
 
 // The pattern of a load upside down, with less pressure than at rest.
-static void what_the_host_has_set_is_lost_if_it_was_wrong(void **state)
+TEST(what_the_host_has_set_is_lost_if_it_was_wrong)
 {
-    (void)state;
     emulated_finger finger = resting_finger();
     bt_baseline base = finger.tare.base;
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -235,9 +221,8 @@ static void what_the_host_has_set_is_lost_if_it_was_wrong(void **state)
 }
 
 // One that was met at rest goes back with the others, to what it first read.
-static void an_electrode_that_came_late_is_rolled_back_too(void **state)
+TEST(an_electrode_that_came_late_is_rolled_back_too)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     for (int k = 0; k < 200; k++) {

@@ -1,6 +1,8 @@
 // What a hand holds is never zeroed: doubt, the host's word, and the way back from a tare that was wrong.
 #include "emulated_finger.h"
 
+#include "solve/results.h"
+
 // Squeezed, then let down to a light hold of which neither size nor pattern tells what it is.
 static emulated_finger light_hold(double load, double pdc_load)
 {
@@ -14,9 +16,8 @@ static emulated_finger light_hold(double load, double pdc_load)
 
 // ---- doubt -------------------------------------------------------------------------------------
 
-static void a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour(void **state)
+TEST(a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour)
 {
-    (void)state;
     emulated_finger finger = light_hold(40, 30);
     bt_baseline before = finger.tare.base;
     run_seconds(&finger, 3600);
@@ -28,9 +29,8 @@ static void a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour(void **stat
     assert_true(tare_error(&finger) < 0.01);
 }
 
-static void the_next_contact_is_seen_after_any_number_of_doubtful_ones(void **state)
+TEST(the_next_contact_is_seen_after_any_number_of_doubtful_ones)
 {
-    (void)state;
     emulated_finger finger = light_hold(40, 30);
     bt_baseline before = finger.tare.base;
     for (int press = 0; press < 100; press++) {
@@ -45,9 +45,8 @@ static void the_next_contact_is_seen_after_any_number_of_doubtful_ones(void **st
     }
 }
 
-static void pressure_that_returns_from_its_undershoot_is_no_contact(void **state)
+TEST(pressure_that_returns_from_its_undershoot_is_no_contact)
 {
-    (void)state;
     emulated_finger finger = light_hold(100, -9); // the electrodes keep it in doubt
     finger.pdc_load = 3;
     run_seconds(&finger, 10);
@@ -55,9 +54,8 @@ static void pressure_that_returns_from_its_undershoot_is_no_contact(void **state
 }
 
 // A press from rest fires in three rounds; the second of them is the first that tells no more.
-static void a_touch_right_after_a_doubt_is_one(void **state)
+TEST(a_touch_right_after_a_doubt_is_one)
 {
-    (void)state;
     emulated_finger finger = light_hold(40, 30);
     for (int round = 1; round <= 3; round++) {
         bt_round frame = next_frame(&finger);
@@ -71,9 +69,8 @@ static void a_touch_right_after_a_doubt_is_one(void **state)
 
 // ---- shifts ------------------------------------------------------------------------------------
 
-static void pressure_alone_is_no_touch_after_two_seconds(void **state)
+TEST(pressure_alone_is_no_touch_after_two_seconds)
 {
-    (void)state;
     for (int step_count = 8; step_count <= 20; step_count += 4) {
         emulated_finger finger = resting_finger();
         finger.pdc_sigma = 1;
@@ -85,9 +82,8 @@ static void pressure_alone_is_no_touch_after_two_seconds(void **state)
     }
 }
 
-static void what_all_electrodes_share_is_no_touch(void **state)
+TEST(what_all_electrodes_share_is_no_touch)
 {
-    (void)state;
     for (int pdc = 0; pdc <= 5; pdc += 5) {
         emulated_finger finger = resting_finger();
         for (int k = 0; k < 500; k++) {
@@ -103,9 +99,8 @@ static void what_all_electrodes_share_is_no_touch(void **state)
     }
 }
 
-static void a_pattern_is_kept_where_the_pressure_is_shifted(void **state)
+TEST(a_pattern_is_kept_where_the_pressure_is_shifted)
 {
-    (void)state;
     emulated_finger finger = touched_finger(10, 20); // 100 count^2
     (void)run_until(&finger, BT_TARE_STATE_REST, 200);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_SHIFT);
@@ -118,9 +113,8 @@ static void a_pattern_is_kept_where_the_pressure_is_shifted(void **state)
     assert_true(fabs(mean / BT_ELECTRODES) < 0.5); // of 2 counts
 }
 
-static void a_press_that_the_pressure_does_not_see_is_not_judged_by_it(void **state)
+TEST(a_press_that_the_pressure_does_not_see_is_not_judged_by_it)
 {
-    (void)state;
     for (int alive = 0; alive <= 1; alive++) { // the channel is dead from the start, or dies after a press
         emulated_finger finger = touched_finger(400, alive ? 300 : 0);
         run_seconds(&finger, 3);
@@ -138,9 +132,8 @@ static void a_press_that_the_pressure_does_not_see_is_not_judged_by_it(void **st
 
 // ---- the host's word ---------------------------------------------------------------------------
 
-static void while_held_nothing_is_tared_down_to_nothing(void **state)
+TEST(while_held_nothing_is_tared_down_to_nothing)
 {
-    (void)state;
     emulated_finger finger = touched_finger(400, 300);
     run_seconds(&finger, 2);
     bt_tare_hold(&finger.tare);
@@ -157,18 +150,16 @@ static void while_held_nothing_is_tared_down_to_nothing(void **state)
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 50);
 }
 
-static void release_settles_what_was_in_doubt(void **state)
+TEST(release_settles_what_was_in_doubt)
 {
-    (void)state;
     emulated_finger finger = light_hold(60, 30);
     bt_tare_release(&finger.tare);
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 20);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RESIDUE);
 }
 
-static void a_lapsed_hold_is_judged_by_its_signals(void **state)
+TEST(a_lapsed_hold_is_judged_by_its_signals)
 {
-    (void)state;
     emulated_finger finger = touched_finger(400, 300);
     bt_tare_hold(&finger.tare);
     run_seconds(&finger, 2);
@@ -184,9 +175,8 @@ static void a_lapsed_hold_is_judged_by_its_signals(void **state)
 
 // A TARE tells one reason, with the round after it: whenever the word comes, a verdict may not take its
 // place.
-static void the_hosts_word_is_told_before_what_follows_from_it(void **state)
+TEST(the_hosts_word_is_told_before_what_follows_from_it)
 {
-    (void)state;
     for (int rounds = 0; rounds < BT_SWEEP_ROUNDS; rounds++) {
         emulated_finger finger = touched_finger(400, 300);
         bt_tare_hold(&finger.tare);
@@ -201,9 +191,8 @@ static void the_hosts_word_is_told_before_what_follows_from_it(void **state)
     }
 }
 
-static void a_held_finger_takes_no_first_tare(void **state)
+TEST(a_held_finger_takes_no_first_tare)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     bt_tare_hold(&finger.tare);
@@ -215,11 +204,32 @@ static void a_held_finger_takes_no_first_tare(void **state)
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_START);
 }
 
+// What a hand acts on: with these words a frame's force is another.
+TEST(a_frame_says_what_is_known_of_its_tare)
+{
+    const uint32_t all = BT_FRAME_FLAG_CONTACT | BT_FRAME_FLAG_DOUBT | BT_FRAME_FLAG_HELD
+                         | BT_FRAME_FLAG_TARE_UNSURE | BT_FRAME_FLAG_PDC_FLAT | BT_FRAME_FLAG_UNTARED;
+    emulated_finger finger = light_hold(40, 30);
+    bt_tare *tare = &finger.tare;
+    const bt_round round = next_frame(&finger);
+    tare->unsure = false;
+    assert_int_equal(bt_channel_flags(&round, tare) & all, BT_FRAME_FLAG_DOUBT);
+    tare->unsure = true;
+    assert_int_equal(bt_channel_flags(&round, tare) & all, BT_FRAME_FLAG_DOUBT | BT_FRAME_FLAG_TARE_UNSURE);
+    bt_tare_hold(tare);
+    tare->unsure = false;
+    assert_int_equal(bt_channel_flags(&round, tare) & all, BT_FRAME_FLAG_CONTACT | BT_FRAME_FLAG_HELD);
+    tare->held = false;
+    tare->witness.flat = true;
+    assert_int_equal(bt_channel_flags(&round, tare) & all, BT_FRAME_FLAG_CONTACT | BT_FRAME_FLAG_PDC_FLAT);
+    tare->tared = tare->witness.flat = false;
+    assert_true(bt_channel_flags(&round, tare) & BT_FRAME_FLAG_UNTARED);
+}
+
 // ---- a tare that was wrong ---------------------------------------------------------------------
 
-static void a_tare_taken_of_a_hold_is_lost_when_it_ends(void **state)
+TEST(a_tare_taken_of_a_hold_is_lost_when_it_ends)
 {
-    (void)state;
     for (int frames = 5; frames <= 200; frames += 39) { // let go within so many
         emulated_finger finger = touched_finger(400, 300);
         run_seconds(&finger, 2);
@@ -242,9 +252,8 @@ static void a_tare_taken_of_a_hold_is_lost_when_it_ends(void **state)
     }
 }
 
-static void a_first_tare_taken_of_a_hold_is_lost_when_it_ends(void **state)
+TEST(a_first_tare_taken_of_a_hold_is_lost_when_it_ends)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     finger.load = 400;
@@ -261,9 +270,8 @@ static void a_first_tare_taken_of_a_hold_is_lost_when_it_ends(void **state)
 }
 
 // What a press leaves missing is where it was before the press, for the trigger too.
-static void pressure_that_comes_back_beyond_its_rest_is_no_contact(void **state)
+TEST(pressure_that_comes_back_beyond_its_rest_is_no_contact)
 {
-    (void)state;
     emulated_finger finger = touched_finger(300, 640);
     run_seconds(&finger, 1);
     finger.load = 0;
@@ -294,6 +302,7 @@ int main(void)
         cmocka_unit_test(a_lapsed_hold_is_judged_by_its_signals),
         cmocka_unit_test(the_hosts_word_is_told_before_what_follows_from_it),
         cmocka_unit_test(a_held_finger_takes_no_first_tare),
+        cmocka_unit_test(a_frame_says_what_is_known_of_its_tare),
         cmocka_unit_test(a_tare_taken_of_a_hold_is_lost_when_it_ends),
         cmocka_unit_test(a_first_tare_taken_of_a_hold_is_lost_when_it_ends),
         cmocka_unit_test(pressure_that_comes_back_beyond_its_rest_is_no_contact),

@@ -42,9 +42,8 @@ static ramp_outcome load_slowly(double n_per_s, bool with_pdc, double sigma, uin
     return outcome;
 }
 
-static void slow_loads_keep_their_signal_at_detection_without_pressure(void **state)
+TEST(slow_loads_keep_their_signal_at_detection_without_pressure)
 {
-    (void)state;
     static const double rates[] = {0.1, 0.2, 0.5, 1, 2, 5, 20};
     for (size_t r = 0; r < sizeof rates / sizeof *rates; r++) {
         double worst = 2, longest = 0;
@@ -63,9 +62,8 @@ static void slow_loads_keep_their_signal_at_detection_without_pressure(void **st
     }
 }
 
-static void pressure_saves_even_the_slowest_loads(void **state)
+TEST(pressure_saves_even_the_slowest_loads)
 {
-    (void)state;
     static const double rates[] = {0.02, 0.1, 0.5, 2, 20};
     for (size_t r = 0; r < sizeof rates / sizeof *rates; r++) {
         double worst = 2, longest = 0;
@@ -79,9 +77,8 @@ static void pressure_saves_even_the_slowest_loads(void **state)
     }
 }
 
-static void a_load_slower_than_the_slew_is_taken_for_drift(void **state)
+TEST(a_load_slower_than_the_slew_is_taken_for_drift)
 {
-    (void)state;
     // The stated limit of the machine, so that nobody is surprised: 0.02 N/s without pressure.
     emulated_finger finger;
     finger_init(&finger);
@@ -95,9 +92,8 @@ static void a_load_slower_than_the_slew_is_taken_for_drift(void **state)
     assert_true(share_kept(&finger, finger.load) < 0.2);
 }
 
-static void ten_minutes_of_rest_have_no_contact(void **state)
+TEST(ten_minutes_of_rest_have_no_contact)
 {
-    (void)state;
     // A new sensor; a worn one with glitches, drifting by 15 counts/min.
     static const double drifts_per_s[] = {0, -15 / 60.0, 15 / 60.0};
     for (int k = 0; k < 3; k++) {
@@ -122,9 +118,8 @@ static void ten_minutes_of_rest_have_no_contact(void **state)
     }
 }
 
-static void the_threshold_rises_with_measured_noise_and_only_with_it(void **state)
+TEST(the_threshold_rises_with_measured_noise_and_only_with_it)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     finger.sigma = 1.5;
@@ -154,9 +149,8 @@ static void the_threshold_rises_with_measured_noise_and_only_with_it(void **stat
     assert_true(finger.tare.noise.count2 <= before + 25);
 }
 
-static void a_growing_vibration_does_not_raise_the_threshold_out_of_reach(void **state)
+TEST(a_growing_vibration_does_not_raise_the_threshold_out_of_reach)
 {
-    (void)state;
     // Each swing passes for noise and lifts the threshold over the next: 10 counts/s of growth.
     for (int half = 2; half <= 6; half++) {
         emulated_finger finger;
@@ -176,9 +170,8 @@ static void a_growing_vibration_does_not_raise_the_threshold_out_of_reach(void *
     }
 }
 
-static void a_press_after_hours_of_drift_is_seen_whole(void **state)
+TEST(a_press_after_hours_of_drift_is_seen_whole)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     finger.drift_per_s = -0.1; // 720 counts in two hours
@@ -191,9 +184,8 @@ static void a_press_after_hours_of_drift_is_seen_whole(void **state)
     assert_true(share_kept(&finger, 400) > 0.995);
 }
 
-static void counters_near_their_ends_do_not_wrap_into_nonsense(void **state)
+TEST(counters_near_their_ends_do_not_wrap_into_nonsense)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     finger.has_pdc = false;

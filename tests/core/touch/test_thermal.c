@@ -103,9 +103,8 @@ static void assert_followed(const emulated_finger *finger, const bt_baseline *fr
     }
 }
 
-static void the_tare_follows_the_temperature_in_contact(void **state)
+TEST(the_tare_follows_the_temperature_in_contact)
 {
-    (void)state;
     static const int gains[] = {500, 700, 970, -500, 1, 5000, -5000};
     static const int steps[] = {1, 40, 90, -1, -40, -90};
     for (int g = 0; g < 7; g++) {
@@ -123,9 +122,8 @@ static void the_tare_follows_the_temperature_in_contact(void **state)
     }
 }
 
-static void the_ends_of_gain_and_temperature_are_bounded(void **state)
+TEST(the_ends_of_gain_and_temperature_are_bounded)
 {
-    (void)state;
     for (int up = 0; up < 2; up++) {
         for (int gain = -5000; gain <= 5000; gain += 2500) {
             emulated_finger finger;
@@ -155,9 +153,8 @@ static void the_ends_of_gain_and_temperature_are_bounded(void **state)
     }
 }
 
-static void nothing_follows_at_rest_or_without_a_gain(void **state)
+TEST(nothing_follows_at_rest_or_without_a_gain)
 {
-    (void)state;
     static const int gains[] = {0, 5000};
     for (int k = 0; k < 2; k++) {
         emulated_finger finger = warm_finger(gains[k]);
@@ -174,9 +171,8 @@ static void nothing_follows_at_rest_or_without_a_gain(void **state)
     }
 }
 
-static void a_missing_or_railed_temperature_holds(void **state)
+TEST(a_missing_or_railed_temperature_holds)
 {
-    (void)state;
     static const uint16_t bad[] = {BT_INVALID_COUNT, 0, 4090, 4095};
     uint64_t seed = 51;
     emulated_finger finger = held_finger(500);
@@ -195,9 +191,8 @@ static void a_missing_or_railed_temperature_holds(void **state)
     assert_in_range(taken, 700, 900);
 }
 
-static void a_first_temperature_in_contact_moves_nothing(void **state)
+TEST(a_first_temperature_in_contact_moves_nothing)
 {
-    (void)state;
     emulated_finger finger;
     finger_init(&finger);
     finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(500);
@@ -222,9 +217,8 @@ static bool flagged(const emulated_finger *finger, uint32_t warmed_max_q8)
     return msg.flags & BT_FRAME_FLAG_TEMP;
 }
 
-static void a_degree_is_flagged_in_contact_alone(void **state)
+TEST(a_degree_is_flagged_in_contact_alone)
 {
-    (void)state;
     for (int step = -100; step <= 100; step++) {
         emulated_finger finger = held_finger(0);
         tdc_now = (uint16_t)(T0 + step);
@@ -247,9 +241,8 @@ static void a_degree_is_flagged_in_contact_alone(void **state)
     }
 }
 
-static void nothing_leaks_into_the_next_contact(void **state)
+TEST(nothing_leaks_into_the_next_contact)
 {
-    (void)state;
     for (int rounds = 3 * SWEEP; rounds < 5 * SWEEP; rounds++) { // let go at every phase, while it warms
         emulated_finger finger = held_finger(970);
         tdc_now = T0 + 90;
@@ -285,9 +278,8 @@ static void fault_round(emulated_finger *finger)
     assert_int_equal(finger->tare.state, BT_TARE_STATE_FAULT);
 }
 
-static void a_fault_in_contact_never_adds_a_step_twice(void **state)
+TEST(a_fault_in_contact_never_adds_a_step_twice)
 {
-    (void)state;
     // A loose connector: faults in the midst of sweeps, some of whose lanes have had their step.
     for (int rounds = 1; rounds <= 2 * SWEEP; rounds++) {
         emulated_finger finger = held_finger(500);
@@ -308,9 +300,8 @@ static void a_fault_in_contact_never_adds_a_step_twice(void **state)
     }
 }
 
-static void warmth_before_a_fault_is_not_added_after_it(void **state)
+TEST(warmth_before_a_fault_is_not_added_after_it)
 {
-    (void)state;
     // At rest the tare follows the counts, not the thermometer: what it read then is nothing to make up for.
     emulated_finger finger = warm_finger(500);
     tdc_now = T0 + 100;

@@ -40,9 +40,8 @@ static int32_t resumed(hold one)
     return bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
 }
 
-static void what_is_no_drift_is_not_followed(void **state)
+TEST(what_is_no_drift_is_not_followed)
 {
-    (void)state;
     const int32_t most = resumed(after_even(64, 0)); // the worst drift that there is
     assert_in_range(most, 1, 7 * COUNT_Q16);
     assert_int_equal(resumed(after_even(100, 0)), most);
