@@ -8,7 +8,7 @@ import pytest
 from biotac.errors import InputError
 from biotac.sim.physics import Finger
 from biotac_lab.experiments import wettels_more
-from biotac_lab.learn import edge, force, inputs, nets, roc
+from biotac_lab.learn import edge, force, nets, roc
 from biotac_lab.learn.stimulations import press_bars, stimulate
 
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
@@ -27,20 +27,6 @@ def test_a_net_follows_what_can_be_learnt_and_not_the_noise() -> None:
     of_noise = nets.train(x[:300], only_noise[:300], (x[300:], only_noise[300:]), units=10, steps=100)
     assert of_noise(new).std() < 0.5
     assert (nets.train(x, noisy, seed=1, steps=5)(new) == nets.train(x, noisy, seed=1, steps=5)(new)).all()
-
-
-def test_reductions_keep_what_they_say() -> None:
-    rng = np.random.default_rng(5)
-    source = rng.uniform(-1.0, 1.0, (2000, 2))
-    columns = np.column_stack([source @ [[1.0, 0.4, 0.1], [0.2, 1.0, -0.6]], rng.normal(0.0, 1e-3, 2000)])
-    assert inputs.principal(columns[:, :3]).matrix.shape == (3, 2), "the third is the first two's"
-    ours = inputs.independent(columns[:, :3])(columns[:, :3])
-    alike = np.abs(np.corrcoef(np.hstack([ours, source]).T)[:2, 2:])
-    assert alike.max(axis=1).min() > 0.98
-    follows = np.column_stack([source[:, 0], source[:, 0] ** 3, rng.normal(size=2000)])
-    kept = inputs.correlated(columns, follows)
-    assert kept[0, :2].all() and not kept[3].any()
-    assert inputs.only(columns, kept[:, 0])(columns).shape == (2000, kept[:, 0].sum())
 
 
 def test_splits_keep_groups_whole_and_the_paper_s_shares() -> None:

@@ -15,8 +15,7 @@ from biotac.calibrate.reference.mounting import LIN, Mounting, read_mounting
 from biotac.calibrate.reference.samples import Samples
 from biotac.calibrate.wrench.sources import read_reference
 from biotac.errors import DeviceLostError, InputError, RecordingError
-from biotac.sim.loading import load_source
-from biotac.sim.nano17 import MOUNTING, RESOLUTION, Nano17
+from biotac.sim.nano17 import MOUNTING
 
 N = 2000
 
@@ -291,23 +290,3 @@ def test_a_file_that_grows_is_read_row_by_row(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match="expected a number in every column"):
             reader.read()
     reader.close()
-
-
-def test_the_nano17_reads_the_scenario_in_its_own_steps() -> None:
-    source = load_source("press.toml", seconds=4.0)
-    nano17 = Nano17()
-    board_s, samples = nano17.measured(source, 0)
-    assert source.truth is not None
-    reading = samples.wrench
-    np.testing.assert_allclose(reading / RESOLUTION, np.rint(reading / RESOLUTION), atol=1e-9)
-    lin = nano17.mounting.to_finger(reading - nano17.zero)
-    truth = np.column_stack([source.truth.force_n[:, 0], source.truth.torque_nmm[:, 0]])
-    at_s = (np.arange(len(truth)) + 0.5) / 100.0
-    expected = np.column_stack([np.interp(board_s, at_s, column) for column in truth.T])
-    error = lin - expected
-    # a step and its noise: 0.7 and 0.29 steps; the offset's lever turns force noise into moment
-    assert (error[:, :3].std(axis=0) < 1.0 / 320).all()
-    assert (error[:, 3:].std(axis=0) < 12.0 / 320).all()
-    assert np.abs(error.mean(axis=0)).max() < 0.01
-    # its own clock: 60 ppm more samples than the board's time would give
-    assert np.diff(board_s).mean() == pytest.approx(1.0 / 500.0 / (1.0 + 60e-6), rel=1e-9)

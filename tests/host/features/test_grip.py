@@ -90,6 +90,7 @@ def test_what_is_not_known_says_nothing(trained: Trained) -> None:
     ("call", "message"),
     [
         (lambda t: train(np.zeros((5, 2)), np.zeros(5, int)), "0 slipping"),
+        (lambda t: train(np.zeros((5, 2)), np.full(5, 7)), "GripStates, one per round"),
         (lambda t: GripFilter(t).feed(np.zeros((3, 1))), "1 values per round"),
         (lambda t: GripFilter(t).feed(np.zeros(3)), r"\(n, k\)"),
         (lambda t: observations(np.zeros(3, [("force_n", "f8", 3)]), np.zeros((2, 22))), r"pac has shape \(2, 22\)"),
