@@ -34,7 +34,7 @@ SHARED = Path(__file__).parents[3] / "shared/data/syntouchcontact"
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Three synthetic fingers."""
     folder = tmp_path_factory.mktemp("fingers")
-    return [wrench_run.save(folder / f"{seed}.npz", wrench_run.fields(seed=seed)) for seed in (1, 2, 3)]
+    return [wrench_run.save(folder / f"{seed}.npz", wrench_run.fields(4000, seed)) for seed in (1, 2, 3)]
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +150,7 @@ def test_the_command_trains_judges_and_keeps(
     facts = json.loads(capsys.readouterr().out)
     for field in ("rmse_n", "rmse_scale5_n", "sigma_n", "sigma_scale5_n"):
         assert len(facts[field]) == 3
-    assert facts["rmse_60s_n"] is None  # a recording of 50 s has no minute and something to judge it by
+    assert facts["rmse_60s_n"] is None  # a recording of 40 s has no minute and something to judge it by
     assert 0.0 < facts["coverage"][0] < facts["coverage"][1] <= 1.0
     trained = population_map.load(out)
     assert trained.provenance["source"] == "made up"

@@ -153,6 +153,14 @@ def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
         calibrate(hand, Silent(), fingers=(0, 3), made_s=0)
 
 
+def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
+    with (
+        biotac.open("sim:fingers.toml?fingers=1&seconds=9") as hand,
+        pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"),
+    ):
+        calibrate(hand, Silent(), fingers=(0,), made_s=0)
+
+
 # ---- recordings ----------------------------------------------------------------------------------
 
 

@@ -290,6 +290,11 @@ def test_ctrl_c_ends_it_and_keeps_everything(tmp_path: Path) -> None:
     assert abs(reader.last_s - np.ptp(reference.samples.t_s)) < 0.05
 
 
+def test_a_source_that_ends_ends_it(tmp_path: Path) -> None:
+    procedure, lines, *_ = walked(tmp_path, "calibrate.toml?seconds=10")
+    assert procedure.zero is None and lines[-1] == "the simulated source has ended"
+
+
 def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
     with pytest.raises(DeviceLostError):
         walked(tmp_path, SHORT, 130.0, DeviceLostError)

@@ -56,6 +56,7 @@ def test_a_mounting_turns_by_hand() -> None:
         ('rotation = [[1,0,0],[0,1,0],[0,0,0.9]]\noffset_mm = [0,0,0]\nreads = "force on finger"',
          r"not orthonormal, R R' is off by 0\.19"),
         ('rotation = [[1,0,0],[0,1,0],[0,0,-1]]\noffset_mm = [0,0,0]\nreads = "force on finger"', "mirrors"),
+        ('rotation = [[1,0,0],[0,1,0]]\noffset_mm = [0,0,0]\nreads = "force on finger"', r"shape \(2, 3\)"),
         ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,9e9]\nreads = "force on finger"', "up to 500 mm"),
         ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,0]\nreads = "both"', "reads is 'both'"),
         ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\nreads = "force on finger"', "offset_mm is missing"),
@@ -290,3 +291,5 @@ def test_a_file_that_grows_is_read_row_by_row(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match="expected a number in every column"):
             reader.read()
     reader.close()
+    with pytest.raises(RecordingError, match="expected --mounting"):
+        GrowingCsv(path)

@@ -126,3 +126,8 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     assert "expected 3 or more" in capsys.readouterr().err
     assert main(argv[:-2]) != 0
     assert "--readings" in capsys.readouterr().err
+
+
+def test_too_few_presses_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "press", "sim:fingers.toml", "--scale", "--finger", "0", "--presses", "2"]) != 0
+    assert "expected 3 or more" in capsys.readouterr().err

@@ -95,7 +95,7 @@ def test_no_weight_is_no_point_of_contact(weights) -> None:
     assert not got["force_n"].any()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     counts=arrays(
         np.uint16, st.tuples(st.integers(0, 40), st.just(19)), elements=st.integers(0, 4095) | st.just(MISSING)

@@ -164,6 +164,7 @@ def test_settings_and_times() -> None:
         (lambda: Finger().feed(np.zeros((3, 19))), "counts are float64, expected integers"),
         (lambda: Finger().feed(np.full((3, 19), 4096)), "counts row 0 holds 4096"),
         (lambda: Finger().feed(np.zeros((3, 19), int), [1, 2]), r"pdc have shape \(2,\), expected \(3,\)"),
+        (lambda: Finger().feed(np.zeros((1, 19), int), pac=np.zeros((1, 21), int)), "pac have shape"),
         (lambda: Finger().feed(np.zeros((1, 19), int), t_us=[0.5]), "t_us is float64"),
         (lambda: Finger(index=5), "index is 5"),
         (lambda: Finger({Setting.POC_WEIGHTS: 3}), "POC_WEIGHTS is 3"),

@@ -330,3 +330,5 @@ def test_settings_leave_a_calibrated_finger_alone() -> None:
         hand.board.set_setting(Setting.FORCE_GAIN_X_NN, 42)
         assert hand.board.finger_settings()[1] == hand.board.settings() | ODD.settings()
         assert hand.board.setting(Setting.FORCE_GAIN_X_NN) == 42
+        with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
+            hand.board.calibration(5)

@@ -194,6 +194,13 @@ def test_a_bus_that_cannot_be_opened(monkeypatch, fault: OSError, message: str) 
         load("24c02")
 
 
+def test_a_bus_that_fails(monkeypatch) -> None:
+    wires, _ = wired(monkeypatch, "24c02")
+    wires.fault = OSError(errno.ETIMEDOUT, "Connection timed out")
+    with pytest.raises(PortError, match=r"the bus failed .*timed out"):
+        load("24c02")
+
+
 def test_a_bus_that_fails_while_the_chip_writes(monkeypatch) -> None:
     wires, made = wired(monkeypatch, "24c02")
 

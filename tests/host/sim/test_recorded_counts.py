@@ -251,6 +251,13 @@ def test_a_btd_without_its_begin_line_or_with_cut_compression_is_refused(tmp_pat
         load_source(path)
 
 
+def test_text_in_a_btd_line_is_named(tmp_path: Path) -> None:
+    path = write_btd(tmp_path / "a.btd", btd_lines())
+    path.write_bytes(path.read_bytes().replace(b"0.000227 ", b"0.0002x7 ", 1))
+    with pytest.raises(InputError, match=r"line 7 is '0\.0002x7"):
+        load_source(path)
+
+
 # ---- real recordings ---------------------------------------------------------------------------
 
 
