@@ -150,6 +150,24 @@ TEST(while_held_nothing_is_tared_down_to_nothing)
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 50);
 }
 
+// Shear too light to be a touch, but the host says that something is held: only what all electrodes share is
+// followed.
+TEST(what_is_held_and_not_seen_is_kept)
+{
+    emulated_finger finger = resting_finger();
+    bt_tare_hold(&finger.tare);
+    const bt_baseline before = finger.tare.base;
+    for (int k = 0; k < 60 * FRAMES_PER_S; k++) {
+        bt_round frame = next_frame(&finger);
+        for (int i = 0; i < BT_ELECTRODES - 1; i++) {
+            frame.electrode[i] = (uint16_t)(frame.electrode[i] + (i % 2 ? 7 : -7)); // 882 count^2
+        }
+        (void)feed(&finger, &frame);
+    }
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+}
+
 TEST(release_settles_what_was_in_doubt)
 {
     emulated_finger finger = light_hold(60, 30);
@@ -298,6 +316,7 @@ int main(void)
         cmocka_unit_test(a_pattern_is_kept_where_the_pressure_is_shifted),
         cmocka_unit_test(a_press_that_the_pressure_does_not_see_is_not_judged_by_it),
         cmocka_unit_test(while_held_nothing_is_tared_down_to_nothing),
+        cmocka_unit_test(what_is_held_and_not_seen_is_kept),
         cmocka_unit_test(release_settles_what_was_in_doubt),
         cmocka_unit_test(a_lapsed_hold_is_judged_by_its_signals),
         cmocka_unit_test(the_hosts_word_is_told_before_what_follows_from_it),
