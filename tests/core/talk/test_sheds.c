@@ -128,6 +128,13 @@ TEST(then_a_map_is_not_computed_but_its_wrench_repeated)
     assert_true(less.flags & BT_FRAME_FLAG_REPEATED && less.flags & BT_FRAME_FLAG_NOT_ASKED);
     assert_int_equal(less.torque_mnmm[1], BT_INVALID_I32);
     assert_memory_equal(less.force_100un, again.force_100un, sizeof again.force_100un);
+    // One without a tare has none to repeat.
+    session.finger[1].tare.tared = false; // as inverted signals do
+    session.finger[1].tare.reason = BT_TARE_REASON_INVERTED;
+    all_late(0);
+    assert_true(frame_of(1988).flags & BT_FRAME_FLAG_UNTARED);
+    all_late(11001);
+    assert_false(frame_of(1988).flags & BT_FRAME_FLAG_REPEATED);
 }
 
 // Later than 22 ms there is no FRAME; the next one says so, once.

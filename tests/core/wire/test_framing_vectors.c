@@ -88,6 +88,16 @@ TEST(every_case_gives_its_frames_and_counts)
     }
 }
 
+TEST(what_is_not_cobs_has_no_length)
+{
+    uint8_t out[4];
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\0", 1, out), -1);
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\0", 2, out), -1);
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7", 1, out), -1); // what is behind it is not read
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\1\3\7", 3, out), -1);
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7\1", 3, out), 2);
+}
+
 TEST(chunks_of_any_size_give_the_same)
 {
     static const size_t sizes[] = {1, 7, 64, MAX_WIRE};
@@ -168,6 +178,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_case_gives_its_frames_and_counts),
         cmocka_unit_test(chunks_of_any_size_give_the_same),
+        cmocka_unit_test(what_is_not_cobs_has_no_length),
         cmocka_unit_test(after_any_noise_one_delimiter_is_enough_to_go_on),
         cmocka_unit_test(any_block_comes_back_from_any_address),
     };
