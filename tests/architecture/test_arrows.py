@@ -308,11 +308,3 @@ def test_a_wrong_arrow_is_named(tmp_path: Path, files: dict[str, str], complaint
         (tmp_path / name).write_text(text, encoding="utf-8")
     found = judge(tmp_path, read_table(MADE_UP))
     assert len(found) == 1 and complaint in found[0]
-
-
-def test_a_right_tree_has_nothing_to_complain_of(tmp_path: Path) -> None:
-    (tmp_path / "host/biotac/high").mkdir(parents=True)
-    (tmp_path / "host/biotac/low").mkdir()
-    (tmp_path / "host/biotac/high/top.py").write_text("from ..low import ground\n", encoding="utf-8")
-    (tmp_path / "host/biotac/low/ground.py").write_text("", encoding="utf-8")
-    assert judge(tmp_path, read_table(MADE_UP)) == []

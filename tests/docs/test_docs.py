@@ -6,21 +6,19 @@ tools/docs builds them with warnings as errors, broken links among them; tools/t
 from __future__ import annotations
 
 import html
-import importlib.util
 import json
 import re
 import shlex
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
 import biotac
-from biotac.cli.main import main, parser
+from biotac.cli.main import parser
 
 ROOT = Path(__file__).parents[2]
 PAGES = [page for folder in ("docs", "biotac-lab/docs") for page in sorted((ROOT / "host" / folder).rglob("*.md"))]
@@ -35,17 +33,6 @@ COMMANDS = [
         r"^    (?:sudo )?biotac (\S.*?)(?:\s+#.*)?$", page.read_text(encoding="utf-8"), flags=re.M
     )
 ]
-
-
-def tool(name: str, monkeypatch) -> ModuleType:
-    """A script of tools/make/ as a module."""
-    monkeypatch.syspath_prepend(str(ROOT / "tools/make"))
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"tools/make/{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if blocks])
@@ -97,17 +84,6 @@ def test_a_pages_command_is_one(page: str, command: str) -> None:
 def test_the_command_lines_page_is_up_to_date() -> None:
     done = subprocess.run([sys.executable, ROOT / "tools/make/cli_page.py", "--check"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-
-
-def test_the_command_lines_page_has_every_option(monkeypatch, capsys) -> None:
-    text = tool("cli_page", monkeypatch).page()
-    for verb in parser()._subparsers._group_actions[0].choices:
-        with pytest.raises(SystemExit):
-            main([verb, "--help"])
-        usage = capsys.readouterr().out
-        section = text.split(f"\n## biotac {verb}\n")[1].split("\n## ")[0]
-        for option in set(re.findall(r"--[a-z][a-z0-9-]+", usage.split("options:")[1].split("example:")[0])):
-            assert option in section or option in ("--json", "--help"), (verb, option)
 
 
 def test_the_reference_has_every_public_name() -> None:

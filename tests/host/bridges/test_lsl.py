@@ -100,16 +100,6 @@ def test_columns_are_the_rows() -> None:
     np.testing.assert_array_equal(samples(row), [np.arange(1, 33)])
 
 
-def test_invalid_stays_nan_on_the_way(inlet) -> None:
-    with biotac.open("sim:press.toml?seconds=0.1") as hand, Outlet(hand) as outlet:
-        stream = inlet(outlet.infos[0])
-        batch = hand.read_batch(1.0)
-        outlet.push(batch)
-        values, _ = pull(stream, len(batch.frames))
-    assert np.isnan(batch.frames["force_n"][0]).all()
-    assert np.isnan(values[0, :9]).all()
-
-
 def test_events_are_markers_by_name(inlet) -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand, Outlet(hand) as outlet:
         hand.stream("events", "raw")

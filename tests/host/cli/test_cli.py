@@ -177,65 +177,30 @@ def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("command", "message"),
     [
-        ("name = 'x'\n[[step]]\ndo = 'press\n", "bad.toml:3: "),
-        (
-            "name = 'x'\n\n[[step]]\ndo = 'rest'\nseconds = 1\n[[step]]\ndo = 'press'\nsecnds = 1\n",
-            ":8: step 2: key 'secnds'",
-        ),
-        ("name = 'x'\n[[step]]\ndo = 'jump'\nseconds = 1\n", ":3: step 1: key 'do'"),
+        ("", "the following arguments are required"),
+        ("fly", "invalid choice: 'fly'"),
+        *((f"stream P --seconds {text}", "expected") for text in ("0", "-1", "nan", "inf", "soon")),
+        ("stream P --rate 1e-308", "expected"),
+        ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
+        ("calibrate press P --scale --readings 1,nan", "seen '1,nan'; expected numbers, separated by commas"),
+        ("calibration clear P --finger 5", "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4"),
+        ("calibrate press P --pressure --finger thumb,9", "expected one of 'index', 'middle'"),
+        ("record P OUT --forc", "unrecognized arguments: --forc"),
+        ("lake check OUT --js", "unrecognized arguments: --js"),
     ],
 )
-def test_a_malformed_scenario_exits_2_with_line_and_key(capsys, tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "bad.toml"
-    path.write_text(text)
-    error = fails(capsys, 2, "demo", str(path), "--out", str(tmp_path / "out"))
-    assert "bad.toml" in error
-    assert message in error
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "record sim:press.toml OUT --f",
-        "record sim:press.toml OUT --forc",
-        "calibration get sim:press.toml OUT --finger 0 --forc",
-        "calibrate press sim:press.toml --scale --finger 0 --forc",
-        "lake check OUT --js",
-    ],
-)
-def test_options_are_written_out(capsys, tmp_path: Path, command: str) -> None:
-    out = tmp_path / "a.mcap"
-    out.write_bytes(b"precious")
+def test_usage_errors_exit_2(capsys, command: str, message: str) -> None:
     with pytest.raises(SystemExit) as refused:
-        main(command.replace("OUT", str(out)).split())
+        main(command.split())
     assert refused.value.code == 2
-    assert "unrecognized arguments: --" in capsys.readouterr().err
-    assert out.read_bytes() == b"precious"
-
-
-def test_usage_errors_exit_2() -> None:
-    assert run("fly").returncode == 2
-    assert run().returncode == 2
-    for option, text in (*(("--seconds", text) for text in ("0", "-1", "nan", "inf", "soon")), ("--rate", "1e-308")):
-        done = run("stream", "sim:press.toml", option, text)
-        assert done.returncode == 2
-        assert "expected" in done.stderr.splitlines()[-1]
-
-
-def test_folders_that_cannot_be_made_exit_2(capsys, tmp_path: Path) -> None:
-    file = tmp_path / "file"
-    file.write_text("")
-    for out in (file, file / "sub", Path("/dev/null"), Path("/proc/nowhere")):
-        assert "cannot create the folder" in fails(capsys, 2, "demo", "press.toml", "--seconds", "1", "--out", str(out))
-    assert "is a folder" in fails(capsys, 2, "record", "sim:press.toml", str(tmp_path))
+    assert message in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_full_disk_exits_2_in_one_line() -> None:
     done = run("record", "sim:press.toml", "/dev/full", "--force", "--seconds", "5")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "No space left" in done.stderr
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1) and "No space left" in done.stderr
 
 
 def test_demo_takes_the_ports_that_list_prints(capsys, tmp_path: Path) -> None:
@@ -278,42 +243,6 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
         assert len(frames) == 40
         with biotac.open(port) as again:  # a port that was closed opens again
             assert again.info.fingers_present == 0b11
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "calibration get PORT out.json --finger nose",
-        "calibration clear PORT --finger 5",
-        "calibrate wrench rec.mcap --finger nose",
-        "calibrate press PORT --scale --finger nose",
-        "calibrate press PORT --pressure --finger thumb,9",
-    ],
-)
-def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> None:
-    with pytest.raises(SystemExit) as refused:
-        main(command.split())
-    notes = capsys.readouterr().err
-    assert refused.value.code == 2
-    assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in notes
-
-
-@pytest.mark.parametrize(
-    ("command", "message"),
-    [
-        ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
-        ("calibrate press P --scale --readings 1,x", "--readings: seen '1,x'; expected numbers, separated by commas"),
-        (
-            "calibrate press P --scale --readings 1,nan",
-            "--readings: seen '1,nan'; expected numbers, separated by commas",
-        ),
-    ],
-)
-def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, message: str, capsys) -> None:
-    with pytest.raises(SystemExit) as refused:
-        main(command.split())
-    assert refused.value.code == 2
-    assert message in capsys.readouterr().err
 
 
 def test_view_once_plays_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,23 +101,6 @@ def test_a_tare_command_changes_the_tare_of_the_next_frame() -> None:
     assert (events[0].seq, events[0].reason) == (0, wire.TareReason.HOST_SET)
 
 
-def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
-    hand = biotac.open("sim:drift.toml")
-    frames = hand.frames()
-    next(frames)
-    hand.link.board._process.kill()
-    with pytest.raises(biotac.DeviceLostError):
-        for _ in frames:
-            pass
-    hand.close()
-
-
-def test_a_port_is_opened_once(scripted_board, hello) -> None:
-    board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
-    with biotac.open(board.path), pytest.raises(biotac.PortError, match=r"in use by .*; close that program"):
-        biotac.open(board.path)
-
-
 @pytest.mark.parametrize(
     ("port", "message"),
     [

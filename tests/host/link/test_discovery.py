@@ -46,29 +46,14 @@ def plugged(monkeypatch):
     return plug
 
 
-def test_the_firmware_and_the_host_have_their_ids_from_one_place() -> None:
-    source = (ROOT / "firmware/port/rp2040/usb/descriptors.c").read_text()
-    assert "LOW(BT_USB_VENDOR)" in source
-    assert "LOW(BT_USB_PRODUCT)" in source
-    assert "0x1209" not in source
-
-
 def test_only_our_usb_ids_are_boards() -> None:
     assert [p.device for p in boards(ONE)] == ["/dev/ttyACM0"]
     assert [p.device for p in serial_ports(ONE)] == ["/dev/ttyACM0", "/dev/ttyUSB0"]
 
 
-def test_com10_comes_after_com3() -> None:
-    assert [p.device for p in boards(TWO)] == ["COM3", "COM10"]
-
-
 def test_of_a_macs_two_names_the_one_that_does_not_wait_is_kept() -> None:
     both = [entry("/dev/tty.usbmodem1"), entry("/dev/cu.usbmodem1"), entry("/dev/tty.usbmodem2")]
     assert [p.device for p in boards(both)] == ["/dev/cu.usbmodem1", "/dev/tty.usbmodem2"]
-
-
-def test_the_only_board_needs_no_name() -> None:
-    assert choose(None, ONE) == "/dev/ttyACM0"
 
 
 @pytest.mark.parametrize("number", ["E6605838831F5B2C", "e6605838831f5b2c"])
@@ -197,19 +182,6 @@ def test_two_programs_that_want_one_port_are_told_apart(scripted_board, hello) -
 
 
 # ---- versions ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("changes", "cure"),
-    [
-        ({"wire_major": wire.WIRE_MAJOR + 1}, "pip install -U biotac-gateway"),
-        ({"wire_major": wire.WIRE_MAJOR - 1}, "biotac flash"),
-    ],
-)
-def test_another_major_names_the_command_that_cures_it(scripted_board, hello, changes, cure: str) -> None:
-    board = scripted_board(lambda i, p: hello(p, **changes) if i == wire.HelloRequest.ID else b"")
-    with pytest.raises(biotac.WireVersionError, match=cure):
-        biotac.open(board.path)
 
 
 @pytest.mark.parametrize(

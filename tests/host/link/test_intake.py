@@ -25,6 +25,8 @@ from biotac.wire.decoder import STREAMED
 from biotac.wire.dtypes_gen import DTYPES
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no ports by file descriptor on this system")
+#: Mostly in order; else skipped, repeated, stepped back or begun anew.
+STEPS = [0] * 40 + [5, -1, -2, -3, -20, -40, -70, 9_000, 32_000]
 START = (wire.Reply.ID, wire.Reply(1, wire.Start.ID, wire.Error.OK).pack())
 
 
@@ -38,7 +40,7 @@ def sent(random: np.random.Generator, n: int) -> list[tuple[int, bytes]]:
             continue
         row = np.frombuffer(random.bytes(DTYPES[kind].itemsize), DTYPES[kind]).copy()
         row["finger"] = random.choice([0, 3, 255])
-        row["seq"] = (65_000 + k + random.choice([0, 0, 0, 0, 5, -40])) % 2**16
+        row["seq"] = (65_000 + k + random.choice(STEPS)) % 2**16
         row["t_us"] = (2**32 - 10**6 + 10_000 * k) % 2**32
         if kind == wire.Idle.ID:
             row["frames"] = random.choice([1, 2, 10])

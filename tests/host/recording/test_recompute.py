@@ -182,8 +182,6 @@ def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
 @pytest.mark.parametrize(
     ("text", "seen"),
     [
-        ("{", "JSON"),
-        ('{"nonsense": 1}', "nonsense"),
         ('{"poc_weights": 1.5}', "integers"),
         ('{"poc_weights": 7}', "0 to 2"),
     ],

@@ -55,18 +55,6 @@ def test_a_field_that_the_recording_does_not_have_is_invalid(recorded: Path) -> 
     assert (rows[FRAME]["seq"] == 0).all()
 
 
-def test_one_fingers_force_takes_little_memory(recorded: Path) -> None:
-    def peak(**part: object) -> int:
-        biotac.load(recorded, **part)  # type: ignore[arg-type]
-        tracemalloc.start()
-        biotac.load(recorded, **part)  # type: ignore[arg-type]
-        most = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return most
-
-    assert peak(fields=["t_us", "force_n"], fingers=[2]) <= 0.15 * peak()
-
-
 def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
     with pytest.raises(biotac.InputError, match="unknown field 'forces_n': expected one or more of finger, seq"):
         biotac.load(recorded, fields=["forces_n"])

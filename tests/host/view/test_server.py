@@ -343,21 +343,6 @@ def test_a_browser_gets_every_file_and_all_fingers() -> None:
     assert fingers_shown("sim:press.toml?fingers=5&seconds=60") == set(range(5))
 
 
-@pytest.mark.parametrize(
-    ("words", "code", "told"),
-    [
-        (["nowhere.mcap"], 2, "nowhere.mcap cannot be read"),
-        (["sim:nowhere.toml"], 2, "No such file"),
-        (["sim:press.toml", "--folder", "/nowhere"], 2, "is not a writable folder"),
-        (["sim:press.toml", "--port", "99999"], 2, "expected 0 to 65535"),
-    ],
-)
-def test_what_can_never_be_shown_ends_the_command(capsys, words: list[str], code: int, told: str) -> None:
-    assert main(["view", "--no-browser", *words]) == code
-    error = capsys.readouterr().err.splitlines()[-1]
-    assert error.startswith("biotac: ") and told in error
-
-
 def test_a_taken_port_is_told(make_player, view_of, capsys) -> None:
     taken = view_of(lambda: make_player()).server.server_port
     assert main(["view", "sim:press.toml", "--no-browser", "--port", str(taken)]) == 3

@@ -62,9 +62,10 @@ def assert_rows_are_those_of(decoded: Decoded, got: list[Message]) -> None:
     assert list(decoded.ids) == [i for i, _ in got]
 
 
-@pytest.mark.parametrize("allow_longer", [False, True])
-@pytest.mark.parametrize("rate", [0.0, 1e-3, 1e-2])
-@pytest.mark.parametrize("longest", [3, 64, 4096, 100_000])
+@pytest.mark.parametrize(
+    ("rate", "longest", "allow_longer"),
+    [(0.0, 64, False), (0.0, 4096, True), (1e-3, 3, True), (1e-2, 4096, False), (1e-2, 100_000, True)],
+)
 def test_the_reference_finds_the_same_messages_and_damage(rate: float, longest: int, allow_longer: bool) -> None:
     random = np.random.default_rng([int(rate * 1e4), longest, allow_longer])
     data = b"".join(encode(*m) for m in messages(random, 600, longer_by=3))
@@ -83,7 +84,7 @@ def test_the_reference_finds_the_same_messages_and_damage(rate: float, longest: 
         assert min(seen["too_long"], seen["bad_cobs"], seen["bad_crc"]) > 0
 
 
-@pytest.mark.parametrize("offset", range(-3, 4))
+@pytest.mark.parametrize("offset", [-1, 0, 1])
 def test_a_chunk_longer_than_the_decoders_own_step_is_one_chunk(offset: int) -> None:
     random = np.random.default_rng(5)
     data = b"".join(encode(*m) for m in messages(random, 5000))
@@ -97,19 +98,18 @@ def test_a_chunk_longer_than_the_decoders_own_step_is_one_chunk(offset: int) -> 
 
 def test_noise_is_no_message() -> None:
     random = np.random.default_rng(6)
-    noise = random.integers(0, 256, 4_000_000, np.uint8).tobytes()
+    noise = random.integers(0, 256, 1_000_000, np.uint8).tobytes()
     decoder, reference = Decoder(), Deframer()
     assert decoder.feed(noise).messages() == reference.feed(noise) == []
     assert decoder.counts == reference.counts
-    assert decoder.counts.bad > 10_000
+    assert decoder.counts.bad > 3_000
 
 
-@pytest.mark.parametrize("size", range(250))
-def test_every_length_of_payload_arrives(size: int) -> None:
-    for fill in (b"\0", b"\1", b"\xff", b"\0\1", b"\1\1\1\1\1\1\1\0"):
-        payload = (fill * size)[:size]
-        decoded = Decoder().feed(encode(UNKNOWN_ID, payload))
-        assert decoded.others == [(UNKNOWN_ID, payload)]
+@pytest.mark.parametrize("fill", [b"\0", b"\1", b"\xff", b"\0\1", b"\1\1\1\1\1\1\1\0"])
+def test_every_length_of_payload_arrives(fill: bytes) -> None:
+    payloads = [(fill * size)[:size] for size in range(250)]
+    decoded = Decoder().feed(b"".join(encode(UNKNOWN_ID, payload) for payload in payloads))
+    assert decoded.others == [(UNKNOWN_ID, payload) for payload in payloads]
 
 
 @pytest.mark.parametrize("bit", range(8))
