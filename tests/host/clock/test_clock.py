@@ -22,6 +22,7 @@ from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
 
 SEEDS = range(8)
+BY_DAY = [pytest.param(seed, marks=() if seed < 2 else pytest.mark.nightly) for seed in SEEDS]
 WORST = {"wander_ppm_per_s": WANDER_PER_S * 1e6, "way_back_s": 0.000_6}
 
 
@@ -78,7 +79,7 @@ def test_a_crystal_50_ppm_off_behind_a_jittery_link(changes: dict[str, float], s
     assert np.quantile(np.concatenate(after_a_minute_s), 0.99) <= 0.000_2
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", BY_DAY)
 def test_every_sample_of_a_recording_gets_a_time_within_the_stated_uncertainty(seed: int) -> None:
     model = Model(seed, 400.0, **WORST)
     clock, _ = follow(model, every_s=50.0)
@@ -92,7 +93,7 @@ def test_every_sample_of_a_recording_gets_a_time_within_the_stated_uncertainty(s
 
 
 def test_old_times_keep_a_bound_that_holds_when_the_crystal_has_turned() -> None:
-    model = Model(3, 600.0, ppm=-20.0, wander_ppm_per_s=WANDER_PER_S * 1e6)
+    model = Model(3, 300.0, ppm=-20.0, wander_ppm_per_s=WANDER_PER_S * 1e6)
     clock, rows = follow(model, every_s=5.0)
     assert (np.abs(rows[:, 1]) <= rows[:, 2]).all()
     silent_us = clock.segments[-1].last_t_us + np.array([1, 10, 50]) * 1_000_000
@@ -199,7 +200,7 @@ def test_without_a_round_trip_nothing_is_claimed() -> None:
     assert clock.host_time_s(np.empty((0, 22))).shape == (0, 22)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", BY_DAY)
 def test_a_promise_stands_in_for_round_trips(seed: int) -> None:
     model = Model(seed, 120.0)
     clock = DeviceClock(promised_delay_s=0.002)
@@ -358,9 +359,10 @@ def test_a_simulated_board_in_real_time_is_a_clock() -> None:
     """However late this computer lets it run: it says nothing ahead of its time, and reads nothing behind it."""
     with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
         hand.stream()
-        while not hand.clock.now().known:  # on a busy computer the first reply comes after many frames
-            hand.read(0.3)
-        for _ in range(3):
+        ages_s: list[float] = []
+        while len(ages_s) < 3:  # on a busy computer replies come late, and after many frames
             last_us = int(hand.read(0.3)["t_us"][-1])
-            assert 0 < time.monotonic() - hand.clock.host_time_s(last_us) < 600
+            if hand.clock.now().known:
+                ages_s.append(time.monotonic() - float(hand.clock.host_time_s(last_us)))
+        assert min(ages_s) > 0 and max(ages_s) < 600
         assert hand.clock.resets == 0

@@ -53,16 +53,15 @@ def test_presses_are_seen_and_released(pressed) -> None:
     assert reasons.count("ROLL_BACK") == reasons.count("RELEASE") + reasons.count("RESIDUE") == 3
 
 
-def test_five_fingers_with_pac_for_a_minute_lose_nothing(tmp_path) -> None:
-    demo = run_demo("press.toml", tmp_path, fingers=5, seconds=60, show=quiet)
+def test_five_fingers_with_pac_lose_nothing(tmp_path) -> None:
+    demo = run_demo("press.toml", tmp_path, fingers=5, seconds=20, show=quiet)
     facts = demo.facts
     assert demo.good
-    assert facts["frames"] == facts["pac_blocks"] == 30_000
+    assert facts["frames"] == facts["pac_blocks"] == 10_000
     assert facts["board_slots_late"] == facts["board_dropped"] == 0
-    assert facts["host_cpu_percent"] < 25
     for finger in range(5):
         mine = demo.batch.frames["finger"] == finger
-        assert np.array_equal(demo.batch.frames["seq"][mine], np.arange(6000))
+        assert np.array_equal(demo.batch.frames["seq"][mine], np.arange(2000))
         assert np.array_equal(demo.batch.frames["counts"][mine], demo.source.samples[:, finger, 7::2])
         mine = demo.batch.pac["finger"] == finger
         assert np.array_equal(demo.batch.pac["pac"][mine], demo.source.samples[:, finger, 0::2])

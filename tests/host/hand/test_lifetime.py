@@ -6,7 +6,6 @@ import asyncio
 import gc
 import os
 import pickle
-import signal
 import subprocess
 import sys
 import threading
@@ -287,15 +286,3 @@ def test_a_cancelled_iteration_and_command_leave_the_hand_usable() -> None:
 
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(asyncio.run, main()).result() == 1
-
-
-def test_a_program_that_is_terminated_loses_less_than_a_second(tmp_path: Path) -> None:
-    # SIGTERM ends Python without a word to anybody: what stands in the file is what was flushed.
-    text = RECORDS.format(run="", end="print('up', flush=True); list(hand.batches())")
-    program = subprocess.Popen([sys.executable, "-c", text, str(tmp_path / "a.mcap")], stdout=subprocess.PIPE)
-    assert program.stdout is not None
-    assert int(program.stdout.readline()) >= 120 and program.stdout.readline() == b"up\n"
-    program.send_signal(signal.SIGTERM)
-    program.wait()
-    program.stdout.close()
-    assert len(biotac.Recording(tmp_path / "a.mcap").frames) >= 30

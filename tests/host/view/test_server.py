@@ -9,7 +9,6 @@ import random
 import re
 import socket
 import threading
-import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -175,7 +174,7 @@ def test_connections_that_drip_make_room(make_player, view_of) -> None:
     viewing = view_of(lambda: make_player())
     port = viewing.server.server_port
     dripping = []
-    for _ in range(3 * MAX_CONNECTIONS):
+    for _ in range(MAX_CONNECTIONS + 8):
         dripping.append(socket.create_connection(("127.0.0.1", port)))
         dripping[-1].sendall(b"GET / HTTP/1.1\r\nHost: ")
     assert ask(viewing, "GET", "/")[0] == 200
@@ -310,10 +309,10 @@ def test_a_recording_is_played_whole_and_once(tmp_path: Path) -> None:
 def test_a_paused_recording_stands_still_until_it_goes_on_or_is_closed(tmp_path: Path, view) -> None:
     recording, player = player_of(tmp_path, "sim:drift.toml?fingers=1&seconds=2", 100.0)
     player.do("pause", None)
-    threading.Timer(0.5, player.do, ("resume", None)).start()
-    begin_s = time.monotonic()
-    assert sum(len(b.frames) for b in player.batches()) == len(recording.frames)
-    assert time.monotonic() - begin_s >= 0.4
+    came, at_resume = [], []
+    threading.Timer(0.5, lambda: (at_resume.append(sum(came)), player.do("resume", None))).start()
+    came.extend(len(b.frames) for b in player.batches())
+    assert at_resume[0] < sum(came) == len(recording.frames)
     with pytest.raises(biotac.InputError, match="a recording cannot be tared; open a board"):
         player.do("tare", 0)
     player.close()
