@@ -11,6 +11,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from biotac.board.gap import Gap
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
@@ -143,6 +144,11 @@ class Live:
         """Let the board send this, in one piece."""
         self.firmware.t_us = max(self.firmware.t_us, batch_of(*frames).last_t_us() or 0)
         os.write(self.board._master, b"".join(frames))
+
+
+def gaps_in(batches: list[Batch]) -> list[Gap]:
+    """The gaps that they tell."""
+    return [m for batch in batches for m in batch.messages if isinstance(m, Gap)]
 
 
 def until(so: Callable[[], Any]) -> None:

@@ -1,24 +1,19 @@
-"""What arrives and who gets it: queues, latest values, callbacks, and what the board is told to send."""
+"""What arrives and who gets it: queues, latest values, and what the board is told to send."""
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 
 import numpy as np
 import pytest
-from live_board import WAIT_S, Live, batch_of, frame, heartbeat, packed, until
+from live_board import WAIT_S, Live, batch_of, frame, gaps_in, heartbeat, packed, until
 
 import biotac
 from biotac.board import consumers, stream
-from biotac.board.consumers import Queue, Troubles
+from biotac.board.consumers import Queue
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
-
-
-def gaps_in(batches: list[Batch]) -> list[biotac.Gap]:
-    return [m for batch in batches for m in batch.messages if isinstance(m, biotac.Gap)]
 
 
 def drained(queue: Queue) -> list[Batch]:
@@ -190,231 +185,6 @@ def test_readers_may_take_turns(live: Live) -> None:
     thread.start()
     thread.join()
     assert (here, there) == ([1, 2], [3, 4])
-
-
-# ---- callbacks -----------------------------------------------------------------------------------
-
-
-def test_callbacks_get_everything_in_order_until_they_unsubscribe(live: Live) -> None:
-    seen: list[object] = []
-    stop = live.hand.on_batch(lambda batch: seen.extend(batch.seq.tolist()))
-    live.hand.on_touch(lambda touch: seen.append(f"touch {touch.finger}"))
-    live.hand.on_status(lambda status: seen.append(f"status {status.req_id}"))
-    live.hand.stream()
-    assert [s.quantities & wire.QuantityFlags.TOUCH for s in live.firmware.of(wire.Subscribe)] == [32]
-    touch = wire.Touch(3, live.firmware.now_us(), 2, 1, 500)
-    live.send(frame(0), frame(1), packed(touch), frame(2), packed(live.firmware.status()))
-    until(lambda: len(seen) == 5)
-    stop()
-    stop()
-    live.send(frame(3), packed(touch))
-    until(lambda: len(seen) == 6)
-    assert seen == [0, 1, 2, "touch 2", "status 0", "touch 2"]  # the keeper's questions are its own
-
-
-def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:
-    seen: list[str] = []
-    live.start_clock()
-    live.hand._latest.max_age_s = 20.0
-    live.hand.on_event(lambda event: seen.append(biotac.EventKind(event.kind).name))
-    stop = live.hand.on_slip(lambda event: seen.append(f"slip of {event.finger}, {event.peak_count}"))
-    live.hand.stream()
-    assert live.firmware.of(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
-    assert len(live.firmware.of(wire.Subscribe)) == 1
-    now_us = live.firmware.now_us()
-    touch = wire.Event(3, now_us, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT)
-    slip = wire.Event(5, now_us, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
-    old = wire.Event(5, now_us - 30_000_000, 3, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
-    live.send(*(packed(event) for event in (old, touch, slip)))
-    until(lambda: len(seen) == 3)
-    stop()
-    assert seen == ["TOUCH", "SLIP", "slip of 2, 120"]
-
-
-def test_what_callbacks_wait_for_is_added_to_what_was_chosen(live: Live) -> None:
-    touch, force, firmware = wire.QuantityFlags.TOUCH, wire.QuantityFlags.FORCE, live.firmware
-    live.hand.on_touch(print)
-    live.hand.stream("force", rest=False)
-    assert firmware.of(wire.Subscribe)[-1].quantities == force | touch
-    live.hand.stream("pac")  # TOUCH comes with frames only
-    assert firmware.of(wire.Start)[-1].streams & wire.StreamFlags.FRAMES
-    live.hand.stream("force", rest=False)
-    seen: list[wire.Bands] = []
-    live.hand.on_bands(seen.append)  # a running stream is changed at once
-    assert firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
-    assert firmware.of(wire.Subscribe)[-1].quantities == force | touch
-    bands = wire.Bands(3, 30_227, 2, 22, (1, 2, 3, 4, 5, 2**32 - 2))
-    live.send(packed(bands), frame(0))
-    until(lambda: seen)
-    assert seen == [bands]
-
-
-def streaming_to_a_slow_callback(live: Live) -> tuple[threading.Event, list[Batch]]:
-    """An event that the callback waits for, and the batches it was called with."""
-    go_on, calls = threading.Event(), []
-
-    def slow(batch: Batch) -> None:
-        calls.append(batch)
-        assert go_on.wait(WAIT_S)
-
-    live.hand.on_batch(slow)
-    live.hand.stream()
-    return go_on, calls
-
-
-def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
-    go_on, calls = streaming_to_a_slow_callback(live)
-    live.send(frame(0))
-    until(lambda: calls)
-    for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
-        live.send(*(frame(seq) for seq in range(first, first + 20)))
-    until(lambda: live.hand.stats.frames == 2001)
-    assert live.hand[0].t_us == 20_000_000
-    live.hand.ping()
-    go_on.set()
-    live.send(frame(2001))  # alone it fits, however large the batches before were
-    until(lambda: any(2001 in batch.seq for batch in calls))
-    frames = sum(len(b.wire) for b in calls)
-    assert live.hand.stats.frames_skipped == 2002 - frames > 0
-    assert [gap.reason for gap in gaps_in(calls)] == ["slow"]
-
-
-def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(consumers, "BACKLOG_S", 0.0)
-    go_on, calls = streaming_to_a_slow_callback(live)
-    for seq in range(100):
-        live.send(frame(seq))
-        until(lambda seq=seq: live.hand.stats.frames > seq)
-    closing = threading.Thread(target=live.hand.close)
-    closing.start()
-    until(lambda: live.hand._callbacks._give_up_s < math.inf)
-    go_on.set()
-    closing.join()
-    stats = live.hand.stats
-    assert len(calls) == 1 and stats.frames == 100
-    assert stats.frames_skipped == 100 - len(calls[0].wire) and stats.batches_skipped > 90
-
-
-def test_commands_of_callbacks_and_the_keepers_looks_do_not_wait_for_each_other(live: Live, quick) -> None:
-    answered: list[None] = []
-    live.hand.on_batch(lambda batch: answered.append(live.hand.ping()))
-    live.hand.stream()
-    for k in range(50):
-        live.send(frame(k))
-        until(lambda: len(answered) > k)  # noqa: B023
-    assert live.hand.connected
-
-
-def test_a_callback_may_give_commands_stop_and_close(live: Live) -> None:
-    live.hand.on_batch(lambda batch: live.hand.tare(0) if 0 in batch.seq else None)
-    live.hand.on_batch(lambda batch: live.hand.stop() if 1 in batch.seq else None)
-    live.hand.on_batch(lambda batch: live.hand.close() if 2 in batch.seq else None)
-    live.hand.stream()
-    live.send(frame(0))
-    live.firmware.wait_for(wire.TareNow)
-    live.send(frame(1))
-    live.firmware.wait_for(wire.Stop, 2)  # after the handshake's
-    live.send(frame(2))
-    until(lambda: live.hand._board.closed)
-    live.hand.close()  # nothing was wrong
-
-
-# ---- errors of callbacks -------------------------------------------------------------------------
-
-CALLS = {
-    "force_n": lambda live, path: live.hand[0].force_n,
-    "frame": lambda live, path: live.hand[0].frame,
-    "stale": lambda live, path: live.hand[0].stale,
-    "ping": lambda live, path: live.hand.ping(),
-    "status": lambda live, path: live.hand.status(),
-    "tare": lambda live, path: live.hand.tare(0),
-    "hold": lambda live, path: live.hand.hold(0),
-    "release": lambda live, path: live.hand.release(0),
-    "setting": lambda live, path: live.hand.board.setting(1),
-    "stream": lambda live, path: live.hand.stream(),
-    "stop": lambda live, path: live.hand.stop(),
-    "record": lambda live, path: live.hand.record(path / "a.mcap"),
-    "streaming": lambda live, path: live.hand.streaming,
-    "stats": lambda live, path: live.hand.stats,
-    "check": lambda live, path: live.hand.check(),
-    "read": lambda live, path: live.hand.read(0.01),
-    "on_batch": lambda live, path: live.hand.on_batch(print),
-    "close": lambda live, path: live.hand.close(),
-}
-
-
-def not_my_day(batch: Batch) -> None:
-    if len(batch.wire):
-        raise ValueError("not my day")
-
-
-@pytest.mark.parametrize("call", CALLS)
-def test_what_a_callback_raises_is_raised_by_the_next_call_of_any_kind(live: Live, call, tmp_path, caplog) -> None:
-    seen: list[int] = []
-    live.hand.on_batch(not_my_day)
-    live.hand.on_batch(lambda batch: seen.extend(batch.seq.tolist()))
-    live.hand.stream()
-    view = live.hand[0]
-    live.send(frame(0))
-    until(lambda: seen == [0])
-    with pytest.raises(biotac.CallbackError, match=r"not_my_day raised ValueError: not my day; fix it") as caught:
-        CALLS[call](live, tmp_path)
-    assert isinstance(caught.value.__cause__, ValueError)
-    (record,) = [r for r in caplog.records if r.levelno == logging.ERROR]
-    assert record.name == "biotac" and record.exc_info[1] is caught.value.__cause__
-    if call != "close":
-        view.stale, live.hand.check()  # once is enough
-        live.send(frame(1))  # it stays subscribed, and so do the others
-        until(lambda: seen == [0, 1])
-        with pytest.raises(biotac.CallbackError, match="not my day"):
-            live.hand.close()
-    live.hand.close()
-
-
-def test_sys_exit_in_a_callback_is_raised_and_ends_no_thread(live: Live) -> None:
-    def leaves(batch: Batch) -> None:
-        if len(batch.wire):
-            raise SystemExit(3)
-
-    live.hand.on_batch(leaves)
-    live.hand.stream()
-    for seq in range(1, 3):
-        live.send(frame(seq))
-        until(lambda: live.hand._troubles._first is not None)
-        with pytest.raises(biotac.CallbackError, match=r"leaves raised SystemExit: 3"):
-            live.hand.check()
-    assert live.hand[0].t_us == 20_000 and live.hand.streaming
-
-
-def test_several_errors_are_one_that_counts_the_others() -> None:
-    troubles = Troubles()
-    for text in "abc":
-        troubles.keep(biotac.CallbackError(text))
-    with pytest.raises(biotac.CallbackError, match=r"^a, and 2 more error\(s\) since; fix it$"):
-        troubles.report()
-    troubles.report()
-
-
-def test_a_callbacks_commands_do_not_raise_what_callbacks_raised(live: Live) -> None:
-    """The program is told, not they: their errors would grow by one another's."""
-    done = threading.Event()
-
-    def commands(batch: Batch) -> None:
-        live.hand.ping()
-        live.hand.check()
-        if 9 in batch.seq:
-            done.set()
-        raise ValueError("again")
-
-    live.hand.on_batch(commands)
-    live.hand.stream()
-    for seq in range(10):
-        live.send(frame(seq))
-    assert done.wait(WAIT_S)
-    with pytest.raises(biotac.CallbackError) as caught:
-        live.hand.close()
-    assert str(caught.value).count("raised ValueError") == 1
 
 
 # ---- what is wanted ------------------------------------------------------------------------------
