@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import pytest
 from deframer import Deframer, encode
-from plain_numbering import Loop
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch, StreamDecoder, join
@@ -62,6 +61,43 @@ def cut(random: np.random.Generator, data: bytes, longest: int) -> Iterator[byte
         size = int(random.integers(1, longest + 1))
         yield data[at : at + size]
         at += size
+
+
+class Loop:
+    """What the compiled numbering answers to: one number at a time, in Python's whole numbers and sets."""
+
+    def __init__(self) -> None:
+        self.last: dict[int, int] = {}
+        self.missing: dict[int, set[int]] = {}
+        self.joined: set[int] = set()
+        self.gaps: list[tuple[int, int, int]] = []
+        self.disordered = 0
+        self.lost = 0
+
+    def extend(self, finger: int, seq: int, rounds: int) -> int:
+        last = self.last.get(finger, seq)
+        whole = min((last - last % 65536 + seq + k * 65536 for k in (-1, 0, 1)), key=lambda v: (abs(v - last), v))
+        lacking = self.missing.setdefault(finger, set())
+        covered = set(range(whole - rounds + 1, whole + 1))
+        if finger not in self.joined or whole <= last - 64:
+            self.disordered += finger in self.joined
+            lacking.clear()
+        elif whole <= last:
+            late = {number for number in lacking & covered if number > last - 64}
+            lacking -= late
+            self.lost -= len(late)
+            self.disordered += 1
+            return whole
+        else:
+            new = set(range(last + 1, whole + 1)) - covered
+            lacking |= new
+            self.lost += len(new)
+            self.disordered += whole - rounds < last
+            if new:
+                self.gaps.append((finger, last, len(new)))
+        self.last[finger] = whole
+        self.joined.add(finger)
+        return whole
 
 
 def nearest(raw: int, near: int, span: int) -> int:
