@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from biotac.calibrate.press import weights
+from biotac.calibrate import population as population_map
+from biotac.calibrate.press import few_shot, weights
+from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
 from biotac.errors import InputError
 
@@ -77,3 +80,16 @@ def test_a_plate_corrects_directions_from_all_sides_alone(recording: Path, capsy
     assert facts["held_out_deg"] < 2.0 < facts["before_deg"] and not facts["why_not"]
     assert main([*argv, "5"]) != 0
     assert "roll the finger further to both sides" in capsys.readouterr().err
+
+
+def test_axes_that_are_mixed_are_told_apart() -> None:
+    """What nine numbers can say: a finger that answers with its axes turned and stretched."""
+    prior = population_map.load(None).population
+    firm = replace(prior, coefficients=100.0 * prior.coefficients)  # so that the prior says little
+    rng = np.random.default_rng(7)
+    counts = 2800.0 - np.abs(rng.normal(200.0, 80.0, (12, 19)))
+    tare = np.full(19, 2800.0)
+    mixing = np.array([[0.9, 0.1, -0.1], [0.05, 1.2, 0.1], [0.1, -0.1, 1.1]])
+    held = Held(counts, tare, np.arange(12), firm.force(counts, tare) @ mixing)
+    result = found(firm, held, few_shot.weighed)
+    assert (result.held_out_n < 0.2 * result.before_n).all()

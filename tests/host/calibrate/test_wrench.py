@@ -135,6 +135,32 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
     np.testing.assert_allclose(left.cross, z.T @ (run.truth - z @ found), atol=1e-3)
 
 
+def test_strips_add_up_to_the_rows_and_axes_keep_their_lags(finger: Path) -> None:
+    run = load_run(finger)
+    blocks = Blocks(run.rest)
+    signals = Signals(run.counts - run.tare, run.tare)
+    late = np.column_stack([moments.moved(run.truth[:, axis], lag) for axis, lag in ((0, 2), (1, -3), (2, 0))])
+    strips = moments.stacked(
+        moments.strip_sums(moments.at(signals, rows), late[rows], run.drift, moments.linear_columns, moments.NO_DRIFT)
+        for rows in blocks.strips
+    )
+    kept = blocks.kept_from([4, 5])
+    rows = np.concatenate([blocks.strips[k] for k in np.flatnonzero(kept)])
+    some = strips.of(kept).axes([1])
+    z = columns.with_one(moments.linear_columns(moments.at(signals, rows)))
+    np.testing.assert_allclose(some.gram, z.T @ z, rtol=1e-9)
+    np.testing.assert_allclose(some.cross[:, 0], z.T @ run.truth[np.minimum(rows + 3, 4999), 1], rtol=1e-9, atol=1e-6)
+
+
+def test_counts_are_averaged_before_anything_is_made_of_them() -> None:
+    values = np.random.default_rng(0).normal(size=(20, 3))
+    mean = moments.averaged(values, 5)
+    np.testing.assert_allclose(mean[7], values[5:10].mean(axis=0))
+    # beyond the ends are the ends
+    np.testing.assert_allclose(mean[0], values[[0, 0, 0, 1, 2]].mean(axis=0))
+    np.testing.assert_array_equal(moments.averaged(values, 1), values)
+
+
 def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is known of others is the force of a whole map, offset and all; torque stays Lin's."""
     run = load_run(finger)
