@@ -42,7 +42,7 @@ def emulator() -> None:
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bringup, "PINGS", 50)
-    monkeypatch.setattr(bringup, "RESTARTS", 2)
+    monkeypatch.setattr(bringup, "RESTARTS", 1)
 
 
 def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
@@ -51,7 +51,7 @@ def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
     facts = examine(
         f"emu:pico?source=press.toml&fingers={FINGERS}&seconds=120&pace=fast&do={verbs}",
         expected_fingers=FINGERS,
-        by=lambda hand: bringup.measure(hand, seen, steps.append, seconds=2.0, press_s=6.0),
+        by=lambda hand: bringup.measure(hand, seen, steps.append, seconds=1.0, press_s=5.0),
     )
     findings = [*judge(facts), *bringup.check(seen, facts)]
     bringup_report.write(folder / "bringup.md", seen, facts, findings)

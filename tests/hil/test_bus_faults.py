@@ -177,10 +177,3 @@ def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: P
     lost = hurt["counts"] == INVALID
     assert 1 <= lost.sum() <= 3 * 5
     assert np.array_equal(hurt["counts"][~lost], healthy["counts"][~lost])
-
-
-def test_a_chip_select_falls_in_time_before_a_word(rig) -> None:
-    rig.need("counters")
-    hand = rig.open("press.toml?fingers=5&seconds=0.5")
-    hand.read(10)
-    assert hand.link.board.counters()["sensors"]["select_setup_ns"] >= 1800  # as SynTouch's library leaves

@@ -39,6 +39,7 @@ def test_a_calibration_is_set_told_and_cleared(board: Callable[[str], biotac.Han
     assert (hand.board.calibration(1), hand.board.calibration_state(1)) == (None, CalibrationState.NONE)
 
 
+@pytest.mark.long
 def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
@@ -48,19 +49,6 @@ def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str]
     assert hand.board.calibration(0) is None
     hand.board.set_calibration(0, OWN)
     assert hand.board.calibration_state(0) == CalibrationState.IN_FORCE
-
-
-def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand]) -> None:
-    hand = board("press.toml")
-    hand.board.set_calibration(0, OWN)
-    hand.stream()
-    with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.board.set_calibration(0, Calibration())
-    with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.board.clear_calibration(0)
-    assert hand.board.calibration(0) == OWN  # asking is allowed
-    hand.stop()
-    hand.board.clear_calibration(0)
 
 
 @pytest.mark.long

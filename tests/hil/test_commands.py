@@ -99,6 +99,7 @@ def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
             hand.stop()
 
 
+@pytest.mark.long
 def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
     hand = board("press.toml")
     for kind, values, error in REFUSED:
@@ -108,6 +109,7 @@ def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
         assert (type(answer), answer.command, answer.error) == (wire.Reply, kind.ID, error), (kind, values)
 
 
+@pytest.mark.long
 def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words(board) -> None:
     hand = board("press.toml")
     (unknown,) = replies_to(hand, 0xEE, bytes([7, 1, 2]))

@@ -69,6 +69,7 @@ def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable
         assert hand.sensor_info(1).present  # the sensors were not lost over it
 
 
+@pytest.mark.long
 def test_another_sensors_is_refused_and_forced_it_is_for_any(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     blob = make_map(1, serial=serial_of(hand, 1))
@@ -81,6 +82,7 @@ def test_another_sensors_is_refused_and_forced_it_is_for_any(board: Callable[[st
     assert hand.board.maps() == {0: for_any_sensor(blob)}
 
 
+@pytest.mark.long
 def test_what_is_no_map_is_refused_and_the_old_one_stays(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml")
     old, new = make_map(1), make_map(2)
@@ -90,21 +92,6 @@ def test_what_is_no_map_is_refused_and_the_old_one_stays(board: Callable[[str], 
     with pytest.raises(CommandRefusedError, match="OUT_OF_RANGE"):
         hand.board.set_map(0, new[:-1])
     assert hand.board.maps() == {0: old}
-
-
-def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand]) -> None:
-    hand = board("press.toml")
-    old, new = make_map(1), make_map(2)
-    hand.board.set_map(0, old)
-    hand.stream()
-    with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.board.set_map(0, new)
-    with pytest.raises(CommandRefusedError, match="send STOP first"):
-        hand.board.clear_map(0)
-    assert hand.board.get_map(0) == old  # asking is allowed
-    hand.stop()
-    hand.board.set_map(0, new)
-    assert hand.board.get_map(0) == new
 
 
 def test_an_upload_that_is_broken_off_leaves_the_old_map_and_nothing_in_the_way(
@@ -171,6 +158,7 @@ def test_a_mapped_fingers_frames_come_from_its_map_and_the_others_from_the_gains
     assert main(["check", str(tmp_path / "two.mcap")]) == 0
 
 
+@pytest.mark.long
 def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?seconds=60")
     hand.board.set_map(0, make_map(1))
