@@ -104,12 +104,9 @@ def test_a_tare_command_changes_the_tare_of_the_next_frame() -> None:
 @pytest.mark.parametrize(
     ("port", "message"),
     [
-        ("/dev/ttyNOWHERE7", r"no port /dev/ttyNOWHERE7; `biotac list`"),
         (os.devnull, "cannot be opened as a serial port"),
         ("modbus:1", "unknown kind of port 'modbus'"),
         ("sim:", "no source"),
-        ("sim:press.toml?speed=2", "option 'speed'"),
-        ("sim:press.toml?pace=quick", "pace is 'quick', expected real, fast or"),
         ("sim:press.toml?pace=nan", "pace is 'nan', expected real, fast or"),
     ],
 )

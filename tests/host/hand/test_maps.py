@@ -341,8 +341,8 @@ def port() -> Iterator[str]:
     board.close()
 
 
-def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) -> None:
-    own, back = tmp_path / "mine.json", tmp_path / "back.json"
+def test_the_verb_puts_shows_gets_and_clears(port: str, recorded: Path, tmp_path: Path, capsys) -> None:
+    own, other, back = (tmp_path / f"{name}.json" for name in ("mine", "other", "back"))
     blob = make_map(1_763_731_310)
     own.write_text(map_file.dumps(blob))
     assert main(["calibration", "put", port, str(own), "--finger", "1", "--save"]) == 0
@@ -352,6 +352,10 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "finger 0: none, the board's settings apply"
     assert shown[1].startswith("finger 1: wrench map in force; force and torque") and "made 2025-11-21" in shown[1]
+    assert main(["info", port]) == 0
+    assert "wrench map made 2025-11-21" in capsys.readouterr().out
+    assert main(["info", port, "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["maps"]) == ["1"]
     assert main(["calibration", "get", port, str(back), "--finger", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["map_crc32"] == f"{zlib.crc32(blob):08x}"
     assert map_file.load(back) == blob
@@ -359,30 +363,11 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     assert "the board's settings apply, until the next reboot" in capsys.readouterr().out
     assert main(["calibration", "show", port, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["1"]["map"] == {"state": "NONE"}
-
-
-def test_the_verb_forces_another_sensors_map(port: str, tmp_path: Path, capsys) -> None:
-    other = tmp_path / "other.json"
     other.write_text(map_file.dumps(make_map(1, serial="BTOTHER")))
-    assert main(["calibration", "put", port, str(other), "--finger", "0"]) == 7
-    assert "OTHER_SENSOR" in capsys.readouterr().err
     assert main(["calibration", "put", port, str(other), "--finger", "0", "--force"]) == 0
     assert "for any sensor" in capsys.readouterr().out
-
-
-def test_the_verb_shows_a_recordings_maps(recorded: Path, capsys) -> None:
     assert main(["calibration", "show", str(recorded)]) == 0
     assert "finger 1: wrench map in force; force and torque, 12 block(s)" in capsys.readouterr().out
-
-
-def test_info_tells_of_a_map_in_force(port: str, tmp_path: Path, capsys) -> None:
-    own = tmp_path / "mine.json"
-    own.write_text(map_file.dumps(make_map(1_763_731_310)))
-    assert main(["calibration", "put", port, str(own), "--finger", "1"]) == 0
-    assert main(["info", port]) == 0
-    assert "wrench map made 2025-11-21" in capsys.readouterr().out
-    assert main(["info", port, "--json"]) == 0
-    assert list(json.loads(capsys.readouterr().out)["maps"]) == ["1"]
 
 
 def test_torsion_goes_wherever_results_go(tmp_path: Path) -> None:

@@ -176,12 +176,8 @@ def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> Non
     ("port", "message"),
     [
         ("spidev:", r"'' is not an SPI device; expected BUS\.DEVICE"),
-        ("spidev:0", "'0' is not an SPI device"),
-        ("spidev:0.0,", "'' is not an SPI device"),
-        ("spidev:0.x", r"'0\.x' is not an SPI device"),
         ("spidev:0.-1", r"'0\.-1' is not an SPI device"),
-        ("spidev:0.0,0.0", r"0\.0 is listed twice; each finger needs"),
-        ("spidev:0.0,0.00", r"0\.00 is listed twice"),
+        ("spidev:0.0,0.00", r"0\.00 is listed twice; each finger needs"),
         ("spidev:0.0,0.1,0.2,1.0,1.1,1.2", "6 devices; expected at most 5"),
     ],
 )

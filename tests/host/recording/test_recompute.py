@@ -39,8 +39,15 @@ def tares(recording: biotac.Recording) -> list[wire.Tare]:
     return [m for m in recording.messages if isinstance(m, wire.Tare)]
 
 
-@pytest.mark.parametrize("options", [[], ["--keep-tare"]])
-@pytest.mark.parametrize("source", ["press.toml?fingers=2", "shear.toml", "drift.toml?seconds=8"])
+@pytest.mark.parametrize(
+    ("source", "options"),
+    [
+        ("press.toml?fingers=2", []),
+        ("press.toml?fingers=2", ["--keep-tare"]),
+        ("shear.toml", []),
+        ("drift.toml?seconds=8", []),
+    ],
+)
 def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: str, options: list[str]) -> None:
     was = record(folder / "same.mcap", f"sim:{source}")
     (folder / "again.mcap").unlink(missing_ok=True)
@@ -214,8 +221,7 @@ def test_a_finger_says_the_tare_message_that_a_board_sends(recorded) -> None:
     assert finger.tare_message() == message
 
 
-@pytest.mark.parametrize("out", ["stopped.mcap", "stopped.csv"])
-@pytest.mark.parametrize("step", [1, 5])
+@pytest.mark.parametrize(("out", "step"), [("stopped.mcap", 1), ("stopped.mcap", 5), ("stopped.csv", 5)])
 def test_an_interrupted_recomputation_leaves_nothing(
     recorded, tmp_path, capsys, monkeypatch, out: str, step: int
 ) -> None:
