@@ -140,6 +140,10 @@ TEST(a_hold_lapses_after_so_many_milliseconds_of_silence)
     assert_true(session.finger[2].tare.held);
     bt_session_tick(&session, 700001);
     assert_false(session.finger[2].tare.held);
+    assert_int_equal(set_setting(BT_SETTING_HOLD_TIMEOUT_MS, 0), BT_ERROR_OK); // never
+    assert_int_equal(host_error(&session, BT_HOLD_ID, "\1\4", 2), BT_ERROR_OK);
+    bt_session_tick(&session, 2000000000);
+    assert_true(session.finger[2].tare.held);
 }
 
 TEST(a_tare_from_the_host_is_told_as_it_was_sent)

@@ -1,7 +1,7 @@
 // What went wrong stays told until the host clears it.
 #include "fake_host.h"
 
-#define FINGER 2
+#define FINGER 0
 
 static bt_msg_status status(void)
 {
@@ -106,24 +106,24 @@ TEST(the_link_and_the_host_have_faults_of_their_own)
 {
     uint8_t garbage[] = {7, 1, 2, 3, 4, 5, 6, 0};
     bt_session_receive(&session, 0, garbage, sizeof garbage, 0);
-    assert_int_equal(status().faults, BT_FAULT_FLAG_LINK_DAMAGED);
-    clear(UINT16_MAX, 0);
+    uint16_t faults = BT_FAULT_FLAG_LINK_DAMAGED; // none goes when another comes
+    assert_int_equal(status().faults, faults);
 
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << FINGER, 100), BT_ERROR_OK);
     bt_session_tick(&session, 100001);
-    assert_int_equal(status().faults, BT_FAULT_FLAG_HOST_SILENT);
-    clear(UINT16_MAX, 0);
+    faults |= BT_FAULT_FLAG_HOST_SILENT;
+    assert_int_equal(status().faults, faults);
 
     assert_int_equal(host_error(&session, BT_HOLD_ID, (uint8_t[]){9, 1 << FINGER}, 2), BT_ERROR_OK);
     bt_session_tick(&session, 2000001);
-    assert_int_equal(status().faults, BT_FAULT_FLAG_HOLD_LAPSED);
-    clear(UINT16_MAX, 0);
+    faults |= BT_FAULT_FLAG_HOLD_LAPSED;
+    assert_int_equal(status().faults, faults);
 
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << FINGER, 0), BT_ERROR_OK);
     host.room = 0;
     rounds(1);
     host.room = SIZE_MAX;
-    assert_int_equal(status().faults, BT_FAULT_FLAG_DROPPED);
+    assert_int_equal(status().faults, faults | BT_FAULT_FLAG_DROPPED);
     clear(UINT16_MAX, 0);
     assert_int_equal(status().faults, 0);
 }
