@@ -64,6 +64,7 @@ def test_every_sample_arrives_at_its_device_time_on_lsls_clock(inlet, monkeypatc
         values, stamps_s = pull(frames_in, 300)
         pac_values, pac_stamps_s = pull(pac_in, 22 * 300)
     np.testing.assert_array_equal(values, samples(frames))
+    assert np.isnan(values[0, :9]).all()  # not tared yet, and no zero
     np.testing.assert_array_equal(pac_values.ravel(), pac["pac"].ravel())
     np.testing.assert_allclose(stamps_s, 50.0 + frames["t_us"] / 1e6 + apart_s, rtol=0, atol=1e-6)
     np.testing.assert_allclose(np.diff(stamps_s), 0.01, rtol=0, atol=1e-6)
