@@ -5,8 +5,7 @@
 
 #include "touch/baseline.h"
 
-// Whether a round's filtered counts speak against the tare. pdc_peak: the most that pressure has been above
-// it; colder: so much that pressure may have fallen by itself.
-bool bt_inverted(const bt_lanes *smooth, const bt_baseline *base, int32_t pdc_peak, bool colder);
+// Do a round's filtered counts speak against the tare? pdc_missing: what else may have taken pressure.
+bool bt_inverted(const bt_lanes *smooth, const bt_baseline *base, int32_t pdc_missing);
 
 #endif

@@ -16,8 +16,8 @@ _Static_assert(BT_ELECTRODES == 19, "220753 / 2^22 is 1/19");
 
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
-    bool colder = bt_thermal_warmed_q8(&tare->thermal) < -BT_WARMER_Q8;
-    bool inverted = bt_inverted(&tare->trigger.smooth, &tare->base, tare->release.pdc_peak, colder);
+    int32_t missing = bt_pdc_missing_max(tare->release.pdc_peak) + bt_thermal_cooled_pdc(&tare->thermal);
+    bool inverted = bt_inverted(&tare->trigger.smooth, &tare->base, missing);
     tare->inverted_rounds = inverted ? (uint8_t)(tare->inverted_rounds + 1) : 0;
     if (tare->inverted_rounds == BT_INVERTED_ROUNDS) {
         bt_adopt_none(tare);
@@ -58,9 +58,10 @@ static void judge_release(bt_tare *tare)
         .forgiven_count2 = forgiven_count2(tare),
         .pressure = tare->pressure_seen && tare->base.pdc_q16 != BT_TARE_UNKNOWN,
         .above = (mean > now ? mean : now) - bt_baseline_count(tare->base.pdc_q16),
+        .cold = bt_thermal_cooled_pdc(&tare->thermal),
         .still_sweeps = tare->sweep.still_sweeps,
         .level_sweeps = tare->watch.level_sweeps,
-        .warmer = bt_thermal_warmed_q8(&tare->thermal) > BT_WARMER_Q8,
+        .warmer = bt_thermal_warmed_q8(&tare->thermal) > BT_DEGREE_Q8 / 2,
     };
     bt_release_verdict verdict = bt_release_judge(&tare->release, &tare->witness, &sweep);
     if (tare->held || verdict == BT_RELEASE_NO) {

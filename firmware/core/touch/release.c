@@ -18,8 +18,7 @@ void bt_release_pressure(bt_release *release, int32_t above)
 // How far pressure has moved, in counts, and whether that is enough for the electrodes' energy.
 static uint32_t pdc_moved(const bt_release *release)
 {
-    int32_t down = -release->pdc_low;
-    return (uint32_t)(down > release->pdc_peak ? down : release->pdc_peak);
+    return (uint32_t)(-release->pdc_low > release->pdc_peak ? -release->pdc_low : release->pdc_peak);
 }
 
 static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
@@ -35,7 +34,7 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     uint32_t forgiven = sweep->witness ? sweep->forgiven_count2 : 0;
     left = (left > BT_CALM_COUNT2 ? left : BT_CALM_COUNT2) + forgiven;
     int32_t rest = bt_clamp(release->pdc_peak / BT_REST_PDC_SHARE, BT_QUIET_PDC, BT_REST_PDC_MAX);
-    bool back = sweep->witness ? sweep->above < rest : release->quiet_sweeps >= BT_QUIET_SWEEPS;
+    bool back = sweep->witness ? sweep->above + sweep->cold < rest : release->quiet_sweeps >= BT_QUIET_SWEEPS;
     bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < BT_EVEN_COUNT2 + forgiven;
     return back && gone && sweep->still_sweeps >= BT_ENDED_SWEEPS;
 }
@@ -49,7 +48,7 @@ static bool is_untouched(const bt_release *release, const bt_release_sweep *swee
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
 {
-    bool low = !sweep->pressure || sweep->above < BT_PDC_PRESSED;
+    bool low = !sweep->pressure || sweep->above + sweep->cold < BT_PDC_PRESSED;
     bool even = low && sweep->uneven_count2 < BT_EVEN_COUNT2;
     bool rose = sweep->pressure && sweep->above > release->even_above + BT_LOADING_PDC;
     if (!even || release->even_sweeps == 0 || rose) {

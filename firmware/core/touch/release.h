@@ -46,8 +46,9 @@ typedef struct {
     uint32_t forgiven_count2; // of that, what drift and temperature may have made
     bool pressure;            // at least one pressure word was good
     bool witness;             // and presses move it; set by bt_release_judge
-    bool warmer;              // so much that pressure may have risen
+    bool warmer;              // by half a degree: pressure may have risen by a quarter of the lightest press
     int32_t above;            // pressure above its tare: now or the mean of eight rounds, whichever is more
+    int32_t cold;             // counts that cooling may have taken from it
     uint8_t still_sweeps;
     uint8_t level_sweeps; // with level pressure
 } bt_release_sweep;

@@ -14,7 +14,6 @@
 #include <stdint.h>
 
 #define BT_DEGREE_Q8 (BT_DEGREE_TDC << 8)
-#define BT_WARMER_Q8 (BT_DEGREE_Q8 / 2) // pressure may have risen by a quarter of the lightest press
 
 typedef struct {
     uint32_t tdc_q8;      // low-passed over 8 rounds; 0 until read
@@ -44,6 +43,12 @@ void bt_thermal_follow(bt_thermal *thermal, int32_t gain_q16);
 static inline int32_t bt_thermal_warmed_q8(const bt_thermal *thermal)
 {
     return (int32_t)(thermal->tdc_q8 - thermal->tdc_then_q8);
+}
+
+// Counts of pressure that cooling since then may have taken: one for each of TDC, 33 for a degree.
+static inline int32_t bt_thermal_cooled_pdc(const bt_thermal *thermal)
+{
+    return bt_thermal_warmed_q8(thermal) < 0 ? -bt_thermal_warmed_q8(thermal) / 256 : 0;
 }
 #endif
 

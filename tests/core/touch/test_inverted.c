@@ -2,6 +2,7 @@
 #include "support.h"
 
 #include "touch/inverted.h"
+#include "touch/release.h"
 
 #define REST 3000
 #define PDC  1000
@@ -10,7 +11,7 @@ typedef struct {
     bt_baseline base;
     bt_lanes smooth;
     int32_t pdc_peak;
-    bool colder;
+    int32_t cooled;
 } finger;
 
 // Tared at REST; the first n electrodes now read `up` counts more, and the pressure is `below` its own.
@@ -27,7 +28,7 @@ static finger reading(int n, int up, int below)
 
 static bool inverted(finger read)
 {
-    return bt_inverted(&read.smooth, &read.base, read.pdc_peak, read.colder);
+    return bt_inverted(&read.smooth, &read.base, bt_pdc_missing_max(read.pdc_peak) + read.cooled);
 }
 
 static void less_pressure_than_at_rest_is_no_touch(void **state)
@@ -42,9 +43,9 @@ static void less_pressure_than_at_rest_is_no_touch(void **state)
         assert_true(inverted(after_press));
         after_press.pdc_peak = 1600; // what it left may be
         assert_false(inverted(after_press));
-        finger colder = reading(5, up, 30); // pressure may have fallen, but a touch takes away
-        colder.colder = true;
-        assert_int_equal(inverted(colder), up > 0);
+        finger colder = reading(5, up, 30); // a degree, which may have taken as much from pressure
+        colder.cooled = 33;
+        assert_false(inverted(colder));
         finger unknown = reading(5, up, 30);
         unknown.base.pdc_q16 = BT_TARE_UNKNOWN;
         assert_false(inverted(unknown));
