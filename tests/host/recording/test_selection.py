@@ -92,7 +92,8 @@ def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, tol
         schema = writer.register_schema(layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, b"")
         channel = writer.register_channel(layout.PACKETS, layout.PACKETS_ENCODING, schema)
         writer.add_metadata(layout.METADATA_NAME, biotac.Recording(recorded).metadata)
-        writer.add_message(channel, 0, bytes(200_000_000), 0)
+        for k in range(2):  # the first one's chunk has the channel too
+            writer.add_message(channel, k, bytes(200_000_000), k)
         writer.finish()
     data = bomb.read_bytes()
     assert len(data) < 200_000
