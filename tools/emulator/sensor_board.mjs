@@ -18,6 +18,7 @@ const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/sensor_board/pins.h
 export const SELECTS = [2, 3, 4, 5, 6]
 const LEADS = { SCK, MOSI, MISO, SS0: 2, SS1: 3, SS2: 4, SS3: 5, SS4: 6 } // where each goes to when all is well
 const SYNCHRONISER_NS = 16 // two flip-flops behind each input
+const LONGEST_STEP_NS = 200 // an exception's entry takes 16 cycles of 8 ns
 const SAMPLE_COMMAND = 0x80 // and above
 const SLOTS = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.frame.slots.length
 const TAPE_FRAMES_AT = 12
@@ -86,7 +87,7 @@ export class SensorBoard {
     })
     const spi = mcu.spi[0]
     const done = mcu.clock.createAlarm(() => {
-      this.follow()
+      this.runUntil(mcu.clock.nanos + this.behind)
       spi.completeTransmit(this.word)
     })
     spi.onTransmit = (mosi) => {
@@ -96,9 +97,9 @@ export class SensorBoard {
     }
   }
 
-  /** Come to where the gateway is. */
+  /** Come to where the gateway is, but never past it: a board runs whole instructions. */
   follow() {
-    this.runUntil(this.gateway.clock.nanos + this.behind)
+    this.runUntil(this.gateway.clock.nanos + this.behind - LONGEST_STEP_NS)
   }
 
   runUntil(nanos) {
