@@ -32,7 +32,6 @@ PRESSED = "the counts are those of a finger that is pressed there, too"
 # What is flagged too late or never, why, and with which gains and when.
 UNSEEN: dict[str, tuple[str, dict[str, tuple[str, ...]]]] = {
     "electrode floating: walks 20 counts a round": (SQUEEZED, {"fitted": WHEN, "lin": ("touch",)}),
-    "electrode stuck": ("a quiet electrode repeats a count for a while, too", {"fitted": ("touch", "hold")}),
     "electrode at half gain": ("so reads another press", {"fitted": ("rest", "touch")}),
     "electrode drifts 10 counts/s": ("a worn sensor's noise hides half a newton", {"fitted": WHEN}),
     "electrode drifts 50 counts/s": (SQUEEZED, {"fitted": ("touch",)}),
@@ -173,7 +172,7 @@ LEFT_OUT = "widens its margins, and looks at `biotac doctor`"
 # What breaks: the faults of one cause, the flag, and what a controller does.
 CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "an electrode is open or shorted": (("electrode open", "electrode shorted"), "ELECTRODE_OUT", LEFT_OUT),
-    "an electrode is stuck": (("electrode stuck",), "ELECTRODE_OUT, once the skin has moved", LEFT_OUT),
+    "an electrode is stuck": (("electrode stuck",), "ELECTRODE_OUT, in a squeeze ELECTRODE_ALONE", LEFT_OUT),
     "an electrode floats": (
         ("electrode floating: walks 20 counts a round", "electrode floating: uniform noise",
          "electrode with noise of 200 counts"),
@@ -208,7 +207,7 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     ),
     "the thermometer jumps by 300 counts": (("TDC jumps by 300 counts",), "TEMP", "lets go, to tare"),
     "pressure is stuck, or at an end of its range": (
-        ("PDC stuck", "PDC 0", "PDC 4095"), "none", "looks at `biotac doctor`",
+        ("PDC stuck", "PDC 0", "PDC 4095"), "PDC_MISSING, if not stuck", "looks at `biotac doctor`",
     ),
     "two fingers exchanged without a silence, or coupled": (
         ("two fingers exchanged", "cross-talk of 30 % between fingers", "cross-talk of 100 % between fingers"), "none",

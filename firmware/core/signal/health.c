@@ -20,6 +20,8 @@
 #define ALIVE_WINDOWS 16
 #define DEAD_WINDOWS  250 // of a sensor that has never changed its words: ten seconds
 #define STUCK_WINDOWS 3   // with the one before: a live electrode hardly ever repeats its word sixteen times
+#define NOISY         32  // count^2 of all electrodes' noise: one in 1000 windows repeats by chance
+#define HALTED_Q4     (28 * 16) // by which a running mean is behind an electrode that moved lately
 #define TRAVEL_Q2     (100 * 4) // sum of what the others move by while an electrode is stuck
 #define CALM_WINDOWS  50        // two seconds
 #define CALM_Q2       (5 * 4)
@@ -71,6 +73,19 @@ static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips)
 
 // ---- words that repeat ---------------------------------------------------------------------------
 
+// A suspicion, before it lasts: electrodes that moved lately, and now say one count while the skin moves on.
+static BT_NOINLINE uint32_t halted(const bt_health *health, const bt_lanes *sum)
+{
+    const bt_lanes *now = &health->sum[health->filling]; // of three rounds
+    uint32_t halted = 0;
+    for (unsigned i = 0; health->same >> i != 0; i++) {
+        uint32_t lag_q4 = bt_abs32(health->mean.lane[i] - 4 * sum->lane[i]);
+        bool still = 4 * now->lane[i] == 3 * sum->lane[i];
+        halted |= still && lag_q4 > HALTED_Q4 ? health->same & 1u << i : 0;
+    }
+    return bt_usable_without(halted) ? halted : 0;
+}
+
 static void judge_repeats(bt_health *health, uint32_t missing)
 {
     bool frozen = (health->same | health->out) == BT_ALL_ELECTRODES && missing == 0;
@@ -97,7 +112,8 @@ static void judge_repeats(bt_health *health, uint32_t missing)
     // A worn sensor's electrode hardly ever repeats its word four times, a quiet one's did so 64 times.
     bool lasts =
         health->unchanged_windows >= STUCK_WINDOWS && health->unchanged_windows > 2 * health->longest;
-    if (lasts && health->travel_q2 >= TRAVEL_Q2 && bt_usable_without(unchanged)) {
+    uint32_t travel_q2 = health->unchanged_windows < ALIVE_WINDOWS ? TRAVEL_Q2 : TRAVEL_Q2 / 2;
+    if (lasts && health->travel_q2 >= travel_q2 && bt_usable_without(unchanged)) {
         condemn(health, unchanged, BT_SENSOR_FAULT_STUCK);
     }
 }
@@ -333,6 +349,9 @@ static BT_NOINLINE uint32_t judge(bt_health *health, const bt_round *round, cons
     }
     health->windows = counted(health->windows);
     judge_repeats(health, trigger->without & ~health->out);
+    if (health->same != 0 && health->moved_windows != 0 && health->noise_count2 >= NOISY) {
+        health->alone |= halted(health, sum);
+    }
     if (health->out != 0) {
         watch_condemned(health, round);
     }

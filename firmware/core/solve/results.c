@@ -71,7 +71,7 @@ static BT_NOINLINE uint32_t trouble(const bt_round *round, const bt_tare *tare)
         flags |= bt_count_railed(count) ? BT_FRAME_FLAG_RAIL : 0;
     }
     flags |= bt_tare_faulty(tare) ? BT_FRAME_FLAG_FAULT : 0;
-    flags |= round->pdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_PDC_MISSING : 0;
+    flags |= !bt_count_usable(round->pdc) ? BT_FRAME_FLAG_PDC_MISSING : 0;
     flags |= round->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
     flags |= round->tdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_TDC_MISSING : 0;
     return flags;
@@ -86,7 +86,7 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     uint32_t flags = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
     // One comparison for what hardly ever happens: a missing word is above every count.
     uint32_t counts = (uint32_t)(round->pdc | round->tac | round->tdc);
-    if (counts > BT_FULL_SCALE_COUNT || tare->trigger.without != 0) {
+    if (counts > BT_FULL_SCALE_COUNT || !bt_count_usable(round->pdc) || tare->trigger.without != 0) {
         flags |= trouble(round, tare);
     }
     if (!tare->tared) {

@@ -97,6 +97,19 @@ static void what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second(void *
     expect_out(1u << 4, BT_SENSOR_FAULT_NOISY);
 }
 
+static void what_halts_in_a_squeeze_is_suspected_within_fifteen_rounds(void **state)
+{
+    (void)state;
+    touched = true;
+    rounds(200, 0, 0);
+    for (int k = 0; k < 36; k++) {
+        one_round(30 * k, 0);
+        assert_int_equal(health.alone, k < 29 ? 0 : health.alone & 1u << 4);
+        stuck = k < 20 ? 0 : sampled.electrode[4];
+    }
+    assert_int_equal(health.alone, 1u << 4);
+}
+
 static void what_sticks_is_condemned_once_the_skin_moves(void **state)
 {
     (void)state;
@@ -147,6 +160,7 @@ int main(void)
         cmocka_unit_test_setup(skin_that_is_pressed_is_never_condemned, begin),
         cmocka_unit_test_setup(an_electrode_that_drifts_alone_is_condemned_unless_something_touches, begin),
         cmocka_unit_test_setup(what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second, begin),
+        cmocka_unit_test_setup(what_halts_in_a_squeeze_is_suspected_within_fifteen_rounds, begin),
         cmocka_unit_test_setup(what_sticks_is_condemned_once_the_skin_moves, begin),
         cmocka_unit_test_setup(words_that_all_repeat_are_a_frozen_sensor_until_one_changes, begin),
         cmocka_unit_test_setup(a_condemned_electrode_comes_back_after_two_calm_seconds, begin),

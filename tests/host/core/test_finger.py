@@ -95,6 +95,11 @@ def test_a_touch_is_told_in_its_slot_and_the_energy_is_that_of_the_signals() -> 
     assert (rows["flags"] & FrameFlags.PDC_MISSING).all()
 
 
+def test_pressure_at_a_rail_is_no_good_pressure() -> None:
+    rows = Finger().feed(np.full((4, 19), 3000), pdc=np.array([2000, 0, 4095, 2000]))
+    assert ((rows["flags"] & FrameFlags.PDC_MISSING) != 0).tolist() == [False, True, True, False]
+
+
 def test_a_silent_sensor_leaves_rows_without_numbers() -> None:
     finger = Finger()
     rest = np.full((40, 19), 3000)
