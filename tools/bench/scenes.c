@@ -247,11 +247,14 @@ void bench_scenes_init(void)
     tare_settings = bt_tare_settings_from(&all);
     for (int s = 0; s < BT_SLOTS; s++) {
         rest_count[s] = (uint16_t)(2900 + 7 * s);
-        press_count[s] = (uint16_t)(rest_count[s] - (s < 2 * BT_ELECTRODES ? 20 * (s % 13) + 40 : -100));
-    }
-    for (int k = 0; k < LANES; k++) { // E1 PAC E2 PAC ... E19 PAC PDC
-        rest_lane[k] = rest_count[2 * k];
-        press_lane[k] = press_count[2 * k];
+        press_count[s] = rest_count[s];
+        int channel = bt_slot_channel[s];
+        int lane = channel == BT_CHANNEL_PDC ? BT_LANE_PDC : channel - BT_CHANNEL_E1;
+        if (lane >= 0 && lane < LANES) {
+            press_count[s] = (uint16_t)(rest_count[s] - (lane < BT_ELECTRODES ? 20 * (s % 13) + 40 : -100));
+            rest_lane[lane] = rest_count[s];
+            press_lane[lane] = press_count[s];
+        }
     }
     bt_finger_reset(&rest_front, 0);
     run(&rest_front, rest_count, 400);
