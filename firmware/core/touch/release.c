@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#define SLOW_SWEEPS 4 // a third of a second: cooling takes 3 counts, a slow release 12
+
 void bt_release_begin(bt_release *release)
 {
     memset(release, 0, sizeof *release);
@@ -24,6 +26,19 @@ static uint32_t pdc_moved(const bt_release *release)
 static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
 {
     return pdc_moved(release) * pdc_moved(release) * count2_per_pdc2 >= release->uneven_peak;
+}
+
+// Counts of a press that cooling may have taken. It takes them slowly: what falls faster to a quarter was let
+// go, and only what cools from then on may take more.
+static int32_t taken_by_cold(bt_release *release, const bt_release_sweep *sweep)
+{
+    int32_t fell = release->slow_above - sweep->above;
+    release->slow_above -= fell / SLOW_SWEEPS;
+    if (fell > BT_MISSING_PDC && sweep->above < release->pdc_peak / BT_FALLEN_SHARE) {
+        release->cold_then = sweep->cold;
+    }
+    int32_t taken = sweep->cold - release->cold_then;
+    return taken > 0 && release->pdc_peak >= BT_PDC_PRESSED ? taken : 0;
 }
 
 // Pressure above rest is a touch, whatever the finger; pressure at rest means no touch only if a touch would
@@ -102,6 +117,7 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     uint32_t energy = sweep->energy_count2, uneven = sweep->uneven_count2;
     release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
     release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
+    sweep->cold = sweep->pressure ? taken_by_cold(release, sweep) : 0;
     bool unmoved = release->uneven_peak >= BT_FIRM_COUNT2 && !moved_for(release, BT_FLAT_SHARE);
     if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED && moved_for(release, BT_MOVES_SHARE)) {
         *witness = (bt_witness){.moves = true};

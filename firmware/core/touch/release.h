@@ -37,6 +37,8 @@ typedef struct {
     uint8_t quiet_sweeps; // consecutive sweeps with pressure (if there is none: energy) back at rest
     uint8_t even_sweeps;  // consecutive sweeps with only a shift of all electrodes and no rise of pressure
     int32_t even_above;   // pressure when those began
+    int32_t slow_above;   // pressure, low-passed
+    int32_t cold_then;    // what cooling may have taken when it was let go
 } bt_release;
 
 // What a sweep showed.
