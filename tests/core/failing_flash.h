@@ -11,6 +11,7 @@ typedef struct {
     uint8_t *bytes;
     size_t sector_bytes;
     long bytes_left;      // that are still erased or programmed before power fails; -1: it holds
+    long dud;             // a page of worn cells: says that it is programmed, and is not; -1: none
     long operations_left; // erases and programs that are still done before power fails; -1: it holds
     bool inside;          // it fails within the next one: of its bits that change some are done, all over it
     bool backwards;       // of a sector or page, the last byte first
@@ -27,6 +28,7 @@ static inline void flash_new(failing_flash *flash, uint8_t *bytes, size_t size)
     *flash = (failing_flash){.bytes = bytes,
                              .sector_bytes = BT_FLASH_SECTOR_BYTES,
                              .bytes_left = -1,
+                             .dud = -1,
                              .operations_left = -1,
                              .seed = 1};
 }
@@ -68,7 +70,9 @@ static inline void flash_erase(failing_flash *flash, size_t at)
 // Programming never sets a bit.
 static inline void flash_program(failing_flash *flash, size_t at, const uint8_t *page)
 {
-    flash_change(flash, at, BT_FLASH_PAGE_BYTES, page);
+    if ((long)at != flash->dud) {
+        flash_change(flash, at, BT_FLASH_PAGE_BYTES, page);
+    }
 }
 
 #endif

@@ -371,7 +371,7 @@ static void tared_at_3000(bt_round *round, bt_tare *tare, uint32_t threshold_cou
 }
 
 // Of a finger with these signals on E2, E12, E17 and E18, on its pad, and none on all others.
-static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
+static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2, uint32_t without)
 {
     static const int pad[4] = {1, 11, 16, 17};
     bt_settings all;
@@ -382,6 +382,7 @@ static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
     bt_tare tare;
     bt_msg_frame msg;
     tared_at_3000(&round, &tare, threshold_count2);
+    tare.trigger.without = without;
     for (int k = 0; k < 4; k++) {
         tare.electrode_q4[pad[k]] = (uint16_t)(16 * 3000 - pad_q4[k]);
     }
@@ -427,12 +428,13 @@ TEST(more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise
 
 TEST(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch)
 {
-    assert_true(torsion_ok((const int[4]){-240, -240, -240, -240}, 899)); // an energy of 900
-    assert_false(torsion_ok((const int[4]){-240, -240, -240, -240}, 900));
-    assert_false(torsion_ok((const int[4]){-240, -240, -240, -239}, 0));
-    assert_true(torsion_ok((const int[4]){-400, -400, -400, 240}, 0));
-    assert_false(torsion_ok((const int[4]){-400, -400, -400, 239}, 0));
-    assert_false(torsion_ok((const int[4]){-900, -900, -900, 0}, 0));
+    assert_true(torsion_ok((const int[4]){-240, -240, -240, -240}, 899, 0));  // an energy of 900
+    assert_false(torsion_ok((const int[4]){-240, -240, -240, -240}, 899, 1)); // E1 is estimated
+    assert_false(torsion_ok((const int[4]){-240, -240, -240, -240}, 900, 0));
+    assert_false(torsion_ok((const int[4]){-240, -240, -240, -239}, 0, 0));
+    assert_true(torsion_ok((const int[4]){-400, -400, -400, 240}, 0, 0));
+    assert_false(torsion_ok((const int[4]){-400, -400, -400, 239}, 0, 0));
+    assert_false(torsion_ok((const int[4]){-900, -900, -900, 0}, 0, 0));
 }
 
 #define T(name) cmocka_unit_test_setup(name, new_finger)

@@ -63,9 +63,8 @@ static int ones(unsigned byte)
     return n;
 }
 
-static void fifty_microseconds_are_kept_to_the_nanosecond(void **state)
+TEST(fifty_microseconds_are_kept_to_the_nanosecond)
 {
-    (void)state;
     for (uint64_t wait_ns = 49980; wait_ns <= 50020; wait_ns++) {
         (void)new_device(NULL);
         (void)transfer(0xA200, 1000000);
@@ -80,9 +79,8 @@ static void fifty_microseconds_are_kept_to_the_nanosecond(void **state)
     }
 }
 
-static void the_wait_counts_from_the_rising_edge_not_from_the_command(void **state)
+TEST(the_wait_counts_from_the_rising_edge_not_from_the_command)
 {
-    (void)state;
     bt_emu_select(&device, true, 0);
     (void)transfer16(&device, 0xA200, 0);
     bt_emu_select(&device, false, 30000); // chip select held low for 30 us after the command
@@ -91,9 +89,8 @@ static void the_wait_counts_from_the_rising_edge_not_from_the_command(void **sta
     assert_int_not_equal(transfer(BT_LISTEN_WORD, 150000), 0xA52D);
 }
 
-static void every_count_comes_in_two_bytes_of_odd_parity(void **state)
+TEST(every_count_comes_in_two_bytes_of_odd_parity)
 {
-    (void)state;
     for (int count = 0; count <= 4095; count++) {
         uint16_t decoded;
         next_count = (uint16_t)count;
@@ -107,9 +104,8 @@ static void every_count_comes_in_two_bytes_of_odd_parity(void **state)
     }
 }
 
-static void no_other_word_is_taken_for_data(void **state)
+TEST(no_other_word_is_taken_for_data)
 {
-    (void)state;
     int good = 0;
     for (unsigned word = 0; word <= 0xFFFF; word++) {
         uint16_t count;
@@ -124,9 +120,8 @@ static void no_other_word_is_taken_for_data(void **state)
     assert_int_equal(good, 128 * 128);
 }
 
-static void every_single_bit_error_is_seen(void **state)
+TEST(every_single_bit_error_is_seen)
 {
-    (void)state;
     for (int count = 0; count <= 4095; count++) {
         next_count = (uint16_t)count;
         uint16_t word = sample(0xA2, 1000000);
@@ -138,9 +133,8 @@ static void every_single_bit_error_is_seen(void **state)
     }
 }
 
-static void one_sample_is_never_answered_twice(void **state)
+TEST(one_sample_is_never_answered_twice)
 {
-    (void)state;
     assert_int_equal(transfer(BT_LISTEN_WORD, 10), BT_ERROR_WORD_NO_DATA);
     (void)sample(0xA2, 1000000);
     assert_int_equal(transfer(BT_LISTEN_WORD, 2000000), BT_ERROR_WORD_NO_DATA);
@@ -152,9 +146,8 @@ static void one_sample_is_never_answered_twice(void **state)
     assert_int_equal(transfer16(&device, BT_LISTEN_WORD, 3064000), BT_ERROR_WORD_NO_DATA);
 }
 
-static void the_sample_is_taken_at_the_command_and_a_new_one_replaces_it(void **state)
+TEST(the_sample_is_taken_at_the_command_and_a_new_one_replaces_it)
 {
-    (void)state;
     (void)transfer(0xA200, 0);
     next_count = 17;
     assert_int_equal(transfer(BT_LISTEN_WORD, 60000) >> 9, 2048 >> 5);
@@ -165,9 +158,8 @@ static void the_sample_is_taken_at_the_command_and_a_new_one_replaces_it(void **
     assert_int_equal(count, 3000);
 }
 
-static void only_odd_command_bytes_are_obeyed(void **state)
+TEST(only_odd_command_bytes_are_obeyed)
 {
-    (void)state;
     for (unsigned command = 0x80; command <= 0xFF; command++) {
         samples = 0;
         uint16_t word = sample((uint8_t)command, command * 1000000ull);
@@ -181,25 +173,22 @@ static void only_odd_command_bytes_are_obeyed(void **state)
     }
 }
 
-static void the_second_byte_of_a_sample_command_is_ignored(void **state)
+TEST(the_second_byte_of_a_sample_command_is_ignored)
 {
-    (void)state;
     for (unsigned low = 0; low <= 0xFF; low++) {
         (void)transfer((uint16_t)(0xA200 | low), low * 1000000);
         assert_int_equal(transfer(BT_LISTEN_WORD, low * 1000000 + 50000) >> 9, 2048 >> 5);
     }
 }
 
-static void unknown_commands_are_refused_by_word(void **state)
+TEST(unknown_commands_are_refused_by_word)
 {
-    (void)state;
     assert_int_equal(sample(0x60, 0), 0xA53F);
     assert_int_equal(sample(0x61, 1000000), 0xA53F); // property 0x00
 }
 
-static void the_answer_does_not_depend_on_what_is_sent_meanwhile(void **state)
+TEST(the_answer_does_not_depend_on_what_is_sent_meanwhile)
 {
-    (void)state;
     for (unsigned mosi = 0; mosi <= 0xFFFF; mosi += 0x55) {
         (void)new_device(NULL);
         (void)transfer(0xA200, 1000000);
@@ -208,9 +197,8 @@ static void the_answer_does_not_depend_on_what_is_sent_meanwhile(void **state)
 }
 
 // As mattmongeon/finger_force_control reads: 0x0100 while it listens, 50 us between, no look at the parity.
-static void a_driver_that_listens_with_0x0100_reads_every_channel(void **state)
+TEST(a_driver_that_listens_with_0x0100_reads_every_channel)
 {
-    (void)state;
     uint64_t t_ns = 1000000;
     for (int round = 0; round < 3; round++) {
         for (unsigned c = 0; c < 23; c++) {
@@ -223,9 +211,8 @@ static void a_driver_that_listens_with_0x0100_reads_every_channel(void **state)
     }
 }
 
-static void a_read_with_the_chip_select_still_low_has_no_answer(void **state)
+TEST(a_read_with_the_chip_select_still_low_has_no_answer)
 {
-    (void)state;
     bt_emu_select(&device, true, 0);
     (void)transfer16(&device, 0xA200, 0);
     assert_int_equal(transfer16(&device, BT_LISTEN_WORD, 60000), 0xA52D);
@@ -234,9 +221,8 @@ static void a_read_with_the_chip_select_still_low_has_no_answer(void **state)
     assert_int_equal(transfer(BT_LISTEN_WORD, 950000) >> 9, 2048 >> 5);
 }
 
-static void resend_gives_the_last_word_again(void **state)
+TEST(resend_gives_the_last_word_again)
 {
-    (void)state;
     static const uint8_t commands[] = {0x50, 0x20}; // the manual's, and SynTouch's library's
     assert_int_equal(sample(0x50, 0), 0xA55F);
     uint16_t first = sample(0xA2, 1000000);
@@ -247,16 +233,14 @@ static void resend_gives_the_last_word_again(void **state)
     assert_int_equal(samples, 1);
 }
 
-static void nothing_can_be_written(void **state)
+TEST(nothing_can_be_written)
 {
-    (void)state;
     (void)transfer(0x4017, 0); // variable 1, odd parity
     assert_int_equal(transfer(BT_LISTEN_WORD, 50000), 0xA552);
 }
 
-static void a_mute_sensor_says_zeros_until_it_is_asked_for_a_property(void **state)
+TEST(a_mute_sensor_says_zeros_until_it_is_asked_for_a_property)
 {
-    (void)state;
     device.mute = true;
     for (unsigned k = 0; k < 100; k++) {
         assert_int_equal(sample(0xA2, k * 1000000), 0x0000);
@@ -265,9 +249,8 @@ static void a_mute_sensor_says_zeros_until_it_is_asked_for_a_property(void **sta
     assert_int_equal(sample(0xA2, 201000000) >> 9, 2048 >> 5);
 }
 
-static void a_sensor_without_power_forgets_and_may_come_back_as_another(void **state)
+TEST(a_sensor_without_power_forgets_and_may_come_back_as_another)
 {
-    (void)state;
     static const struct {
         uint16_t fault;
         const char *serial;
@@ -288,9 +271,8 @@ static void a_sensor_without_power_forgets_and_may_come_back_as_another(void **s
     }
 }
 
-static void every_fault_shows_on_the_bus_as_itself(void **state)
+TEST(every_fault_shows_on_the_bus_as_itself)
 {
-    (void)state;
     static const struct {
         uint16_t fault, word;
         enum bt_word kind;
@@ -326,9 +308,8 @@ static void read_property(uint8_t selector, uint8_t *out, int bytes)
     bt_emu_select(&device, false, 200000);
 }
 
-static void properties_are_plain_bytes_padded_with_zeros(void **state)
+TEST(properties_are_plain_bytes_padded_with_zeros)
 {
-    (void)state;
     uint8_t out[20];
     read_property(0x15, out, 20);
     assert_memory_equal(out, "BT0123456789ABCD\0\0\0\0", 20);
@@ -350,18 +331,16 @@ static uint8_t one_byte(uint64_t t_ns)
     return miso;
 }
 
-static void property_bytes_may_come_one_by_one(void **state)
+TEST(property_bytes_may_come_one_by_one)
 {
-    (void)state;
     (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 0);
     for (unsigned k = 0; k < 18; k++) {
         assert_int_equal(one_byte(50000 + 10000 * k), k < 16 ? "BT0123456789ABCD"[k] : 0);
     }
 }
 
-static void the_list_of_channels_is_pairs_and_an_end(void **state)
+TEST(the_list_of_channels_is_pairs_and_an_end)
 {
-    (void)state;
     (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x73, 0);
     for (unsigned slot = 0; slot < 44; slot++) {
         assert_int_equal(one_byte(50000 + 30000 * slot), bt_channel_command[bt_slot_channel[slot]]);
@@ -378,9 +357,8 @@ static void assert_said_ahead(uint64_t t_ns, bool settled)
     assert_int_equal(transfer16(&copy, BT_LISTEN_WORD, t_ns), ahead);
 }
 
-static void what_it_will_say_is_told_ahead(void **state)
+TEST(what_it_will_say_is_told_ahead)
 {
-    (void)state;
     const uint16_t words[] = {0xA200, 0x6115, 0x0001, 0x0001, 0x6113, 0x0100, 0xA300, 0x0001,
                               0xFF00, 0x2000, 0x4000, 0x0001, 0x8000, 0x0000, 0x0000};
     const uint16_t counts[] = {2048,
@@ -401,9 +379,8 @@ static void what_it_will_say_is_told_ahead(void **state)
     }
 }
 
-static void a_property_is_told_a_byte_further_on(void **state)
+TEST(a_property_is_told_a_byte_further_on)
 {
-    (void)state;
     (void)transfer(0x6115, 0);
     assert_int_equal(bt_emu_word_ahead(&device, 0, true, 0), 'B' << 8 | 'T');
     assert_int_equal(bt_emu_word_ahead(&device, 1, true, 0), 'T' << 8 | '0');

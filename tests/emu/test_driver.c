@@ -23,9 +23,8 @@ static void check_command(const sent_command *command)
     assert_int_equal(command->mask, 0x1F);
 }
 
-static void all_command_bytes_are_right_on_the_wire(void **state)
+TEST(all_command_bytes_are_right_on_the_wire)
 {
-    (void)state;
     for (int c = 0; c < BT_CHANNELS; c++) {
         assert_int_equal(bt_channel_command[c], wire_command[c]);
         int parity = 0;
@@ -51,9 +50,8 @@ static void check_time(const sent_command *command)
     worst_late_ns = command->t_ns - due_ns > worst_late_ns ? command->t_ns - due_ns : worst_late_ns;
 }
 
-static void the_slot_rate_is_exact_over_a_minute(void **state)
+TEST(the_slot_rate_is_exact_over_a_minute)
 {
-    (void)state;
     boot(START_NS);
     last_slot = 0;
     worst_late_ns = 0;
@@ -73,9 +71,8 @@ static void the_slot_rate_is_exact_over_a_minute(void **state)
     assert_int_equal(gateway.session.slots_late, 0);
 }
 
-static void interrupt_latency_neither_drifts_nor_breaks_the_settling_time(void **state)
+TEST(interrupt_latency_neither_drifts_nor_breaks_the_settling_time)
 {
-    (void)state;
     boot(START_NS);
     last_slot = 0;
     worst_late_ns = 0;
@@ -91,9 +88,8 @@ static void interrupt_latency_neither_drifts_nor_breaks_the_settling_time(void *
     }
 }
 
-static void the_clock_may_wrap_in_the_middle(void **state)
+TEST(the_clock_may_wrap_in_the_middle)
 {
-    (void)state;
     uint64_t wrap_ns = ((uint64_t)1 << 32) * 1000;
     boot(wrap_ns - 1500000000ull);
     run_rounds(300);
@@ -143,9 +139,8 @@ static void fingers_other_than_the_faulty_one_are_untouched(const char *what)
     }
 }
 
-static void one_finger_in_trouble_never_changes_another(void **state)
+TEST(one_finger_in_trouble_never_changes_another)
 {
-    (void)state;
     static const struct {
         const char *name;
         uint16_t fault;
@@ -182,9 +177,8 @@ static void one_finger_in_trouble_never_changes_another(void **state)
     }
 }
 
-static void every_count_arrives_at_its_finger_and_channel(void **state)
+TEST(every_count_arrives_at_its_finger_and_channel)
 {
-    (void)state;
     boot(START_NS);
     run_rounds(50);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
@@ -202,9 +196,8 @@ static void every_count_arrives_at_its_finger_and_channel(void **state)
     }
 }
 
-static void bad_words_are_counted_by_kind_for_their_finger(void **state)
+TEST(bad_words_are_counted_by_kind_for_their_finger)
 {
-    (void)state;
     trouble.finger = 3;
     trouble.one_in = 1;
     trouble.fault = BT_EMU_FAULT_NO_CHANNEL;

@@ -21,9 +21,8 @@ static uint32_t missing_words(int finger)
     return n;
 }
 
-static void a_late_main_loop_loses_whole_slots_that_are_counted_and_marked(void **state)
+TEST(a_late_main_loop_loses_whole_slots_that_are_counted_and_marked)
 {
-    (void)state;
     boot(START_NS);
     run_rounds(20);
     assert_int_equal(missing_words(0), 0);
@@ -47,9 +46,8 @@ static void a_late_main_loop_loses_whole_slots_that_are_counted_and_marked(void 
                      gateway.session.scheduler.sheds.frames); // those whose slots had waited for too long
 }
 
-static void rounds_lost_whole_leave_a_gap_in_time(void **state)
+TEST(rounds_lost_whole_leave_a_gap_in_time)
 {
-    (void)state;
     boot(START_NS);
     run_rounds(20);
     int before = host.frames[0];
@@ -65,9 +63,8 @@ static void rounds_lost_whole_leave_a_gap_in_time(void **state)
     assert_int_equal(host.frame[0][host.frames[0] - 1].flags & BT_FRAME_FLAG_ELECTRODE_MISSING, 0);
 }
 
-static void t_us_is_that_of_slot_0_even_when_it_was_lost(void **state)
+TEST(t_us_is_that_of_slot_0_even_when_it_was_lost)
 {
-    (void)state;
     uint32_t worst_us = 0;
     int lost = 0;
     for (uint64_t late_us = 29600; late_us < 49000; late_us += 400) {
@@ -89,9 +86,8 @@ static void t_us_is_that_of_slot_0_even_when_it_was_lost(void **state)
     }
 }
 
-static void a_held_off_interrupt_loses_slots_and_never_the_time_base(void **state)
+TEST(a_held_off_interrupt_loses_slots_and_never_the_time_base)
 {
-    (void)state;
     boot(START_NS);
     run_rounds(10);
     fake.held_off_ns = 1000000; // four slots and a half
@@ -107,9 +103,8 @@ static void a_held_off_interrupt_loses_slots_and_never_the_time_base(void **stat
 
 // ---- power-up and the link -------------------------------------------------------------------------------
 
-static void sensors_are_known_by_name_and_absent_ones_stay_blank(void **state)
+TEST(sensors_are_known_by_name_and_absent_ones_stay_blank)
 {
-    (void)state;
     trouble.finger = 2;
     trouble.absent = true;
     boot(START_NS);
@@ -135,9 +130,8 @@ static void sensors_are_known_by_name_and_absent_ones_stay_blank(void **state)
     assert_true(fake.shortest_gap_ns >= 5000);
 }
 
-static void a_closed_port_ends_the_stream(void **state)
+TEST(a_closed_port_ends_the_stream)
 {
-    (void)state;
     boot(START_NS);
     run_rounds(5);
     fake.link_turns++;
@@ -150,9 +144,8 @@ static void a_closed_port_ends_the_stream(void **state)
 }
 
 // The board hangs while finger 2 is held.
-static void a_hang_forgets_no_tare_and_no_hold(void **state)
+TEST(a_hang_forgets_no_tare_and_no_hold)
 {
-    (void)state;
     for (int damaged = 0; damaged <= 2; damaged++) { // so many of the two copies
         bt_baseline before[BT_MAX_FINGERS];
         boot(START_NS);

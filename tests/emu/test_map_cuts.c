@@ -138,24 +138,21 @@ static int powered(void **state)
     return 0;
 }
 
-static void a_cut_at_any_byte_leaves_the_old_map_or_the_new(void **state)
+TEST(a_cut_at_any_byte_leaves_the_old_map_or_the_new)
 {
-    (void)state;
     upload_and_save(0, 1, 2);
     cut_everywhere(2, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 3 * BT_FLASH_PAGE_BYTES));
 }
 
-static void nor_do_half_done_bytes_matter(void **state)
+TEST(nor_do_half_done_bytes_matter)
 {
-    (void)state;
     fake.flash.ragged = true;
     upload_and_save(0, 1, 5);
     cut_everywhere(5, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES));
 }
 
-static void nor_while_the_records_sector_changes(void **state)
+TEST(nor_while_the_records_sector_changes)
 {
-    (void)state;
     uint32_t number = 1;
     int erases;
     upload_and_save(0, number, 1);
@@ -170,9 +167,8 @@ static void nor_while_the_records_sector_changes(void **state)
 }
 
 // Before every erase and program, and thrice inside of each, its cells done in no order: seed 17.
-static void nor_where_and_how_an_operation_is_cut(void **state)
+TEST(nor_where_and_how_an_operation_is_cut)
 {
-    (void)state;
     int at = 0, within = 0;
     fake.flash.seed = 17;
     upload_and_save(0, 1, 5);
@@ -202,9 +198,8 @@ static void nor_where_and_how_an_operation_is_cut(void **state)
     assert_in_range(within, 100, 1000);
 }
 
-static void saved_maps_hold_for_their_own_sensors_alone(void **state)
+TEST(saved_maps_hold_for_their_own_sensors_alone)
 {
-    (void)state;
     char serial[17] = {0};
     const bt_session *session = &gateway.session;
     memcpy(serial, session->info[3].serial, 16);

@@ -100,9 +100,8 @@ static void slots_and_commands_are_kept(void)
     assert_int_equal(gateway.session.streams, 0);
 }
 
-static void what_there_is_time_for_is_all_done(void **state)
+TEST(what_there_is_time_for_is_all_done)
 {
-    (void)state;
     start();
     map_ns = 1240000; // of the largest map on the RP2040; 80 % with all the rest
     sigma_ns = 120000;
@@ -113,9 +112,8 @@ static void what_there_is_time_for_is_all_done(void **state)
     slots_and_commands_are_kept();
 }
 
-static void sigma_goes_first(void **state)
+TEST(sigma_goes_first)
 {
-    (void)state;
     start();
     map_ns = 1240000;
     sigma_ns = 1700000; // 150 % together, 70 % without it
@@ -126,9 +124,8 @@ static void sigma_goes_first(void **state)
     slots_and_commands_are_kept();
 }
 
-static void then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age(void **state)
+TEST(then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age)
 {
-    (void)state;
     uint32_t repeated = 0;
     start();
     map_ns = 3000000; // 150 %
@@ -165,9 +162,8 @@ static void then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age(void **s
     slots_and_commands_are_kept();
 }
 
-static void whole_frames_go_last(void **state)
+TEST(whole_frames_go_last)
 {
-    (void)state;
     int frames = 0;
     start();
     frame_ns = 3000000; // 150 % for packing alone
@@ -189,9 +185,8 @@ static void whole_frames_go_last(void **state)
     slots_and_commands_are_kept();
 }
 
-static void a_wrench_is_not_repeated_from_before_a_start(void **state)
+TEST(a_wrench_is_not_repeated_from_before_a_start)
 {
-    (void)state;
     start();
     run_ms(100);
     const bt_finger *finger = &gateway.session.finger[0];

@@ -26,9 +26,8 @@ static int new_bus(void **state)
     return 0;
 }
 
-static void all_are_read_with_gaps_between_the_bytes(void **state)
+TEST(all_are_read_with_gaps_between_the_bytes)
 {
-    (void)state;
     bt_msg_sensor_info info;
     bt_properties_read(ONLY_BOARD, 0, &info);
     assert_int_equal(info.present, 1);
@@ -50,9 +49,8 @@ static uint16_t one_bit(uint64_t n)
     return n == flipped ? BT_EMU_FAULT_BAD_PARITY : 0;
 }
 
-static void one_flipped_bit_anywhere_changes_nothing(void **state)
+TEST(one_flipped_bit_anywhere_changes_nothing)
 {
-    (void)state;
     for (flipped = 0; flipped < 80; flipped++) {
         bt_msg_sensor_info info;
         (void)new_bus(NULL);
@@ -71,9 +69,8 @@ static uint16_t error_words(uint64_t n)
     return n > 50 ? BT_EMU_FAULT_NO_CHANNEL : 0;
 }
 
-static void an_error_word_is_no_value(void **state)
+TEST(an_error_word_is_no_value)
 {
-    (void)state;
     bt_msg_sensor_info info;
     line = error_words; // from the property behind the serial number on
     bt_properties_read(ONLY_BOARD, 0, &info);
@@ -84,9 +81,8 @@ static void an_error_word_is_no_value(void **state)
     assert_memory_equal(info.flex_version, none, 2);
 }
 
-static void a_line_that_is_stuck_is_nobody(void **state)
+TEST(a_line_that_is_stuck_is_nobody)
 {
-    (void)state;
     bt_msg_sensor_info info;
     fake.bus.sensor[0].present = false;
     bt_properties_read(ONLY_BOARD, 0, &info);
@@ -96,9 +92,8 @@ static void a_line_that_is_stuck_is_nobody(void **state)
 }
 
 // A BioTac SP has 24 electrodes, elsewhere: its counts come, and no force of them is ever sure.
-static void a_sensor_of_another_type_is_named_and_never_sure(void **state)
+TEST(a_sensor_of_another_type_is_named_and_never_sure)
 {
-    (void)state;
     static const char *const serial[] = {"BTSP050400018017", "BTTB050400018017"};
     for (int k = 0; k < 2; k++) {
         bt_msg_sensor_info info;
@@ -121,9 +116,8 @@ static void a_sensor_of_another_type_is_named_and_never_sure(void **state)
     }
 }
 
-static void a_mute_sensor_finds_its_voice(void **state)
+TEST(a_mute_sensor_finds_its_voice)
 {
-    (void)state;
     bt_msg_sensor_info info;
     fake.bus.sensor[0].mute = true;
     bt_properties_read(ONLY_BOARD, 0, &info);
@@ -132,9 +126,8 @@ static void a_mute_sensor_finds_its_voice(void **state)
 }
 
 // At start the whole serial number is garbled; it is asked for again while sampling goes on.
-static void a_serial_number_that_could_not_be_read_is_read_later(void **state)
+TEST(a_serial_number_that_could_not_be_read_is_read_later)
 {
-    (void)state;
     trouble.finger = 2;
     trouble.one_in = 1;
     trouble.fault = BT_EMU_FAULT_BAD_PARITY;

@@ -46,9 +46,8 @@ static void power_cycle(void)
     bt_gateway_init(&gateway, ONLY_BOARD);
 }
 
-static void saved_settings_are_in_force_after_the_next_boot(void **state)
+TEST(saved_settings_are_in_force_after_the_next_boot)
 {
-    (void)state;
     boot(START_NS);
     assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_BUSY);
     assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
@@ -78,9 +77,8 @@ static uint8_t calibrate(uint8_t finger, int32_t gain_nn, bool forced)
     return gateway.session.calibration_state[finger];
 }
 
-static void saved_calibrations_hold_for_their_own_sensors_alone(void **state)
+TEST(saved_calibrations_hold_for_their_own_sensors_alone)
 {
-    (void)state;
     const bt_session *session = &gateway.session;
     boot(START_NS);
     assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
@@ -109,9 +107,8 @@ static void saved_calibrations_hold_for_their_own_sensors_alone(void **state)
     assert_int_equal(session->calibration_state[4], BT_CALIBRATION_STATE_OTHER_SENSOR);
 }
 
-static void a_cleared_calibration_stays_cleared_once_saved(void **state)
+TEST(a_cleared_calibration_stays_cleared_once_saved)
 {
-    (void)state;
     static const uint8_t finger_1[2] = {1, 1};
     boot(START_NS);
     assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
@@ -126,18 +123,16 @@ static void a_cleared_calibration_stays_cleared_once_saved(void **state)
     assert_int_equal(gateway.session.calibration_state[1], BT_CALIBRATION_STATE_NONE);
 }
 
-static void a_flash_that_takes_nothing_is_told(void **state)
+TEST(a_flash_that_takes_nothing_is_told)
 {
-    (void)state;
     boot(START_NS);
     assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
     fake.flash_broken = true;
     assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_NOT_STORED);
 }
 
-static void a_board_without_a_loader_says_so(void **state)
+TEST(a_board_without_a_loader_says_so)
 {
-    (void)state;
     uint8_t payload[BT_REBOOT_BOOTLOADER_BYTES];
     bt_msg_reboot_bootloader msg = {.req_id = 1, .magic = BT_BOOTLOADER_MAGIC};
     bt_msg_reboot_bootloader_pack(&msg, payload);

@@ -40,9 +40,8 @@ static int empty(void **state)
     return 0;
 }
 
-static void test_every_finger_gets_every_slot_over_the_rings_end(void **state)
+TEST(test_every_finger_gets_every_slot_over_the_rings_end)
 {
-    (void)state;
     uint32_t put_in = 0;
     for (uint32_t slot = 0; slot < ROUNDS * BT_SLOTS; slot++) {
         put_in += put_in - slot < 2 ? put(put_in, 7) : 0;
@@ -54,9 +53,8 @@ static void test_every_finger_gets_every_slot_over_the_rings_end(void **state)
     assert_int_equal(stream.starved, 0);
 }
 
-static void test_a_slot_that_is_left_out_moves_nothing(void **state)
+TEST(test_a_slot_that_is_left_out_moves_nothing)
 {
-    (void)state;
     (void)put(0, BT_SLOTS);
     assert_int_equal(ask(0, 0), count_at(0, 0));
     assert_int_equal(ask(0, 5), count_at(5, 0)); // 1 to 4 were never asked for
@@ -64,9 +62,8 @@ static void test_a_slot_that_is_left_out_moves_nothing(void **state)
     assert_int_equal(ask(0, 6), count_at(6, 0));
 }
 
-static void test_what_has_not_come_is_silence_and_the_order_stays(void **state)
+TEST(test_what_has_not_come_is_silence_and_the_order_stays)
 {
-    (void)state;
     (void)put(0, 2);
     (void)ask(0, 0);
     (void)ask(0, 1);
@@ -77,9 +74,8 @@ static void test_what_has_not_come_is_silence_and_the_order_stays(void **state)
     assert_int_equal(ask(0, 2), count_at(2, 0));
 }
 
-static void test_room_is_told_and_kept(void **state)
+TEST(test_room_is_told_and_kept)
 {
-    (void)state;
     assert_int_equal(put(0, BT_SLOTS), BT_SLOTS);
     assert_int_equal(bt_emu_stream_room(&stream), BT_SLOTS);
     assert_int_equal(put(BT_SLOTS, BT_SLOTS), BT_SLOTS);
@@ -90,9 +86,8 @@ static void test_room_is_told_and_kept(void **state)
     assert_int_equal(bt_emu_stream_room(&stream), 1); // slot 1 may be asked for by the others yet
 }
 
-static void test_a_fault_hides_the_tape_and_does_not_hold_it_up(void **state)
+TEST(test_a_fault_hides_the_tape_and_does_not_hold_it_up)
 {
-    (void)state;
     (void)put(0, 4);
     stream.fault[1] = BT_EMU_FAULT_BAD_PARITY;
     assert_int_equal(ask(1, 0), BT_EMU_FAULT_BAD_PARITY);
@@ -103,9 +98,8 @@ static void test_a_fault_hides_the_tape_and_does_not_hold_it_up(void **state)
     assert_int_equal(bt_emu_stream_count(&stream, 1, BT_EMU_LINE, 0), 0);
 }
 
-static void test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape(void **state)
+TEST(test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape)
 {
-    (void)state;
     (void)put(0, 4);
     assert_int_equal(bt_emu_stream_count(&stream, 0, 63, 0), BT_EMU_FAULT_NO_CHANNEL);
     assert_int_equal(ask(FINGERS, 0), BT_EMU_FAULT_STUCK_LOW);
@@ -116,9 +110,8 @@ static void ask_who(uint8_t finger)
     (void)bt_emu_stream_count(&stream, finger, BT_EMU_LINE, 0);
 }
 
-static void test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_they_are(void **state)
+TEST(test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_they_are)
 {
-    (void)state;
     (void)put(0, BT_SLOTS);
     (void)put(BT_SLOTS, BT_SLOTS);
     stream.hold = BT_SLOTS;
@@ -144,9 +137,8 @@ static void test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_ask
     }
 }
 
-static void test_a_loop_has_no_end_and_takes_nothing(void **state)
+TEST(test_a_loop_has_no_end_and_takes_nothing)
 {
-    (void)state;
     static uint16_t kept[FINGERS * BT_SLOTS];
     for (uint32_t k = 0; k < FINGERS * BT_SLOTS; k++) {
         kept[k] = count_at(k / FINGERS, k % FINGERS);
@@ -160,9 +152,8 @@ static void test_a_loop_has_no_end_and_takes_nothing(void **state)
     assert_true(bt_emu_stream_whole(&stream) == NULL);
 }
 
-static void test_a_tape_is_whole_until_some_of_it_is_overwritten(void **state)
+TEST(test_a_tape_is_whole_until_some_of_it_is_overwritten)
 {
-    (void)state;
     (void)put(0, BT_SLOTS - 1);
     assert_true(bt_emu_stream_whole(&stream) == NULL); // no whole round
     (void)put(BT_SLOTS - 1, BT_SLOTS);
@@ -197,9 +188,8 @@ static uint32_t play_by_time(uint32_t rounds, uint32_t round_us)
     return stream.at / BT_SLOTS;
 }
 
-static void test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice(void **state)
+TEST(test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice)
 {
-    (void)state;
     assert_int_equal(play_by_time(1001, 10000), 1000);
     assert_int_equal(stream.moved, 0);
     assert_int_equal(play_by_time(1001, 10010), 1001); // 1000 ppm of 10 s are one round

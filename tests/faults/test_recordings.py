@@ -30,18 +30,9 @@ def content(path: Path) -> tuple[dict[str, Any], list[str]]:
     """All that a Recording gives, and its problems."""
     found = biotac.Recording(path)
     names = [
-        "settings",
-        "calibrations",
-        "maps",
-        "names",
-        "info",
-        "sensors",
-        "metadata",
-        "arrived_ns",
-        "messages",
-        "counts",
+        "settings", "calibrations", "maps", "names", "info", "sensors", "metadata", "arrived_ns", "messages", "counts",
         "frames_lost",
-    ]
+    ]  # fmt: skip
     facts = {name: getattr(found, name) for name in names} | {
         name: getattr(found, name).tobytes() for name in ("frames", "pac", "idle", "wire")
     }

@@ -246,6 +246,8 @@ TEST(an_electrode_that_is_estimated_stays_in_its_range)
             }
             bt_complete(counts, tare_q4, 1u << i, completed);
             assert_in_range(completed[i], 1, 4089);
+            bt_complete(counts, tare_q4, 7u << i % 17, completed); // too many are out: none is made up
+            assert_memory_equal(completed, counts, sizeof counts);
         }
     }
 }

@@ -31,9 +31,8 @@ static bool inverted(finger read)
     return bt_inverted(&read.smooth, &read.base, bt_pdc_missing_max(read.pdc_peak) + read.cooled);
 }
 
-static void less_pressure_than_at_rest_is_no_touch(void **state)
+TEST(less_pressure_than_at_rest_is_no_touch)
 {
-    (void)state;
     for (int up = -30; up <= 30; up += 60) { // pressed skin bulges elsewhere: either may prevail
         assert_true(inverted(reading(5, up, 30)));
         assert_false(inverted(reading(5, up, 5)));
@@ -52,9 +51,8 @@ static void less_pressure_than_at_rest_is_no_touch(void **state)
     }
 }
 
-static void electrodes_without_a_tare_or_a_word_say_nothing(void **state)
+TEST(electrodes_without_a_tare_or_a_word_say_nothing)
 {
-    (void)state;
     finger one = reading(1, 60, 30);
     assert_true(inverted(one));
     finger silent = one;
