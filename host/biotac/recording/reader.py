@@ -25,16 +25,14 @@ from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
 from .block import FRAME, Packet, as_sent
-from .blocks import Block, Blocks
-from .contents import Contents
+from .blocks import Block, Blocks, Contents
 from .facts import Facts
-from .index import Index
 from .labels import Label
 from .layout import finger_of
-from .selection import fields_named, part_of
+from .scan import Index
+from .selection import Selection, fields_named, part_of
 from .stamps import Stamps, unwrapped_us
 from .summary import lines, summary
-from .tabular import Selection
 
 
 def _of_contents(name: str) -> Any:
@@ -99,11 +97,9 @@ class Recording:
             self._index.check(self.path)
         return Contents(self.path)
 
-    def packets(self, from_us: int = 0) -> Iterator[tuple[int, Packet]]:
-        """Messages in order of arrival, each with its block's number; without blocks that end before ``from_us``."""
-        for k, block in enumerate(self._contents.blocks):
-            for packet in block.packets() if from_us <= (block.rest.last_us or from_us) else ():
-                yield k, packet
+    def packets(self, block: int) -> Iterator[Packet]:
+        """Messages of a block, by its number in ``blocks``, in order of arrival."""
+        return self._contents.blocks[block].packets()
 
     def gaps_before(self, block: int) -> list[Gap]:
         """Those between this block, by its number in ``blocks``, and the one before it."""

@@ -23,9 +23,10 @@ from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
 from ..wire.framing import encode
 from ..wire.native import lib
+from .block import Packet
 from .facts import in_force
-from .mcap_file import RecordingFile
 from .reader import Recording
+from .rewrite import rewrite
 from .rounds import HostTare, Rounds, frames_and_tares, with_silence
 
 Settings = dict[wire.Setting, int]
@@ -88,7 +89,7 @@ def recompute(
     }
     blobs = {finger: own_map.blob for finger, own_map in board_maps.items()}
     metadata = recording.metadata | in_force(settings, calibrations, blobs) | {"recomputed": json.dumps(made)}
-    _write(recording, out, metadata, new, tares, lambda share: show(0.5 + share / 2))
+    rewrite(recording, out, metadata, _replaced(new, tares), show=lambda share: show(0.5 + share / 2))
     return notes
 
 
@@ -228,33 +229,17 @@ def _give(tares: dict[int, HostTare], row: int, values: NDArray[np.float64], now
         tares[row] = HostTare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]), now)
 
 
-def _write(
-    recording: Recording,
-    out: Path,
-    metadata: dict[str, str],
-    new: StructArray,
-    tares: dict[int, wire.Tare] | None,
-    show: Show,
-) -> None:
-    """Write the wire as it was, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
-    blocks = [bytearray() for _ in recording.arrived_ns]
-    row = 0
-    for number, packet in recording.packets():
-        block = blocks[number]
+def _replaced(new: StructArray, tares: dict[int, wire.Tare] | None) -> Callable[[Packet], bytes]:
+    """The wire's packets as they were, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
+    rows = iter(range(len(new)))
+
+    def change(packet: Packet) -> bytes:
         if packet.message_id == wire.Tare.ID and tares is not None:
-            continue
+            return b""
         if packet.message_id != wire.Frame.ID:
-            block += packet.data
-            continue
-        if tares is not None and row in tares:
-            block += encode(wire.Tare.ID, tares[row].pack())
-        block += encode(wire.Frame.ID, new[row].tobytes())
-        row += 1
-    with out.open("xb") as stream:
-        file = RecordingFile(stream, metadata)
-        for k, block in enumerate(blocks):
-            for gap in recording.gaps_before(k):
-                file.add_gap(gap)
-            file.add(bytes(block), recording.arrived_ns[k], recording.all_here_ns[k])
-            show((k + 1) / len(blocks))
-        file.close()
+            return packet.data
+        row = next(rows)
+        tare = encode(wire.Tare.ID, tares[row].pack()) if tares is not None and row in tares else b""
+        return tare + encode(wire.Frame.ID, new[row].tobytes())
+
+    return change

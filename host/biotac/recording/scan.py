@@ -1,4 +1,4 @@
-"""Scanning an MCAP file from first byte to last, yielding the undamaged parts of the wanted chunks.
+"""Reading an MCAP file: by its index only what is wanted, or from first byte to last all that is undamaged.
 
 mcap's own readers end at the first damage, and do not say where; its records and chunks are read by its own code. Every
 chunk has a checksum, and so have the file's records and its index. The statistics say how many chunks, metadata
@@ -8,10 +8,12 @@ records and messages there were. A flipped bit shows in one or the other.
 from __future__ import annotations
 
 import io
+import os
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -25,7 +27,7 @@ from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
-from .index import Index
+from . import layout
 
 # A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to, or less with fingers at rest. In
 # memory the data takes ten times its unpacked size.
@@ -33,12 +35,16 @@ _CHUNK_MAX_BYTES = 1 << 23
 _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
 
-_HEAD_BYTES = 9  # of a record: opcode, length
+_HEAD = struct.Struct("<BQ")  # of a record: opcode, length
 _START = struct.Struct("<BQH")  # a record's head, and the channel that a message index begins with
+# Of a chunk index: first and last time, where the chunk begins, its length, bytes of its channels' list, one channel.
+_CHUNK_INDEX = struct.Struct("<QQQQIH")
+_METADATA_INDEX = struct.Struct("<QQ")
+_FOOTER_RECORD = struct.Struct("<BQQQI")
 # As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
 _CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
 _FOOTER = int(Opcode.FOOTER)
-_FOOTER_BYTES = _HEAD_BYTES + 16  # the part of the footer that its checksum covers, too
+_FOOTER_BYTES = _HEAD.size + 16  # the part of the footer that its checksum covers, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
     Opcode.SCHEMA: Schema,
@@ -47,6 +53,77 @@ _READ: dict[int, Any] = {
     Opcode.DATA_END: DataEnd,
     Opcode.FOOTER: Footer,
 }
+
+
+Place = tuple[int, int]  # where a record begins in the file, and its length, head included
+
+
+@dataclass(frozen=True)
+class Index:
+    """``blocks`` are the places of each block's chunks by topic, ``metadata`` those of the metadata records.
+
+    ``records`` are the schemas and channels. ``state`` is what changes when the file is written again.
+    """
+
+    state: tuple[int, int]
+    records: list[Schema | Channel]
+    blocks: list[dict[str, Place]]
+    metadata: list[Place]
+
+    @classmethod
+    def read(cls, path: Path) -> Index | None:
+        """The index of a recording; None where the file has none that its checksum proves, as after a kill."""
+        try:
+            with path.open("rb") as stream:
+                state = _state_of(stream.fileno())
+                tail = _FOOTER_RECORD.size + len(MCAP0_MAGIC)
+                stream.seek(max(0, state[0] - tail))
+                opcode, _, begin, _, crc = _FOOTER_RECORD.unpack(stream.read(_FOOTER_RECORD.size))
+                if opcode != Opcode.FOOTER or stream.read() != MCAP0_MAGIC or not 0 < begin <= state[0] - tail:
+                    return None
+                stream.seek(begin)
+                data = stream.read(state[0] - begin - len(MCAP0_MAGIC))
+            return cls._parsed(state, data) if zlib.crc32(data[:-4]) == crc else None
+        except (OSError, ValueError, struct.error, EOFError):
+            return None
+
+    def check(self, path: Path) -> None:
+        """Raise RecordingError unless the file is the one that this is the index of."""
+        if not path.exists() or _state_of(path) != self.state:
+            raise RecordingError(f"{path} has changed or gone since it was opened; open it again")
+
+    @classmethod
+    def _parsed(cls, state: tuple[int, int], data: bytes) -> Index:
+        records: list[Schema | Channel] = []
+        chunks: list[tuple[int, int, int]] = []
+        metadata: list[Place] = []
+        at = 0
+        while at < len(data):
+            opcode, length = _HEAD.unpack_from(data, at)
+            at += _HEAD.size
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                records.append(_READ[opcode].read(ReadDataStream(io.BytesIO(data[at : at + length]))))
+            elif opcode == Opcode.CHUNK_INDEX:
+                _, _, begin, size, channels, channel = _CHUNK_INDEX.unpack_from(data, at)
+                chunks += [(begin, size, channel)] if channels else []
+            elif opcode == Opcode.METADATA_INDEX:
+                metadata.append(_METADATA_INDEX.unpack_from(data, at))
+            at += length
+        topics = {record.id: record.topic for record in records if isinstance(record, Channel)}
+        blocks: list[dict[str, Place]] = [{}]
+        for begin, size, channel in chunks:  # a block's packets come after its tables
+            topic = topics[channel]
+            if topic == layout.PACKETS or topic.startswith(layout.TABLE):
+                blocks[-1][topic] = begin, size
+            if topic == layout.PACKETS:
+                blocks.append({})
+        return cls(state, records, blocks[:-1], metadata)
+
+
+def _state_of(file: Path | int) -> tuple[int, int]:
+    """Size in bytes and time of the last change in ns of a file, by its path or descriptor."""
+    state = os.stat(file)
+    return state.st_size, state.st_mtime_ns
 
 
 def _content(stream: BinaryIO, at: int, length: int) -> ReadDataStream:
@@ -121,7 +198,7 @@ class Scan:
             channels: set[int] = set()
             while True:
                 opcode, length, channel = _START.unpack(stream.read(_START.size).ljust(_START.size, b"\0"))
-                at = good_until + _HEAD_BYTES
+                at = good_until + _HEAD.size
                 whole = opcode != 0 and length <= self._size - at
                 if opcode == _MESSAGE_INDEX and whole:  # two out of three records
                     channels.add(channel)
@@ -160,23 +237,23 @@ class Scan:
 
     def _by_index(self, stream: BinaryIO, index: Index) -> Iterator[Metadata | tuple[str, Message]]:
         index.check(self.path)
-        yield from self._take(index.records)
         for at, length in index.metadata:
-            record = self._read(Opcode.METADATA, _content(stream, at + _HEAD_BYTES, length - _HEAD_BYTES))
+            record = self._read(Opcode.METADATA, _content(stream, at + _HEAD.size, length - _HEAD.size))
             yield from self._take([record] if record is not None else [])
+        yield from self._take(index.records)
         for block in map(index.blocks.__getitem__, self._only):
             for topic, (at, length) in block.items():
                 if self._wanted(topic):
-                    yield from self._open(stream, at + _HEAD_BYTES, length - _HEAD_BYTES, unwanted=False)
+                    yield from self._open(stream, at + _HEAD.size, length - _HEAD.size, unwanted=False)
 
     def _prove(self, stream: BinaryIO, record: DataEnd | Footer, at: int, length: int) -> None:
         """Verify the checksum in ``record``; 0 means that the program that wrote it made none."""
         if isinstance(record, DataEnd):
             self._data_end = at + length
-            what, begin, end, expected = "records", 0, at - _HEAD_BYTES, record.data_section_crc
+            what, begin, end, expected = "records", 0, at - _HEAD.size, record.data_section_crc
         else:
             what, begin, expected = "index", record.summary_start, record.summary_crc
-            end = at - _HEAD_BYTES + _FOOTER_BYTES
+            end = at - _HEAD.size + _FOOTER_BYTES
             if begin != self._data_end:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return

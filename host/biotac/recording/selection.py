@@ -1,4 +1,4 @@
-"""Loading a recording's frames, or only a part of them; memory use is in proportion to that part."""
+"""A part of a recording, read without the rest: in rows, pandas or xarray; resampled; beside another signal."""
 
 from __future__ import annotations
 
@@ -6,21 +6,36 @@ import math
 import os
 import warnings
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
 
+from ..core.geometry import ELECTRODE_MM
 from ..errors import InputError, RecordingError, RecordingWarning, printable
-from ..wire.fields import FRAME_FIELDS, Field, dtype_of, values_of
+from ..wire.fields import AXES, FRAME_FIELDS, Field, dtype_of, values_of
 from ..wire.frames import StructArray
+from ..wire.messages_gen import INVALID_COUNT, FrameFlags
+from ..wire.slots import FRAME_HZ
 from . import layout
+from .alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
 from .block import FRAME
 from .blocks import Blocks
-from .index import Index
+from .scan import Index
 
 _BY_NAME = {field.name: field for field in FRAME_FIELDS}
+_OF_ROW = ("finger", "seq", "t_us")
+#: What says of a row that is not there that none of its values may be used.
+_ABSENT = (
+    FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.ELECTRODE_MISSING | FrameFlags.PDC_MISSING
+    | FrameFlags.TAC_MISSING | FrameFlags.TDC_MISSING | FrameFlags.FAULT
+)  # fmt: skip
 
 
 def load(
@@ -56,13 +71,13 @@ def part_of(
     stop_s: float | None = None,
 ) -> tuple[StructArray, Blocks, int]:
     """The rows that ``load`` gives, what was read for them, and how many gaps that has."""
-    numbers = None if fingers is None else _fingers(path, fingers)
+    named = None if fingers is None else {fingers} if isinstance(fingers, (int, str)) else set(fingers)
     wanted = {FRAME: {"t_us", *(field.sent or field.name for field in chosen)}}
     begin_us: int | None = None
     only = range(0)
     if index is not None:
         begin_us, only = _within(path, index, start_s, stop_s)
-    blocks = Blocks(path, wanted, numbers, check=False, index=index, only=only)
+    blocks = Blocks(path, wanted, named, check=False, index=index, only=only)
     dtype = dtype_of(chosen)
     parts = [np.empty(0, dtype)]
     gaps = 0
@@ -113,22 +128,6 @@ def fields_named(names: Iterable[str] | None) -> list[Field]:
     return [field for field in FRAME_FIELDS if field.name in chosen]
 
 
-def _fingers(path: Path, fingers: Iterable[int | str]) -> set[int]:
-    wanted = {fingers} if isinstance(fingers, (int, str)) else set(fingers)
-    names: dict[str, int] = {}
-    if any(isinstance(finger, str) for finger in wanted):
-        blocks = Blocks(path, {}, (), check=False)
-        next(iter(blocks), None)
-        try:
-            names = layout.names_of(blocks.metadata or {})
-        except (TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
-            raise RecordingError(f"{path} has damaged metadata ({error}); name its fingers by number") from error
-    try:
-        return {layout.finger_of(finger, names) for finger in wanted}
-    except KeyError as error:
-        raise InputError(f"{path}: {error.args[0]}") from None
-
-
 def _check(blocks: Blocks, path: Path, gaps: int) -> None:
     if blocks.metadata is None:
         raise RecordingError(f"{path} holds no readable biotac recording; expected a file written by `biotac record`")
@@ -139,3 +138,164 @@ def _check(blocks: Blocks, path: Path, gaps: int) -> None:
     if problems:
         more = f", and {len(problems) - 1} more: see Recording(...).problems" if len(problems) > 1 else ""
         warnings.warn(printable(f"{problems[0]}{more}"), RecordingWarning, stacklevel=3)
+
+
+@dataclass(frozen=True, repr=False)
+class Selection:
+    """Rows of a recording, made by ``Recording.select``.
+
+    ``rows`` is a structured array (n,) in order of arrival, with ``finger``, ``seq``, ``t_us`` and the ``fields`` asked
+    for. ``names`` has the fingers' names by number.
+    """
+
+    rows: StructArray
+    fields: tuple[Field, ...]
+    names: dict[int, str]
+    label_of: Callable[[StructArray], NDArray[np.str_]]
+    stamp_ns: Callable[[NDArray[np.int64]], NDArray[np.int64]]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __repr__(self) -> str:
+        there = ", ".join(self.names.get(f, str(f)) for f in np.unique(self.rows["finger"]).tolist())
+        what = ", ".join(f"{field.name} ({field.unit})" for field in self.fields if field.name not in _OF_ROW)
+        return f"<biotac.Selection: {len(self)} rows of {there or 'no finger'}: {what}>"
+
+    @property
+    def label(self) -> NDArray[np.str_]:
+        """Which labels hold at each row (n,); the first use looks for them in the whole recording."""
+        return self.label_of(self.rows)
+
+    def to_numpy(self) -> StructArray:
+        """The rows."""
+        return self.rows
+
+    def to_pandas(self) -> Any:
+        """A DataFrame with the flat names of host/docs/reference/rows.md: a row per frame, indexed by ``stamp`` (UTC).
+
+        Integer fields that can be missing are nullable (UInt16); all others have NumPy types. ``label`` is the last
+        column. ``attrs["units"]`` has each column's unit. Needs the extra ``export``.
+        """
+        pandas = _imported("pandas")
+        columns: dict[str, Any] = {}
+        units: dict[str, str] = {}
+        for field in self.fields:
+            values = self.rows[field.name].reshape(len(self), -1)
+            for k, name in enumerate(field.flat_names()):
+                column = values[:, k].copy()
+                if field.invalid is not None:
+                    column = pandas.arrays.IntegerArray(column, column == field.invalid)
+                columns[name], units[name] = column, field.unit
+        columns["label"] = pandas.Categorical(self.label)
+        index = pandas.DatetimeIndex(pandas.to_datetime(self.stamp_ns(self.rows["t_us"]), utc=True), name="stamp")
+        table = pandas.DataFrame(columns, index=index)
+        table.attrs["units"] = units
+        return table
+
+    def to_xarray(self) -> Any:
+        """A Dataset with dimensions ``time`` and ``finger``, and ``axis`` or ``electrode`` for vectors.
+
+        ``time`` is the stamp (UTC) of a round, ``finger`` the name or else the number as text. Electrodes have their
+        positions on the core as coordinates ``electrode_x_mm``, ``_y_mm`` and ``_z_mm``; variables have ``units`` and
+        ``long_name``. Where a finger has no row in a round, and for missing counts, floats are NaN (float32 holds 0 to
+        4095 exactly), and ``flags`` say so. Needs the extra ``export``.
+        """
+        xarray = _imported("xarray")
+        t_us, round_of = np.unique(self.rows["t_us"], return_inverse=True)
+        numbers, finger_of = np.unique(self.rows["finger"], return_inverse=True)
+        shape = len(t_us), len(numbers)
+        texts = self.label
+        label = np.full(shape, "", texts.dtype)
+        label[round_of, finger_of] = texts
+        coordinates: dict[str, Any] = {
+            "time": self.stamp_ns(t_us).astype("datetime64[ns]"),
+            "finger": [self.names.get(finger, str(finger)) for finger in numbers.tolist()],
+            "t_us": ("time", t_us),
+            "label": (("time", "finger"), label),
+        }
+        data: dict[str, Any] = {}
+        for field in self.fields:
+            values = self.rows[field.name]
+            if field.name in ("finger", "t_us"):
+                continue
+            if field.invalid is not None:
+                values = np.where(values == field.invalid, np.float32(np.nan), values.astype(np.float32))
+            absent = np.nan if values.dtype.kind == "f" else _ABSENT if field.name == "flags" else 0
+            cube = np.full((*shape, *field.shape), absent, values.dtype)
+            cube[round_of, finger_of] = values
+            inner = () if not field.parts else ("axis",) if field.parts == AXES else ("electrode",)
+            coordinates |= {name: list(field.parts) for name in inner}
+            data[field.name] = (("time", "finger", *inner), cube, {"units": field.unit, "long_name": field.what})
+        if "electrode" in coordinates:
+            places = zip(AXES, ELECTRODE_MM.T, strict=True)
+            coordinates |= {f"electrode_{axis}_mm": ("electrode", at, {"units": "mm"}) for axis, at in places}
+        return xarray.Dataset(data, coordinates)
+
+    def resample(self, rate_hz: float) -> Selection:
+        """The means of each finger's rows over steps of 1 / ``rate_hz``, above 0 and at most the board's 100.
+
+        ``t_us`` is the middle of a step. All means are float64, NaN where no row has a value; ``flags`` are those that
+        any of the rows has, other integers those of the first row. Steps without a row are left out.
+        """
+        if not 0 < rate_hz <= FRAME_HZ:
+            raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ}")
+        step_us = 1e6 / rate_hz
+        step = np.floor(self.rows["t_us"] / step_us).astype(np.int64)
+        order = np.lexsort((self.rows["finger"], step))
+        rows, step = self.rows[order], step[order]
+        first = np.flatnonzero(np.diff(step, prepend=-1) | np.diff(rows["finger"].astype(np.int16), prepend=-1))
+        fields = tuple(
+            replace(f, dtype="<f8", invalid=None) if f.dtype[1] == "f" or f.invalid is not None else f
+            for f in self.fields
+        )
+        out = np.empty(len(first), dtype_of(fields))
+        for before, field in zip(self.fields, fields, strict=True):
+            values = rows[field.name]
+            if field.name == "flags":
+                out["flags"] = np.bitwise_or.reduceat(values, first) if len(first) else values
+            elif field.dtype != "<f8":
+                out[field.name] = values[first]
+            elif len(first):
+                known = ~np.isnan(values) if before.invalid is None else values != before.invalid
+                count = np.add.reduceat(known, first, dtype=np.float64)
+                total = np.add.reduceat(np.where(known, values, 0.0), first)
+                out[field.name] = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
+        out["t_us"] = np.round((step[first] + 0.5) * step_us)
+        return replace(self, rows=out, fields=fields)
+
+    def align(self, signal: npt.ArrayLike, t_s: npt.ArrayLike) -> tuple[NDArray[np.float64], Alignment]:
+        """Another sensor's ``signal``, (m,) or (m, k) at ``t_s`` (m,) in s of its own clock, at this selection's rows.
+
+        The selection holds one finger, with ``counts``, ``pdc`` or both. How they move with the load is correlated
+        with how the signal's distance from its median does; the better of the two counts, as in ``biotac calibrate
+        wrench``. Ten seconds with a few irregular presses are enough. Returns means over each row's 10 ms, (n,) or
+        (n, k), NaN where the signal does not reach, and the Alignment, whose ``offset_s`` is the lag and ``sigma_s``
+        one standard deviation of it. Raises RecordingError when the two do not clearly match.
+        """
+        after_s = {"counts": ELECTRODES_S, "pdc": PDC_S}
+        sources = [name for name in after_s if name in (self.rows.dtype.names or ())]
+        if not sources or len(np.unique(self.rows["finger"])) != 1:
+            raise InputError("align needs the counts or pdc of one finger: select(fingers=..., fields=['counts', ...])")
+        other = np.asarray(signal, np.float64)
+        values, times, board_s = other.reshape(len(other), -1), np.asarray(t_s, np.float64), self.rows["t_us"] / 1e6
+        loads = []
+        for name in sources:
+            own = self.rows[name].reshape(len(self), -1).astype(np.float64)
+            own[own == INVALID_COUNT] = np.nan
+            loads.append((board_s + after_s[name], _distance(own)))
+        found = align_best("the selection and the signal", loads, times, _distance(values))
+        at_s = found.to_reference_s(board_s + ELECTRODES_S)  # most of a row, and all results, come from the electrodes
+        return means(times, values, at_s).reshape(-1, *other.shape[1:]), found
+
+
+def _distance(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    distance: NDArray[np.float64] = np.linalg.norm(values - np.nanmedian(values, axis=0), axis=1)
+    return distance
+
+
+def _imported(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise InputError(f"{name} is not installed; pip install 'biotac-gateway[export]'") from error

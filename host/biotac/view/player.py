@@ -12,7 +12,7 @@ from ..errors import CommandRefusedError, InputError
 from ..hand.hand import Hand
 from ..hand.opening import shake_hands
 from ..hand.record import Recorder
-from ..recording.cut import cut
+from ..recording.rewrite import cut
 from ..recording.reader import Recording
 from ..recording.replay.link import ReplayLink
 from ..recording.replay.playback import Playback

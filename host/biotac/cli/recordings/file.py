@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...errors import InputError, printable
 from ...partial_file import whole
-from ...recording.cut import cut
+from ...recording.rewrite import cut
 from .. import values
 from ..outputs import say
 from .loading import load

@@ -84,7 +84,7 @@ class Playback:
     def _timed(self) -> Iterator[tuple[int, Packet]]:
         """Packets in the range played, each with the device time at which it came."""
         now_us = self.from_us - (self.from_us > self.recording.begin_us)  # what comes before a clock is older
-        for _, packet in self.recording.packets(self.from_us):
+        for packet in self._packets():
             if packet.message_id in _CLOCKS:
                 (raw_us,) = _TIME.unpack_from(packet.payload, _TIME_AT)
                 now_us = nearest(raw_us, now_us)
@@ -92,6 +92,12 @@ class Playback:
                 return
             if now_us >= self.from_us:
                 yield now_us, packet
+
+    def _packets(self) -> Iterator[Packet]:
+        """All, without the blocks that end before ``from_us``."""
+        for k, block in enumerate(self.recording.heads()):
+            if self.from_us <= (block.rest.last_us or self.from_us):
+                yield from self.recording.packets(k)
 
     def _wanted(self, packet: Packet) -> bytes | None:
         """The packet's bytes as sent to this session; None if they are not sent."""

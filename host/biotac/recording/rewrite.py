@@ -1,0 +1,67 @@
+"""A recording written again, block by block: a part of it, what is left of a damaged one, or with other frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from ..errors import InputError
+from . import layout
+from .block import Packet
+from .mcap_file import RecordingFile
+from .reader import Recording
+
+
+def rewrite(
+    recording: Recording,
+    out: Path,
+    metadata: Mapping[str, str],
+    change: Callable[[Packet], bytes] = lambda packet: packet.data,
+    *,
+    blocks: range | None = None,
+    show: Callable[[float], None] = lambda share: None,
+) -> None:
+    """Write ``blocks`` (default: all), with their gaps and all labels that hold in them; ``change`` makes the bytes."""
+    numbers = range(len(recording.arrived_ns)) if blocks is None else blocks
+    heads = [recording.heads()[k].rest for k in numbers]
+    begin_us = next((head.first_us for head in heads if head.first_us is not None), 0)
+    labels = [
+        label for label in recording.labels if label.t_us is None or begin_us <= (label.end_us or label.t_us)
+    ]  # in order of time
+    at_us = begin_us
+    with out.open("xb") as stream:
+        file = RecordingFile(stream, dict(metadata))
+        for done, (k, head) in enumerate(zip(numbers, heads, strict=True), 1):
+            for gap in recording.gaps_before(k):
+                file.add_gap(gap)
+            data = b"".join(map(change, recording.packets(k)))
+            file.add(data, recording.arrived_ns[k], recording.all_here_ns[k])
+            at_us = head.last_us or at_us
+            while labels and (labels[0].t_us or 0) <= at_us:
+                file.add_label(labels.pop(0))
+            show(done / len(numbers))
+        file.close()
+
+
+def cut(recording: Recording, out: Path, start_s: float = 0.0, stop_s: float | None = None) -> tuple[float, float]:
+    """Write the blocks, of about a second, that have rows from ``start_s`` to ``stop_s``, device seconds since the
+    first row; returns the first and last row's time in s. Bytes, times and losses stay as they are.
+
+    Raises InputError when there is no row in that time.
+    """
+    begin_us = recording.begin_us
+    chosen = [
+        (k, block.rest.first_us, block.rest.last_us)
+        for k, block in enumerate(recording.heads())
+        if block.rest.first_us is not None
+        and block.rest.last_us is not None
+        and block.rest.last_us >= begin_us + start_s * 1e6
+        and (stop_s is None or block.rest.first_us < begin_us + stop_s * 1e6)
+    ]
+    if not chosen:
+        duration_s = (recording.end_us - begin_us) / 1e6
+        raise InputError(f"{recording.path} has {duration_s:.1f} s and no row from {start_s:g} s on in that time")
+    (first, from_us, _), (last, _, to_us) = chosen[0], chosen[-1]
+    metadata = recording.metadata | {layout.CUT_FROM: recording.path.name}
+    rewrite(recording, out, metadata, blocks=range(first, last + 1))
+    return (from_us - begin_us) / 1e6, (to_us - begin_us) / 1e6
