@@ -35,8 +35,8 @@ from .hand.views import FingerView as FingerView
 from .keep import Calibration as Calibration
 from .recording.labels import Label as Label
 from .recording.reader import Recording as Recording
-from .recording.selection import load as load
 from .recording.selection import Selection as Selection
+from .recording.selection import load as load
 from .version import __version__ as __version__
 from .wire.batches import Batch as Batch
 from .wire.batches import LinkStats as LinkStats

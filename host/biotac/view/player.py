@@ -12,10 +12,10 @@ from ..errors import CommandRefusedError, InputError
 from ..hand.hand import Hand
 from ..hand.opening import shake_hands
 from ..hand.record import Recorder
-from ..recording.rewrite import cut
 from ..recording.reader import Recording
 from ..recording.replay.link import ReplayLink
 from ..recording.replay.playback import Playback
+from ..recording.rewrite import cut
 from ..wire.batches import Batch, LinkStats
 from ..wire.identity import board_name, version_text
 

@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 from record_all import record_all
 
 import biotac
+from biotac.cli.main import main
 from biotac.recording import labels
 
 
@@ -45,6 +46,12 @@ def test_live_labels_have_their_times_and_facts(recorded: Path) -> None:
     # The reader is ahead of the program by what waits to be read, so only the span's order is known here.
     assert recording.begin_us <= touched.t_us <= grasp.t_us < grasp.end_us <= recording.end_us
     assert recording.problems == [] and recording.gaps == []
+
+
+@pytest.mark.parametrize("options", [["export", "--recompute", "--keep-tare"], ["file", "recover"]])
+def test_a_recording_written_again_keeps_them(recorded: Path, tmp_path: Path, options: list[str]) -> None:
+    assert main([*options, str(recorded), str(tmp_path / "again.mcap")]) == 0
+    assert biotac.Recording(tmp_path / "again.mcap").labels == biotac.Recording(recorded).labels
 
 
 def test_rows_know_which_labels_hold(recorded: Path, tmp_path: Path) -> None:
