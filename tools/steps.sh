@@ -3,6 +3,7 @@
 . tools/venv.sh
 export BIOTAC_CI=1 # a proof or a rig whose tool is missing fails instead of being skipped
 PATH="$PWD/.venv/bin:$PATH"
+unset PYTHONDONTWRITEBYTECODE # with it every process that a test starts compiles NumPy and this package again
 
 step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells how long it took
     local begin=$SECONDS
