@@ -102,11 +102,11 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) 
     """As a real one: stopped and set, with what each finger has of its own left as it was."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
-        outcome = calibrate(hand, Silent(), fingers=(0,), made_s=77)
-        assert hand.board.calibration(0) == outcome.calibrations[0]
-    own = outcome.calibrations[0]
+        (found,) = calibrate(hand, Silent(), fingers=(0,), made_s=77)
+        assert hand.board.calibration(0) == found.calibration
+    own = found.calibration
     assert (own.thermal_gain_milli, own.made_s, own.serial) == (321, 77, "BTSIM00000000001")
-    assert outcome.verified[0].board_error <= 0.059
+    assert found.verified.board_error <= 0.059
 
 
 class Scale(Silent):
@@ -120,10 +120,9 @@ def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) ->
     """As on a real port: nothing behind it that knows a truth."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
         hand.link.source = None
-        outcome = calibrate(hand, Scale(), fingers=(0,), made_s=1, save=True)
-    assert outcome.verified[0].board_error <= 0.059
-    assert outcome.fits[0].press_forces_n == CALIBRATION_FORCES_N
-    assert outcome.not_saved is None
+        (found,) = calibrate(hand, Scale(), fingers=(0,), made_s=1)
+    assert found.verified.board_error <= 0.059
+    assert found.fit.press_forces_n == CALIBRATION_FORCES_N
 
 
 def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Path, capsys, monkeypatch) -> None:

@@ -268,7 +268,6 @@ class Procedure:
         for forces_n in series_n:
             if not forces_n or not all(0 < force < MAX_N for force in forces_n):
                 raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
-        self.needs_force = needs_force
         self._turns = [
             (Presses(finger, len(forces_n), needs_force=needs_force), tuple(map(float, forces_n)))
             for forces_n in series_n
@@ -325,13 +324,24 @@ class Procedure:
             # The next finger begins after this row, even if later rows came in the same call.
             rows = rows[rows["t_us"] > own["t_us"][taken - 1]] if taken else rows
 
-    def finish(self) -> None:
-        """End: no more rows come. Raises InputError unless every press was seen."""
+    def finish(self, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
+        """End: no more rows come. The presses by finger, each with what a scale showed in asked()'s order, if given.
+
+        Raises InputError unless every press was seen.
+        """
         for machine, _ in self._turns:
             machine.finish()
+        if not forces_n:
+            return self.presses
+        found: dict[int, list[Press]] = {}
+        for (press, _), force_n in zip(self.asked(), forces_n, strict=True):
+            found.setdefault(press.finger, []).append(press.with_column("force_n", force_n))
+        return found
 
-    def find(self, rows: StructArray) -> dict[int, list[Press]]:
-        """The presses in all rows of a recording, by finger. Raises InputError unless every press was seen."""
+    def find(self, rows: StructArray, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
+        """The presses in all rows of a recording, by finger, with forces as finish() gives them.
+
+        Raises InputError unless every press was seen.
+        """
         self.feed(rows)
-        self.finish()
-        return self.presses
+        return self.finish(forces_n)

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.compiled import ELECTRODES
 from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...link.base import Played
@@ -23,7 +24,6 @@ from ..reference.csv_file import columns, open_table
 LAG_ROWS = 100
 MAX_LAG_ROWS = 20  # 0.2 s: more is not a transport delay but another clock; a contact held for 0.5 s allows this much
 MIN_CORRELATION = 0.9
-_COLUMNS = (("t_s", "force_n"), ("t_s", "fx_n", "fy_n", "fz_n"))
 MAX_FORCE_N = 200.0  # more than a finger withstands; values in millinewtons and grams exceed it
 
 
@@ -35,12 +35,14 @@ class Reference(Protocol):
 
 
 #: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.
-#: ``board_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``touched`` means
-#: contact or a fault, ``railed`` a PDC at an end of its range.
+#: ``board_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``counts`` are the
+#: electrodes' and ``tare`` theirs, NaN where unknown. ``touched`` means contact or a fault, ``railed`` a PDC at an end
+#: of its range.
 ROW_DTYPE = np.dtype(
     [
         *(("finger", "u1"), ("t_us", "<i8")),
         *((name, "<f8") for name in ("pressure", "rest", "board_n", "force_n")),
+        *(("counts", "<u2", (ELECTRODES,)), ("tare", "<f8", (ELECTRODES,))),
         *(("touched", "?"), ("railed", "?")),
     ]
 )
@@ -53,6 +55,7 @@ def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: Reference
     out["pressure"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
     out["rest"] = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
     out["board_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
+    out["counts"], out["tare"] = messages["counts"], to_units(messages["tare_q4"], Q4_PER_COUNT)
     out["force_n"] = np.nan if reference is None else reference.at(messages["finger"], t_us)
     out["touched"] = (messages["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.FAULT)) != 0
     out["railed"] = ~usable(messages["pdc"]) & (messages["pdc"] != wire.INVALID_COUNT)
@@ -150,9 +153,9 @@ def load_csv(path: Path) -> Series:
     are ignored. Raises InputError that says what is wrong with the file.
     """
     _, head, read = open_table(path)
-    names = next((names for names in _COLUMNS if set(names) <= set(head)), None)
+    size = {"t_s", "force_n"} <= set(head)
     try:
-        indices = columns(path, head, torque=False)[0] if names is None else [head.index(name) for name in names]
+        indices = [head.index("t_s"), head.index("force_n")] if size else columns(path, head, torque=False)[0]
     except RecordingError as error:
         raise InputError(
             f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and "

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 from ...hand.hand import Hand
-from ...wire.batches import Batch
 from .detector import Press, Procedure, Step
 from .force_source import Reference, rows_of
 
@@ -26,14 +24,12 @@ def guide(
     procedure: Procedure,
     reference: Reference | None,
     face: Face | None,
-    *,
-    heard: Callable[[Batch], None] = lambda batch: None,
 ) -> dict[int, list[Press]]:
     """Feed ``procedure`` with what ``hand`` streams until it is done; the presses by finger, each with its force.
 
     The force is the ``reference``'s, or what ``face`` gives; a scenario, which presses by itself, needs no face. Starts
-    the stream if necessary and leaves it on. ``heard`` gets every batch. Raises InputError when a finger waits too
-    long, or a simulated source ends first.
+    the stream if necessary and leaves it on. Raises InputError when a finger waits too long, or a simulated source ends
+    first.
     """
     forces_n: list[float] = []
 
@@ -46,7 +42,6 @@ def guide(
     shown = procedure.step
     show(shown)
     for batch in hand.batches():
-        heard(batch)
         rows = rows_of(batch.wire, batch.t_us, reference)
         for k in range(len(rows)):  # one by one: a batch may hold more than one step
             procedure.feed(rows[k : k + 1])
@@ -55,13 +50,7 @@ def guide(
                 show(shown)
         if procedure.done:
             break
-    procedure.finish()
-    if reference is not None:
-        return procedure.presses
-    found: dict[int, list[Press]] = {}
-    for (press, _), force_n in zip(procedure.asked(), forces_n, strict=True):
-        found.setdefault(press.finger, []).append(press.with_column("force_n", force_n))
-    return found
+    return procedure.finish(forces_n)
 
 
 def ask_forces(procedure: Procedure, forces_n: list[float], face: Face) -> None:

@@ -15,8 +15,6 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
-from ...wire.batches import Batch, join
-from ...wire.frames import Q4_PER_COUNT, StructArray
 from ..population import Population, by_columns
 from .detector import Press, Procedure
 from .force_source import Reference, rows_of
@@ -134,12 +132,9 @@ def guided(
     """
     _check_enough(len(forces_n))
     procedure = Procedure([finger], forces_n, needs_force=reference is not None)
-    heard: list[Batch] = []
-    presses = guide(hand, procedure, reference, face, heard=heard.append)[finger]
+    presses = guide(hand, procedure, reference, face)[finger]
     hand.stop()
-    batch = join(heard)
-    own = batch.wire["finger"] == finger
-    return _held(batch.wire[own], batch.t_us[own], presses, toward)
+    return _held(presses, toward)
 
 
 def recorded(
@@ -148,10 +143,8 @@ def recorded(
     """Presses in a recording, one for each of ``forces_n`` (k,). Raises InputError when it has fewer."""
     _check_enough(len(forces_n))
     own = recording.wire["finger"] == finger
-    messages, t_us = recording.wire[own], recording.frames["t_us"][own]
-    found = Procedure([finger], forces_n, needs_force=False).find(rows_of(messages, t_us))[finger]
-    presses = [press.with_column("force_n", force) for press, force in zip(found, forces_n, strict=True)]
-    return _held(messages, t_us, presses, toward)
+    rows = rows_of(recording.wire[own], recording.frames["t_us"][own])
+    return _held(Procedure([finger], forces_n, needs_force=False).find(rows, forces_n)[finger], toward)
 
 
 def _check_enough(presses: int) -> None:
@@ -159,19 +152,18 @@ def _check_enough(presses: int) -> None:
         raise InputError(f"{presses} presses of known force: expected {LEAST_PRESSES} or more; five work better")
 
 
-def _held(frames: StructArray, t_us: Any, presses: Sequence[Press], toward: Sequence[Sequence[float]] | None) -> Held:
-    counts, numbers, tares = [], [], []
+def _held(presses: Sequence[Press], toward: Sequence[Sequence[float]] | None) -> Held:
+    above, numbers, tares = [], [], []
     for k, press in enumerate(presses):
-        held = frames[np.isin(t_us, press.rows["t_us"])]
-        whole = (held["counts"] != wire.INVALID_COUNT).all(axis=1) & (held["tare_q4"] != wire.INVALID_COUNT).all(axis=1)
+        rows = press.rows
+        whole = (rows["counts"] != wire.INVALID_COUNT).all(axis=1) & np.isfinite(rows["tare"]).all(axis=1)
         if not whole.any():
             raise InputError(f"press {k + 1}: no frame with all electrodes and a tare: expected one; check the sensor")
-        counts.append(held["counts"][whole].astype(np.float64))
-        tares.append(held["tare_q4"][whole] / Q4_PER_COUNT)
+        # above each press's own tare: the board takes a new one between presses
+        above.append(rows["counts"][whole] - rows["tare"][whole])
+        tares.append(rows["tare"][whole])
         numbers.append(np.full(int(whole.sum()), k))
     tare = tares[0].mean(axis=0)
-    # counts above each press's own tare: the board takes a new one between presses
-    level = [one - at + tare for one, at in zip(counts, tares, strict=True)]
     directions = np.array([STRAIGHT_DOWN] * len(presses) if toward is None else toward)
     sizes_n = np.array([press.force_n for press in presses])
-    return Held(np.concatenate(level), tare, np.concatenate(numbers), sizes_n[:, None] * directions)
+    return Held(np.concatenate(above) + tare, tare, np.concatenate(numbers), sizes_n[:, None] * directions)

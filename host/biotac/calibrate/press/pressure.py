@@ -7,7 +7,7 @@ K = pinv(P - P0) |F|    Eq 6, over the held rows of all presses
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from ...core.compiled import NN_PER_N, pressure_force_100un
 from ...core.geometry import Floats
 from ...documents import Provenance
-from ...errors import CommandRefusedError, InputError
+from ...errors import InputError
 from ...keep import Calibration
 from ...version import __version__
 from ...wire import messages_gen as wire
@@ -157,29 +157,30 @@ def _check(where: str, press: Press) -> None:
 # ---- results -----------------------------------------------------------------------------------
 
 
-@dataclass
-class Outcome:
-    """Results by finger: K, the calibration with it, its provenance, and the verification press.
+@dataclass(frozen=True)
+class Calibrated:
+    """One finger's K, its error on the verification press, the calibration with it, and where the presses are from.
 
-    ``lag_rows`` is how many rows pressure lags a reference that has its own times. ``not_saved`` is why the board did
-    not save the calibrations, None if it did or was not asked to.
+    ``lag_rows`` is how many rows pressure lags a reference that has its own times, None for a force without.
     """
 
-    fits: dict[int, Fit] = field(default_factory=dict)
-    calibrations: dict[int, Calibration] = field(default_factory=dict)
-    provenance: dict[int, Provenance] = field(default_factory=dict)
-    verified: dict[int, Verification] = field(default_factory=dict)
-    lag_rows: dict[int, int] = field(default_factory=dict)
-    not_saved: CommandRefusedError | None = None
+    fit: Fit
+    verified: Verification
+    calibration: Calibration
+    source: Provenance
+    lag_rows: int | None = None
 
-    def add(self, rest: Rest, presses: Sequence[Press], **source: str) -> Fit:
-        """Fit a finger's presses but the last, which verifies the fit; ``source`` is where they are from."""
-        fitted = fit(rest, presses[:-1])
-        self.fits[fitted.finger] = fitted
-        self.verified[fitted.finger] = verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
+    @property
+    def provenance(self) -> Provenance:
+        """How the calibration was made."""
         made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
-        self.provenance[fitted.finger] = {**made, **source, **_numbers(fitted)}
-        return fitted
+        return made | self.source | _numbers(self.fit)
+
+
+def fit_and_verify(rest: Rest, presses: Sequence[Press]) -> tuple[Fit, Verification]:
+    """A finger's fit to its presses but the last, and that press by the board's own code. Raises as fit()."""
+    fitted = fit(rest, presses[:-1])
+    return fitted, verify(fitted, with_board_force(presses[-1], fitted.gain_nn))
 
 
 def _numbers(fitted: Fit) -> Provenance:
@@ -195,38 +196,39 @@ def _numbers(fitted: Fit) -> Provenance:
     }
 
 
-def facts(outcome: Outcome) -> list[dict[str, Any]]:
+def facts(fingers: Sequence[Calibrated]) -> list[dict[str, Any]]:
     """One object for each finger, in JSON types."""
     digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
     return [
-        _numbers(fitted)
+        _numbers(one.fit)
         | {
-            "serial": outcome.calibrations[finger].serial,
-            "pressure_gain_nn": fitted.gain_nn,
-            "notes": list(fitted.notes),
-            "verification": {key: round(getattr(outcome.verified[finger], key), n) for key, n in digits.items()},
+            "serial": one.calibration.serial,
+            "pressure_gain_nn": one.fit.gain_nn,
+            "notes": list(one.fit.notes),
+            "verification": {key: round(getattr(one.verified, key), n) for key, n in digits.items()},
         }
-        | ({"lag_rows": outcome.lag_rows[finger]} if finger in outcome.lag_rows else {})
-        for finger, fitted in outcome.fits.items()
+        | ({} if one.lag_rows is None else {"lag_rows": one.lag_rows})
+        for one in fingers
     ]
 
 
-def lines(outcome: Outcome) -> list[str]:
+def lines(fingers: Sequence[Calibrated]) -> list[str]:
     """The table of K and P0, with the verification press."""
     out = ["finger  sensor            K N/count  P0 count     fit  force N  board N   error  float64"]
-    for finger, fitted in outcome.fits.items():
-        seen, serial = outcome.verified[finger], outcome.calibrations[finger].serial or "any"
+    notes: list[str] = []
+    for one in fingers:
+        fitted, seen = one.fit, one.verified
         out.append(
-            f"{finger:>6}  {serial:<16}  {fitted.gain_n:>9.6f}  {fitted.rest.counts:>8.1f}"
-            f"  {fitted.relative_error:>6.2%}  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}"
+            f"{fitted.finger:>6}  {one.calibration.serial or 'any':<16}  {fitted.gain_n:>9.6f}"
+            f"  {fitted.rest.counts:>8.1f}  {fitted.relative_error:>6.2%}  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}"
             f"  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
         )
-    notes = [note for fitted in outcome.fits.values() for note in fitted.notes]
-    notes += [
-        f"finger {f}: {seen.board_error:.1%} off on the verification press (the paper's: {PAPER_ERROR:.2%}): was it at "
-        "another place, or pressed in another way?"
-        for f, seen in outcome.verified.items()
-        if seen.board_error > PAPER_ERROR
-    ]
-    lags = [f"finger {f}: pressure lags the force by {lag} rows" for f, lag in outcome.lag_rows.items() if lag]
-    return [*out, *(f"  {note}" for note in (*notes, *lags))]
+        notes += fitted.notes
+        if seen.board_error > PAPER_ERROR:
+            notes.append(
+                f"finger {fitted.finger}: {seen.board_error:.1%} off on the verification press (the paper's: "
+                f"{PAPER_ERROR:.2%}): was it at another place, or pressed in another way?"
+            )
+        if one.lag_rows:
+            notes.append(f"finger {fitted.finger}: pressure lags the force by {one.lag_rows} rows")
+    return [*out, *(f"  {note}" for note in notes)]

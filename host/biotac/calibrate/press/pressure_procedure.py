@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...errors import CommandRefusedError, InputError
+from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import Calibration
 from ...recording.reader import Recording
@@ -21,17 +21,16 @@ from ...wire.identity import ascii_text, serial_text
 from .detector import Procedure
 from .force_source import Series, Truth, check_alignment, rows_of
 from .guide import Face, guide
-from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Fit, Outcome
+from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, Fit, fit_and_verify
 
 AROUND_ROWS = 50  # before and after a touch, in which the plate's force is taken as this finger's
 
 
-def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int, save: bool = False) -> Outcome:
-    """K of each of ``fingers`` (none: all) on a board, from the paper's presses.
+def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int) -> list[Calibrated]:
+    """K of each of ``fingers`` (none: all) on a board, from the paper's presses; in force until the next reboot.
 
-    The force is the board's scenario's, or what ``face`` gives. ``save`` keeps the result over reboots; see
-    Outcome.not_saved if the board refuses. Raises InputError for presses that cannot be used, for a finger without a
-    sensor, and for a sensor that was changed meanwhile; the board then keeps nothing beyond the next reboot.
+    The force is the board's scenario's, or what ``face`` gives. Raises InputError for presses that cannot be used, for
+    a finger without a sensor, and for a sensor that was changed meanwhile.
     """
     absent = sorted(set(fingers) - set(hand.fingers))
     if absent or not hand.fingers:
@@ -43,7 +42,8 @@ def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: in
     procedure = Procedure(fingers, CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, needs_force=reference is not None)
     held = guide(hand, procedure, reference, face)
     hand.stop()
-    outcome = Outcome()
+    source = {"from": hand.port, "board_serial": serial_text(hand.info)}
+    calibrated = []
     for finger, presses in held.items():
         now = _serial(hand, finger)
         if now != serials[finger]:
@@ -51,17 +51,10 @@ def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: in
                 f"finger {finger} is now sensor {now!r}, but was {serials[finger]!r} when it began; expected the same; "
                 "start again"
             )
-        fitted = outcome.add(
-            procedure.rests[finger], presses, **{"from": hand.port, "board_serial": serial_text(hand.info)}
-        )
-        outcome.calibrations[finger] = with_gain(hand, fitted, made_s)
-        put(hand, finger, outcome.calibrations[finger])
-    if save:
-        try:
-            hand.board.save_settings()
-        except CommandRefusedError as error:
-            outcome.not_saved = error  # the presses are not lost for this
-    return outcome
+        fitted, verified = fit_and_verify(procedure.rests[finger], presses)
+        calibrated.append(Calibrated(fitted, verified, with_gain(hand, fitted, made_s), source))
+        put(hand, finger, calibrated[-1].calibration)
+    return calibrated
 
 
 def _serial(hand: Hand, finger: int) -> str:
@@ -97,7 +90,7 @@ def calibrate_recording(
     fingers: Sequence[int] = (),
     forces_n: Sequence[float] = (),
     made_s: int = 0,
-) -> Outcome:
+) -> list[Calibrated]:
     """K of each of ``fingers`` (none: all in the recording), from all of its presses but the last, which verifies it.
 
     ``reference`` has the force over the board's time; without it ``forces_n`` are what a scale showed at each press,
@@ -133,23 +126,19 @@ def calibrate_recording(
         "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
         "reference": reference.name if reference is not None else "typed",
     }
-    outcome = Outcome()
+    calibrated = []
     for finger in fingers or there:
-        own_rows = rows[rows["finger"] == finger]
+        own_rows, lag_rows = rows[rows["finger"] == finger], None
         if reference is not None:
             # All fingers share one plate: its force is this finger's only around its own touches.
             near = np.convolve(own_rows["touched"], np.ones(2 * AROUND_ROWS + 1), "same") > 0
             above = np.where(near, own_rows["pressure"] - own_rows["rest"], np.nan)
-            where = f"{recording.path}, finger {finger}"
-            outcome.lag_rows[finger] = check_alignment(where, above, own_rows["force_n"])
+            lag_rows = check_alignment(f"{recording.path}, finger {finger}", above, own_rows["force_n"])
         # A procedure for each finger: a recording may have them in any order.
         procedure = Procedure([finger], asked, needs_force=reference is not None)
-        presses = procedure.find(own_rows)[finger]
-        if reference is None:
-            presses = [press.with_column("force_n", force) for press, force in zip(presses, forces_n, strict=True)]
-        fitted = outcome.add(procedure.rests[finger], presses, **source)
+        presses = procedure.find(own_rows, forces_n if reference is None else ())[finger]
+        fitted, verified = fit_and_verify(procedure.rests[finger], presses)
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
-        outcome.calibrations[finger] = replace(
-            own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s
-        )
-    return outcome
+        own = replace(own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s)
+        calibrated.append(Calibrated(fitted, verified, own, source, lag_rows))
+    return calibrated

@@ -28,7 +28,7 @@ from .samples import Reference, Samples, check
 COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
 # in the order of the result; torque may be named M or T
 _NAMES = ("t", "fx", "fy", "fz", "mx", "my", "mz")
-_UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
+_UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0, "n": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
 _COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]([^\])]*)[\])]|_(.+))?$", re.IGNORECASE)
 SILENCE_S = 5.0  # programs write in pieces
 _WANTED = "t in s, forces in N, torques in N mm or N m"

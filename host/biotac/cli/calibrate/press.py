@@ -19,7 +19,7 @@ from ...calibrate.press.force_source import Truth, load_csv
 from ...calibrate.reference.scale import UNITS_N, Scale
 from ...calibrate.wrench.upload import upload
 from ...documents import write_new
-from ...errors import InputError
+from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
 from ...keep import calibration_file
 from ...map import file as map_file
@@ -283,13 +283,14 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
 
 def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
     stem, made_s = f"{Path(args.where).stem}-" if recorded else "", int(time.time())
+    not_saved = None
     if args.out is not None:
         every = [args.out / f"{stem}finger{finger}.json" for finger in args.finger or range(MAX_SENSORS)]
         outputs.check(args.out, every, overwrite=args.force)
     if recorded:
         reference = load_csv(Path(args.pressure)) if args.pressure else None
         readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
-        outcome = pressure_procedure.calibrate_recording(
+        calibrated = pressure_procedure.calibrate_recording(
             load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=made_s
         )
     elif args.pressure:
@@ -298,23 +299,23 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
             "presses together with the plate"
         )
     else:
-        outcome = _on_board(args, made_s)
+        calibrated, not_saved = _on_board(args, made_s)
     written = []
-    for finger, calibration in outcome.calibrations.items() if args.out is not None else ():
+    for one in calibrated if args.out is not None else ():
         outputs.make_folder(args.out)
-        path = args.out / f"{stem}finger{finger}.json"
-        write_new(path, calibration_file.dumps(calibration, outcome.provenance[finger]), overwrite=args.force)
+        path = args.out / f"{stem}finger{one.fit.finger}.json"
+        write_new(path, calibration_file.dumps(one.calibration, one.provenance), overwrite=args.force)
         written.append(str(path))
-    lines = [*pressure.lines(outcome), *(f"  written: {path}" for path in written)]
-    if not recorded and (not args.save or outcome.not_saved is not None):
+    lines = [*pressure.lines(calibrated), *(f"  written: {path}" for path in written)]
+    if not recorded and (not args.save or not_saved is not None):
         lines.append("in force until the next reboot (--save keeps it)")
-    outputs.say(args, {"fingers": pressure.facts(outcome), "written": written}, "\n".join(lines))
-    if outcome.not_saved is not None:
-        raise outcome.not_saved
+    outputs.say(args, {"fingers": pressure.facts(calibrated), "written": written}, "\n".join(lines))
+    if not_saved is not None:
+        raise not_saved  # only now: the presses are not lost for this
     return 0
 
 
-def _on_board(args: argparse.Namespace, made_s: int) -> pressure.Outcome:
+def _on_board(args: argparse.Namespace, made_s: int) -> tuple[list[pressure.Calibrated], CommandRefusedError | None]:
     face = _Guide(
         lambda step: f"press finger {step.finger} with about {step.force_n:g} N, and hold still",
         lambda step: _typed_n(step, args.unit),
@@ -322,4 +323,10 @@ def _on_board(args: argparse.Namespace, made_s: int) -> pressure.Outcome:
     )
     with biotac.open(args.where, pace=1.0) as hand:  # prompts that a person can follow
         _check_terminal(hand, args.where)
-        return pressure_procedure.calibrate(hand, face, fingers=args.finger, made_s=made_s, save=args.save)
+        calibrated = pressure_procedure.calibrate(hand, face, fingers=args.finger, made_s=made_s)
+        try:
+            if args.save:
+                hand.board.save_settings()
+        except CommandRefusedError as error:
+            return calibrated, error
+    return calibrated, None
