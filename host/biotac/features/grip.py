@@ -1,8 +1,8 @@
-"""Grip state by a particle filter (Wettels and Loeb 2011, Eq 7), with histograms to relate sensor values to states.
+"""Grip state by the Bayes filter of Wettels and Loeb 2011, Eq 7, with histograms to relate sensor values to states.
 
-A particle is a guess of the state: the grip holds, it is about to give, or it slips. In each round the particles change
-state as often as the states did in training, are weighted by the histograms' probability of the sensed values, and are
-resampled by weight. The result is the weighted share of particles in each state. Only NumPy is needed.
+The grip holds, is about to give, or slips. In each round the states change as often as they did in training, and are
+weighted by the histograms' probability of the sensed values. The paper sums over particles; three states can be summed
+exactly. Only NumPy is needed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from ..wire.messages_gen import INVALID_COUNT
 
 LAG = 8  # PAC samples over which a change is taken, as in the board's events
 EDGES = 4  # bin edges for each state
-PARTICLES = 500
 NAMES = ("shake", "ratio")
 
 
@@ -130,33 +129,22 @@ def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
 
 
 class GripFilter:
-    """Tracks one finger's grip, round by round; the same ``seed`` gives the same particles."""
+    """Tracks one finger's grip, round by round."""
 
-    def __init__(self, trained: Trained, *, particles: int = PARTICLES, seed: int = 0) -> None:
+    def __init__(self, trained: Trained) -> None:
         self._trained = trained
-        self._rng = np.random.default_rng(seed)
-        # each state's share as in training
-        self._particles = np.searchsorted(np.cumsum(trained.start), (np.arange(particles) + 0.5) / particles)
-        self._reach = np.cumsum(trained.transition, axis=1)
+        self._share = trained.start
 
     def feed(self, observed: npt.ArrayLike) -> Floats:
-        """Share of each GripState (n, 3) after each round of ``observed`` (n, k). Raises InputError for another k."""
+        """Probability of each GripState (n, 3) after each round of ``observed`` (n, k). InputError for another k."""
         values = _rounds(observed)
         if values.shape[1] != len(self._trained.edges):
             raise InputError(f"{values.shape[1]} values per round: expected {len(self._trained.edges)}, as in training")
-        return np.array([self._step(weight) for weight in self._trained.weigh(values)]).reshape(-1, STATES)
-
-    def _step(self, of_state: Floats) -> Floats:
-        """Eq 7: move by the transitions, then weight; resampled at even steps, which adds the least randomness."""
-        n = len(self._particles)
-        draw = self._rng.random(n)
-        moved = np.minimum((draw[:, None] > self._reach[self._particles]).sum(axis=1), STATES - 1)
-        weight = of_state[moved]
-        weight /= weight.sum()
-        share: Floats = np.bincount(moved, weight, STATES).astype(np.float64)
-        even = (np.arange(n) + self._rng.random()) / n
-        self._particles = moved[np.minimum(np.searchsorted(np.cumsum(weight), even), n - 1)]
-        return share
+        shares = np.empty((len(values), STATES))
+        for k, weight in enumerate(self._trained.weigh(values)):
+            share = (self._share @ self._trained.transition) * weight
+            self._share = shares[k] = share / share.sum()
+        return shares
 
 
 def _rounds(observed: npt.ArrayLike) -> Floats:

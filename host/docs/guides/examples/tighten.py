@@ -1,7 +1,7 @@
 """A grip that tightens before it slips: python tighten.py, against a simulated finger and thing.
 
 A finger holds a thing against a wall with 2 N while its weight comes upon it. What the finger feels goes through the
-board's own code; a particle filter, trained on grasps that were let slip, says how near the grip is to giving.
+board's own code; a Bayes filter, trained on grasps that were let slip, says how near the grip is to giving.
 """
 
 from dataclasses import dataclass, field
@@ -95,7 +95,7 @@ def pressed(normal_n: np.ndarray, tangential_n: np.ndarray, speed_mm_s: np.ndarr
 
 def grasp(thing: Thing, seed: int, trained: grip.Trained | None) -> np.ndarray:
     """Hold ``thing``, and tighten where the grip is about to give, if ``trained``. Returns what was felt (n, 2)."""
-    felt, believes = Felt(seed), None if trained is None else grip.GripFilter(trained, seed=seed)
+    felt, believes = Felt(seed), None if trained is None else grip.GripFilter(trained)
     press_n, tightens, seen = HELD_N, False, []
     while len(thing.rounds) < GRASP_S / ROUND_S and thing.slid_mm < LOST_MM:
         for _ in range(BLOCK):
