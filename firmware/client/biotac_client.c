@@ -70,11 +70,11 @@ static size_t copy(const uint8_t *layout, uint8_t *to, const uint8_t *from, int 
         in_struct = (in_struct + size - 1) & ~(size - 1);
         for (unsigned count = *layout & 0x3F; count > 0; count--, in_struct += size, on_wire += size) {
             for (size_t k = 0; to != NULL && k < size; k++) {
-                size_t its = in_struct + (big_endian ? size - 1 - k : k);
+                size_t at = in_struct + (big_endian ? size - 1 - k : k);
                 if (to_wire) {
-                    to[on_wire + k] = from[its];
+                    to[on_wire + k] = from[at];
                 } else {
-                    to[its] = from[on_wire + k];
+                    to[at] = from[on_wire + k];
                 }
             }
         }

@@ -29,21 +29,21 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
         # In a folder of its own it has its right name already: a bag's files are called after it.
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
         try:
-            place = folder / path.name
-            yield place
-            _replace(place, path)
+            part = folder / path.name
+            yield part
+            _replace(part, path)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{path} was not written; the partial file was removed") from None
     except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another part") from error
 
 
-def _replace(place: Path, path: Path) -> None:
+def _replace(part: Path, path: Path) -> None:
     """os.replace, also where a folder is to go or to come."""
     if path.is_dir():
         shutil.rmtree(path)
-    elif place.is_dir():
+    elif part.is_dir():
         path.unlink(missing_ok=True)
-    os.replace(place, path)
+    os.replace(part, path)

@@ -52,8 +52,8 @@ def unbounded(x: Floats) -> Floats:
 
 def fit(paths: list[Path]) -> Floats:
     """Weights (19, 19): row i has those of the others' bounded signals in electrode i's, and 0 for itself."""
-    place = np.array(ELECTRODE_UM)
-    image = [int(np.abs(place - row * [1, -1, 1]).sum(axis=1).argmin()) for row in place]
+    position = np.array(ELECTRODE_UM)
+    image = [int(np.abs(position - row * [1, -1, 1]).sum(axis=1).argmin()) for row in position]
     square = np.zeros((19, 19))
     for path in paths:
         x = bounded(signals(path))

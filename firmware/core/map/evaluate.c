@@ -164,12 +164,12 @@ static inline void add_row(const int32_t f[BT_MAP_ROW], const bt_map_word *word,
 static inline void line(const int32_t f[BT_MAP_LINE_COEFFICIENTS], const bt_map_word *word, int width,
                         int32_t sum[])
 {
-    int32_t its[BT_MAP_GROUP_MAX] = {0, 0, 0, 0};
+    int32_t local[BT_MAP_GROUP_MAX] = {0, 0, 0, 0};
     for (int half = 0; half < 2; half++, f += BT_MAP_ROW, word += width * BT_MAP_ROW_WORDS) {
-        add_row(f, word, width, its);
+        add_row(f, word, width, local);
     }
     for (int a = 0; a < width; a++) {
-        sum[a] = its[a];
+        sum[a] = local[a];
     }
 }
 
@@ -221,9 +221,9 @@ static BT_NOINLINE void pairs_of_4(const int32_t *f, const bt_map_word *word, in
 // For a kind with a single column.
 static void single(int32_t factor, const bt_map_word *word, int width, int32_t sum[])
 {
-    const bt_map_coefficient *its = (const bt_map_coefficient *)word;
+    const bt_map_coefficient *coefficient = (const bt_map_coefficient *)word;
     for (int a = 0; a < width; a++) {
-        sum[a] = factor * its[a];
+        sum[a] = factor * coefficient[a];
     }
 }
 

@@ -33,8 +33,8 @@ static size_t judge_blocks(bt_map *map)
         map->kinds = (uint16_t)(map->kinds | 1u << kind);
         map->gates = (uint16_t)(map->gates | 1u << gate);
         for (int a = 0; a < BT_MAP_EXPONENTS; a++) {
-            bool its = a < map->axes;
-            if (block[2 + a] < its || block[2 + a] > (its ? BT_MAP_EXPONENT_MAX : 0)) {
+            bool used = a < map->axes;
+            if (block[2 + a] < used || block[2 + a] > (used ? BT_MAP_EXPONENT_MAX : 0)) {
                 return 0;
             }
         }
@@ -43,18 +43,18 @@ static size_t judge_blocks(bt_map *map)
     return 2 * coefficients * map->axes;
 }
 
-// The largest magnitude of an axis's sum over `columns` columns, with factors up to `most`. its: the axis's
+// The largest magnitude of an axis's sum over `columns` columns, with factors up to `most`. first: the axis's
 // first coefficient, one of `width` side by side.
-static uint64_t largest(const bt_map_coefficient *its, int columns, int width, uint32_t most)
+static uint64_t largest(const bt_map_coefficient *first, int columns, int width, uint32_t most)
 {
     uint32_t sum = 0;
     for (int k = 0; k < columns; k++) {
-        sum += bt_abs32(its[k * width]);
+        sum += bt_abs32(first[k * width]);
     }
     return (uint64_t)sum * most;
 }
 
-// A sum shifted down by cut, plus one for its rounding.
+// A sum shifted down by cut, plus one for first rounding.
 static uint64_t left(uint64_t sum, int cut)
 {
     return (sum >> cut) + 1;
@@ -63,7 +63,7 @@ static uint64_t left(uint64_t sum, int cut)
 #define REFUSED UINT64_MAX
 
 // The largest magnitude that a block adds to an axis, or REFUSED where a sum on the way might not fit.
-static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *its, int width, int exponent)
+static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *first, int width, int exponent)
 {
     static const uint16_t factor_max[BT_MAP_KINDS] = BT_MAP_FACTOR_MAX;
     int coefficients = bt_map_coefficients[head[0]];
@@ -71,14 +71,14 @@ static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *its
     uint64_t sum = 0;
     if (coefficients == BT_MAP_PAIR_COEFFICIENTS) {
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            uint64_t row = largest(its + i * BT_MAP_ROW * width, BT_MAP_ROW, width, most);
+            uint64_t row = largest(first + i * BT_MAP_ROW * width, BT_MAP_ROW, width, most);
             if (row > INT32_MAX) {
                 return REFUSED;
             }
             sum += left(row, BT_MAP_ROW_CUT) * most;
         }
     } else {
-        sum = largest(its, coefficients, width, most);
+        sum = largest(first, coefficients, width, most);
     }
     if (sum > INT32_MAX - (1 << BT_MAP_GATE_CUT)) {
         return REFUSED;
@@ -90,11 +90,11 @@ static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *its
 }
 
 // The number of columns is even: 19 electrodes, or a single column, have one more behind them, which is 0.
-static bool last_is_zero(uint8_t kind, const bt_map_coefficient *its, int width)
+static bool last_is_zero(uint8_t kind, const bt_map_coefficient *first, int width)
 {
     int coefficients = bt_map_coefficients[kind];
     for (int a = 0; a < width && coefficients != BT_MAP_PAIR_COEFFICIENTS; a++) {
-        if (its[width * (coefficients - 1) + a] != 0) {
+        if (first[width * (coefficients - 1) + a] != 0) {
             return false;
         }
     }
@@ -103,23 +103,23 @@ static bool last_is_zero(uint8_t kind, const bt_map_coefficient *its, int width)
 
 static bool coefficients_bounded(const bt_map *map)
 {
-    const bt_map_coefficient *its = (const bt_map_coefficient *)bt_map_words(map);
+    const bt_map_coefficient *first = (const bt_map_coefficient *)bt_map_words(map);
     uint64_t total[BT_MAP_AXES_MAX] = {0};
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
         for (int axis = 0, width; axis < map->axes; axis += width) {
             width = bt_map_group_width(map, axis);
-            if (!last_is_zero(head[0], its, width)) {
+            if (!last_is_zero(head[0], first, width)) {
                 return false;
             }
             for (int a = 0; a < width; a++) {
-                uint64_t most = block_largest(head, its + a, width, head[2 + axis + a]);
+                uint64_t most = block_largest(head, first + a, width, head[2 + axis + a]);
                 if (most == REFUSED || total[axis + a] + most > INT32_MAX) {
                     return false;
                 }
                 total[axis + a] += most;
             }
-            its += width * bt_map_coefficients[head[0]];
+            first += width * bt_map_coefficients[head[0]];
         }
     }
     return true;

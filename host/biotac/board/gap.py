@@ -63,7 +63,7 @@ class Gap:
     frames_missed: int | None = None
     holds_lapsed: int = 0
 
-    def words(self) -> str:
+    def line(self) -> str:
         """One sentence for people."""
         missed = "" if self.frames_missed is None else f", {self.frames_missed} frames missed"
         lapsed = "; a hold lapsed" if self.holds_lapsed else ""

@@ -49,8 +49,8 @@ def answers_to(batch: Batch, settings: Settings, source: Source) -> Answers:
         force_n[(frames["flags"] & wire.FrameFlags.UNTARED) != 0] = np.nan
         return force_n
 
-    def by(its: Settings) -> NDArray[np.float64]:
-        return newtons(on_board_q4(frames["counts"], frames["tare_q4"], its)[1])
+    def by(used: Settings) -> NDArray[np.float64]:
+        return newtons(on_board_q4(frames["counts"], frames["tare_q4"], used)[1])
 
     lin_n = by(settings | {gain: wire.SETTINGS[gain].default for gain in FORCE_GAINS})
     if source.emulated:
@@ -58,8 +58,8 @@ def answers_to(batch: Batch, settings: Settings, source: Source) -> Answers:
         calibrated_n[frames["finger"] != 0] = np.nan
         return Answers(lin_n, "finger 0's own wrench map", calibrated_n)
     by_default = settings | {wire.Setting.FORCE_MODEL: wire.ForceModel.POPULATION}
-    words = "population map of real fingers" if in_force(by_default) else "scales fitted to this finger"
-    return Answers(lin_n, words, by(by_default))
+    calibrated_by = "population map of real fingers" if in_force(by_default) else "scales fitted to this finger"
+    return Answers(lin_n, calibrated_by, by(by_default))
 
 
 def own_map(finger: Finger) -> BoardMap:

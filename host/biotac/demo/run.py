@@ -167,22 +167,22 @@ def force_error(source: Source, batch: Batch, force_n: NDArray[np.float64] | Non
     if not touched.any():
         return None
     frames, rows = batch.frames[touched], source_rows(source, batch)[touched]
-    said = frames["force_n"] if force_n is None else force_n[touched]
-    difference = said - truth[rows, frames["finger"]]
+    computed_n = frames["force_n"] if force_n is None else force_n[touched]
+    difference = computed_n - truth[rows, frames["finger"]]
     return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
 
 
 def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], answers: Answers, path: Path) -> None:
     """Write a PNG of finger 0; ``source_rows`` (n,) gives the source's row of each frame."""
-    mine = batch.frames["finger"] == 0
-    frames, messages = batch.frames[mine], batch.wire[mine]
+    at_0 = batch.frames["finger"] == 0
+    frames, messages = batch.frames[at_0], batch.wire[at_0]
     with picture(path) as figure:
         figure.set_size_inches(13, 5.6)
         axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
         figure.suptitle(f"{source.name}: finger 0 through the simulated board")
         draw_fingertip(figure, axes[0], frames, messages)
-        lin_n, calibrated_n = answers.lin_n[mine], answers.calibrated_n[mine]
-        draw_force(axes[1], source, frames, source_rows[mine], replace(answers, lin_n=lin_n, calibrated_n=calibrated_n))
+        lin_n, calibrated_n = answers.lin_n[at_0], answers.calibrated_n[at_0]
+        draw_force(axes[1], source, frames, source_rows[at_0], replace(answers, lin_n=lin_n, calibrated_n=calibrated_n))
 
 
 def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
@@ -228,7 +228,7 @@ def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64], 
         t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06, label="contact"
     )
     axes.set(xlabel="device time [s]", ylabel="force on the finger [N]")
-    words = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
-    axes.set_title(f"{words}, truth (thick)" if truth_n is not None else words, fontsize=10)
+    title = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
+    axes.set_title(f"{title}, truth (thick)" if truth_n is not None else title, fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

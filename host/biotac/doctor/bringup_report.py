@@ -107,8 +107,8 @@ def _fingers(seen: Bringup, facts: Facts) -> list[str]:
         gain, most_n = bringup.pdc_per_n(seen.of(finger))
         warm = bringup.pdc_per_c(seen.of(finger))
         parity = facts.board.more(finger, "words_parity")
-        told = [f"{noise.min():.2f} to {noise.max():.2f}", f"{gain:.0f} ({most_n:.1f} N)", f"{warm:+.0f}"]
-        rows.append([str(finger), serial, str(parity), *("-" if "nan" in one else one for one in told)])
+        cells = [f"{noise.min():.2f} to {noise.max():.2f}", f"{gain:.0f} ({most_n:.1f} N)", f"{warm:+.0f}"]
+        rows.append([str(finger), serial, str(parity), *("-" if "nan" in cell else cell for cell in cells)])
     head = ["finger", "serial number", "bad parity", "noise of electrodes, counts", "PDC a newton", "PDC a degree"]
     return ["## Fingers", "", *table(head, rows)]
 

@@ -16,8 +16,8 @@ from .facts import Facts
 def check(facts: Facts) -> Iterator[Finding]:
     """Boot loader, permission, other programs, ModemManager, whether a gateway answers, and of which release it is."""
     system, error = facts.system, facts.error
-    for place in system.loaders:
-        yield Finding("in_loader", f"a board waits in its loader at {place}")
+    for drive in system.loaders:
+        yield Finding("in_loader", f"a board waits in its loader at {drive}")
     if facts.port is None:
         if len(system.boards) > 1:
             there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)

@@ -66,8 +66,8 @@ def _serials(board: BoardFacts) -> Iterator[Finding]:
         if len(fingers) > 1:
             yield Finding("same_serial", f"fingers {', '.join(map(str, fingers))} all report serial number {serial}")
     if len(kinds) > 1:
-        words = [f"finger {', '.join(map(str, f))}: flex {flex}, software {sw}" for (flex, sw), f in kinds.items()]
-        yield Finding("mixed_sensors", "; ".join(words))
+        versions = [f"finger {', '.join(map(str, f))}: flex {flex}, software {sw}" for (flex, sw), f in kinds.items()]
+        yield Finding("mixed_sensors", "; ".join(versions))
 
 
 def _words(board: BoardFacts) -> Iterator[Finding]:

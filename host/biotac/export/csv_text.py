@@ -15,12 +15,12 @@ KINDS_APART = True
 _ROWS = 10_000
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write the file, with numbers in their shortest exact form and NaN as ``NaN``, which Polars knows, too."""
     names = ["finger", "frame_id", *(name for name, _, _ in made[0].flat())]
     of_table, order = in_order(made)
     row_of = np.concatenate([np.arange(len(table)) for table in made])
-    with place.open("w", newline="", encoding="utf-8") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(names)
         for begin in range(0, len(order), _ROWS):
@@ -34,8 +34,8 @@ def _rows(made: list[Table], of_table: Any, row_of: Any, chosen: Any) -> list[li
         at = np.flatnonzero(of_table[chosen] == k)
         rows = row_of[chosen[at]]
         columns = [_cells(values[rows]) for _, _, values in table.flat()]
-        for place, values in zip(at.tolist(), zip(*columns, strict=True), strict=True):
-            out[place] = [table.finger, table.frame_id, *values]
+        for row, values in zip(at.tolist(), zip(*columns, strict=True), strict=True):
+            out[row] = [table.finger, table.frame_id, *values]
     return out
 
 

@@ -12,13 +12,13 @@ from .columns import Show, Table
 KINDS_APART = False
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write the file. Units and meanings are attributes of the datasets, frame_id of the groups, metadata of the file.
 
     The file is built in memory and written by Python: on a full disk, HDF5 itself crashes the process (SIGSEGV while
     closing).
     """
-    with h5py.File(place.name, "w", driver="core", backing_store=False, block_size=1 << 22) as file:
+    with h5py.File(path.name, "w", driver="core", backing_store=False, block_size=1 << 22) as file:
         file.attrs.update(recording.metadata)
         for k, table in enumerate(made):
             group = file.create_group(f"finger{table.finger}/{table.kind}")
@@ -34,4 +34,4 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
                     data.attrs["parts"] = list(column.parts)
             show((k + 1) / len(made))
         file.flush()
-        place.write_bytes(file.id.get_file_image())
+        path.write_bytes(file.id.get_file_image())

@@ -13,7 +13,7 @@ from .columns import EXPORTED, Show, Table
 KINDS_APART = False
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write a file of version 5. Labels are a cell array of texts."""
     fingers: dict[str, Any] = {}
     for k, table in enumerate(made):
@@ -25,5 +25,5 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
         for kind, fields in EXPORTED.items()
     }
     about = {"metadata": recording.metadata, "columns": columns}
-    with place.open("wb") as file:
+    with path.open("wb") as file:
         savemat(file, fingers | about, do_compression=True, oned_as="column")

@@ -18,7 +18,7 @@ from .columns import EXPORTED, Show, Table
 KINDS_APART = False
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write the file as numpy.savez_compressed would, but array by array, in order to report progress."""
     about = {
         "metadata": recording.metadata,
@@ -28,7 +28,7 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
     arrays: dict[str, NDArray[Any]] = {"columns": np.array(json.dumps(about))}
     for table in made:
         arrays |= {f"finger{table.finger}/{table.kind}/{name}": values for name, values in table.arrays.items()}
-    with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for k, (name, values) in enumerate(arrays.items()):
             buffer = io.BytesIO()
             np.save(buffer, values)

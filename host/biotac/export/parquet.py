@@ -33,10 +33,10 @@ class Label:
     texts: tuple[str | None, ...]
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write the rows of all fingers, sorted by t_us and finger; null where there is no value."""
     metadata = {f"biotac.{key}": value for key, value in recording.metadata.items()}
-    write_labelled(place, made, [frame_ids(made)], metadata, show)
+    write_labelled(path, made, [frame_ids(made)], metadata, show)
 
 
 def frame_ids(made: list[Table]) -> Label:
@@ -44,7 +44,7 @@ def frame_ids(made: list[Table]) -> Label:
 
 
 def write_labelled(
-    place: Path, made: list[Table], labels: list[Label], metadata: Mapping[str, str], show: Show = lambda share: None
+    path: Path, made: list[Table], labels: list[Label], metadata: Mapping[str, str], show: Show = lambda share: None
 ) -> None:
     """Write the rows of tables of one kind in order of time, each row with its table's labels.
 
@@ -71,7 +71,7 @@ def write_labelled(
         "sorting_columns": pq.SortingColumn.from_ordering(schema, sorting),
     }
     # Opened here: pyarrow takes no path that is not UTF-8.
-    with place.open("wb") as file, pq.ParquetWriter(file, schema, **how) as out:
+    with path.open("wb") as file, pq.ParquetWriter(file, schema, **how) as out:
         for begin in range(0, len(order), _ROWS):
             chosen = order[begin : begin + _ROWS]
             columns = list(_columns(made, labels, fingers, of_table, chosen))

@@ -14,11 +14,11 @@ KINDS_APART = False
 _COLOURS = ("C0", "C1", "C2", "C3", "C4")
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Draw it. Texts of labels that would overprint are left out; `biotac info` has them all."""
     begin_us, end_us = recording.begin_us, recording.end_us
     name_of = {finger: name for name, finger in recording.names.items()}
-    with picture(place) as page:
+    with picture(path) as page:
         page.set_size_inches(12, 6)
         force, pressure = axes = page.subplots(2, 1, sharex=True)
         for k, table in enumerate(made):

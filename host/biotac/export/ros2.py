@@ -31,14 +31,14 @@ _TOPICS = {
 }
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """Write a bag with topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``
     and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
     store = get_typestore(Stores.ROS2_HUMBLE)
     total = sum(len(table) for table in made)
     done = 0
-    with Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
 
         def topic(name: str, kind: str) -> Callable[[int, Any], None]:
             connection = bag.add_connection(f"/biotac/{name}", kind, typestore=store)
@@ -54,11 +54,11 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
                 done += 1
         begin_us = recording.begin_us
         at_ns = recording.stamp_ns(np.array([label.t_us or begin_us for label in recording.labels], np.int64)).tolist()
-        said = [(ns, _INFO, label.words()) for ns, label in zip(at_ns, recording.labels, strict=True)]
-        said += [(gap.back_at_ns, _WARN, gap.words()) for gap in recording.gaps]
-        log = topic("log", _LOG) if said else lambda stamp_ns, message: None
-        for stamp_ns, level, words in said:
-            log(stamp_ns, store.types[_LOG](_time(store.types, stamp_ns), level, "biotac", words, "", "", 0))
+        logged = [(ns, _INFO, label.line()) for ns, label in zip(at_ns, recording.labels, strict=True)]
+        logged += [(gap.back_at_ns, _WARN, gap.line()) for gap in recording.gaps]
+        log = topic("log", _LOG) if logged else lambda stamp_ns, message: None
+        for stamp_ns, level, text in logged:
+            log(stamp_ns, store.types[_LOG](_time(store.types, stamp_ns), level, "biotac", text, "", "", 0))
 
 
 def _time(types: Any, stamp_ns: int) -> Any:

@@ -86,13 +86,13 @@ def mounted_folders() -> list[Path]:
 
 def linux_folders(root: Path) -> list[Path]:
     """The usual mount points, and all others of devices in /proc/mounts."""
-    places = [found for pattern in ("media/*", "media/*/*", "run/media/*/*") for found in sorted(root.glob(pattern))]
+    folders = [found for pattern in ("media/*", "media/*/*", "run/media/*/*") for found in sorted(root.glob(pattern))]
     try:
         mounts = (root / "proc/mounts").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         mounts = []
     for line in mounts:
-        device, folder, *_ = [*line.split(), "", ""]
+        device, mounted_at, *_ = [*line.split(), "", ""]
         if device.startswith("/dev/"):
-            places.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), folder)))  # a space is \040
-    return list(dict.fromkeys(place.resolve() for place in places))
+            folders.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), mounted_at)))
+    return list(dict.fromkeys(folder.resolve() for folder in folders))

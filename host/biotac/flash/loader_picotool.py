@@ -37,10 +37,10 @@ class PicotoolLoader(Loader):
             raise FlashError(f"picotool did not load {image.path}: {self._heard}; plug the board in with BOOTSEL held")
         show(len(image.blocks), len(image.blocks))
 
-    def _run(self, *words: str, seconds: float) -> bool:
+    def _run(self, *arguments: str, seconds: float) -> bool:
         try:
             done = subprocess.run(
-                [TOOL, *words], capture_output=True, text=True, errors="replace", timeout=seconds, check=False
+                [TOOL, *arguments], capture_output=True, text=True, errors="replace", timeout=seconds, check=False
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             self._heard = str(error)

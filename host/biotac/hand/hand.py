@@ -340,7 +340,7 @@ class Hand:
         """
         batch = self.read_batch(seconds, fresh=fresh)
         for gap in (m for m in batch.messages if isinstance(m, Gap)):
-            python_warnings.warn(gap.words(), ReadWarning, stacklevel=2)
+            python_warnings.warn(gap.line(), ReadWarning, stacklevel=2)
         return batch.frames
 
     def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:

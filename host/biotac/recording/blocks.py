@@ -225,7 +225,7 @@ class Contents:
     def _gap(self, facts: dict[str, Any]) -> Gap | None:
         try:
             gap = Gap(**facts)
-            self.problems.append(gap.words())
+            self.problems.append(gap.line())
             return gap
         except TypeError as error:
             self.problems.append(f"a gap is marked in {self._path.name}, but its entry is damaged ({error})")

@@ -175,8 +175,8 @@ class CrossCheck:
     def _find(self, messages: StructArray, k: int, what: str) -> None:
         self.violations += 1
         if len(self.findings) < FINDINGS:
-            place = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
-            self.findings.append(f"{place}: {what}")
+            frame = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
+            self.findings.append(f"{frame}: {what}")
 
     def _judge(self, messages: StructArray, quantity: Quantity, error: NDArray[np.float64]) -> None:
         name, unit, sent, _, truth, bound = quantity
@@ -188,9 +188,9 @@ class CrossCheck:
                 continue
             limits = np.broadcast_to(bound, error.shape)[k]
             axis = int(np.nanargmax(error[k] - limits))
-            place = f" {'xyz'[axis]}" if error.shape[1] == 3 else ""
+            suffix = f" {'xyz'[axis]}" if error.shape[1] == 3 else ""
             off = f"off by {error[k, axis]:.4g} {unit}, bound {limits[axis]:.4g} {unit}"
-            self._find(messages, int(k), f"{name}{place} {off}")
+            self._find(messages, int(k), f"{name}{suffix} {off}")
 
 
 def _by_map(

@@ -45,7 +45,7 @@ class Label:
             raise InputError(f"label {self.text!r} ends before it begins")
         object.__setattr__(self, "text", printable(self.text))
 
-    def words(self) -> str:
+    def line(self) -> str:
         """The text and the facts in a line."""
         return printable(" ".join([self.text, *(f"{name}={value}" for name, value in self.facts.items())]).strip())
 
@@ -108,7 +108,7 @@ def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uin
             at = at[np.unique(finger[at], return_index=True)[1]]
         for before in np.unique(code[at]).tolist():
             code[at[code[at] == before]] = len(texts)
-            texts.append("; ".join(filter(None, (texts[before], label.words()))))
+            texts.append("; ".join(filter(None, (texts[before], label.line()))))
     made: NDArray[np.str_] = np.array(texts)[code]
     return made
 

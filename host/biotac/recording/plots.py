@@ -89,7 +89,7 @@ class Plots:
 
     def gap(self, gap: Gap) -> None:
         """Write a log of a time without the board."""
-        text = plot_ros.log("biotac", gap.words(), gap.back_at_ns, plot_ros.WARN)
+        text = plot_ros.log("biotac", gap.line(), gap.back_at_ns, plot_ros.WARN)
         self._writer.add_message(self._channel("log", "/biotac/log"), gap.back_at_ns, text, gap.back_at_ns, 0)
 
     def label(self, label: Label, t_us: int | None) -> None:
@@ -97,7 +97,7 @@ class Plots:
         known = self._stamps is not None and t_us is not None
         stamp_ns = max(0, int(self._stamps(np.array([t_us]))[0])) if self._stamps and known else 0
         name = "label" if label.finger is None else f"label of finger{label.finger}"
-        text = plot_ros.log(name, label.words(), stamp_ns)
+        text = plot_ros.log(name, label.line(), stamp_ns)
         self._writer.add_message(self._channel("log", "/biotac/log"), stamp_ns, text, stamp_ns, 0)
 
     def _of_rows(self, batch: Batch) -> Iterator[_Message]:

@@ -42,7 +42,7 @@ def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
         "frames_lost": sum(lost for block in heads for _, _, lost in block.rest.lost),
         "gaps": sum(len(block.rest.gaps) for block in heads),
         "labels": [
-            {"text": label.words(), "at_s": at(recording, label.t_us), "until_s": at(recording, label.end_us)}
+            {"text": label.line(), "at_s": at(recording, label.t_us), "until_s": at(recording, label.end_us)}
             | {"finger": label.finger}
             for label in recording.labels
         ],

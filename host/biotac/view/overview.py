@@ -23,7 +23,7 @@ def overview(recording: Recording) -> dict[str, Any]:
     at = np.clip((recording.frames["t_us"] - begin_us) * BINS // length_us, 0, BINS - 1)
     np.maximum.at(peaks, at, force_n)
     marks: list[dict[str, Any]] = [
-        {"at_s": ((label.t_us or begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.words()}
+        {"at_s": ((label.t_us or begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.line()}
         for label in recording.labels
     ]
     events = [message for message in recording.messages if isinstance(message, wire.Event)]
@@ -35,6 +35,6 @@ def overview(recording: Recording) -> dict[str, Any]:
         whose = " ".join(str(finger) for finger in sorted({*felt}))
         marks.append({"at_s": tenth / 10, "finger": None, "name": f"{name}, finger {whose}"})
     for gap in recording.gaps:
-        marks.append({"at_s": ((gap.next_t_us or begin_us) - begin_us) / 1e6, "finger": None, "name": gap.words()})
+        marks.append({"at_s": ((gap.next_t_us or begin_us) - begin_us) / 1e6, "finger": None, "name": gap.line()})
     marks.sort(key=lambda mark: mark["at_s"])
     return {"length_s": length_us / 1e6, "peaks_n": np.round(peaks, 2).tolist(), "marks": marks}

@@ -106,9 +106,9 @@ class Player:
             return f"playing at {value:g} times its pace"
         if command == "save" and isinstance(value, float):
             stop_s = self.position()[0] or 0.0
-            place = self._folder / f"{replay.recording.path.stem}-{stop_s:.2f}s.mcap"
-            begin_s, end_s = cut(replay.recording, place, max(0.0, stop_s - value), stop_s + 0.01)
-            return f"{begin_s:.1f} to {end_s:.1f} s saved to {place}"
+            path = self._folder / f"{replay.recording.path.stem}-{stop_s:.2f}s.mcap"
+            begin_s, end_s = cut(replay.recording, path, max(0.0, stop_s - value), stop_s + 0.01)
+            return f"{begin_s:.1f} to {end_s:.1f} s saved to {path}"
         if command not in ("pause", "resume"):
             what = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
             raise InputError(f"a recording cannot be {what}; open a board for that")

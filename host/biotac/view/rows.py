@@ -64,10 +64,10 @@ def signal_q4(messages: StructArray) -> NDArray[np.int32]:
 
 def map_um(frames: StructArray) -> list[list[int] | None]:
     """The column ``map_um`` for FRAME_DTYPE rows."""
-    places = np.column_stack(unroll(frames["poc_mm"])) * UM_PER_MM
-    good = np.asarray(np.isfinite(places).all(axis=1))
-    whole = np.rint(np.where(good[:, None], places, 0.0)).astype(np.int64).tolist()
-    return [place if ok else None for place, ok in zip(whole, good.tolist(), strict=True)]
+    points = np.column_stack(unroll(frames["poc_mm"])) * UM_PER_MM
+    good = np.asarray(np.isfinite(points).all(axis=1))
+    whole = np.rint(np.where(good[:, None], points, 0.0)).astype(np.int64).tolist()
+    return [point if ok else None for point, ok in zip(whole, good.tolist(), strict=True)]
 
 
 def with_null(values: NDArray[Any], invalid: int) -> Any:

@@ -46,7 +46,7 @@ def test_a_part_has_the_bytes_and_labels_of_the_whole(recorded: Path, tmp_path: 
     since_s = (part.frames["t_us"] - whole.begin_us) / 1e6
     assert 3.2 < since_s.min() <= 5.2 and 7 - 0.01 <= since_s.max() < 9
     (label,) = part.labels  # in the recording itself now
-    assert label.words() == "slip trial=3" and label.t_us == whole.begin_us + 5_500_000
+    assert label.line() == "slip trial=3" and label.t_us == whole.begin_us + 5_500_000
     assert [m.msg for *_, m in of_topic(part.path, "/biotac/log")] == ["slip trial=3"]  # for Foxglove and Rerun
     assert part.metadata["cut_from"] == "a.mcap"
     assert main(["file", "cut", str(recorded), str(tmp_path / "none.mcap"), "--from", "100"]) == 2

@@ -106,7 +106,7 @@ def test_tares_events_and_gaps_are_logged(tmp_path: Path) -> None:
         recorder.write(block)
     recorder.close()
     (stamp_ns, _, message), *_ = of_topic(path, "/biotac/log")
-    assert (stamp_ns, message.msg, message.level) == (gap.back_at_ns, gap.words(), plot_ros.WARN)
+    assert (stamp_ns, message.msg, message.level) == (gap.back_at_ns, gap.line(), plot_ros.WARN)
     tares = [m for m in biotac.Recording(path).messages if isinstance(m, wire.Tare)]
     logs = of_topic(path, "/biotac/finger0/log")
     assert [seq for _, seq, m in logs if m.msg.startswith("tare")] == [m.seq for m in tares]

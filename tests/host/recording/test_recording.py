@@ -265,7 +265,7 @@ def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
     recorder.close()
     assert recorder.frames == len(recorded[1])
     recording = biotac.Recording(path)
-    assert recording.gaps == [gap, at_the_end] and recording.problems == [gap.words(), at_the_end.words()]
+    assert recording.gaps == [gap, at_the_end] and recording.problems == [gap.line(), at_the_end.line()]
     assert recording.gaps_before(1) == [gap] and recording.gaps_before(0) == []
     assert [h.arrived_ns for h in biotac.Recording(path).heads()] == [h.arrived_ns for h in recording.heads()]
     assert frames_equal(recording.frames, recorded[1])
@@ -273,7 +273,7 @@ def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
         biotac.load(path)
     assert main(["check", str(path)]) == 0
     told = capsys.readouterr()
-    assert "good, 2 gap(s)" in told.out and {gap.words(), at_the_end.words()} <= {
+    assert "good, 2 gap(s)" in told.out and {gap.line(), at_the_end.line()} <= {
         line.removeprefix("biotac: ") for line in told.err.splitlines()
     }
     assert main(["check", str(path), "--json"]) == 0

@@ -100,7 +100,7 @@ def kept(port: str, path: str) -> biotac.Recording:
     recording = biotac.Recording(files.path)
     part: biotac.Selection = recording.select(fingers="index", fields=["force_n"], stop_s=1.0).resample(10)
     labels: list[biotac.Label] = recording.labels
-    print(part.rows["force_n"].max(), [label.words() for label in labels])
+    print(part.rows["force_n"].max(), [label.line() for label in labels])
     print(biotac.load(files.path).dtype == biotac.FRAME_DTYPE, biotac.PAC_DTYPE, biotac.IDLE_DTYPE, biotac.__version__)
     print(biotac.export.FORMATS, biotac.clock.LAST_SAMPLE_US, biotac.calibrate.__name__)
     return recording

@@ -62,9 +62,9 @@ class Producer:
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
-        words = [str(word) for word in (self._master, rate, self.frames, self._times)]
+        options = [str(value) for value in (self._master, rate, self.frames, self._times)]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "biotac_lab.bench.flood", *words], stdout=subprocess.PIPE, pass_fds=[self._master]
+            [sys.executable, "-m", "biotac_lab.bench.flood", *options], stdout=subprocess.PIPE, pass_fds=[self._master]
         )
         self.wait()
 

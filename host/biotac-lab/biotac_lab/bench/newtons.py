@@ -230,15 +230,15 @@ def draw(outcome: Outcome, path: Path) -> None:
 
 
 def _panel(axes: Any, outcome: Outcome, core: str) -> None:
-    for field, words, style in FLOORS:
+    for field, name, style in FLOORS:
         level = _pooled(getattr(outcome, field))
-        axes.axhline(level, color="#334155", linestyle=style, linewidth=1, label=f"{words}: {level:.2f} N")
+        axes.axhline(level, color="#334155", linestyle=style, linewidth=1, label=f"{name}: {level:.2f} N")
     seen = set()
     for point in outcome.points:
         color = COLORS.get(point.knows, LITTLE)
-        words = point.knows if point.knows in COLORS else "a little"
-        label = None if words in seen else f"known about the finger: {words}"
-        seen.add(words)
+        known = point.knows if point.knows in COLORS else "a little"
+        label = None if known in seen else f"known about the finger: {known}"
+        seen.add(known)
         x = point.cycles[core]
         axes.plot(x, point.error_n, "o", color=color, markersize=9, label=label)
         for three in point.rmse_n.values():

@@ -79,7 +79,7 @@ class Hands:
 def calibrate(
     seed: int,
     profile: Profile = "new",
-    show: Show = lambda words: None,
+    show: Show = lambda text: None,
     *,
     board: str = "posix",
     fingers: Sequence[int] = FINGERS,
@@ -136,11 +136,11 @@ def places(seed: int) -> Table:
         [name, one.gain_n * 1e3, *[_error_percent(one.gain_nn, group) for group in groups]]
         for name, one in zip(PLACES, fits, strict=True)
     ]
-    words = (
+    caption = (
         "K fitted at one place (row), and its relative error in % at each place (column), from the tip backwards. K is "
         "valid only where it was fitted."
     )
-    return Table("Place of the press", ["K from", "K [mN/count]", *PLACES], rows, words)
+    return Table("Place of the press", ["K from", "K [mN/count]", *PLACES], rows, caption)
 
 
 def _error_percent(gain_nn: int, group: Sequence[Press]) -> float:

@@ -264,12 +264,12 @@ def _draw_electrodes(axes: Any, result: Result) -> None:
         for k, trial in enumerate(case.trials, start=1)
     ]
     series += [(f"paper, trial {k + 1}", np.array(PAPER_MM[k]), color) for k, color in ((0, "#57534e"), (1, "#a8a29e"))]
-    place, width = np.arange(len(sensor.ELECTRODE_NAMES)), 0.84 / len(series)
+    x, width = np.arange(len(sensor.ELECTRODE_NAMES)), 0.84 / len(series)
     for k, (label, std, color) in enumerate(series):
-        at = place + (k - (len(series) - 1) / 2) * width
+        at = x + (k - (len(series) - 1) / 2) * width
         axes.bar(at, std, width, color=color, label=f"{label}: {std.mean():.3f}")
     axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
-    axes.set_xticks(place, sensor.ELECTRODE_NAMES)
+    axes.set_xticks(x, sensor.ELECTRODE_NAMES)
     axes.set(ylabel="std of the point of contact [mm]", yscale="log", xlim=(-0.6, 18.6))
     axes.set_title("table 2, with the board's default weights; mean of the 19 in the legend", fontsize=10)
     axes.grid(alpha=0.25, axis="y")

@@ -99,12 +99,12 @@ def measure(options: Options) -> Result:
 
 def convolved(result: Result) -> Table:
     """Signs and leakage of each model."""
-    trial, words = result.trial, {True: "right", False: "WRONG", None: "-"}
+    trial, verdict = result.trial, {True: "right", False: "WRONG", None: "-"}
     assert trial.at_mm is not None
     rows: list[list[Any]] = []
     for model in result.estimates:
         found = [signs(trial, model, at_mm) for at_mm in (trial.at_mm, trial.frames["poc_mm"])]
-        marks = [words[right.get(region)] for right in found for region in REGIONS]
+        marks = [verdict[right.get(region)] for right in found for region in REGIONS]
         rows.append([model.name, *marks, leakage(trial, model), *together(trial, model)])
     head = ["model", *[f"sign in {region}" for region in REGIONS], *[f"{region}, board's point" for region in REGIONS]]
     text = (

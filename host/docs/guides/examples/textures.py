@@ -24,7 +24,7 @@ for trial in sorted(name.removesuffix("frame") for name in slides if name.endswi
     materials.append(trial.split("_")[0])
 folds = StratifiedKFold(5, shuffle=True, random_state=0)
 for samples in (220, 1100, 2200, None):
-    rows = texture.describe_all(its[:samples] for its in pac)
+    rows = texture.describe_all(trial_pac[:samples] for trial_pac in pac)
     found = cross_val_predict(texture.classifier(), rows, materials, cv=folds)
     what = "whole slides" if samples is None else f"the first {samples / 2200:g} s"
     print(f"{what}: {np.mean(found == np.array(materials)):.0%} of {len(pac)} slides recognised")

@@ -124,8 +124,8 @@ def learn(seeds: range) -> grip.Trained:
 
 if __name__ == "__main__":
     trained = learn(range(4))
-    for name, its in (("grip not changed", None), ("tightened", trained)):
+    for name, grip_model in (("grip not changed", None), ("tightened", trained)):
         thing = Thing(mass_kg=0.25, lift_s=2.0)
-        grasp(thing, 100, its)
+        grasp(thing, 100, grip_model)
         lost = "lost" if thing.slid_mm >= LOST_MM else "kept"
         print(f"{name}: {lost}, slid {thing.slid_mm:.1f} mm, pressed with {thing.rounds[-1][0]:.1f} N at the end")
