@@ -19,7 +19,8 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.frames import StructArray
 
 # With pressure, after a release: at rest within a second, or in doubt while the press's residue still shows; and at
-# rest within ten seconds of the residue falling below what counts as a touch.
+# rest after at most ten seconds in a row in which the residue is no touch. It may become one again: pressure is low
+# for a second after a press, and what then comes back of it stays above the tare for minutes.
 LET_GO_WITHIN = 100
 TARED_WITHIN = 1000
 PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; what noise may add in three rounds
@@ -53,7 +54,7 @@ class Outcome:
     force_mn: float = 0.0
     torque_share: float = 0.0
     let_go_frames: int = 0  # with pressure, the longest from a release to rest or doubt
-    tared_frames: int = 0  # the longest from the end of a residue that counts as a touch to rest
+    tared_frames: int = 0  # the longest that a residue was no touch before it was tared
     releases: int = 0
     held_frames: int = 0  # with a load over HELD_N
     tared_away: int = 0  # tared although loaded with more than HELD_N
@@ -229,11 +230,9 @@ def _judge_releases(course: Course, rows: StructArray, outcome: Outcome) -> None
         outcome.let_go_frames = max(outcome.let_go_frames, int(free[0]) if len(free) else len(state))
         if not len(free) or free[0] > LET_GO_WITHIN:
             outcome.broken.append(f"frame {k}: released, but in contact for more than {LET_GO_WITHIN} frames")
-        at_rest = np.flatnonzero(state == TareState.REST)
-        over = np.flatnonzero(~touch[k:end])
-        if not len(over) or (not len(at_rest) and over[0] + TARED_WITHIN > len(state)):
-            continue
-        waited = int(at_rest[0] - over[0]) if len(at_rest) else len(state)
+        tared = int(np.argmax(np.append(state == TareState.REST, True)))
+        touched = np.flatnonzero(np.append(touch[k : k + tared], True))
+        waited = int(np.diff(touched, prepend=-1).max()) - 1
         outcome.tared_frames = max(outcome.tared_frames, waited)
         if waited > TARED_WITHIN:
             outcome.broken.append(f"frame {k}: released, but not tared within {TARED_WITHIN} frames of no touch")

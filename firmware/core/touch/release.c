@@ -85,16 +85,15 @@ static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
     return level && sweep->still_sweeps >= BT_QUIET_SWEEPS;
 }
 
-// A press has fallen to a quarter by its pressure; by its energy where pressure is no witness, or may have
+// A press has fallen to a quarter by its pressure; or by its energy where pressure is no witness, or may have
 // risen with the temperature.
 static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
 {
     int32_t quarter = release->pdc_peak / BT_FALLEN_SHARE;
-    bool fallen =
-        sweep->witness && !sweep->warmer
-            ? sweep->above < (quarter > BT_QUIET_PDC ? quarter : BT_QUIET_PDC)
-            : sweep->energy_count2 < release->energy_peak / BT_FALLEN_SHARE + sweep->forgiven_count2;
-    return sweep->still_sweeps >= BT_ENDED_SWEEPS && fallen;
+    bool low = sweep->witness && sweep->above < (quarter > BT_QUIET_PDC ? quarter : BT_QUIET_PDC);
+    bool faint = (!sweep->witness || sweep->warmer)
+                 && sweep->energy_count2 < release->energy_peak / BT_FALLEN_SHARE + sweep->forgiven_count2;
+    return sweep->still_sweeps >= BT_ENDED_SWEEPS && (low || faint);
 }
 
 static bt_release_verdict verdict(const bt_release *release, const bt_release_sweep *sweep, bool low)
