@@ -34,7 +34,6 @@ class Board:
         self.link = link
         self.host_clock = host_clock or SystemClock()
         self.closed = False
-        self.sent_s = time.monotonic()  #: when the board last heard from this side
         self._req_ids = cycle(range(1, 256))
         self.ending = threading.RLock()  #: one thread closes it, and others wait until it has
         self._writing = threading.Lock()
@@ -99,7 +98,6 @@ class Board:
             if self.closed:
                 self.reader.raise_closed()
             self.link.write(encode(message.ID, payload))
-            self.sent_s = time.monotonic()
 
     @contextmanager
     def turn(self) -> Iterator[None]:

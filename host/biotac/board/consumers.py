@@ -31,14 +31,12 @@ class Queue:
     """Batches on their way to one consumer, who may be slow: first in, first out.
 
     A full queue drops its oldest batches and counts them; their Gaps are kept, and a Gap says what is missing. A board
-    whose time waits for its reader waits instead. With ``lets_pass`` nothing is kept: nobody takes from this queue yet.
+    whose time waits for its reader waits instead. While nobody takes from it yet, what it drops is nobody's loss.
     ``on_news`` is called on the reading thread, to tell the consumer to look.
     """
 
-    def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None) -> None:
-        self.batches_skipped = 0
-        self.frames_skipped = 0
-        self.lets_pass = False
+    def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None, *, is_taken: bool = True) -> None:
+        self.is_taken = is_taken
         self._reader = reader
         self._on_news = on_news
         # Thousands of times a second: this wakes its consumer at a fifth of the cost of a Condition. None only wakes.
@@ -51,15 +49,8 @@ class Queue:
         self._slow: Gap | None = None
         self._kept: list[Gap] = []  # of batches that were dropped
 
-    def begin(self) -> None:
-        """Somebody begins to take: what was dropped before was nobody's."""
-        self.batches_skipped = self.frames_skipped = 0
-        self.lets_pass, self._slow = False, None
-
     def put(self, batch: Batch) -> None:
         """Add the newest batch."""
-        if self.lets_pass:
-            return
         self._waiting.put(batch)
         self._put_rows += weight(batch)
         self._has_rows |= bool(len(batch.wire) or len(batch.pac) or len(batch.idle))
@@ -111,7 +102,7 @@ class Queue:
 
     def leave(self) -> None:
         """Discard what waits and count it as skipped: the consumer has no more time for it."""
-        self.batches_skipped += len(self._back)
+        self._reader.batches_skipped += len(self._back)
         while not self._waiting.empty():
             self._skip()
 
@@ -121,9 +112,11 @@ class Queue:
             if batch is None:
                 return
             self._put_rows -= weight(batch)
-            self.batches_skipped += 1
-            self.frames_skipped += len(batch.wire)
             self._kept += [m for m in batch.messages if isinstance(m, Gap)]
+            if not self.is_taken:
+                return
+            self._reader.batches_skipped += 1
+            self._reader.frames_skipped += len(batch.wire)
             first_us = batch.first_t_us()
             if first_us is not None and self._slow is None:
                 self._slow = Gap("slow", None, None, time.time_ns(), 0, self._reader.hello.boot_id, frames_missed=0)

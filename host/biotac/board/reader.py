@@ -61,7 +61,7 @@ class Tap(Consumer, Protocol):
 class Reader:
     """Reads ``link``, whose board said ``hello``, into ``clock`` and the consumers.
 
-    When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (keeper.py).
+    When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (watch.py).
     """
 
     def __init__(self, link: Link, hello: wire.Hello) -> None:
@@ -79,6 +79,7 @@ class Reader:
         self.present = hello.fingers_present  #: bit mask of the fingers that have ever answered
         self.every = 1  #: consumers get frames whose seq is a multiple of this
         self.rows = 0  #: how many batches with rows have come
+        self.batches_skipped = self.frames_skipped = 0  #: dropped by queues whose consumers are too slow
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
         self.silent_s = 0.0  #: for how long it has listened in vain
         self.awaited = 0  #: how many replies are awaited
@@ -218,11 +219,12 @@ class Reader:
 
     @property
     def stats(self) -> LinkStats:
-        """Counts since the handshake, over reboots too; ``..._skipped`` are the consumers'."""
+        """Counts since the handshake, over reboots too."""
         now = self._decoder.stats(self._bytes, self._frames)
         counted = ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors")
         lost = {name: sum(getattr(stats, name) for stats in (*self._past, now)) for name in counted}
-        return replace(now, gaps=self.gaps.count, **lost)
+        skipped = {"batches_skipped": self.batches_skipped, "frames_skipped": self.frames_skipped}
+        return replace(now, gaps=self.gaps.count, **skipped, **lost)
 
     # ---- reading -------------------------------------------------------------------------------
 

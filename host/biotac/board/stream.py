@@ -13,7 +13,6 @@ from .board import Board
 
 #: What a FRAME can say about a contact.
 RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
-AT_FIRST = RESULTS | QuantityFlags.REST_FRAMES
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 # A board stops streaming this long after it last heard from its host.
 KEEPALIVE_S = 1.0
@@ -39,13 +38,14 @@ CARRIED_BY = {Touch: "touch", Event: "events", Bands: "bands"}
 class Wants:
     """Flags for the board; this side keeps one of ``every`` frames."""
 
-    quantities: QuantityFlags = AT_FIRST
-    streams: StreamFlags = StreamFlags.FRAMES | StreamFlags.STATUS
-    fingers: int = ALL_FINGERS
-    every: int = 1
+    quantities: QuantityFlags
+    streams: StreamFlags
+    fingers: int
+    every: int
 
     @classmethod
-    def of(cls, names: tuple[str, ...], *, fingers: int, rest: bool, rate_hz: float | None, has_room: bool) -> Wants:
+    def named(cls, names: tuple[str, ...] = (), *, fingers: int = ALL_FINGERS, rest: bool = True,
+              rate_hz: float | None = None, has_room: bool) -> Wants:  # fmt: skip
         """The flags for ``names``; for none, "results", with PAC where the line ``has_room``.
 
         Raises InputError for an unknown name, or a rate out of range.
@@ -77,26 +77,28 @@ class Stream:
     """The board's stream: what it was told to send, and whether it does."""
 
     def __init__(self, board: Board) -> None:
-        #: Whether the board was told to stream, and has neither ended nor been stopped.
-        self.on = False
+        #: The last START; None before the first, after a STOP, and once the source has ended.
+        self.started: Start | None = None
         #: Whether a simulated source has played to its end and all of it has arrived.
         self.ended = False
-        self.started: Start | None = None  #: the last START; None before the first and after a STOP
         self._board = board
-        self._wants = Wants()
-        self._has_chosen = False
+        self._has_room = board.link.bits_per_s is None
+        self._wants = Wants.named(has_room=self._has_room)
         self._implied: dict[str, None] = {}  # by callbacks, in order
 
-    def start(self, names: tuple[str, ...] = (), *, fingers: int = ALL_FINGERS, rest: bool = True,
-              rate_hz: float | None = None) -> None:  # fmt: skip
+    @property
+    def on(self) -> bool:
+        """Whether the board was told to stream, and has neither ended nor been stopped."""
+        return self.started is not None
+
+    def start(self, names: tuple[str, ...], *, fingers: int, rest: bool, rate_hz: float | None) -> None:
         """See Hand.stream."""
-        has_room = self._board.link.bits_per_s is None
-        self._tell(Wants.of(names, fingers=fingers, rest=rest, rate_hz=rate_hz, has_room=has_room), chosen=True)
+        self._tell(Wants.named(names, fingers=fingers, rest=rest, rate_hz=rate_hz, has_room=self._has_room))
 
     def go(self) -> None:
-        """Start the stream, unless it runs or the source has ended."""
+        """Start the stream with what was chosen last, unless it runs or the source has ended."""
         if not (self.on or self.ended):
-            self.start() if not self._has_chosen else self._tell(self._wants, chosen=True)
+            self._tell(self._wants)
 
     def imply(self, kind: type) -> None:
         """Add what carries messages of this kind, which a callback waits for."""
@@ -104,9 +106,9 @@ class Stream:
         if name is not None and name not in self._implied:
             self._implied[name] = None
             if self.on:
-                self._tell(self._wants, chosen=self._has_chosen)
+                self._tell(self._wants)
 
-    def _tell(self, wants: Wants, *, chosen: bool) -> None:
+    def _tell(self, wants: Wants) -> None:
         board, link = self._board, self._board.link
         asked = wants
         for name in self._implied:
@@ -124,7 +126,7 @@ class Stream:
                     raise
             start = Start(0, int(asked.streams), asked.fingers, self.keepalive_ms())
             board.tell(start)
-            self._wants, self._has_chosen, self.started, self.on = wants, chosen, start, True
+            self._wants, self.started = wants, start
             board.reader.every = asked.every
         board.reader.wake()
         link.release()
@@ -144,18 +146,18 @@ class Stream:
     def stop(self) -> None:
         """Stop the stream. What was on its way has arrived when this returns."""
         with self._board.turn():
-            self.started, self.on = None, False
+            self.started = None
             self._board.tell(Stop(0))
             self._board.reader.gaps.forget()
         self._board.reader.wake()
 
     def end(self) -> None:
         """The simulated source has ended, and all of it has arrived."""
-        self.ended, self.on = True, False
+        self.started, self.ended = None, True
         self._board.reader.wake()
 
     def leave(self) -> None:
         """Tell the board to stop, without waiting for its answer."""
         if self.on and self._board.connected:
-            self.started, self.on = None, False
+            self.started = None
             self._board.send(Stop(0))

@@ -96,7 +96,7 @@ class AsyncHand:
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(news.set)
 
-        queue = hand._open_queue(wake)
+        queue = hand._reading.also(wake)
         try:
             await asyncio.to_thread(hand._go)
             while True:
@@ -109,7 +109,7 @@ class AsyncHand:
                     return
                 await news.wait()
         finally:
-            hand._close_queue(queue)
+            hand._reader.remove(queue)
 
     async def frames(self) -> AsyncIterator[Frame]:
         """Typed frames as they arrive; see ``batches``."""

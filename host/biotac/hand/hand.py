@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import threading
-import warnings as python_warnings
 import weakref
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
+from contextlib import ExitStack, suppress
 from functools import wraps
 from pathlib import Path
 from types import TracebackType
@@ -16,24 +14,25 @@ from typing import Any, Concatenate, NoReturn, ParamSpec, SupportsIndex, TypeVar
 
 from ..board import handshake
 from ..board.board import Board
-from ..board.consumers import Callbacks, Queue, Troubles, Unsubscribe
-from ..board.gap import Gap
+from ..board.consumers import Callbacks, Troubles
 from ..board.handshake import HandWarning
-from ..board.keeper import SILENCE_S, Keeper
 from ..board.reader import THREADS
 from ..board.stream import ALL_FINGERS, Stream
+from ..board.watch import StreamWatch
 from ..clock import DeviceClock
 from ..clock.host_clock import HostClock
-from ..errors import DeviceLostError, InputError, ReadWarning
+from ..errors import DeviceLostError, InputError
 from ..link import Link
 from ..markdown import html_table
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch, LinkStats, join, split
-from ..wire.frames import Frame, StructArray
+from ..wire.batches import Batch, LinkStats
+from ..wire.frames import Frame
 from ..wire.sensor_gen import MAX_SENSORS
 from .commands import Commands
 from .configuration import Configuration
+from .reading import Reading
 from .record import Mark, Recorder
+from .subscriptions import Subscriptions
 from .views import Fingers, FingerView, Latest, checked_names, finger_index
 
 P = ParamSpec("P")
@@ -42,12 +41,12 @@ R = TypeVar("R")
 MAX_AGE_S = 0.25
 
 
-def _of(method: Callable[Concatenate[Commands, P], R]) -> Callable[Concatenate[Hand, P], R]:
-    """A method of Hand that calls the same method of its Commands."""
+def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Hand, P], R]:
+    """A method of Hand that calls the same method of one of its parts."""
 
     @wraps(method)
     def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        return method(self._commands, *args, **kwargs)
+        return method(getattr(self, part), *args, **kwargs)
 
     return call
 
@@ -69,24 +68,19 @@ class Hand:
         self._reader = reader = board.reader
         self._troubles = Troubles()
         self._latest = Latest(reader, names, max_age_s=max_age_s, report=_reporter(board, self._troubles))
+        reader.add(self._latest)  # before every queue: who takes a batch finds its frames here, too
         self._commands = Commands(board, self._latest)
         #: Settings, calibrations and wrench maps that the board keeps, and its faults.
         self.board = Configuration(board, self._commands)
         self._stream = Stream(board)
         self._callbacks = Callbacks(reader, self._troubles)
-        self._pulled = Queue(reader)
-        self._has_pulled = False
-        self._puller: threading.Thread | None = None  # the thread that reads
-        self._pulling = threading.Lock()
-        self._left = [0, 0]  # batches and frames skipped in queues that are closed
-        self._others: list[Queue] = []  # of biotac.aio
+        self._reading = Reading(board, self._stream, self._commands, self._latest)
+        self._subscriptions = Subscriptions(reader, self._stream, self._callbacks, self._reading, self._latest)
         self._recorders: list[Recorder] = []  # the open one last
-        self._keeper = Keeper(board, self._stream, self._callbacks, reconnect=reconnect)
-        reader.add(self._latest)
-        reader.add(self._pulled)
-        self._keeper.start()
+        self._watch = StreamWatch(board, self._stream, self._callbacks, reconnect=reconnect)
+        self._watch.start()
         # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
-        parts = board, self._stream, self._keeper, self._callbacks, self._recorders
+        parts = board, self._stream, self._watch, self._callbacks, self._recorders
         self._finalizer = weakref.finalize(self, _end, *parts)
         #: The link that carries the bytes.
         self.link = link
@@ -120,12 +114,7 @@ class Hand:
     def stats(self) -> LinkStats:
         """Counts since the handshake, over reboots too."""
         self._latest.report()
-        queues = [self._callbacks.queue, *self._others, *([self._pulled] if self._has_pulled else [])]
-        return replace(
-            self._reader.stats,
-            batches_skipped=self._left[0] + sum(queue.batches_skipped for queue in queues),
-            frames_skipped=self._left[1] + sum(queue.frames_skipped for queue in queues),
-        )
+        return self._reader.stats
 
     @property
     def connected(self) -> bool:
@@ -152,7 +141,7 @@ class Hand:
         Raises KeyError for an unknown finger, and for one whose sensor has never answered.
         """
         number = self._latest.present(finger)
-        self._let_pass()
+        self._reading.set_aside()
         return FingerView(self._latest.name(number), number, self._latest, self._go)
 
     def __iter__(self) -> Iterator[str]:
@@ -212,7 +201,7 @@ class Hand:
         self._report_at_end()
 
     def _end(self) -> None:
-        _end(self._board, self._stream, self._keeper, self._callbacks, self._recorders)
+        _end(self._board, self._stream, self._watch, self._callbacks, self._recorders)
 
     def _report_at_end(self) -> None:
         if not self._reader.reported:
@@ -228,18 +217,18 @@ class Hand:
 
     # ---- commands (commands.py) ----------------------------------------------------------------
 
-    ping = _of(Commands.ping)
-    status = _of(Commands.status)
-    sync = _of(Commands.sync)
-    take_link = _of(Commands.take_link)
-    sensor_status = _of(Commands.sensor_status)
-    sensor_info = _of(Commands.sensor_info)
-    point = _of(Commands.point)
-    tare = _of(Commands.tare)
-    set_tare = _of(Commands.set_tare)
-    hold = _of(Commands.hold)
-    release = _of(Commands.release)
-    grasp = _of(Commands.grasp)
+    ping = _of("_commands", Commands.ping)
+    status = _of("_commands", Commands.status)
+    sync = _of("_commands", Commands.sync)
+    take_link = _of("_commands", Commands.take_link)
+    sensor_status = _of("_commands", Commands.sensor_status)
+    sensor_info = _of("_commands", Commands.sensor_info)
+    point = _of("_commands", Commands.point)
+    tare = _of("_commands", Commands.tare)
+    set_tare = _of("_commands", Commands.set_tare)
+    hold = _of("_commands", Commands.hold)
+    release = _of("_commands", Commands.release)
+    grasp = _of("_commands", Commands.grasp)
 
     # ---- what arrives --------------------------------------------------------------------------
 
@@ -273,9 +262,7 @@ class Hand:
         self._latest.report()
 
     def _go(self) -> None:
-        """Start the stream, with what was chosen last, unless it runs."""
-        self._latest.report()
-        self._stream.go()
+        self._reading.go()
 
     def batches(self) -> Iterator[Batch]:
         """Yield batches as they arrive, starting the stream if need be.
@@ -284,44 +271,7 @@ class Hand:
         and ``read``, share one queue, which only one thread at a time may use; another gets InputError. It begins with
         the stream, or, where a callback or a view was used before, with this call, and holds 16 384 rows, 10 to 20 s.
         """
-        queue, stream, closing = self._pulled, self._stream, self._reader.closing
-        with self._by_one_thread():
-            if not self._has_pulled:
-                self._has_pulled = True
-                self._pulled.begin()
-            self._go()
-            while True:
-                self._latest.report()
-                over = not stream.on  # before the queue is emptied, so that nothing is left in it
-                batch = queue.take(wait=not (over or closing.is_set()))
-                if batch is not None:
-                    yield batch
-                elif closing.is_set():
-                    self._reader.raise_closed()
-                elif over:
-                    return
-
-    def _let_pass(self) -> None:
-        """What arrives is looked at in another way: it need not be kept until somebody reads."""
-        if not self._has_pulled and not self._pulled.lets_pass:
-            self._pulled.lets_pass = True
-            self._pulled.clear()
-
-    @contextmanager
-    def _by_one_thread(self) -> Iterator[None]:
-        here = threading.current_thread()
-        with self._pulling:
-            before = self._puller
-            if before is not None and before is not here and before.is_alive():
-                raise InputError(
-                    f"thread {before.name!r} is reading this hand, and {here.name!r} would take part of its data; "
-                    "read in one thread, or give each an on_batch callback"
-                )
-            self._puller = here
-        try:
-            yield
-        finally:
-            self._puller = before
+        yield from self._reading.batches()  # in a generator of the hand's, so that it is not collected meanwhile
 
     def frames(self) -> Iterator[Frame]:
         """Yield typed frames as they arrive; starts and ends like ``batches``."""
@@ -329,131 +279,19 @@ class Hand:
             for row in batch.frames:
                 yield Frame.from_row(row)
 
-    def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
-        """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
+    read = _of("_reading", Reading.read)
+    read_batch = _of("_reading", Reading.read_batch)
 
-        They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
-        reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
-        discarded. A ReadWarning tells of a Gap among them, and when a simulated source ended first: the array is then
-        shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
-        ValueError unless seconds is a number above 0.
-        """
-        batch = self.read_batch(seconds, fresh=fresh)
-        for gap in (m for m in batch.messages if isinstance(m, Gap)):
-            python_warnings.warn(gap.line(), ReadWarning, stacklevel=2)
-        return batch.frames
+    # ---- callbacks (subscriptions.py) ----------------------------------------------------------
 
-    def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
-        """Like ``read``, but returns the Batch: also the wire messages, PAC, events and Gaps of the same time."""
-        if not 0 < seconds < float("inf"):
-            raise ValueError(f"seconds is {seconds}, expected a number above 0")
-        if fresh and self._stream.on:
-            self.ping()  # a barrier: its reply comes after everything made before
-            self._pulled.clear()
-        taken: list[Batch] = []
-        end_us: int | None = None
-        first_status_us: int | None = None
-        for batch in self.batches():
-            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
-                first_status_us = status.t_us if first_status_us is None else first_status_us
-                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
-                    return join(taken)  # the board is there, its sensors are not
-            first_us, last_us = batch.first_t_us(), batch.last_t_us()
-            if end_us is None and first_us is not None:
-                end_us = first_us + round(seconds * 1e6)
-            if end_us is None or last_us is None or last_us < end_us:
-                taken.append(batch)
-                continue
-            now, later = split(batch, end_us)
-            self._pulled.put_back(later)
-            return join([*taken, now])
-        if self._stream.ended:
-            text = f"the source of {self.port} ended before {seconds:g} s were read"
-            python_warnings.warn(text, ReadWarning, stacklevel=3)
-        return join(taken)
-
-    # ---- callbacks (consumers.py) --------------------------------------------------------------
-
-    def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
-        """Call ``fn`` with every batch; returns a function that ends this.
-
-        Callbacks of a hand run in one thread, in order, and may give commands. While they are slow they lose the oldest
-        batches, counted in ``stats`` and told by a Gap; the link is read on. What one raises is logged, and raised as
-        CallbackError by the next call of any kind on the hand or its fingers. The stream starts with ``stream``, or
-        with the first read.
-        """
-        return self._on(Batch, fn)
-
-    def on_event(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
-        """Call ``fn`` with every EVENT (touch, lift, jolt, slip and its end, see EventKind) as soon as it arrives.
-
-        Adds events to what is streamed. Events older than ``max_age_s`` (biotac.open), which waited somewhere while
-        this program stood still, are left out; batches and recordings have them. The same holds for ``on_touch`` and
-        ``on_slip``.
-        """
-        return self._on(wire.Event, self._if_new(fn))
-
-    def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
-        """Call ``fn`` when what a finger holds begins to slip: with the events of ``on_event`` that are SLIP."""
-        return self._on(wire.Event, self._if_new(fn, wire.EventKind.SLIP))
-
-    def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
-        """Call ``fn`` as soon as a resting finger's signals move, within the round: a hint that CONTACT may follow.
-
-        Adds touch to what is streamed.
-        """
-        return self._on(wire.Touch, self._if_new(fn))
-
-    def on_bands(self, fn: Callable[[wire.Bands], Any]) -> Unsubscribe:
-        """Call ``fn`` with how strongly dynamic pressure vibrated, by octave, 100 times a second for each finger.
-
-        Adds bands to what is streamed.
-        """
-        return self._on(wire.Bands, fn)
-
-    def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
-        """Call ``fn`` with every change of a tare."""
-        return self._on(wire.Tare, fn)
-
-    def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
-        """Call ``fn`` with each STATUS, the board's counters, which comes every second by default."""
-        return self._on(wire.Status, fn)
-
-    def on_gap(self, fn: Callable[[Gap], Any]) -> Unsubscribe:
-        """Call ``fn`` when rows are missing and the next ones have come: see Gap."""
-        return self._on(Gap, fn)
-
-    def _on(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
-        self._latest.report()
-        self._let_pass()
-        self._stream.imply(kind)
-        return self._callbacks.add(kind, fn)
-
-    def _if_new(self, fn: Callable[[Any], Any], kind: wire.EventKind | None = None) -> Callable[[Any], Any]:
-        reader, max_age_s = self._reader, self._latest.max_age_s
-
-        @wraps(fn)
-        def call(message: Any) -> None:
-            if kind in (None, getattr(message, "kind", None)) and reader.age_s(message.t_us) <= max_age_s:
-                fn(message)
-
-        return call
-
-    def _open_queue(self, on_news: Callable[[], None]) -> Queue:
-        """A queue of one's own for what arrives from now on; ``on_news`` is called on the reading thread."""
-        self._latest.report()
-        self._let_pass()
-        queue = Queue(self._reader, on_news)
-        self._others.append(queue)
-        self._reader.add(queue)
-        return queue
-
-    def _close_queue(self, queue: Queue) -> None:
-        """Close a queue made by _open_queue."""
-        self._reader.remove(queue)
-        if queue in self._others:
-            self._others.remove(queue)
-            self._left = [self._left[0] + queue.batches_skipped, self._left[1] + queue.frames_skipped]
+    on_batch = _of("_subscriptions", Subscriptions.on_batch)
+    on_event = _of("_subscriptions", Subscriptions.on_event)
+    on_slip = _of("_subscriptions", Subscriptions.on_slip)
+    on_touch = _of("_subscriptions", Subscriptions.on_touch)
+    on_bands = _of("_subscriptions", Subscriptions.on_bands)
+    on_tare = _of("_subscriptions", Subscriptions.on_tare)
+    on_status = _of("_subscriptions", Subscriptions.on_status)
+    on_gap = _of("_subscriptions", Subscriptions.on_gap)
 
     # ---- recording -----------------------------------------------------------------------------
 
@@ -510,13 +348,13 @@ def _reporter(board: Board, troubles: Troubles) -> Callable[[], None]:
     return report
 
 
-def _end(board: Board, stream: Stream, keeper: Keeper, callbacks: Callbacks, recorders: list[Recorder]) -> None:
+def _end(board: Board, stream: Stream, watch: StreamWatch, callbacks: Callbacks, recorders: list[Recorder]) -> None:
     """Close a hand's parts; also called when the hand is garbage-collected or the program ends."""
     reader = board.reader
     if reader.is_inherited():
         return
     if threading.current_thread() in THREADS:  # it cannot wait for itself, nor are other hands to wait
-        threading.Thread(target=_end, args=(board, stream, keeper, callbacks, recorders), name="biotac end").start()
+        threading.Thread(target=_end, args=(board, stream, watch, callbacks, recorders), name="biotac end").start()
         return
     with board.ending, ExitStack() as last:  # these run even when one of them fails
         if board.closed:
@@ -525,7 +363,7 @@ def _end(board: Board, stream: Stream, keeper: Keeper, callbacks: Callbacks, rec
         for recorder in recorders:
             last.callback(recorder.close)
         last.callback(callbacks.close)
-        last.callback(keeper.close)
+        last.callback(watch.close)
         reader.closing.set()
         with suppress(DeviceLostError):  # a board that is gone does not stream either
             stream.leave()

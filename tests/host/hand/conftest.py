@@ -9,7 +9,7 @@ import pytest
 from live_board import Firmware, Live
 
 import biotac
-from biotac.board import keeper
+from biotac.board import watch
 from biotac.link.serial_port import SerialLink
 
 
@@ -24,7 +24,7 @@ def live(scripted_board, hello) -> Iterator[Live]:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
-    """The keeper looks all the time, and waits for answers as long as ever."""
-    monkeypatch.setattr(keeper, "LOOK_S", 0.005)
+    """The watch looks all the time, and waits for answers as long as ever."""
+    monkeypatch.setattr(watch, "LOOK_S", 0.005)
     monkeypatch.setattr(SerialLink, "patience", 12_000.0)
     return lambda: None

@@ -30,7 +30,7 @@ def test_callbacks_get_everything_in_order_until_they_unsubscribe(live: Live) ->
     stop()
     live.send(frame(3), packed(touch))
     until(lambda: len(seen) == 6)
-    assert seen == [0, 1, 2, "touch 2", "status 0", "touch 2"]  # the keeper's questions are its own
+    assert seen == [0, 1, 2, "touch 2", "status 0", "touch 2"]  # the watch's questions are its own
 
 
 def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:
@@ -117,7 +117,7 @@ def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) ->
     assert stats.frames_skipped == 100 - len(calls[0].wire) and stats.batches_skipped > 90
 
 
-def test_commands_of_callbacks_and_the_keepers_looks_do_not_wait_for_each_other(live: Live, quick) -> None:
+def test_commands_of_callbacks_and_the_watchs_looks_do_not_wait_for_each_other(live: Live, quick) -> None:
     answered: list[None] = []
     live.hand.on_batch(lambda batch: answered.append(live.hand.ping()))
     live.hand.stream()

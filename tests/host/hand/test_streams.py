@@ -35,7 +35,7 @@ def test_a_full_queue_drops_the_oldest_counts_them_and_a_gap_says_so(queue: Queu
     for k in range(5):
         queue.put(batch_of(*(frame(4 * k + n, finger=k % 2) for n in range(4))))
     first, second = drained(queue)
-    assert (queue.batches_skipped, queue.frames_skipped) == (3, 12)
+    assert (queue._reader.batches_skipped, queue._reader.frames_skipped) == (3, 12)
     assert first.seq.tolist() == [12, 13, 14, 15]
     (gap,) = gaps_in([first])
     assert (gap.reason, gap.frames_missed, gap.fingers) == ("slow", 12, 0b11)
@@ -61,22 +61,13 @@ def test_gaps_of_dropped_batches_are_kept_and_come_in_their_order(queue: Queue) 
 def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(queue: Queue) -> None:
     queue.put(batch_of(*(frame(n) for n in range(12))))
     assert len(queue.take().wire) == 12
-    assert (queue.take(), queue.batches_skipped) == (None, 0)
+    assert (queue.take(), queue._reader.batches_skipped) == (None, 0)
 
 
 def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
     for _ in range(50):
         queue.put(batch_of(packed(wire.Touch(1, 1, 0, 1, 1))))
     assert len(drained(queue)) == 10
-
-
-def test_what_a_closed_queue_has_skipped_stays_counted(live: Live, queue: Queue) -> None:
-    one = live.hand._open_queue(lambda: None)
-    for seq in range(0, 30, 10):
-        one.put(batch_of(*(frame(seq + n) for n in range(10))))
-    for _ in range(2):
-        assert (live.hand.stats.batches_skipped, live.hand.stats.frames_skipped) == (2, 20)
-        live.hand._close_queue(one)
 
 
 # ---- who pulls -----------------------------------------------------------------------------------
@@ -122,14 +113,14 @@ def test_an_unpaced_board_waits_for_a_slow_puller_instead() -> None:
 
 def test_a_fresh_read_has_nothing_of_before(live: Live, monkeypatch) -> None:
     live.hand.stream()
-    clear = live.hand._pulled.clear
+    clear = live.hand._reading._queue.clear
     for first in range(0, 20_000, 1000):
 
         def clear_and_go_on(first: int = first) -> None:
             clear()
             live.send(frame(first + 400), frame(first + 500))
 
-        monkeypatch.setattr(live.hand._pulled, "clear", clear_and_go_on)
+        monkeypatch.setattr(live.hand._reading._queue, "clear", clear_and_go_on)
         live.send(frame(first + 1), frame(first + 2))
         live.firmware.before[wire.Ping] = frame(first + 3)  # on its way when the question came
         assert live.hand.read_batch(0.5, fresh=True).seq.tolist() == [first + 400]
@@ -139,8 +130,7 @@ def test_a_fresh_read_has_nothing_of_before(live: Live, monkeypatch) -> None:
 
 def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
     """When STOP is answered, its rows are there for who pulls; when PING is, for views."""
-    live.hand._pulled.begin()
-    live.hand._has_pulled = True
+    queue = live.hand._reading.also(lambda: None)
     for round_ in range(1, 100):
         live.hand.stream()
         live.firmware.before[wire.Ping] = frame(10 * round_)
@@ -148,8 +138,8 @@ def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
         assert live.hand[0].frame.seq == 10 * round_
         live.firmware.before[wire.Stop] = frame(10 * round_ + 1)
         live.hand.stop()
-        assert live.hand._pulled.take() is not None
-        assert [b.seq[-1] for b in drained(live.hand._pulled) if len(b.wire)][-1:] == [10 * round_ + 1]
+        assert queue.take() is not None
+        assert [b.seq[-1] for b in drained(queue) if len(b.wire)][-1:] == [10 * round_ + 1]
 
 
 def test_a_second_thread_that_reads_is_told_so(live: Live) -> None:
@@ -193,7 +183,7 @@ def test_readers_may_take_turns(live: Live) -> None:
 @pytest.mark.parametrize(
     ("names", "rest", "quantities", "streams"),
     [
-        ((), True, int(stream.AT_FIRST), 0b111),
+        ((), True, int(stream.RESULTS) | 0b010000, 0b111),
         (("force", "poc", "pac"), True, 0b010011, 0b111),
         (("force",), False, 0b000010, 0b101),
         (("raw",), True, 0b010000, 0b101),

@@ -1,8 +1,8 @@
-"""Keeps a board's stream alive, finds out when it has stopped, and starts it again.
+"""Watches a board's stream: keeps it alive, finds out when it has stopped, starts it again, reconnects.
 
-A thread asks the board every third of a second which streams are on. The answer keeps the board from stopping, feeds
-the clock, and is compared with what was started: replies alone are no sign that the stream lives. A board whose time
-waits for its reader is not asked.
+A thread asks the board every third of a second which streams are on. The question keeps the board from stopping; the
+answer feeds the clock, and is compared with what was started: replies alone are no sign that the stream lives. A board
+whose time waits for its reader is not asked.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ ROWS = functools.reduce(operator.or_, (wire.STREAMS_OF[message] for message in w
 SILENCE_S = 3.0
 
 
-class Keeper:
-    """Keeps ``stream`` of ``board`` alive; with ``reconnect``, also brings back a board that was lost."""
+class StreamWatch:
+    """Watches ``stream`` of ``board``; with ``reconnect``, also brings back a board that was lost."""
 
     def __init__(self, board: Board, stream: Stream, callbacks: Callbacks, *, reconnect: bool) -> None:
         self._board = board
@@ -38,10 +38,10 @@ class Keeper:
         self._callbacks = callbacks
         self._reader.reconnects = reconnect
         self._started: wire.Start | None = None  # the stream that was looked at last
-        self._asked_s = time.monotonic()
+        self._heard_us: int | None = None  # the board's time at the last look; None before the first after a START
         # At the last look; looks without rows since, and how often the stream was started again for that.
         self._rows = self._idle = self._faults = self._looks = self._restarts = 0
-        self._thread = self._reader.thread(self._run, "keeper")
+        self._thread = self._reader.thread(self._run, "stream watch")
 
     def start(self) -> None:
         """Start the thread."""
@@ -98,25 +98,24 @@ class Keeper:
             if started is None or self._reader.lost is not None:
                 return
             is_new, self._started = started is not self._started, started
-            heard_s, self._asked_s = self._asked_s, time.monotonic()  # the board heard nothing in between
             try:
                 status = board.ask(wire.GetStatus(0), wire.Status, timeout_s=LOOK_S * board.link.patience, quiet=True)
             except CommandRefusedError:
                 return  # a recording that has no STATUS yet
-            silent_s = time.monotonic() - heard_s
             if is_new:
-                self._looks = self._restarts = 0
+                self._looks, self._restarts, self._heard_us = 0, 0, None
                 if self._has_restarted():  # while nothing streamed, so that nobody looked
                     return
             if board.link.owns_stream or board.link.keeps_time:  # a recording has pauses of its own
-                self._judge(started, status, silent_s)
+                self._judge(started, status)
             self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
+            self._heard_us = status.t_us
 
-    def _judge(self, started: wire.Start, status: wire.Status, silent_s: float) -> None:
+    def _judge(self, started: wire.Start, status: wire.Status) -> None:
         if self._stream.started is not started:
             return  # it is being closed
         if self._board.link.owns_stream and status.streams != started.streams:
-            self._stopped(status, silent_s)
+            self._stopped(started, status)
         elif not (started.fingers & status.fingers_present and started.streams & status.streams & ROWS):
             self._looks = 0  # no rows are due
         elif self._reader.rows != self._rows or status.frames_idle != self._idle:
@@ -126,20 +125,29 @@ class Keeper:
             if self._looks >= LOOKS_WITHOUT_ROWS:
                 self._start_again("silence")
 
-    def _stopped(self, status: wire.Status, silent_s: float) -> None:
+    def _stopped(self, started: wire.Start, status: wire.Status) -> None:
         """The board answers, but does not send what it was told to."""
         if self._has_restarted():
             return
-        port = self._board.link.port
-        if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or silent_s >= KEEPALIVE_S:
+        if status.faults & ~self._faults & wire.FaultFlags.HOST_SILENT or self._may_have_been_silent(started, status):
             self._start_again("paused")
         else:
             self._reader.fail(
                 StreamTakenError(
-                    f"another program, or the board's other port, took the stream of {port}; end that program and open "
-                    "the port again"
+                    f"another program, or the board's other port, took the stream of {self._board.link.port}; end that "
+                    "program and open the port again"
                 )
             )
+
+    def _may_have_been_silent(self, started: wire.Start, status: wire.Status) -> bool:
+        """Whether the board may have heard nothing for its keep-alive since the last look.
+
+        By its own clock: this computer's stands still in its sleep, and a simulated board's goes in jumps. An answer
+        is a little younger than the hearing of its question, hence a tenth.
+        """
+        if self._heard_us is None:
+            return True
+        return (status.t_us - self._heard_us) % 2**32 >= 900 * started.keepalive_ms
 
     def _has_restarted(self) -> bool:
         hello = self._board.ask(wire.HelloRequest(0, secrets.randbits(32)), wire.Hello, quiet=True)
@@ -177,7 +185,7 @@ class Keeper:
             reader.gaps.begin(reason)
             board.tell_again()
             self._stream.resume()
-        self._asked_s = time.monotonic()
+            self._heard_us = None
 
     def _found(self, before: wire.Hello) -> bool:
         board = self._board

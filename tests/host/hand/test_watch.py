@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import termios
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from types import SimpleNamespace
@@ -14,7 +13,7 @@ from live_board import Clock, Firmware, Live, frame, heartbeat, point, until
 
 import biotac
 from biotac.board import gap as gap_module
-from biotac.board import keeper
+from biotac.board import watch
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 
@@ -29,11 +28,23 @@ def gaps_of(hand: biotac.Hand) -> Callable[[], list[biotac.Gap]]:
     return lambda: gaps
 
 
+def stops_at_the_next_look(firmware: Firmware, after_us: int) -> None:
+    """It has heard nothing for so long, and says so."""
+    status = firmware.status
+
+    def stopped(req_id: int = 0) -> wire.Status:
+        firmware.status, firmware.streams = status, 0
+        firmware.t_us += after_us
+        return status(req_id)
+
+    firmware.status = stopped
+
+
 # ---- it answers, but does not stream -------------------------------------------------------------
 
 
 def test_a_started_stream_is_looked_at_at_once(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(keeper, "LOOK_S", 600.0)
+    monkeypatch.setattr(watch, "LOOK_S", 600.0)
     live.hand.stream()
     live.firmware.wait_for(wire.GetStatus)
     live.hand.stream("raw")
@@ -85,23 +96,15 @@ def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, qu
     assert live.hand.connected and len(live.firmware.of(wire.Start)) == 2
 
 
-def test_a_board_that_took_too_long_to_answer_was_not_taken(live: Live, quick, monkeypatch) -> None:
-    """Its HOST_SILENT is latched since an earlier pause. It may have heard nothing until it answered."""
+def test_a_board_that_may_have_heard_nothing_by_its_own_clock_was_not_taken(live: Live, quick) -> None:
+    """Its HOST_SILENT is latched since an earlier pause, and this computer's clock stood still in its sleep."""
     gaps = gaps_of(live.hand)
     live.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
     live.hand.stream()
     live.send(frame(1))
     live.firmware.wait_for_looks()
-    monkeypatch.setattr(keeper, "KEEPALIVE_S", 0.05)
-    answer = live.firmware.status
-
-    def late(req_id: int = 0) -> wire.Status:
-        time.sleep(0.1)
-        return answer(req_id)
-
-    monkeypatch.setattr(live.firmware, "status", late)
-    live.firmware.after[wire.Start] = frame(11)
-    live.firmware.streams = 0
+    live.firmware.after[wire.Start] = frame(110)
+    stops_at_the_next_look(live.firmware, after_us=999_000)  # a question is heard before it is answered
     until(lambda: live.hand.check() or gaps())
     assert gaps()[0].reason == "paused"
 
@@ -270,6 +273,27 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
     assert [m.quantities for m in firmware.of(wire.Subscribe)] == [wire.QuantityFlags.FORCE]
     assert [(m.streams, m.keepalive_ms) for m in firmware.of(wire.Start)] == [(0b111, 1000)]
     assert hand.stats.gaps == 1 and hand.connected and hand[0].t_us == 500_000
+
+
+def test_a_board_that_came_back_and_stopped_at_once_was_not_taken(world, quick) -> None:
+    """It may have heard START long before its reply came here."""
+    live = world.opened(there := world.plug(boot_id=1))
+    there.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
+    live.hand.stream()
+    live.send(frame(1))
+    there.firmware.wait_for_looks()
+    back = []
+
+    def come_back(pauses: int) -> None:
+        back.append(world.plug(boot_id=1).firmware)
+        back[0].faults, back[0].t_us = int(wire.FaultFlags.HOST_SILENT), there.firmware.t_us
+        stops_at_the_next_look(back[0], after_us=0)
+
+    world.clock.while_away = come_back
+    world.unplug(there)
+    until(lambda: live.hand.check() or (back and len(back[0].of(wire.Start)) == 2))
+    back[0].wait_for_looks()
+    assert live.hand.connected
 
 
 def test_a_board_that_comes_back_and_refuses_what_it_had_ends_the_hand_in_words(world) -> None:

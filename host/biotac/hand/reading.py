@@ -1,0 +1,138 @@
+"""Reading in order: what one thread of the program takes, from one queue that begins with the stream."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ..board.board import Board
+from ..board.consumers import Queue
+from ..board.gap import Gap
+from ..board.stream import Stream
+from ..board.watch import SILENCE_S
+from ..errors import InputError, ReadWarning
+from ..wire import messages_gen as wire
+from ..wire.batches import Batch, join, split
+from ..wire.frames import StructArray
+from .commands import Commands
+from .views import Latest
+
+
+class Reading:
+    """``Hand.batches``, ``frames`` and ``read``, which share one queue."""
+
+    def __init__(self, board: Board, stream: Stream, commands: Commands, latest: Latest) -> None:
+        self._board = board
+        self._reader = board.reader
+        self._stream = stream
+        self._commands = commands
+        self._latest = latest
+        self._queue = Queue(self._reader, is_taken=False)
+        self._thread: threading.Thread | None = None  # that takes
+        self._turn = threading.Lock()
+        self._reader.add(self._queue)
+
+    def set_aside(self) -> None:
+        """What arrives is looked at in another way: it need not be kept until somebody reads."""
+        if not self._queue.is_taken:
+            self._reader.remove(self._queue)
+
+    def also(self, on_news: Callable[[], None]) -> Queue:
+        """A queue of one's own for what arrives from now on; ``on_news`` is called on the reading thread."""
+        self._latest.report()
+        self.set_aside()
+        queue = Queue(self._reader, on_news)
+        self._reader.add(queue)
+        return queue
+
+    def go(self) -> None:
+        """Start the stream, with what was chosen last, unless it runs."""
+        self._latest.report()
+        self._stream.go()
+
+    def batches(self) -> Iterator[Batch]:
+        """See Hand.batches, which keeps the hand open meanwhile."""
+        stream, closing = self._stream, self._reader.closing
+        with self._by_one_thread():
+            self._begin()
+            self.go()
+            while True:
+                self._latest.report()
+                over = not stream.on  # before the queue is emptied, so that nothing is left in it
+                batch = self._queue.take(wait=not (over or closing.is_set()))
+                if batch is not None:
+                    yield batch
+                elif closing.is_set():
+                    self._reader.raise_closed()
+                elif over:
+                    return
+
+    def _begin(self) -> None:
+        if self._queue not in self._reader.consumers:
+            self._queue = Queue(self._reader)
+            self._reader.add(self._queue)
+        self._queue.is_taken = True
+
+    @contextmanager
+    def _by_one_thread(self) -> Iterator[None]:
+        here = threading.current_thread()
+        with self._turn:
+            before = self._thread
+            if before is not None and before is not here and before.is_alive():
+                raise InputError(
+                    f"thread {before.name!r} is reading this hand, and {here.name!r} would take part of its data; "
+                    "read in one thread, or give each an on_batch callback"
+                )
+            self._thread = here
+        try:
+            yield
+        finally:
+            self._thread = before
+
+    def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
+        """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
+
+        They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
+        reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
+        discarded. A ReadWarning tells of a Gap among them, and when a simulated source ended first: the array is then
+        shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
+        ValueError unless seconds is a number above 0.
+        """
+        batch = self._read(seconds, fresh)
+        for gap in (m for m in batch.messages if isinstance(m, Gap)):
+            warnings.warn(gap.line(), ReadWarning, stacklevel=3)
+        return batch.frames
+
+    def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
+        """Like ``read``, but returns the Batch: also the wire messages, PAC, events and Gaps of the same time."""
+        return self._read(seconds, fresh)
+
+    def _read(self, seconds: float, fresh: bool) -> Batch:
+        if not 0 < seconds < float("inf"):
+            raise ValueError(f"seconds is {seconds}, expected a number above 0")
+        if fresh and self._stream.on:
+            self._commands.ping()  # a barrier: its reply comes after everything made before
+            self._queue.clear()
+        taken: list[Batch] = []
+        end_us: int | None = None
+        first_status_us: int | None = None
+        for batch in self.batches():
+            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
+                first_status_us = status.t_us if first_status_us is None else first_status_us
+                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
+                    return join(taken)  # the board is there, its sensors are not
+            first_us, last_us = batch.first_t_us(), batch.last_t_us()
+            if end_us is None and first_us is not None:
+                end_us = first_us + round(seconds * 1e6)
+            if end_us is None or last_us is None or last_us < end_us:
+                taken.append(batch)
+                continue
+            now, later = split(batch, end_us)
+            self._queue.put_back(later)
+            return join([*taken, now])
+        if self._stream.ended:
+            text = f"the source of {self._board.link.port} ended before {seconds:g} s were read"
+            warnings.warn(text, ReadWarning, stacklevel=4)
+        return join(taken)
