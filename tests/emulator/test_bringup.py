@@ -22,13 +22,13 @@ DEFECTS = {
     "lead SS2 to nothing": ("sensor_missing", "2 of 3 sensors answer: finger 0, 1"),
     "lead SS0 to SS1;lead SS1 to SS0": ("lead_crossed", "the select of finger 0 ends at the sensor of finger 1"),
     "late bits above 5 MHz": ("bus_margin", "finger 0 is clean up to 4.81 MHz"),
-    "flash chip c84015": ("flash_unknown", "JEDEC id c84015"),
-    "erase in 600 ms": ("flash_slow", "a sector took 60"),
+    "flash chip c84015": ("flash_unknown", "flash: c84015"),
+    "erase in 600 ms": ("flash_slow", "erase of a sector: 60"),
     "supply at 3900 mV": ("supply", "mV; expected 4100 to 5500 mV"),
-    "clock 1.005 times as fast": ("clock_off", "ppm against USB's frames"),
+    "clock 1.005 times as fast": ("clock_off", "clock against USB: "),
     "finger 1 feels 0.02 of PDC": ("pressure_flat", "counts/N, up to "),
     "finger 1 feels 0 of E7": ("channel_stuck", "finger 1: E7"),
-    "lose a start of frame in 5": ("usb_frames", "starts of frame did not come"),
+    "lose a start of frame in 5": ("usb_frames", "lost starts of frame"),
 }
 
 

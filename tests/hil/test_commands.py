@@ -77,7 +77,7 @@ FOR_MAPS = (wire.BeginMap, wire.WriteMap, wire.EndMap, wire.ClearMap)
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
     """All that comes back for a message, sent so many times, and the PING behind it, but not the PING's reply."""
     overheard = Overheard()
-    hand._reader.add_tap(overheard)
+    hand._reader.add(overheard)
     hand.link.write(times * encode(message_id, payload))
     hand.ping()
     hand._reader.remove(overheard)

@@ -115,7 +115,7 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
     hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
     standstill = Overheard(still=True)
-    hand._reader.add_tap(standstill)
+    hand._reader.add(standstill)
     hand.link.release()
     while not hand.link.board.over:
         hand.link.board.hear(None)
@@ -181,7 +181,7 @@ def hurt(sent: bytes, draw: random.Random) -> bytes:
 def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
     overheard = Overheard()
-    hand._reader.add_tap(overheard)
+    hand._reader.add(overheard)
     hand.read(10)
     sent = overheard.sent
     truth = StreamDecoder().feed(sent)

@@ -14,7 +14,7 @@ import weakref
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn, Protocol, runtime_checkable
 
 from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from ..errors import DeviceLostError
@@ -51,6 +51,7 @@ class Last(Consumer, Protocol):
         """Let another thread read, if this one is held up or, ``at_once``, will be."""
 
 
+@runtime_checkable
 class Tap(Consumer, Protocol):
     """Takes the bytes themselves too, before the batch that they completed."""
 
@@ -89,7 +90,7 @@ class Reader:
         self.gaps = Gaps()
         self.consumers: tuple[Consumer, ...] = ()
         self.last: Last | None = None
-        self.taps: tuple[Tap, ...] = ()
+        self._taps: tuple[Tap, ...] = ()
         #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
         self.changed = threading.Condition()
         self._pid = os.getpid()
@@ -116,7 +117,7 @@ class Reader:
     def add(self, consumer: Consumer) -> None:
         """Pass everything that arrives from now on to ``consumer`` too."""
         with self.changed:
-            self.consumers = (*self.consumers, consumer)
+            self._set((*self.consumers, consumer))
 
     def read_in_another_thread(self) -> threading.Thread:
         """Let a new thread read. Returns the one that did, in which a consumer holds it up, and reads no more."""
@@ -130,18 +131,15 @@ class Reader:
         if threading.current_thread() is self._thread and self.last is not None:
             self.last.relieve(at_once=True)
 
-    def add_tap(self, tap: Tap) -> None:
-        """Pass the bytes to ``tap`` too, and the batches."""
-        self.add(tap)
-        with self.changed:
-            self.taps = (*self.taps, tap)
-
     def remove(self, consumer: Consumer) -> None:
         """Pass nothing more to ``consumer``."""
         with self.changed:
-            self.consumers = tuple(one for one in self.consumers if one is not consumer)
-            self.taps = tuple(one for one in self.taps if one is not consumer)
+            self._set(tuple(one for one in self.consumers if one is not consumer))
             self.changed.notify_all()
+
+    def _set(self, consumers: tuple[Consumer, ...]) -> None:
+        self.consumers = consumers
+        self._taps = tuple(one for one in consumers if isinstance(one, Tap))
 
     # ---- what has become of it -----------------------------------------------------------------
 
@@ -272,16 +270,16 @@ class Reader:
         fd, decoder = self.link.fd, self._decoder
         if fd is not None:
             batch = decoder.read(fd, POLL_S)
-            if batch is not None and self.taps:
+            if batch is not None and self._taps:
                 self._tap(decoder.chunk())
             return batch
         chunk = self.link.read(POLL_S)
-        if chunk and self.taps:
+        if chunk and self._taps:
             self._tap(chunk)
         return decoder.feed(chunk, time.monotonic()) if chunk else None
 
     def _tap(self, chunk: bytes) -> None:
-        for tap in self.taps:
+        for tap in self._taps:
             tap.put_raw(chunk)
 
     def _arrived(self, batch: Batch) -> None:

@@ -41,6 +41,7 @@ RATES_KHZ = (0, 4900, 5300, 5700, 6300, 7000, 7900, 9000)
 RATE_US = 250_000
 Floats = NDArray[np.float64]
 TOUCHED_N = 1.0
+UNKNOWN = "not measured"
 
 
 @dataclass(frozen=True)
@@ -228,48 +229,59 @@ def clean_khz(seen: Bringup, finger: int) -> tuple[int, int] | None:
     return (max(good), min(seen.rates)) if good else None
 
 
+@dataclass(frozen=True)
+class Measure:
+    """A value of the board's own, as text, and what is expected; ``code`` is the finding where it is not that."""
+
+    what: str
+    seen: str
+    expected: str
+    code: str = ""
+
+
+def of_board(seen: Bringup) -> list[Measure]:
+    """What the board measured of itself, empty where it cannot."""
+    if not seen.chip:
+        return []
+    last, ppm, lost = seen.chip[-1], clock_ppm(seen.chip), lost_starts(seen.idle)
+    flash, (low, high) = bytes(last.flash_id).hex(), SUPPLY_MV
+    found: list[tuple[str, str, str, str, bool]] = [
+        ("chip id", f"0x{last.chip_id:08X}", "revision in the first digit: 1 is B0 or B1, 2 is B2", "", False),
+        ("flash", f"{flash} {FLASH.get(flash, '')}".strip(), ", ".join(FLASH), "flash_unknown",
+         any(last.flash_id) and flash not in FLASH),
+        ("slots lost by late DMA", str(last.slots_dma_late), "none", "dma_late", last.slots_dma_late > 0),
+        ("starts that failed", str(last.early_faults), "none", "early_fault", last.early_faults > 0),
+        ("erase of a sector", f"{last.erase_us / 1000:.1f} ms", f"at most {ERASE_MAX_US / 1000:.0f} ms", "flash_slow",
+         last.erase_us > ERASE_MAX_US),
+        ("supply", f"{last.supply_mv} mV" if last.supply_mv else UNKNOWN, f"{low} to {high} mV", "supply",
+         bool(last.supply_mv) and not low <= last.supply_mv <= high),
+        ("temperature", UNKNOWN if last.die_centi_c == wire.INVALID_I16 else f"{last.die_centi_c / 100:.1f} degrees",
+         "-20 to 85 degrees", "", False),
+        ("clock against USB", UNKNOWN if ppm is None else f"{ppm:+.0f} ppm", f"within {CLOCK_PPM:g} ppm", "clock_off",
+         ppm is not None and abs(ppm) > CLOCK_PPM),
+        ("lost starts of frame", UNKNOWN if lost is None else "{} of {}".format(*lost), f"at most {LOST_STARTS}",
+         "usb_frames", lost is not None and lost[0] > LOST_STARTS),
+    ]  # fmt: skip
+    if len(seen.frames):
+        late_us = np.ptp(jitter_us(seen.of(seen.frames["finger"][0])))
+        expected = f"at most {JITTER_US:g} us"
+        found.append(("jitter of rounds", f"{late_us:.0f} us", expected, "slots_jitter", bool(late_us > JITTER_US)))
+    return [Measure(what, text, expected, code if is_bad else "") for what, text, expected, code, is_bad in found]
+
+
 def check(seen: Bringup, facts: Facts) -> Iterator[Finding]:
     """What is outside its range, the board first; beside what ``judge`` finds."""
-    yield from _board(seen)
-    yield from _link(seen)
-    if facts.board is not None:
-        yield from crossed(facts.board, seen.serials)
-        for finger in facts.board.present:
-            yield from _finger(seen, finger)
-
-
-def _board(seen: Bringup) -> Iterator[Finding]:
-    if not seen.chip:
-        return
-    last = seen.chip[-1]
-    flash = bytes(last.flash_id).hex()
-    if any(last.flash_id) and flash not in FLASH:
-        yield Finding("flash_unknown", f"JEDEC id {flash}; a Pico has {', '.join(FLASH)}")
-    if last.slots_dma_late:
-        yield Finding("dma_late", f"{last.slots_dma_late} slots were lost; expected none")
-    if last.early_faults:
-        yield Finding("early_fault", f"{last.early_faults} starts before this one failed; expected none")
-    if last.erase_us > ERASE_MAX_US:
-        yield Finding("flash_slow", f"a sector took {last.erase_us / 1000:.0f} ms to erase; its most is 400 ms")
-    if last.supply_mv and not SUPPLY_MV[0] <= last.supply_mv <= SUPPLY_MV[1]:
-        yield Finding("supply", f"{last.supply_mv} mV; expected {SUPPLY_MV[0]} to {SUPPLY_MV[1]} mV")
-    ppm = clock_ppm(seen.chip)
-    if ppm is not None and abs(ppm) > CLOCK_PPM:
-        yield Finding("clock_off", f"{ppm:+.0f} ppm against USB's frames; up to {CLOCK_PPM:.0f} ppm is normal")
-    if len(seen.frames):
-        late_us = jitter_us(seen.of(seen.frames["finger"][0]))
-        if np.ptp(late_us) > JITTER_US:
-            yield Finding("slots_jitter", f"{np.ptp(late_us):.0f} us; up to {JITTER_US:g} us is normal")
-
-
-def _link(seen: Bringup) -> Iterator[Finding]:
-    lost = lost_starts(seen.idle)
-    if lost is not None and lost[0] > LOST_STARTS:
-        yield Finding("usb_frames", f"{lost[0]} of {lost[1]} starts of frame did not come")
+    for one in of_board(seen):
+        if one.code:
+            yield Finding(one.code, f"{one.what}: {one.seen}; expected {one.expected}")
     for k, restart in enumerate(seen.restarts, 1):
         if restart.present != seen.restarts[0].present or restart.faults != wire.FaultFlags.STARTED:
             what = f"sensors {restart.present:#07b}, faults {wire.FaultFlags(restart.faults)!r}"
             yield Finding("restart", f"after restart {k}: {what}; after the first {seen.restarts[0].present:#07b}")
+    if facts.board is not None:
+        yield from crossed(facts.board, seen.serials)
+        for finger in facts.board.present:
+            yield from _finger(seen, finger)
 
 
 def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:

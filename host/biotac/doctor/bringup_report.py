@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import InputError
 from ..markdown import table
 from ..picture import picture
-from ..wire import messages_gen as wire
 from ..wire.identity import ascii_text, board_text, version_text
 from . import bringup
 from .bringup import Bringup
@@ -64,37 +63,13 @@ def _findings(findings: Sequence[Finding]) -> list[str]:
 def _board(seen: Bringup) -> list[str]:
     if not seen.chip:
         return ["The board measures nothing of itself: its firmware or its kind does not.", ""]
-    last, ppm, lost = seen.chip[-1], bringup.clock_ppm(seen.chip), bringup.lost_starts(seen.idle)
-    low, high = bringup.SUPPLY_MV
-    flash = bytes(last.flash_id).hex()
-    rows = [
-        ["chip id", f"0x{last.chip_id:08X}", "revision in the first digit: 1 is B0 or B1, 2 is B2"],
-        ["flash", f"{flash} {bringup.FLASH.get(flash, '')}", ", ".join(bringup.FLASH)],
-        ["slots lost by late DMA", str(last.slots_dma_late), "none"],
-        ["starts that failed", str(last.early_faults), "none"],
-        ["erase of a sector", f"{last.erase_us / 1000:.1f} ms", f"at most {bringup.ERASE_MAX_US / 1000:.0f} ms"],
-        ["supply", f"{last.supply_mv} mV" if last.supply_mv else "not measured", f"{low} to {high} mV"],
-        ["temperature", _celsius(last), "-20 to 85 degrees"],
-        [
-            "clock against USB",
-            "not measured" if ppm is None else f"{ppm:+.0f} ppm",
-            f"within {bringup.CLOCK_PPM:g} ppm",
-        ],
-        ["lost starts of frame", "not measured" if lost is None else "{} of {}".format(*lost), "none"],
-    ]
-    if len(seen.frames):
-        late_us = bringup.jitter_us(seen.of(seen.frames["finger"][0]))
-        rows.append(["jitter of rounds", f"{np.ptp(late_us):.0f} us", f"at most {bringup.JITTER_US:g} us"])
+    rows = [[one.what, one.seen, one.expected] for one in bringup.of_board(seen)]
     if seen.restarts:
         took_s = [restart.seconds for restart in seen.restarts]
         rows.append(
             ["restarts", f"{len(took_s)} of {bringup.RESTARTS}, {min(took_s):.1f} to {max(took_s):.1f} s", "all"]
         )
     return ["## The board", "", *table(["what", "seen", "expected"], rows)]
-
-
-def _celsius(facts: wire.BoardFacts) -> str:
-    return "not measured" if facts.die_centi_c == wire.INVALID_I16 else f"{facts.die_centi_c / 100:.1f} degrees"
 
 
 def _fingers(seen: Bringup, facts: Facts) -> list[str]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from serial.tools.list_ports_common import ListPortInfo
+
 from ..board.handshake import HandWarning
 from ..clock import Fit
 from ..errors import BiotacError
-from ..link.discovery import SerialPort
 from ..link.holders import Holder
 from ..wire import messages_gen as wire
 from ..wire.batches import LinkStats
@@ -19,7 +20,7 @@ from ..wire.frames import StructArray
 class SystemFacts:
     """Facts about this computer, found without opening a port."""
 
-    boards: list[SerialPort] = field(default_factory=list)
+    boards: list[ListPortInfo] = field(default_factory=list)
     usb_boards: int = 0  #: devices with our USB ids, with or without a serial port; Linux only
     loaders: list[str] = field(default_factory=list)  #: where boards wait in their boot loader
     permitted: bool = True  #: this user may read and write the port

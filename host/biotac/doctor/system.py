@@ -9,7 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..link.discovery import SERIAL_PREFIX, SerialPort, boards, same_serial
+from serial.tools.list_ports_common import ListPortInfo
+
+from ..link.discovery import SERIAL_PREFIX, boards, same_serial
 from ..link.holders import holders
 from ..wire import messages_gen as wire
 from .facts import SystemFacts
@@ -47,7 +49,7 @@ def look(port: str | None, *, root: Path = Path("/"), entries: Iterable[Any] | N
     )
 
 
-def device_of(port: str | None, found: list[SerialPort]) -> str | None:
+def device_of(port: str | None, found: list[ListPortInfo]) -> str | None:
     """The device of ``port``, or of the only board if ``port`` is None; None if no board or several match."""
     if port is not None and not port.startswith(SERIAL_PREFIX):
         return port

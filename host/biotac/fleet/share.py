@@ -55,7 +55,7 @@ class Share:
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
         self._new_epoch()
-        hand._reader.add_tap(self)
+        hand._reader.add(self)
         hand.stream()
 
     def _new_epoch(self) -> None:

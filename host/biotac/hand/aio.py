@@ -10,7 +10,6 @@ import os
 import threading
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
-from types import TracebackType
 from typing import NoReturn, TypeVar
 
 from ..errors import DeviceLostError
@@ -56,9 +55,7 @@ class AsyncHand:
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, kind: object, error: object, trace: object) -> None:
         await asyncio.to_thread(self.hand.__exit__, kind, error, trace)
 
     @property

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from ..board.board import Board
@@ -57,7 +56,7 @@ class Recorder:
         self._due = threading.Event()
         self._thread = board.reader.thread(self._run, "recorder")
         self._thread.start()
-        board.reader.add_tap(self)
+        board.reader.add(self)
 
     @property
     def path(self) -> Path:
@@ -120,9 +119,7 @@ class Recorder:
     def __enter__(self) -> Recorder:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
 
     # ---- on the reading thread -----------------------------------------------------------------
@@ -213,7 +210,5 @@ class Mark:
     def __enter__(self) -> None:
         """It has begun already."""
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._recorder._end(self._label)

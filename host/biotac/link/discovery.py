@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
 
 from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
 
 from ..errors import PortError
 from ..wire import messages_gen as wire
@@ -15,39 +14,27 @@ from .serial_port import SerialLink
 SERIAL_PREFIX = "serial:"
 
 
-@dataclass(frozen=True)
-class SerialPort:
-    """What the operating system says about one serial port."""
-
-    device: str
-    description: str
-    serial_number: str | None  # of the USB device
-    vendor: int | None
-    product: int | None
-
-    @property
-    def is_board(self) -> bool:
-        """Whether it has the USB ids of our firmware."""
-        return (self.vendor, self.product) == (wire.USB_VENDOR, wire.USB_PRODUCT)
+def is_board(port: ListPortInfo) -> bool:
+    """Whether it has the USB ids of our firmware."""
+    return (port.vid, port.pid) == (wire.USB_VENDOR, wire.USB_PRODUCT)
 
 
-def serial_ports(entries: Iterable[Any] | None = None) -> list[SerialPort]:
-    """All serial ports, COM3 before COM10; ``entries`` are pyserial's, by default those of this computer.
+def serial_ports(entries: Iterable[ListPortInfo] | None = None) -> list[ListPortInfo]:
+    """All serial ports as pyserial describes them, COM3 before COM10; ``entries`` by default those of this computer.
 
     On macOS a port has two names; /dev/cu.* is kept, because opening /dev/tty.* waits for a modem's carrier.
     """
-    listed = sorted(list_ports.comports() if entries is None else entries)
-    ports = [SerialPort(e.device, str(e.description), e.serial_number, e.vid, e.pid) for e in listed]
+    ports = sorted(list_ports.comports() if entries is None else entries)
     calling = {port.device for port in ports if port.device.startswith("/dev/cu.")}
     return [port for port in ports if port.device.replace("/dev/tty.", "/dev/cu.", 1) not in calling - {port.device}]
 
 
-def boards(entries: Iterable[Any] | None = None) -> list[SerialPort]:
+def boards(entries: Iterable[ListPortInfo] | None = None) -> list[ListPortInfo]:
     """The ports with our USB ids."""
-    return [port for port in serial_ports(entries) if port.is_board]
+    return [port for port in serial_ports(entries) if is_board(port)]
 
 
-def choose(serial_number: str | None = None, entries: Iterable[Any] | None = None) -> str:
+def choose(serial_number: str | None = None, entries: Iterable[ListPortInfo] | None = None) -> str:
     """Device path of the board with this serial number; None: of the only board.
 
     Raises PortError, naming the boards that are there, when none or several fit.
@@ -55,7 +42,7 @@ def choose(serial_number: str | None = None, entries: Iterable[Any] | None = Non
     found = boards(entries)
     fitting = [p for p in found if serial_number is None or same_serial(p.serial_number, serial_number)]
     if len(fitting) == 1:
-        return fitting[0].device
+        return str(fitting[0].device)
     there = ", ".join(f"{SERIAL_PREFIX}{p.serial_number} on {p.device}" for p in found)
     if not found:
         wanted = "no board" if serial_number is None else f"no board with serial number {serial_number}"

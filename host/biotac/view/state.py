@@ -116,12 +116,10 @@ class State:
     def begin(self, player: Player) -> None:
         """Start a new epoch, and forget rows, status and tares of the previous one."""
         with self._news:
-            self._health.epoch += 1
+            source, epoch = self._health.source, self._health.epoch + 1
+            self._health = Health(source=source, board=player.board, live=player.live, epoch=epoch)
             self._frames.clear()
             self._pac.clear()
-            self._health.board, self._health.live = player.board, player.live
-            self._health.status, self._health.fingers = {}, {}
-            self._health.events.clear()
             self._arrived.clear()
 
     def take(self, batch: Batch, player: Player) -> None:

@@ -101,8 +101,8 @@ def rows(name: str, values: Callable[[np.ndarray], Any]) -> Callable[[Bringup], 
 
 EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
     ("flash_unknown", chip(flash_id=(0xC8, 0x40, 0x15)), "c84015"),
-    ("dma_late", chip(slots_dma_late=3), "3 slots"),
-    ("early_fault", chip(early_faults=2), "2 starts"),
+    ("dma_late", chip(slots_dma_late=3), "late DMA: 3; expected none"),
+    ("early_fault", chip(early_faults=2), "failed: 2; expected none"),
     ("flash_slow", chip(erase_us=400_001), "400 ms"),
     ("supply", chip(supply_mv=4099), "4099 mV"),
     ("supply", chip(supply_mv=5501), "5501 mV"),

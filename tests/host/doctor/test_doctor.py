@@ -30,7 +30,6 @@ from biotac.errors import (
     PortError,
     WireVersionError,
 )
-from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder
 from biotac.version import __version__
 from biotac.wire import messages_gen as wire
@@ -108,8 +107,10 @@ def link(**counters: int) -> Facts:
     return board(stats=dataclasses.replace(healthy().stats, **counters))
 
 
-def port(device: str, number: str) -> SerialPort:
-    return SerialPort(device, "", number, wire.USB_VENDOR, wire.USB_PRODUCT)
+def port(device: str, number: str) -> ListPortInfo:
+    info = ListPortInfo(device, skip_link_detection=True)
+    info.serial_number, info.vid, info.pid = number, wire.USB_VENDOR, wire.USB_PRODUCT
+    return info
 
 
 # What there is -> the one code that must come, and what its words must name.

@@ -7,10 +7,12 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
+from serial.tools.list_ports_common import ListPortInfo
+
 from ...errors import BiotacError, printable
 from ...hand.hand import Hand
 from ...link import open_link
-from ...link.discovery import SerialPort, serial_ports
+from ...link.discovery import is_board, serial_ports
 from ...sim.loading import bundled_scenarios
 from ...wire.identity import board_name, serial_text, version_text
 from ..outputs import say
@@ -31,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
+    ports = [describe(port, ask=is_board(port) or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
     running = simulated()
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []
@@ -82,12 +84,12 @@ def _shared(endpoint: str | None) -> list[dict[str, Any]]:
         return [{"port": f"zenoh:{facts['name']}", **facts} for facts in network.shared(session)]
 
 
-def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
+def describe(port: ListPortInfo, *, ask: bool) -> dict[str, Any]:
     """What the operating system knows about a port and, if ``ask``, what the port answers."""
     facts: dict[str, Any] = {
         "port": port.device,
-        "is_board": port.is_board,
-        "description": port.description,
+        "is_board": is_board(port),
+        "description": str(port.description),
         "serial_number": port.serial_number,
     }
     if ask:
