@@ -152,7 +152,7 @@ def dumps(trained: Trained) -> str:
     """The map as JSON, one line for each column."""
     rounded = np.array([_short(row) for row in trained.population.coefficients])
     # the board's map is made from the rounded coefficients, so that a reader of the file gets the same one
-    on_board = board_map([(*name, values) for name, values in split(_BLOCKS, rounded).items()])
+    on_board = board_map(split(_BLOCKS, rounded))
     rows = np.column_stack([rounded, trained.population.variance])
     document = sealed(
         {

@@ -18,7 +18,7 @@ from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
 from ..wire.native import ffi, lib
-from .compiled import FORCE_GAINS, TORQUE_GAINS, default_settings, formula_settings
+from .compiled import FORCE_GAINS, TORQUE_GAINS, board_settings, default_settings, formula_settings
 
 #: poc_mm, force_n and torque_nmm of one frame; names, units and axes are as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
@@ -166,10 +166,7 @@ def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
         if key not in _DEFAULTS:
             raise ValueError(f"settings contain {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
     chosen = {key: int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS}
-    for key, value in chosen.items():
-        spec = wire.SETTINGS[key]
-        if not spec.low <= value <= spec.high:
-            raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
+    board_settings(chosen)  # raises ValueError for a value out of range
     plan = ffi.new("bt_block_plan *")
     from ..map import population  # here: everybody would wait for it at `import biotac`
 

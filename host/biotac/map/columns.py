@@ -51,11 +51,11 @@ def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Si
     return Signals(np.where(missing, 0.0, counts - tare), tare)
 
 
-def summed(blocks: Iterable[tuple[Kind, Gate, Floats]], signals: Signals) -> Floats:
+def summed(blocks: Iterable[tuple[tuple[Kind, Gate], Floats]], signals: Signals) -> Floats:
     """The sum of blocks (n, axes), each with coefficients (columns, axes)."""
     found, gate = kinds(signals), gates(signals.e)
     total: Floats = np.zeros(())
-    for kind, which, coefficients in blocks:
+    for (kind, which), coefficients in blocks:
         total = total + found[kind] @ coefficients * gate[which]
     return total
 

@@ -115,13 +115,7 @@ def quantise(blocks: Unrounded, serial: str = "", made_s: int = 0) -> BoardMap:
     kept = tuple(_block(kind, gate, values) for (kind, gate), values in blocks.items() if np.any(values != 0.0))
     if not kept:
         raise InputError("every coefficient of the map is 0: expected a fitted map; calibrate again")
-    axes = kept[0].coefficients.shape[1]
-    size = _map.HEADER_BYTES + sum(_map.BLOCK_BYTES + 2 * axes * _map.KINDS[block.kind].halves for block in kept)
-    if size > _map.MAX_BYTES:
-        raise InputError(
-            f"the map takes {size} bytes: expected at most {_map.MAX_BYTES}, which fit a board; choose a smaller model"
-        )
-    return BoardMap(axes, kept, serial, made_s)
+    return BoardMap(kept[0].coefficients.shape[1], kept, serial, made_s)
 
 
 def _block(kind: Kind, gate: Gate, values: Floats) -> BoardBlock:

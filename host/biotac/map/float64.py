@@ -88,7 +88,10 @@ def exact(
 ) -> Floats:
     """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results()."""
     blocks = [
-        (block.kind, block.gate, block.coefficients * (unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)))
+        (
+            (block.kind, block.gate),
+            block.coefficients * (unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)),
+        )
         for block in board_map.blocks
     ]
     parts = [summed(blocks, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]

@@ -30,7 +30,6 @@ from .fitted import quantise
 from .float64 import derived_torque_x
 
 SHIPPED = "population.json"
-Block = tuple[Kind, Gate, Floats]
 Integers = npt.NDArray[np.int64]
 
 ALL = 256  # the share 1
@@ -58,17 +57,17 @@ def shipped() -> str:
 
 
 @cache
-def blocks() -> list[Block]:
-    """Kind, gate and coefficients (columns, 3) in N of each block."""
+def blocks() -> dict[tuple[Kind, Gate], Floats]:
+    """The coefficients (columns, 3) in N of each block."""
     facts = json.loads(shipped())
     named = [(Kind[kind], Gate[gate]) for kind, gate in facts["blocks"]]
     coefficients = np.array(facts["coefficients_n_and_variance"], dtype=np.float64)[:, :3]
-    return [(*name, values) for name, values in split(named, coefficients).items()]
+    return split(named, coefficients)
 
 
-def board_map(each: list[Block]) -> BoardMap:
-    """The blocks as a board's map. Raises InputError when they do not fit the board's formats."""
-    return quantise({(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in each})
+def board_map(newtons: Mapping[tuple[Kind, Gate], Floats]) -> BoardMap:
+    """Such blocks as a board's map. Raises InputError when they do not fit the board's formats."""
+    return quantise({block: values * FORCE_LSB_PER_N for block, values in newtons.items()})
 
 
 @dataclass(frozen=True)
@@ -142,15 +141,15 @@ def replace_force(
         rows = slice(start, start + _CHUNK_ROWS)
         signals = tared(counts[rows], tare_q4[rows])
         by_board = board_force_100un(counts[rows], tare_q4[rows])
-        force_n[rows] = likeness(signals.e, by_board).mixed(summed(blocks(), signals))
+        force_n[rows] = likeness(signals.e, by_board).mixed(summed(blocks().items(), signals))
     torque_nmm[:, 0] = derived_torque_x(poc_mm, force_n)
 
 
 @cache
 def compiled_coefficients() -> Any:
     """The coefficients as host/binding/population_float64.h wants them; they live as long as the process."""
-    if [(kind, gate) for kind, gate, _ in blocks()] != _COMPILED:
+    if list(blocks()) != _COMPILED:
         raise ValueError(
             f"{SHIPPED} has different blocks from host/binding/population_float64.c; retrain it with this version"
         )
-    return ffi.new("double[]", (np.concatenate([c for *_, c in blocks()]) / SIGNAL_COUNTS).ravel().tolist())
+    return ffi.new("double[]", (np.concatenate(list(blocks().values())) / SIGNAL_COUNTS).ravel().tolist())

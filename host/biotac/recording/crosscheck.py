@@ -234,7 +234,7 @@ def _likeness(messages: StructArray) -> population.Likeness:
 def _population_bound_n(messages: StructArray) -> NDArray[np.float64]:
     """Bound (n, 3) of the population map's force in N from its formats; what it is mixed with is exact."""
     part = (_likeness(messages).share / population.ALL)[:, None]
-    wanted = {(kind, gate): values * FORCE_LSB_PER_N for kind, gate, values in population.blocks()}
+    wanted = {block: values * FORCE_LSB_PER_N for block, values in population.blocks().items()}
     off = bound_of(population.on_board(), wanted, tared(messages["counts"], messages["tare_q4"])) / FORCE_LSB_PER_N
     result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + 0.5 / FORCE_LSB_PER_N
     return result

@@ -41,21 +41,6 @@ def test_the_closed_form_undoes_the_forward_computation(torsion: str) -> None:
     assert found.on_skin.all()
 
 
-def test_known_contacts() -> None:
-    # 3 N straight up at the pad's middle, 8 mm behind the sphere's centre: m = c x f = (0, 24, 0)
-    pad = locate(np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 24.0, 0.0]]))
-    np.testing.assert_allclose(pad.point_mm, [[-8.0, 0.0, -R]], atol=1e-12)
-    assert pad.normal_force_n[0] == pytest.approx(3.0)
-    assert pad.torsion_nmm[0] == pytest.approx(0.0)
-    # the same with 4 N mm about the outward normal, which is -z there
-    twisted = locate(np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 24.0, -4.0]]))
-    np.testing.assert_allclose(twisted.point_mm, [[-8.0, 0.0, -R]], atol=1e-12)
-    assert twisted.torsion_nmm[0] == pytest.approx(4.0)
-    # straight onto the tip, along -x: the line through the centre has no moment
-    tip = locate(np.array([[-2.0, 0.0, 0.0]]), np.zeros((1, 3)))
-    np.testing.assert_allclose(tip.point_mm, [[R, 0.0, 0.0]], atol=1e-12)
-
-
 def test_what_has_no_contact_is_nan_and_flagged() -> None:
     force = np.array([[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 2.0], [0.0, 0.0, -2.0]])
     # third: pulls its line of action 20 mm aside; fourth: 40 mm behind the origin; fifth: pushed from the nail's side

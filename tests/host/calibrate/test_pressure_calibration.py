@@ -98,17 +98,6 @@ def write_patient_scenario(folder: Path) -> Path:
     return path
 
 
-def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) -> None:
-    """As a real one: stopped and set, with what each finger has of its own left as it was."""
-    with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
-        hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
-        (found,) = calibrate(hand, Silent(), fingers=(0,), made_s=77)
-        assert hand.board.calibration(0) == found.calibration
-    own = found.calibration
-    assert (own.thermal_gain_milli, own.made_s, own.serial) == (321, 77, "BTSIM00000000001")
-    assert found.verified.board_error <= 0.059
-
-
 class Scale(Silent):
     """Somebody reads a scale, whose newtons are the ones that were asked for."""
 
@@ -116,11 +105,15 @@ class Scale(Silent):
         return step.force_n
 
 
-def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) -> None:
-    """As on a real port: nothing behind it that knows a truth."""
+def test_a_board_whose_time_passes_is_calibrated_to_a_scale_in_one_session(tmp_path: Path) -> None:
+    """As a real one: nothing behind it knows a force; stopped and set, with what the finger has of its own kept."""
     with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
+        hand.board.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         hand.link.source = None
-        (found,) = calibrate(hand, Scale(), fingers=(0,), made_s=1)
+        (found,) = calibrate(hand, Scale(), fingers=(0,), made_s=77)
+        assert hand.board.calibration(0) == found.calibration
+    own = found.calibration
+    assert (own.thermal_gain_milli, own.made_s, own.serial) == (321, 77, "BTSIM00000000001")
     assert found.verified.board_error <= 0.059
     assert found.fit.press_forces_n == CALIBRATION_FORCES_N
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from biotac.calibrate.reference.scale import Scale
+from biotac.calibrate.reference.scale import SerialScale
 from biotac.cli.main import main
 from biotac.errors import InputError, PortError
 
@@ -61,7 +61,7 @@ def printing(lines: list[bytes]) -> Iterator[str]:
     ],
 )
 def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
-    with printing([printed]) as port, Scale(port, PATIENCE_S) as scale:
+    with printing([printed]) as port, SerialScale(port, PATIENCE_S) as scale:
         assert scale.force_n() == pytest.approx(force_n)
         assert scale.force_n() == pytest.approx(force_n)
 
@@ -80,7 +80,7 @@ def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
     ],
 )
 def test_what_is_no_reading_is_one_line(printed: bytes, message: str) -> None:
-    with printing([printed]) as port, Scale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
+    with printing([printed]) as port, SerialScale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
         scale.force_n()
     assert message in str(refused.value) and "\n" not in str(refused.value)
 
@@ -88,17 +88,17 @@ def test_what_is_no_reading_is_one_line(printed: bytes, message: str) -> None:
 @pytest.mark.parametrize("query", ["?baud=fast", "?speed=9600", "?parity=X"])
 def test_a_form_that_is_not_known_is_refused(query: str) -> None:
     with pytest.raises(InputError, match="baud=9600"):
-        Scale(f"/dev/null{query}")
+        SerialScale(f"/dev/null{query}")
 
 
 def test_a_port_that_is_not_there_is_named() -> None:
     with pytest.raises(PortError, match="no port /dev/nowhere"):
-        Scale("/dev/nowhere")
+        SerialScale("/dev/nowhere")
 
 
 def test_a_scale_that_is_unplugged_is_told() -> None:
     with printing([b"S S 1 g\r\n"]) as port:
-        scale = Scale(port)
+        scale = SerialScale(port)
     with scale, pytest.raises(PortError, match="lost the connection to the scale"):
         scale.force_n()
 

@@ -207,14 +207,6 @@ def test_the_integers_mean_the_fitted_map() -> None:
     assert np.abs(exact(stored, counts, tare_q4, pdc_q4) - truth).max() < 1e-3 * np.abs(truth).max()
 
 
-def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    stored = random_map(5, 7)
-    size = len(stored.on_board().blob)
-    monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
-    with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, which fit a board"):
-        stored.on_board()
-
-
 def spec_round(value: int, bits: int) -> int:
     """Half up, as SPEC.md has every cut; Python's >> is floor."""
     return (value + (1 << bits - 1)) >> bits

@@ -93,7 +93,7 @@ def noise(values: Any) -> float:
 
 
 class Presses:
-    """Follows one finger through ``count`` presses. Feed it rows; they are its only clock.
+    """Follows one finger through ``count`` presses, row by row; they are its only clock.
 
     With ``needs_force``, rows without a reference do not count as held, whatever the pressure does.
     """
@@ -114,19 +114,12 @@ class Presses:
         """Whether every press was seen and released (after finish(), the last need not be)."""
         return self.phase is Phase.DONE
 
-    def feed(self, rows: StructArray) -> int:
-        """Take rows (n,) of this finger, up to the one that ends its last press; returns how many were taken.
-
-        Raises InputError that says why after a minute in one phase.
-        """
-        for k, row in enumerate(rows):
-            if self.phase is Phase.DONE:
-                return k
-            self._waited += 1
-            self._take(row)
-            if self._waited >= GIVE_UP_ROWS:
-                raise InputError(self.why())
-        return len(rows)
+    def take(self, row: Any) -> None:
+        """Take this finger's next row. Raises InputError that says why after a minute in one phase."""
+        self._waited += 1
+        self._take(row)
+        if self._waited >= GIVE_UP_ROWS:
+            raise InputError(self.why())
 
     def finish(self) -> None:
         """End: no more rows come. Raises InputError unless every press was seen."""
@@ -275,11 +268,15 @@ class Procedure:
         ]
 
     @property
+    def _turn(self) -> tuple[Presses, tuple[float, ...]] | None:
+        return next((turn for turn in self._turns if not turn[0].done), None)
+
+    @property
     def step(self) -> Step | None:
         """What to do now; None when all is done."""
-        machine, forces_n = next((turn for turn in self._turns if not turn[0].done), (None, ()))
-        if machine is None:
+        if self._turn is None:
             return None
+        machine, forces_n = self._turn
         number = len(machine.presses) + (machine.phase is not Phase.RELEASE)
         return Step(machine.finger, machine.phase, number, len(forces_n), forces_n[number - 1])
 
@@ -314,15 +311,12 @@ class Procedure:
 
         Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
         """
-        for machine, _ in self._turns:
-            if machine.done:
-                continue
-            own = rows[rows["finger"] == machine.finger]
-            taken = machine.feed(own)
-            if not machine.done:
+        for row in rows:
+            if self._turn is None:
                 return
-            # The next finger begins after this row, even if later rows came in the same call.
-            rows = rows[rows["t_us"] > own["t_us"][taken - 1]] if taken else rows
+            machine, _ = self._turn
+            if row["finger"] == machine.finger:
+                machine.take(row)
 
     def finish(self, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
         """End: no more rows come. The presses by finger, each with what a scale showed in asked()'s order, if given.

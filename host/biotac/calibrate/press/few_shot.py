@@ -84,10 +84,7 @@ def weighed(population: Population, columns: Floats, force_n: Floats) -> Populat
     A mixing of the axes, nine numbers, is fitted first; what it leaves then changes the columns' coefficients.
     """
     mixing, _ = mixing_of(columns @ population.coefficients, force_n)
-    mixed = replace(population, coefficients=population.coefficients @ mixing)
-    k = len(columns)
-    mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))
-    return pulled(mixed, mean, WEIGHT_S * k)
+    return _pulled_by_presses(replace(population, coefficients=population.coefficients @ mixing), columns, force_n)
 
 
 def plated(population: Population, columns: Floats, force_n: Floats) -> Population:
@@ -98,9 +95,13 @@ def plated(population: Population, columns: Floats, force_n: Floats) -> Populati
     """
     felt_n = columns @ normals()
     gain = (felt_n * force_n).sum() / (felt_n**2).sum()
+    return _pulled_by_presses(replace(population, coefficients=gain * normals()), columns, force_n)
+
+
+def _pulled_by_presses(population: Population, columns: Floats, force_n: Floats) -> Population:
     k = len(columns)
     mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))
-    return pulled(replace(population, coefficients=gain * normals()), mean, WEIGHT_S * k)
+    return pulled(population, mean, WEIGHT_S * k)
 
 
 def pulled(population: Population, new: Sums, seconds: float) -> Population:

@@ -1,6 +1,6 @@
 """The rows that presses are found in, and the force to calibrate to: a magnitude in N for every frame (Eq 2).
 
-There is no driver for a force plate here; anything that gives newtons at device times can be a ``Reference``.
+There is no driver for a force plate here; anything that gives newtons at device times can be a ``ForceSource``.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ MIN_CORRELATION = 0.9
 MAX_FORCE_N = 200.0  # more than a finger withstands; values in millinewtons and grams exceed it
 
 
-class Reference(Protocol):
-    """Source of the force on the finger that is pressed."""
+class ForceSource(Protocol):
+    """What knows the force on the finger that is pressed."""
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
         """Magnitude (n,) in N at device times (n,), NaN where it is not known."""
@@ -48,7 +48,7 @@ ROW_DTYPE = np.dtype(
 )
 
 
-def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: Reference | None = None) -> StructArray:
+def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: ForceSource | None = None) -> StructArray:
     """Rows (n,) from FRAME messages (n,) and their unwrapped times (n,), with the reference's force."""
     out = np.empty(len(messages), ROW_DTYPE)
     out["finger"], out["t_us"] = messages["finger"], t_us
@@ -117,7 +117,7 @@ class Series:
         self._t_s, self._force_n = t_s, force_n
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        """See Reference.at; the force is the same for all fingers, as they share one plate."""
+        """See ForceSource.at; the force is the same for all fingers, as they share one plate."""
         force_n: Floats = np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan)
         return force_n
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from ...hand.hand import Hand
 from .detector import Press, Procedure, Step
-from .force_source import Reference, rows_of
+from .force_source import ForceSource, rows_of
 
 
 class Face(Protocol):
@@ -22,7 +22,7 @@ class Face(Protocol):
 def guide(
     hand: Hand,
     procedure: Procedure,
-    reference: Reference | None,
+    reference: ForceSource | None,
     face: Face | None,
 ) -> dict[int, list[Press]]:
     """Feed ``procedure`` with what ``hand`` streams until it is done; the presses by finger, each with its force.

@@ -16,8 +16,9 @@ from ...hand.hand import Hand
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ..population import Population, by_columns
+from ..wrench.figures import angles_deg, rmse
 from .detector import Press, Procedure
-from .force_source import Reference, rows_of
+from .force_source import ForceSource, rows_of
 from .guide import Face, guide
 
 LEAST_PRESSES = 3
@@ -27,7 +28,7 @@ ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # on a scale: light and firm in turn; start
 SIDE = 0.3  # component of a plate's normal, on each side
 
 #: From a map, and columns (k, 114) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
-Fit = Callable[[Population, Floats, Floats], Population]
+Fitter = Callable[[Population, Floats, Floats], Population]
 
 
 @dataclass(frozen=True)
@@ -81,21 +82,15 @@ class Found:
         return ""
 
 
-def found(population: Population, held: Held, fit: Fit) -> Found:
+def found(population: Population, held: Held, fit: Fitter) -> Found:
     """The finger's own map by ``fit``, and its errors. Raises InputError for presses that ``fit`` cannot use."""
     columns, force_n = held.columns, held.force_n
     own = fit(population, columns, force_n)
     every = np.arange(len(force_n))
     out = [columns[k] @ fit(population, columns[every != k], force_n[every != k]).coefficients for k in every]
-    both = columns @ population.coefficients, np.array(out)
-    rms = [np.sqrt(((felt_n - force_n) ** 2).mean(axis=0)) for felt_n in both]
-    return Found(own, *rms, *(float(np.median(angles_deg(felt_n, force_n))) for felt_n in both))
-
-
-def angles_deg(a: Floats, b: Floats) -> Floats:
-    """Angles (k,) between the rows of two (k, 3)."""
-    angles: Floats = np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)))
-    return angles
+    before, held_out = columns @ population.coefficients, np.array(out)
+    deg = [float(np.median(angles_deg(felt_n, force_n))) for felt_n in (before, held_out)]
+    return Found(own, rmse(before, force_n), rmse(held_out, force_n), *deg)
 
 
 def of_plate(held: Held, population: Population) -> Held:
@@ -122,7 +117,7 @@ def guided(
     forces_n: Sequence[float],
     face: Face,
     *,
-    reference: Reference | None = None,
+    reference: ForceSource | None = None,
     toward: Sequence[Sequence[float]] | None = None,
 ) -> Held:
     """Presses on a board, one for each of ``forces_n`` (k,): ``face`` says what to do, and gives the force of each.

@@ -34,7 +34,7 @@ _WEIGHT = re.compile(
 _BEYOND = re.compile(r"S[IR]*\s+[-+]|OL,.*")
 
 
-class Scale:
+class SerialScale:
     """The scale at ``port``, opened with its options (``?baud=`` etc.)."""
 
     def __init__(self, port: str, patience_s: float = PATIENCE_S) -> None:
@@ -55,7 +55,7 @@ class Scale:
         except (serial.SerialException, OSError) as error:
             raise open_error(device, error) from error
 
-    def __enter__(self) -> Scale:
+    def __enter__(self) -> SerialScale:
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -39,10 +39,14 @@ def median_angle_deg(predicted: Floats, truth: Floats) -> float:
     firm = size >= ANGLE_MIN_N
     if not firm.any():
         return float("nan")
-    a, b = predicted[firm, :3], truth[firm, :3]
+    return float(np.median(angles_deg(predicted[firm, :3], truth[firm, :3])))
+
+
+def angles_deg(a: Floats, b: Floats) -> Floats:
+    """Angles (k,) between the rows of two (k, 3)."""
     # atan2 is exact for small angles, which acos rounds to 0
-    angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
-    return float(np.degrees(np.median(angle)))
+    angles: Floats = np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)))
+    return angles
 
 
 def confusion(predicted: Floats, truth: Floats) -> Floats:

@@ -16,7 +16,7 @@ from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
 from ...calibrate.press.detector import MAX_N, Phase, Step
 from ...calibrate.press.force_source import Truth, load_csv
-from ...calibrate.reference.scale import UNITS_N, Scale
+from ...calibrate.reference.scale import UNITS_N, SerialScale
 from ...calibrate.wrench.upload import upload
 from ...documents import write_new
 from ...errors import CommandRefusedError, InputError
@@ -186,7 +186,7 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
         )
         return known_force.guided(hand, finger, asked_n, face)
     if args.scale:
-        with Scale(args.scale) as scale:
+        with SerialScale(args.scale) as scale:
             return known_force.guided(hand, finger, asked_n, _Guide(press, lambda step: scale.force_n(), "let go"))
     _check_terminal(hand, args.where)
     face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go")
