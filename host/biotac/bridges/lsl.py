@@ -65,10 +65,11 @@ class Outlet:
         self._outlets: dict[tuple[int, str], Any] = {}
         rounds_hz = hand.info.slot_hz / len(SLOTS)
         for finger in hand.fingers:
-            self._add(finger, "", _FRAME_COLUMNS, rounds_hz)
-            self._add(finger, " PAC", (_PAC_COLUMN,), rounds_hz * _PAC_PER_ROUND)
+            frame = [(name, column) for column in _FRAME_COLUMNS for name in column.flat_names()]
+            self._add(finger, "", rounds_hz, frame)
+            self._add(finger, " PAC", rounds_hz * _PAC_PER_ROUND, [("PAC", _PAC_COLUMN)])
         for finger in hand.fingers:
-            self._add_markers(finger)
+            self._add(finger, EVENTS, self._lsl.IRREGULAR_RATE, [])
 
     def push(self, batch: Batch) -> None:
         """Send what ``batch`` holds. Raises DeviceLostError when the board no longer answers."""
@@ -99,13 +100,11 @@ class Outlet:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def _add(self, finger: int, suffix: str, columns: tuple[Field, ...], rate_hz: float) -> None:
-        lsl = self._lsl
-        labels = [("PAC", columns[0])]
-        if not suffix:
-            labels = [(name, column) for column in columns for name in column.flat_names()]
+    def _add(self, finger: int, suffix: str, rate_hz: float, labels: list[tuple[str, Field]]) -> None:
+        lsl, is_marker = self._lsl, not labels
+        kind, format = ("Markers", lsl.cf_string) if is_marker else (TYPE, lsl.cf_double64)
         source = f"biotac-{serial_text(self._hand.info)}-{finger}{suffix.replace(' ', '-')}"
-        info = lsl.StreamInfo(f"BioTac finger{finger}{suffix}", TYPE, len(labels), rate_hz, lsl.cf_double64, source)
+        info = lsl.StreamInfo(f"BioTac finger{finger}{suffix}", kind, len(labels) or 1, rate_hz, format, source)
         about = info.desc()
         for name, value in describe(self._hand, finger).items():
             about.append_child_value(name, value)
@@ -116,14 +115,6 @@ class Outlet:
                 channel.append_child_value(name, value)
         self.infos.append(info)
         self._outlets[finger, suffix] = lsl.StreamOutlet(info)
-
-    def _add_markers(self, finger: int) -> None:
-        lsl = self._lsl
-        source = f"biotac-{serial_text(self._hand.info)}-{finger}-events"
-        name = f"BioTac finger{finger}{EVENTS}"
-        info = lsl.StreamInfo(name, "Markers", 1, lsl.IRREGULAR_RATE, lsl.cf_string, source)
-        self.infos.append(info)
-        self._outlets[finger, EVENTS] = lsl.StreamOutlet(info)
 
     def _push(self, finger: int, suffix: str, values: NDArray[Any], t_us: NDArray[np.float64]) -> None:
         stamps_s = self._stamps.of(t_us, (finger, suffix))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
+from ..errors import BiotacError, FlashError, InputError, NotAGatewayError, WireVersionError
 from ..wire import messages_gen as wire
 from ..wire.identity import board_name, board_text, serial_text, version_text
 from .backup import Backup, Restored, restore, save
@@ -132,15 +132,8 @@ def leave(
         if backup is not None:
             say(f"saved {len(backup.values)} settings to {backup.path}")
         with step(backup):
-            try:
-                hand.board.reboot_bootloader()
-                return hand.info, backup
-            except CommandRefusedError as refused:
-                if refused.error != wire.Error.UNKNOWN_COMMAND:
-                    raise
-    with step(backup):
-        target.touch()  # its firmware is too old to have that command
-    return hand.info, backup
+            hand.board.reboot_bootloader()
+        return hand.info, backup
 
 
 def firmware(hello: wire.Hello) -> tuple[int, int, int]:

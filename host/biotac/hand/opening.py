@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from typing import Any
 
 from ..errors import NotAGatewayError
 from ..keep import Calibration, harness
@@ -54,20 +55,13 @@ def open(
     return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers, max_age_s=max_age_s)
 
 
-def shake_hands(
-    link: Link,
-    *,
-    reconnect: bool = False,
-    fingers: Mapping[str, int] | None = None,
-    max_age_s: float = MAX_AGE_S,
-    calibrations: Mapping[int, Calibration] | None = None,
-) -> Hand:
-    """Make a Hand from an open link, and give it each finger's calibration.
+def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = None, **options: Any) -> Hand:
+    """Make a Hand with these ``options`` from an open link, and give it each finger's calibration.
 
     A simulated board gets its source's settings (an emulated finger's own gains) and stored tare, as a real one would
     from its user. Closes the link when any of this fails.
     """
-    hand = Hand(link, reconnect=reconnect, fingers=fingers, max_age_s=max_age_s)
+    hand = Hand(link, **options)
     source = link.source
     try:
         if hand.info.board == wire.Board.PICO_SENSOR:

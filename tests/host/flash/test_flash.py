@@ -224,13 +224,6 @@ def test_two_boards_are_not_mixed_up(fake: FakeBoard, tmp_path: Path) -> None:
     assert fake.events == []
 
 
-def test_firmware_from_before_the_loaders_command_is_left_by_touch(fake: FakeBoard, tmp_path: Path) -> None:
-    fake.refuses_loader = wire.Error.UNKNOWN_COMMAND
-    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
-    assert fake.events == ["touch", "write"]
-    assert outcome.backup is not None
-
-
 def test_a_board_without_a_loader_is_not_flashed(fake: FakeBoard, tmp_path: Path) -> None:
     fake.refuses_loader = wire.Error.NOT_HERE
     assert "NOT_HERE" in fails(fake, tmp_path)

@@ -53,21 +53,6 @@ def test_a_refused_command_names_command_and_reason() -> None:
             hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)
 
 
-def test_settings_are_read_back() -> None:
-    with biotac.open("sim:drift.toml?seconds=1") as hand:
-        hand.board.set_setting(biotac.Setting.FORCE_GAIN_X_NN, -123_456)
-        assert hand.board.settings()[biotac.Setting.FORCE_GAIN_X_NN] == -123_456
-
-
-def test_read_returns_exactly_the_time_that_was_asked_for() -> None:
-    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
-        first = hand.read(0.5)
-        second = hand.read(1.0)
-    assert len(first) == 100
-    assert len(second) == 200
-    assert np.array_equal(np.sort(np.concatenate([first, second]), order=["finger", "seq"])["seq"], [*range(150)] * 2)
-
-
 def test_frames_are_typed_and_in_order() -> None:
     with biotac.open("sim:press.toml?seconds=0.5") as hand:
         frames = list(hand.frames())
@@ -195,17 +180,6 @@ def test_one_recording_at_a_time_and_the_stream_goes_on_after_it(tmp_path) -> No
         hand.read(10.0, fresh=True)  # what comes after that
     assert biotac.Recording(tmp_path / "a.mcap").problems == []
     assert len(biotac.load(tmp_path / "b.mcap")) > 0
-
-
-def test_what_a_hand_and_its_recording_give_are_the_documented_classes(tmp_path) -> None:
-    path = tmp_path / "pressed.mcap"
-    with biotac.open("sim:press.toml?seconds=2") as hand, hand.record(path) as recorder:
-        assert isinstance(recorder, biotac.Recorder) and isinstance(hand["index"], biotac.FingerView)
-        with hand.mark("pressed"):
-            hand.read(1)
-    recording = biotac.Recording(path)
-    assert [type(label) for label in recording.labels] == [biotac.Label]
-    assert isinstance(recording.select(start_s=0.5), biotac.Selection)
 
 
 def test_the_bus_is_tried_at_another_rate_only_while_nothing_streams() -> None:

@@ -258,28 +258,23 @@ def test_a_file_of_the_same_name_comes_first(tmp_path: Path, monkeypatch: pytest
     assert load_source("poke.toml", seconds=0.1).name == "poke"
 
 
-def test_an_unknown_suffix_is_refused() -> None:
-    with pytest.raises(InputError, match=r"press\.csv: unknown kind of source: expected \.toml"):
-        load_source("press.csv")
-
-
-def test_a_folder_is_refused(tmp_path: Path) -> None:
-    for name in ("a.toml", "a.npz"):
-        (tmp_path / name).mkdir()
-        with pytest.raises(InputError, match="not a file"):
-            load_source(tmp_path / name)
-
-
-@pytest.mark.parametrize("fingers", [0, 6, True])
-def test_fingers_out_of_range_are_refused(fingers: int) -> None:
-    with pytest.raises(InputError, match="expected 1 to 5"):
-        load_source("press.toml", fingers=fingers)
-
-
-@pytest.mark.parametrize("seconds", [0.0, float("nan"), 3601.0])
-def test_seconds_out_of_range_are_refused(seconds: float) -> None:
-    with pytest.raises(InputError, match=r"expected 0\.01 to 3600"):
-        load_source("press.toml", seconds=seconds)
+@pytest.mark.parametrize(
+    ("path", "options", "words"),
+    [
+        ("press.csv", {}, r"press\.csv: unknown kind of source: expected \.toml"),
+        *((f"folder.{kind}", {}, "not a file") for kind in ("toml", "npz")),
+        *(("press.toml", {"fingers": count}, "expected 1 to 5") for count in (0, 6, True)),
+        *(("press.toml", {"seconds": s}, r"expected 0\.01 to 3600") for s in (0.0, float("nan"), 3601.0)),
+    ],
+)
+def test_what_cannot_be_loaded_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path, options, words
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("folder.toml", "folder.npz"):
+        Path(name).mkdir()
+    with pytest.raises(InputError, match=words):
+        load_source(path, **options)
 
 
 def test_what_skin_remembers_goes_on_over_thousands_of_frames() -> None:

@@ -24,7 +24,7 @@ from biotac.recording.replay.link import ReplayLink
 from biotac.recording.replay.playback import Playback
 from biotac.view.overview import overview
 from biotac.view.player import Player
-from biotac.view.rows import FRAME_ROW, facts, frame_rows
+from biotac.view.rows import FRAME_ROW, frame_rows
 from biotac.view.server import MAX_CONNECTIONS, MAX_PAGES, TOKEN_HEADER
 from biotac.view.serving import lasting
 from biotac.view.state import KEPT_ROWS, State, tared
@@ -270,13 +270,6 @@ def test_heartbeats_are_frames_without_signals() -> None:
     assert len(rows) == len(batch.frames) + len(batch.idle)
     assert [r["t_us"] for r in rows] == sorted(r["t_us"] for r in rows)
     assert {r["seq"] for r in rows if r["signal_q4"] is None} == set(batch.idle["seq"].tolist())
-
-
-def test_words_are_the_contracts() -> None:
-    told = facts()
-    assert [f["name"] for f in told["flags"]] == [f.name for f in biotac.FrameFlags]
-    assert told["pac_hz"] == 2200
-    assert told["tare_reasons"][1]["words"] == "first still frames after power-up or plug-in"
 
 
 def test_a_tares_age_grows_between_two_status_messages() -> None:
