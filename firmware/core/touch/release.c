@@ -20,7 +20,8 @@ void bt_release_pressure(bt_release *release, int32_t above)
 // How far pressure has moved, in counts, and whether that is enough for the electrodes' energy.
 static uint32_t pdc_moved(const bt_release *release)
 {
-    return (uint32_t)(-release->pdc_low > release->pdc_peak ? -release->pdc_low : release->pdc_peak);
+    int32_t down = -release->pdc_low;
+    return (uint32_t)(down > release->pdc_peak ? down : release->pdc_peak);
 }
 
 static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
@@ -49,7 +50,7 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     uint32_t forgiven = sweep->witness ? sweep->forgiven_count2 : 0;
     left = (left > BT_CALM_COUNT2 ? left : BT_CALM_COUNT2) + forgiven;
     int32_t rest = bt_clamp(release->pdc_peak / BT_REST_PDC_SHARE, BT_QUIET_PDC, BT_REST_PDC_MAX);
-    bool back = sweep->witness ? sweep->above + sweep->cold < rest : release->quiet_sweeps >= BT_QUIET_SWEEPS;
+    bool back = sweep->witness ? sweep->uncooled < rest : release->quiet_sweeps >= BT_QUIET_SWEEPS;
     bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < BT_EVEN_COUNT2 + forgiven;
     return back && gone && sweep->still_sweeps >= BT_ENDED_SWEEPS;
 }
@@ -63,8 +64,7 @@ static bool is_untouched(const bt_release *release, const bt_release_sweep *swee
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
 {
-    bool low = !sweep->pressure || sweep->above + sweep->cold < BT_PDC_PRESSED;
-    bool even = low && sweep->uneven_count2 < BT_EVEN_COUNT2;
+    bool even = sweep->uncooled < BT_PDC_PRESSED && sweep->uneven_count2 < BT_EVEN_COUNT2;
     bool rose = sweep->pressure && sweep->above > release->even_above + BT_LOADING_PDC;
     if (!even || release->even_sweeps == 0 || rose) {
         release->even_above = sweep->above;
@@ -116,7 +116,7 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     uint32_t energy = sweep->energy_count2, uneven = sweep->uneven_count2;
     release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
     release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
-    sweep->cold = sweep->pressure ? taken_by_cold(release, sweep) : 0;
+    sweep->uncooled = sweep->pressure ? sweep->above + taken_by_cold(release, sweep) : 0;
     bool unmoved = release->uneven_peak >= BT_FIRM_COUNT2 && !moved_for(release, BT_FLAT_SHARE);
     if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED && moved_for(release, BT_MOVES_SHARE)) {
         *witness = (bt_witness){.moves = true};

@@ -50,7 +50,8 @@ typedef struct {
     bool witness;             // and presses move it; set by bt_release_judge
     bool warmer;              // by half a degree: pressure may have risen by a quarter of the lightest press
     int32_t above;            // pressure above its tare: now or the mean of eight rounds, whichever is more
-    int32_t cold;             // counts that cooling may have taken from it
+    int32_t cold;             // counts that cooling may have taken from it since the tare was taken
+    int32_t uncooled; // above, with what cooling may hide of a press; set by bt_release_judge, 0: unknown
     uint8_t still_sweeps;
     uint8_t level_sweeps; // with level pressure
 } bt_release_sweep;
