@@ -16,6 +16,7 @@ _Static_assert(BT_ELECTRODES == 19, "220753 / 2^22 is 1/19");
 
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
+    // By all the cooling, also from before it was let go: at rest too, pressure is low by that.
     int32_t missing = bt_pdc_missing_max(tare->release.pdc_peak) + bt_thermal_cooled_pdc(&tare->thermal);
     bool inverted = bt_inverted(&tare->trigger.smooth, &tare->base, missing);
     tare->inverted_rounds = inverted ? (uint8_t)(tare->inverted_rounds + 1) : 0;
