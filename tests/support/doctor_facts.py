@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from serial.tools.list_ports_common import ListPortInfo
 
 from biotac.clock import Fit
 from biotac.doctor import BoardFacts, Facts
@@ -18,6 +19,15 @@ from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE
 PORT = "/dev/ttyACM0"
 
 RELEASE = release(__version__)
+
+
+def usb_port(device: str, serial: str | None = None, *, ours: bool = True, description: str = "a port") -> ListPortInfo:
+    """What pyserial says of a port: our board's, or something else's."""
+    info = ListPortInfo(device, skip_link_detection=True)
+    info.description, info.serial_number = description, serial
+    if ours:
+        info.vid, info.pid = wire.USB_VENDOR, wire.USB_PRODUCT
+    return info
 
 
 def message(kind: Any, **values: Any) -> Any:

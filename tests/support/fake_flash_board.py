@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from doctor_facts import usb_port
 from serial.tools.list_ports_common import ListPortInfo
 
 from biotac.errors import DeviceLostError, PortError
@@ -170,19 +171,12 @@ def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(waiting, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
 
 
-def _entry(device: str, number: str | None, vendor: int) -> ListPortInfo:
-    info = ListPortInfo(device, skip_link_detection=True)
-    info.serial_number, info.vid, info.pid = number, vendor, wire.USB_PRODUCT
-    return info
-
-
 def plug_in(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     """Device: serial number, of the gateways that are plugged in; change it as you like."""
     plugged: dict[str, str] = {}
 
     def comports() -> list[ListPortInfo]:
-        ours = [_entry(device, number, wire.USB_VENDOR) for device, number in plugged.items()]
-        return [_entry("/dev/ttyUSB7", None, 0x0403), *ours]
+        return [usb_port("/dev/ttyUSB7", ours=False), *(usb_port(*device) for device in plugged.items())]
 
     monkeypatch.setattr(discovery.list_ports, "comports", comports)
     no_waiting(monkeypatch)

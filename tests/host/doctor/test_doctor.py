@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from doctor_facts import PORT, RELEASE, board, dynamic_pressure, healthy, hello, info, message, rounds
-from serial.tools.list_ports_common import ListPortInfo
+from doctor_facts import PORT, RELEASE, board, dynamic_pressure, healthy, hello, info, message, rounds, usb_port
 
 import biotac
 from biotac import HandWarning
@@ -107,18 +106,12 @@ def link(**counters: int) -> Facts:
     return board(stats=dataclasses.replace(healthy().stats, **counters))
 
 
-def port(device: str, number: str) -> ListPortInfo:
-    info = ListPortInfo(device, skip_link_detection=True)
-    info.serial_number, info.vid, info.pid = number, wire.USB_VENDOR, wire.USB_PRODUCT
-    return info
-
-
 # What there is -> the one code that must come, and what its words must name.
 CASES: list[tuple[str, Facts, str]] = [
     ("no_board", Facts(None), "no serial port"),
     (
         "several_boards",
-        Facts(None, SystemFacts(boards=[port("COM3", "A"), port("COM10", "B")])),
+        Facts(None, SystemFacts(boards=[usb_port("COM3", "A"), usb_port("COM10", "B")])),
         "serial:A on COM3, serial:B on COM10",
     ),
     ("no_serial_port", Facts(None, SystemFacts(usb_boards=1)), "no serial port"),
@@ -355,9 +348,8 @@ def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:
 
 
 def test_a_serial_number_that_nobody_has_names_those_there(capsys, monkeypatch) -> None:
-    entry = ListPortInfo(PORT, skip_link_detection=True)
-    entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, "E6605838831F5B2C"
-    monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: [entry])
+    there = [usb_port(PORT, "E6605838831F5B2C")]
+    monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: there)
     assert main(["doctor", "serial:0", "--json"]) == 1
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
     assert finding["code"] == "port_failed"

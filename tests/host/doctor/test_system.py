@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from serial.tools.list_ports_common import ListPortInfo
+from doctor_facts import usb_port
 
 from biotac.cli.main import main
 from biotac.doctor import Facts, judge, udev
@@ -64,14 +64,8 @@ def test_modem_manager_is_in_the_way_unless_udev_says_otherwise(root: Path) -> N
     assert look(PORT, root=root, entries=[]).left_alone
 
 
-def board_at(device: str, serial: str) -> ListPortInfo:
-    entry = ListPortInfo(device, skip_link_detection=True)
-    entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, serial
-    return entry
-
-
 def test_permission_and_holders_are_those_of_the_only_board_or_of_the_one_named(root: Path, monkeypatch) -> None:
-    entry, other = board_at(PORT, "A"), board_at("/dev/ttyACM1", "B")
+    entry, other = usb_port(PORT, "A"), usb_port("/dev/ttyACM1", "B")
     (root / "proc/71/fd").mkdir(parents=True)
     write(root / "proc/71/comm", "minicom\n")
     (root / "proc/71/fd/3").symlink_to(PORT)

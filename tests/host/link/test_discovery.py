@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from doctor_facts import usb_port
 from serial.tools.list_ports_common import ListPortInfo
 
 import biotac
@@ -22,17 +23,8 @@ from biotac.wire.identity import ascii_text, serial_text
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def entry(device: str, serial: str | None = None, *, ours: bool = True, description: str = "a port") -> ListPortInfo:
-    info = ListPortInfo(device, skip_link_detection=True)
-    info.description = description
-    info.serial_number = serial
-    if ours:
-        info.vid, info.pid = wire.USB_VENDOR, wire.USB_PRODUCT
-    return info
-
-
-ONE = [entry("/dev/ttyACM0", "E6605838831F5B2C"), entry("/dev/ttyUSB0", "A5XK3RJT", ours=False)]
-TWO = [entry("COM10", "E6605838831F5B2C"), entry("COM3", "E660583883200000")]
+ONE = [usb_port("/dev/ttyACM0", "E6605838831F5B2C"), usb_port("/dev/ttyUSB0", "A5XK3RJT", ours=False)]
+TWO = [usb_port("COM10", "E6605838831F5B2C"), usb_port("COM3", "E660583883200000")]
 
 
 @pytest.fixture
@@ -52,7 +44,7 @@ def test_only_our_usb_ids_are_boards() -> None:
 
 
 def test_of_a_macs_two_names_the_one_that_does_not_wait_is_kept() -> None:
-    both = [entry("/dev/tty.usbmodem1"), entry("/dev/cu.usbmodem1"), entry("/dev/tty.usbmodem2")]
+    both = [usb_port("/dev/tty.usbmodem1"), usb_port("/dev/cu.usbmodem1"), usb_port("/dev/tty.usbmodem2")]
     assert [p.device for p in boards(both)] == ["/dev/cu.usbmodem1", "/dev/tty.usbmodem2"]
 
 
@@ -77,7 +69,7 @@ def test_what_cannot_be_chosen_is_said_with_what_is_there(entries, number, messa
 
 def test_open_without_a_port_opens_the_only_board(scripted_board, hello, plugged) -> None:
     board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
-    plugged([entry(board.path, "E6605838831F5B2C"), entry("/dev/ttyNOWHERE", ours=False)])
+    plugged([usb_port(board.path, "E6605838831F5B2C"), usb_port("/dev/ttyNOWHERE", ours=False)])
     for port in (None, "serial:E6605838831F5B2C"):
         with biotac.open(port) as hand:
             assert hand.port == board.path
@@ -105,7 +97,7 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
         return say
 
     board, other = scripted_board(answer("board")), scripted_board(answer("other"))
-    plugged([entry(board.path, "0102"), entry(other.path, "A5", ours=False)])
+    plugged([usb_port(board.path, "0102"), usb_port(other.path, "A5", ours=False)])
     assert main(["list", "--json"]) == 0
     ours, theirs = json.loads(capsys.readouterr().out)["ports"]
     assert (ours["fingers"], ours["firmware"], ours["board"]) == ([0, 2], "0.1.0", "POSIX_SIM")
@@ -118,7 +110,7 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
 
 
 def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, capsys) -> None:
-    plugged([entry("/dev/ttyS0", ours=False, description="n/a")])
+    plugged([usb_port("/dev/ttyS0", ours=False, description="n/a")])
     assert main(["list"]) == 0
     first, second, third, *_ = capsys.readouterr().out.splitlines()
     assert first == "/dev/ttyS0  not our USB id"
