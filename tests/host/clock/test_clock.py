@@ -360,9 +360,11 @@ def test_a_simulated_board_in_real_time_is_a_clock() -> None:
     with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
         hand.stream()
         ages_s: list[float] = []
+        resets = 0
         while len(ages_s) < 3:  # on a busy computer replies come late, and after many frames
             last_us = int(hand.read(0.3)["t_us"][-1])
-            if hand.clock.now().known:
+            if hand.clock.resets > resets:  # it got no core for longer than it makes up for (port_posix.c)
+                ages_s, resets = [], hand.clock.resets
+            elif hand.clock.now().known:
                 ages_s.append(time.monotonic() - float(hand.clock.host_time_s(last_us)))
         assert min(ages_s) > 0 and max(ages_s) < 600
-        assert hand.clock.resets == 0

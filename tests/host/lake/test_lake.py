@@ -23,7 +23,6 @@ import pyarrow as pa
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
-from copies import copies
 from maps import make_map
 from record_all import record_all
 
@@ -33,10 +32,26 @@ from biotac.errors import InputError
 from biotac.export.messages import message_tables
 from biotac.lake import checking, ids
 from biotac.lake import folder as lake_folder
+from biotac.recording.layout import CHECKSUM
 from biotac.recording.mcap_file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import frames_from_wire, frames_to_wire
 from biotac.wire.framing import encode
+
+
+def copies(recording: biotac.Recording, folder: Path, count: int, apart_s: float) -> list[Path]:
+    """``count`` recordings in ``folder``, the k-th ``k * apart_s`` later than ``recording``."""
+    metadata = {key: value for key, value in recording.metadata.items() if key != CHECKSUM}
+    paths = [folder / f"{k:05}.mcap" for k in range(count)]
+    for k, path in enumerate(paths):
+        later_ns = round(k * apart_s * 1e9)
+        file = RecordingFile(path.open("xb"), metadata)
+        for block, arrived_ns, here_ns in zip(
+            recording.blocks, recording.arrived_ns, recording.all_here_ns, strict=True
+        ):
+            file.add(block, arrived_ns + later_ns, None if here_ns is None else here_ns + later_ns)
+        file.close()
+    return paths
 
 
 @pytest.fixture(scope="module")

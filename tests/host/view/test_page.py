@@ -84,7 +84,7 @@ def test_numbers_are_those_of_the_frame_with_that_number(view, open_page) -> Non
 
 def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     path = tmp_path / "press.mcap"
-    record_all("sim:press.toml?seconds=6", path)
+    record_all("sim:press.toml?seconds=60", path)  # longer than a busy computer takes to pause it
     recording = biotac.Recording(path)
     page = open_page(view(str(path), again=False))
     link_is(page, "playing")
@@ -96,6 +96,9 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     link_is(page, "paused")
     page.keyboard.press("p")
     link_is(page, "playing")
+    page.focus("#seek")
+    page.keyboard.press("End")
+    page.focus("#pause")
     link_is(page, "over")
     assert page.text_content("#link-words") == "Playback finished."
     # Its last picture comes after the word.
