@@ -1,8 +1,6 @@
 #include "batch.h"
 
-#include "signal/round.h"
 #include "signal/signals.h"
-#include "solve/results.h"
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
@@ -52,21 +50,6 @@ void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *
     for (int64_t k = 0; k < n; k++) {
         force_100un[k] = bt_pressure_force(filtered_q4[k], tare_q4[k], gain_nn);
     }
-}
-
-int bt_rail_count(void)
-{
-    return BT_RAIL_COUNT;
-}
-
-int bt_active_q4(void)
-{
-    return BT_ACTIVE_Q4;
-}
-
-int bt_active_for_torsion(void)
-{
-    return BT_ACTIVE_FOR_TORSION;
 }
 
 uint32_t bt_binding_schema_hash(void)

@@ -3,7 +3,9 @@
 #define BIOTAC_BATCH_H
 
 #include "map/map.h"
+#include "signal/round.h"
 #include "solve/pressure.h"
+#include "solve/results.h"
 #include "solve/solve.h"
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID,
@@ -28,9 +30,12 @@ void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const u
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
                         int32_t *force_100un);
 
-int bt_rail_count(void);         // BT_RAIL_COUNT
-int bt_active_q4(void);          // BT_ACTIVE_Q4
-int bt_active_for_torsion(void); // BT_ACTIVE_FOR_TORSION
+// Macros of the core, which cffi does not see.
+enum bt_thresholds {
+    BT_THRESHOLD_RAIL_COUNT = BT_RAIL_COUNT,
+    BT_THRESHOLD_ACTIVE_Q4 = BT_ACTIVE_Q4,
+    BT_THRESHOLD_ACTIVE_FOR_TORSION = BT_ACTIVE_FOR_TORSION,
+};
 
 // Compared with host/biotac/wire/messages_gen.py when the module is imported.
 uint32_t bt_binding_schema_hash(void);

@@ -104,28 +104,6 @@ int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t
     return list.found;
 }
 
-int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, uint8_t *events, int64_t room)
-{
-    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
-    bt_finger finger;
-    event_list list = {.next = events, .room = room};
-    bt_finger_reset(&finger, 0);
-    finger.events.touched = held != 0;
-    finger.tare.state = held ? BT_TARE_STATE_CONTACT : BT_TARE_STATE_REST;
-    for (int64_t k = 0; k < n; k++, pac += BT_PAC_PER_FRAME) {
-        finger.seq = (uint16_t)k;
-        for (size_t p = 0, done = 0; p < sizeof pac_slot; p++) {
-            const size_t end = bt_slot_pac[pac_slot[p]] + 1u; // as the words come
-            memcpy(finger.round.pac + done, pac + done, (end - done) * sizeof *pac);
-            done = end;
-            uint32_t found = bt_finger_events(&finger, pac_slot[p], false);
-            keep(&list, found, &finger, pac_slot[p], (uint32_t)(k * BT_FRAME_MS * 1000));
-        }
-        slips[k] = finger.events.slipping;
-    }
-    return list.found;
-}
-
 void bt_replay_bands(bt_bands *bands, int64_t n, const uint16_t *pac, uint8_t *good, uint32_t *energy_q4)
 {
     for (int64_t k = 0; k < n; k++) {

@@ -6,6 +6,9 @@ Each message is one line: what was seen, what was expected, and the cure. The co
 
 from __future__ import annotations
 
+from importlib import import_module
+from types import ModuleType
+
 LONGEST = 1000  # characters of a message
 
 
@@ -27,6 +30,15 @@ class InputError(BiotacError):
 def taken(path: object) -> InputError:
     """What to raise when ``path`` exists and may not be overwritten."""
     return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")
+
+
+def imported(module: str, what: str, extra: str) -> ModuleType:
+    """A module that needs the ``extra``, for ``what``. Raises InputError where a package of it is missing."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        cure = f"pip install 'biotac-gateway[{extra}]'"
+        raise InputError(f"{what} needs {error.name}, which is not installed; {cure}") from error
 
 
 class ScenarioError(InputError):

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biotac.core.compiled import c_pointers, checked_words
+from biotac.core.compiled import checked_words
 from biotac.core.finger import EVENT_DTYPE
-from biotac.wire.native import lib
+from biotac.wire import messages_gen as wire
+from biotac.wire.native import ffi, lib
 
-_MOST_A_ROUND = 8
+_SLOTS = (14, 28, 42)  # in which jolts and slips are looked for
 
 
 def pac_events(pac: Any) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
@@ -19,8 +20,20 @@ def pac_events(pac: Any) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
 
     ``pac`` (n, 22) are as in pac_bands().
     """
-    words = checked_words("pac", pac, None, 22)
-    slips = np.zeros(len(words), np.uint8)
-    events = np.zeros(_MOST_A_ROUND * len(words), EVENT_DTYPE)
-    found = lib.bt_replay_pac(len(words), *c_pointers(words), True, *c_pointers(slips, events), len(events))
-    return events[:found], slips.astype(bool)
+    finger, message, packed = ffi.new("bt_finger *"), ffi.new("bt_msg_event *"), bytearray(EVENT_DTYPE.itemsize)
+    lib.bt_finger_reset(finger, 0)
+    finger.events.touched, finger.tare.state = 1, wire.TareState.CONTACT
+    events, slips = [], []
+    for k, words in enumerate(checked_words("pac", pac, None, 22).tolist()):
+        finger.seq = k % 2**16
+        for slot in _SLOTS:
+            there = lib.bt_slot_pac[slot] + 1  # as the words come
+            finger.round.pac[0:there] = words[:there]
+            found = lib.bt_finger_events(finger, slot, False)
+            for kind in (kind for kind in range(found.bit_length()) if found >> kind & 1):
+                t_us = (10_000 * k + slot * 1_000_000 // 4400) % 2**32
+                lib.bt_finger_event(finger, kind, slot, t_us, message)
+                lib.bt_msg_event_pack(message, ffi.from_buffer(packed))
+                events.append(bytes(packed))
+        slips.append(finger.events.slipping)
+    return np.frombuffer(b"".join(events), EVENT_DTYPE), np.array(slips, bool)

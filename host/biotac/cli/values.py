@@ -30,29 +30,26 @@ def facts(given: list[str]) -> dict[str, str]:
     return made
 
 
-def seconds(text: str) -> float:
-    value = number(text)
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds above 0")
-    return value
+def checked(good: Callable[[float], bool], problem: str) -> Callable[[str], float]:
+    """The type of a number that is ``good``; ``problem`` ends the message about one that is not."""
+
+    def parse(text: str) -> float:
+        value = number(text)
+        if not good(value):
+            raise argparse.ArgumentTypeError(f"{text!r} is not {problem}")
+        return value
+
+    return parse
 
 
-def moment(text: str) -> float:
-    """Seconds since the first row, 0 or more."""
-    value = number(text)
-    if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds, 0 or more")
-    return value
-
-
-def rate(text: str) -> float:
-    """Lines per second: 0 for all, or at least one a day."""
-    value = number(text)
-    if not (value == 0 or 1 / 86400 <= value < math.inf):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a rate; expected lines per second, at least 1/86400, or 0 for all"
-        )
-    return value
+seconds = checked(lambda s: 0 < s < math.inf, "a time; expected seconds above 0")
+#: Seconds since the first row.
+moment = checked(lambda s: 0 <= s < math.inf, "a time; expected seconds, 0 or more")
+#: Lines per second: 0 for all, or at least one a day.
+rate = checked(
+    lambda hz: hz == 0 or 1 / 86400 <= hz < math.inf,
+    "a rate; expected lines per second, at least 1/86400, or 0 for all",
+)
 
 
 def pace(text: str) -> float:

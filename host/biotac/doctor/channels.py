@@ -15,7 +15,7 @@ from .catalogue import Finding
 from .facts import BoardFacts
 
 #: The limits of FrameFlags.RAIL.
-RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()
+RAIL_LOW, RAIL_HIGH = 0, lib.BT_THRESHOLD_RAIL_COUNT
 
 # For how many rounds until the end a channel must say one and the same count. An electrode whose noise is 0.45 counts,
 # the quietest seen, does so for 100 once in 10^13 tries; TDC, which is slow, did so for 280 in one of 1000 tries.

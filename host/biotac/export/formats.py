@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from ..errors import InputError
+from ..errors import InputError, imported
 from ..partial_file import whole
 from ..recording.reader import Recording
 from .columns import Show, Table, tables
@@ -57,12 +56,7 @@ def writer_for(out: Path) -> ModuleType:
     kind = FORMATS.get(out.suffix.lower())
     if kind is None:
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
-    try:
-        return import_module(kind.module)
-    except ImportError as error:
-        raise InputError(
-            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"
-        ) from error
+    return imported(kind.module, out.suffix, kind.extra)
 
 
 def parts(out: Path, made: list[Table], *, apart: bool) -> list[tuple[Path, list[Table]]]:

@@ -10,13 +10,12 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
 from .columns import Show, Table
 
 KINDS_APART = False
 _SHOW_ROWS = 1000
-_LOG = "rcl_interfaces/msg/Log"
-_INFO, _WARN = 20, 30
 _COUNTS = "std_msgs/msg/UInt16MultiArray"
 #: By kind of table: its topics, with their types.
 _TOPICS = {
@@ -54,16 +53,15 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
                 done += 1
         begin_us = recording.begin_us
         at_ns = recording.stamp_ns(np.array([label.t_us or begin_us for label in recording.labels], np.int64)).tolist()
-        logged = [(ns, _INFO, label.line()) for ns, label in zip(at_ns, recording.labels, strict=True)]
-        logged += [(gap.back_at_ns, _WARN, gap.line()) for gap in recording.gaps]
-        log = topic("log", _LOG) if logged else lambda stamp_ns, message: None
+        logged = [(ns, INFO, label.line()) for ns, label in zip(at_ns, recording.labels, strict=True)]
+        logged += [(gap.back_at_ns, WARN, gap.line()) for gap in recording.gaps]
+        log = topic("log", LOG) if logged else lambda stamp_ns, message: None
         for stamp_ns, level, text in logged:
-            log(stamp_ns, store.types[_LOG](_time(store.types, stamp_ns), level, "biotac", text, "", "", 0))
+            log(stamp_ns, store.types[LOG](_time(store.types, stamp_ns), level, "biotac", text, "", "", 0))
 
 
 def _time(types: Any, stamp_ns: int) -> Any:
-    """ROS 2 counts seconds in 32 bits: after January 2038, header stamps stand still."""
-    return types["builtin_interfaces/msg/Time"](min(stamp_ns // 10**9, 2**31 - 1), stamp_ns % 10**9)
+    return types["builtin_interfaces/msg/Time"](*time(stamp_ns))
 
 
 def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:

@@ -15,8 +15,10 @@ import pyarrow.parquet as pq
 from ..keep.calibration import own_settings
 from ..recording.crosscheck import CrossCheck
 from ..recording.facts import Facts
-from ..wire.fields import FRAME_FIELDS
-from ..wire.frames import FRAME_DTYPE, StructArray, frames_to_wire
+from ..wire import messages_gen as wire
+from ..wire.dtypes_gen import DTYPES
+from ..wire.fields import FRAME_FIELDS, sent_of
+from ..wire.frames import StructArray
 from .folder import RECORDINGS
 
 
@@ -56,7 +58,7 @@ def check(lake: str, item: tuple[str, dict[str, str]]) -> Checked:
         row = tables[RECORDINGS].to_pylist()[0]
         try:
             facts = Facts.read(dict(row["metadata"]))
-            frames = frames_to_wire(frames_of(tables["frames"]))
+            frames = messages_of(tables["frames"])
         except (KeyError, ValueError) as error:  # another version's: the checksums say that it is as it was exported
             checked.wrong.append(
                 f"{recording} ({row['source']}): another version of biotac-gateway wrote it ({error}); "
@@ -69,12 +71,16 @@ def check(lake: str, item: tuple[str, dict[str, str]]) -> Checked:
     return checked
 
 
-def frames_of(table: pa.Table) -> StructArray:
-    """The topic ``frames`` as FRAME_DTYPE (n,), with null turned into the fields' invalid values."""
-    out = np.empty(table.num_rows, FRAME_DTYPE)
+def messages_of(table: pa.Table) -> StructArray:
+    """The FRAME messages (n,) from which the topic ``frames`` was made, to the bit."""
+    out = np.zeros(table.num_rows, DTYPES[wire.Frame.ID])
     for column in FRAME_FIELDS:
-        values = [_numbers(table[name], column.invalid) for name in column.flat_names()]
-        out[column.name] = np.column_stack(values) if column.parts else values[0]
+        parts = [_numbers(table[name], column.invalid) for name in column.flat_names()]
+        values = np.column_stack(parts) if column.parts else parts[0]
+        name = column.sent or column.name
+        if not column.sent:
+            values = values & np.iinfo(out.dtype[name]).max  # the wire's counters wrap
+        out[name] = sent_of(column, values, out.dtype[name].base)
     return out
 
 

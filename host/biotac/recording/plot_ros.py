@@ -19,7 +19,6 @@ POSE = "geometry_msgs/msg/PoseStamped"
 FLAGS = "std_msgs/msg/UInt32"
 LOG = "rcl_interfaces/msg/Log"
 INFO, WARN = 20, 30  # levels of a log
-_LAST_S = 2**31 - 1  # that ROS's time can say, in 2038
 #: Fields of the types that messages are made of.
 _FIELDS = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
@@ -64,17 +63,18 @@ def flags(value: int) -> bytes:
 def contact(finger: int, poc_m: Any, force_n: Any, stamp_ns: int) -> bytes:
     """A PoseStamped at the point of contact, its x axis along the force (the finger's own x where there is none)."""
     pose = np.array([*poc_m, *_turned_to(force_n)], np.float32)
-    return _cdr(*_time(stamp_ns), layout.frame_id(finger), pose)
+    return _cdr(*time(stamp_ns), layout.frame_id(finger), pose)
 
 
 def log(name: str, text: str, stamp_ns: int, level: int = INFO) -> bytes:
     """A Log of ``text``, said by ``name``."""
-    return _cdr(*_time(stamp_ns), bytes([level]), name, text, "", "", 0)
+    return _cdr(*time(stamp_ns), bytes([level]), name, text, "", "", 0)
 
 
-def _time(stamp_ns: int) -> tuple[int, int]:
+def time(stamp_ns: int) -> tuple[int, int]:
+    """Seconds and ns of a stamp. ROS 2 counts seconds in 32 bits: after January 2038, they stand still."""
     seconds, ns = divmod(stamp_ns, 10**9)
-    return min(seconds, _LAST_S), ns
+    return min(seconds, 2**31 - 1), ns
 
 
 def _cdr(*fields: int | str | bytes | Any) -> bytes:

@@ -19,7 +19,7 @@ from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 from ..wire.native import lib
 
-RAIL_COUNT: int = lib.bt_rail_count()
+RAIL_COUNT: int = lib.BT_THRESHOLD_RAIL_COUNT
 #: Half a step of the published force, N.
 FORCE_BOUND_N = 0.5 / FORCE_LSB_PER_N
 SLACK = 1e-9  # for rounding in float64: an error of exactly half a step is allowed

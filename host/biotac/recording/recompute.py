@@ -35,8 +35,8 @@ Show = Callable[[float], None]
 #: Settings used by the maths after the tare; all others act on the tare machine and the stream.
 RESULT_SETTINGS = {wire.Setting.FORCE_MODEL, *wire.CALIBRATION_SETTINGS} - {wire.Setting.THERMAL_GAIN_MILLI}
 _KERNEL_FLAGS = wire.FrameFlags.POC_INVALID | wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
-_ACTIVE_Q4: int = lib.bt_active_q4()
-_ACTIVE_FOR_TORSION: int = lib.bt_active_for_torsion()
+_ACTIVE_Q4: int = lib.BT_THRESHOLD_ACTIVE_Q4
+_ACTIVE_FOR_TORSION: int = lib.BT_THRESHOLD_ACTIVE_FOR_TORSION
 
 
 def recompute(

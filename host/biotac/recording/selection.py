@@ -9,7 +9,6 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from ..core.geometry import ELECTRODE_MM
-from ..errors import InputError, RecordingError, RecordingWarning, printable
+from ..errors import InputError, RecordingError, RecordingWarning, imported, printable
 from ..wire.fields import AXES, FRAME_FIELDS, Field, dtype_of, values_of
 from ..wire.frames import StructArray
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags
@@ -177,7 +176,7 @@ class Selection:
         Integer fields that can be missing are nullable (UInt16); all others have NumPy types. ``label`` is the last
         column. ``attrs["units"]`` has each column's unit. Needs the extra ``export``.
         """
-        pandas = _imported("pandas")
+        pandas: Any = imported("pandas", "a DataFrame", "export")
         columns: dict[str, Any] = {}
         units: dict[str, str] = {}
         for field in self.fields:
@@ -201,7 +200,7 @@ class Selection:
         ``long_name``. Where a finger has no row in a round, and for missing counts, floats are NaN (float32 holds 0 to
         4095 exactly), and ``flags`` say so. Needs the extra ``export``.
         """
-        xarray = _imported("xarray")
+        xarray: Any = imported("xarray", "a Dataset", "export")
         t_us, round_of = np.unique(self.rows["t_us"], return_inverse=True)
         numbers, finger_of = np.unique(self.rows["finger"], return_inverse=True)
         shape = len(t_us), len(numbers)
@@ -292,10 +291,3 @@ class Selection:
 def _distance(values: NDArray[np.float64]) -> NDArray[np.float64]:
     distance: NDArray[np.float64] = np.linalg.norm(values - np.nanmedian(values, axis=0), axis=1)
     return distance
-
-
-def _imported(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise InputError(f"{name} is not installed; pip install 'biotac-gateway[export]'") from error

@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .dtypes_gen import DTYPES
-from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of, sent_of
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of
 from .fields import FORCE_LSB_PER_N as FORCE_LSB_PER_N
 from .fields import MNMM_PER_NMM as MNMM_PER_NMM
 from .fields import Q4_PER_COUNT as Q4_PER_COUNT
 from .fields import UM_PER_MM as UM_PER_MM
 from .fields import to_units as to_units
 from .messages_gen import INVALID_COUNT, FrameFlags, TareState
-from .messages_gen import Frame as _FrameMessage
 from .sensor_gen import FULL_SCALE_COUNT
 
 StructArray = NDArray[np.void]
@@ -106,17 +104,6 @@ def _from_wire(
         if column.sent:
             sent = messages[column.sent]
             out[column.name] = sent if column.per_unit is None else to_units(sent, column.per_unit)
-    return out
-
-
-def frames_to_wire(frames: StructArray) -> StructArray:
-    """Inverse of frames_from_wire: the FRAME messages (n,) from which FRAME_DTYPE (n,) was made, to the bit."""
-    out = np.zeros(len(frames), DTYPES[_FrameMessage.ID])
-    out["finger"] = frames["finger"]
-    out["seq"], out["t_us"] = frames["seq"] & 0xFFFF, frames["t_us"] & 0xFFFFFFFF
-    for column in FRAME_FIELDS:
-        if column.sent:
-            out[column.sent] = sent_of(column, frames[column.name], out.dtype[column.sent].base)
     return out
 
 

@@ -8,12 +8,11 @@ import functools
 import json
 import sys
 from collections.abc import Callable, Iterator
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-from ...errors import BiotacError, InputError, printable
+from ...errors import BiotacError, InputError, imported, printable
 from .. import values
 from ..outputs import note, say
 from ..progress import Progress
@@ -150,9 +149,4 @@ def _all(
 
 def room(name: str) -> ModuleType:
     """A module of the lake. Raises InputError naming the extra that it needs."""
-    try:
-        return import_module(f"biotac.lake.{name}")
-    except ImportError as error:
-        raise InputError(
-            f"a lake needs {error.name}, which is not installed; pip install 'biotac-gateway[lake]'"
-        ) from error
+    return imported(f"biotac.lake.{name}", "a lake", "lake")
