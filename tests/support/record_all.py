@@ -1,10 +1,13 @@
-"""A recording to look at."""
+"""Recordings to look at: of all that a simulated board plays, or of given bytes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import biotac
+from biotac.recording.layout import CHECKSUM
+from biotac.recording.mcap_file import RecordingFile
 
 
 def record_all(source: str, path: Path) -> Path:
@@ -12,4 +15,14 @@ def record_all(source: str, path: Path) -> Path:
     with biotac.open(source) as hand:
         hand.record(path)
         hand.read_batch(100)
+    return path
+
+
+def written(path: Path, metadata: Mapping[str, str], blocks: Iterable[tuple[bytes, int]]) -> Path:
+    """``path``, with ``blocks`` of the wire and when each arrived, Unix ns."""
+    with path.open("wb") as stream:
+        file = RecordingFile(stream, {key: value for key, value in metadata.items() if key != CHECKSUM})
+        for data, arrived_ns in blocks:
+            file.add(data, arrived_ns)
+        file.close()
     return path

@@ -169,13 +169,6 @@ def test_record_tells_faults_of_its_time_only(capsys, tmp_path: Path) -> None:
     assert [line.partition(",")[0] for line in faults] == ["index: TDC_MISSING"]
 
 
-def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
-    out = tmp_path / "a.mcap"
-    out.write_bytes(b"precious")
-    assert "--force" in fails(capsys, 2, "record", "sim:press.toml", str(out), "--seconds", "1")
-    assert out.read_bytes() == b"precious"
-
-
 @pytest.mark.parametrize(
     ("command", "message"),
     [

@@ -9,12 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from record_all import record_all
+from record_all import record_all, written
 
 import biotac
 from biotac.cli.main import main
-from biotac.recording import layout
-from biotac.recording.mcap_file import RecordingFile
 
 NOT_UTF8 = os.fsdecode(b"\xff\xfe")
 ESCAPES = "\x1b[31m\nred"
@@ -57,12 +55,9 @@ def test_a_stream_that_takes_nothing_is_no_traceback(recorded: Path, redirect: s
 @pytest.mark.parametrize("serial", [[65] * 100_000, [300] * 12, [], "text", None])
 def test_a_serial_number_of_any_length_is_refused(recorded: Path, tmp_path: Path, capsys, serial: object) -> None:
     """Under a right checksum: somebody made it so."""
-    facts = {key: value for key, value in biotac.Recording(recorded).metadata.items() if key != layout.CHECKSUM}
-    facts["hello"] = json.dumps(json.loads(facts["hello"]) | {"board_serial": serial})
-    path = tmp_path / "hostile.mcap"
-    file = RecordingFile(path.open("xb"), facts)
-    file.add(biotac.Recording(recorded).blocks[0], 0)
-    file.close()
+    good = biotac.Recording(recorded)
+    hello = json.dumps(json.loads(good.metadata["hello"]) | {"board_serial": serial})
+    path = written(tmp_path / "hostile.mcap", good.metadata | {"hello": hello}, [(good.blocks[0], 0)])
     with pytest.raises(biotac.RecordingError, match="damaged metadata"):
         biotac.Recording(path)
     assert main(["export", str(path), "--lake", str(tmp_path / "lake")]) == 2

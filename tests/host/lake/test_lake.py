@@ -24,7 +24,7 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 from maps import make_map
-from record_all import record_all
+from record_all import record_all, written
 
 import biotac
 from biotac.cli.main import main
@@ -172,10 +172,7 @@ def test_again_does_nothing_and_grown_files_replace(sources, tmp_path, capsys) -
     data = b"".join(recording.blocks)
     middle = data.index(b"\0", len(data) // 2) + 1
     for path, blocks in ((cut, [data[:middle]]), (grown, [data[:middle], data[middle:]])):
-        file = RecordingFile(path.open("xb"), recording.metadata)
-        for k, block in enumerate(blocks):
-            file.add(block, recording.begin_ns + k)
-        file.close()
+        written(path, recording.metadata, ((block, recording.begin_ns + k) for k, block in enumerate(blocks)))
     whole = biotac.Recording(grown)
     assert ids.recording_id(cut) == ids.recording_id(grown) != ids.recording_id(sources[1])
     assert export([cut], folder) == 0
@@ -396,9 +393,8 @@ def test_a_wrong_result_is_found(sources, tmp_path, capsys) -> None:
     sent = real.wire.copy()
     at = int(np.flatnonzero(sent["force_100un"][:, 2] != wire.INVALID_I32)[-1])
     sent["force_100un"][at, 2] += 10
-    file = RecordingFile((tmp_path / "wrong.mcap").open("xb"), real.metadata)
-    file.add(b"".join(encode(wire.Frame.ID, row.tobytes()) for row in sent), real.begin_ns)
-    file.close()
+    block = b"".join(encode(wire.Frame.ID, row.tobytes()) for row in sent)
+    written(tmp_path / "wrong.mcap", real.metadata, [(block, real.begin_ns)])
     assert export([tmp_path / "wrong.mcap"], tmp_path / "lake") == 0
     assert main(["lake", "check", str(tmp_path / "lake")]) == 1
     assert f"frame {sent['seq'][at]} " in capsys.readouterr().out

@@ -86,17 +86,6 @@ def test_it_is_a_recording_as_any_other(imported, capsys) -> None:
     assert recording.metadata["port"] == "btd:a.btd"
 
 
-def test_an_interrupted_import_leaves_nothing(imported, tmp_path, capsys, monkeypatch) -> None:
-    def interrupt(self: object, text: str) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
-    source = imported[0].path.with_name("a.btd")
-    assert main(["export", str(source), str(tmp_path / "b.mcap")]) == 130
-    assert "was not written" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_real_file_with_gaps(tmp_path) -> None:
     if not DATA.exists():
         pytest.skip(f"needs a recording whose licence keeps it out of this project; not at {DATA}")

@@ -179,20 +179,7 @@ def test_heartbeats_need_kept_tares(folder, capsys) -> None:
     assert biotac.Recording(folder / "q2.mcap").wire.tobytes() == biotac.Recording(path).wire.tobytes()
 
 
-def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
-    before = recorded.path.read_bytes()
-    assert main(["export", "--recompute", str(recorded.path), str(recorded.path)]) == 2
-    assert "--force" in capsys.readouterr().err
-    assert recorded.path.read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    ("text", "seen"),
-    [
-        ('{"poc_weights": 1.5}', "integers"),
-        ('{"poc_weights": 7}', "0 to 2"),
-    ],
-)
+@pytest.mark.parametrize(("text", "seen"), [('{"poc_weights": 1.5}', "integers"), ('{"poc_weights": 7}', "0 to 2")])
 def test_settings_that_are_none_are_refused(folder, recorded, capsys, text: str, seen: str) -> None:
     (folder / "bad.json").write_text(text)
     words = ["export", "--recompute", str(recorded.path), str(folder / "x.mcap")]
@@ -209,16 +196,6 @@ def test_out_may_be_an_export(folder, recorded) -> None:
         about = json.loads(str(arrays["columns"]))
         assert json.loads(about["metadata"]["settings"])["poc_weights"] == 0
         assert len(arrays["finger1/frames/poc_mm"]) == len(recorded.frames) // 2
-
-
-def test_a_finger_says_the_tare_message_that_a_board_sends(recorded) -> None:
-    mine = recorded.wire["finger"] == 0
-    sent = recorded.wire[mine]
-    message = next(m for m in tares(recorded) if m.finger == 0)
-    finger = biotac.Finger(recorded.settings)
-    rows = slice(0, message.seq + 1)
-    finger.feed(sent["counts"][rows], sent["pdc"][rows], sent["tac"][rows], sent["tdc"][rows], t_us=sent["t_us"][rows])
-    assert finger.tare_message() == message
 
 
 @pytest.mark.parametrize(("out", "step"), [("stopped.mcap", 1), ("stopped.mcap", 5), ("stopped.csv", 5)])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
-from record_all import record_all
+from record_all import record_all, written
 
 import biotac
 from biotac.recording import layout
@@ -66,21 +66,15 @@ def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
 
 def test_a_damaged_second_is_kept_as_it_came(recorded: Path, tmp_path: Path) -> None:
     """To the byte, whatever was on the line; and its rows come with the others."""
-    from biotac.recording.mcap_file import RecordingFile
-
     whole = biotac.Recording(recorded)
     blocks = list(whole.blocks)
     blocks[1] = b"noise\0" + blocks[1]
     blocks[3] += encode(0x7F, b"of a version to come")
-    with (tmp_path / "noisy.mcap").open("wb") as stream:
-        file = RecordingFile(stream, whole.metadata)
-        for block, arrived_ns in zip(blocks, whole.arrived_ns, strict=True):
-            file.add(block, arrived_ns)
-        file.close()
-    noisy = biotac.Recording(tmp_path / "noisy.mcap")
+    path = written(tmp_path / "noisy.mcap", whole.metadata, zip(blocks, whole.arrived_ns, strict=True))
+    noisy = biotac.Recording(path)
     assert b"".join(noisy.blocks) == b"".join(blocks)
     same(noisy.frames, whole.frames)
-    same(biotac.load(tmp_path / "noisy.mcap"), whole.frames)
+    same(biotac.load(path), whole.frames)
 
 
 @pytest.mark.parametrize("told", [True, False])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
-from record_all import record_all
+from record_all import record_all, written
 from ros_topics import of_topic
 
 import biotac
@@ -91,15 +92,10 @@ def test_a_missing_electrode_is_nan(drifting: Path) -> None:
 
 def test_where_nobody_knows_the_hosts_time_device_time_counts(tmp_path: Path, metadata) -> None:
     """As in imported files: one time a block, which says nothing of a clock."""
-    with (tmp_path / "a.mcap").open("wb") as stream:
-        file = RecordingFile(stream, metadata)
-        frame = np.zeros((), DTYPES[wire.Frame.ID])
-        for seq, t_us, _ in rows(0.0):
-            frame["seq"], frame["t_us"] = seq, t_us % 2**32
-            file.add(encode(wire.Frame.ID, frame.tobytes()), t_us * 1000 // 10**9 * 10**9)
-            if seq == 20:
-                break
-        file.close()
-    recording = biotac.Recording(tmp_path / "a.mcap")
+    frame, blocks = np.zeros((), DTYPES[wire.Frame.ID]), []
+    for seq, t_us, _ in islice(rows(0.0), 21):
+        frame["seq"], frame["t_us"] = seq, t_us % 2**32
+        blocks.append((encode(wire.Frame.ID, frame.tobytes()), t_us * 1000 // 10**9 * 10**9))
+    recording = biotac.Recording(written(tmp_path / "a.mcap", metadata, blocks))
     t_us = recording.frames["t_us"]
     assert recording.stamp_ns(t_us).tolist() == (t_us * 1000).tolist()
