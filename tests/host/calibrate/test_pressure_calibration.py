@@ -58,7 +58,7 @@ class Silent:
 
 def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     port = "sim:fingers.toml?pace=fast"
-    assert main(["calibrate", "press", port, "--pressure", "--json", "--out", str(tmp_path)]) == 0
+    assert main(["calibrate", "press", port, "--pressure", "--save", "--json", "--out", str(tmp_path)]) == 0
     output = capsys.readouterr()
     facts = json.loads(output.out)
     assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
