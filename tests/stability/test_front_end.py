@@ -124,7 +124,7 @@ def test_after_hours_of_drift_a_press_is_seen_whole(per_min: float) -> None:
     np.testing.assert_allclose(finger.tare_counts, true, atol=5 * 5.0 / 8**0.5)
     pressed = np.rint(np.tile(true, (10, 1))).astype(int)
     pressed[:, [1, 11, 16]] -= 200
-    rows = finger.feed(pressed, np.full(10, 1326 + 300))
+    rows = finger.feed(pressed, np.full(10, sensor.pdc_rest + 300).astype(int))
     assert rows["tare_state"][-1] == TareState.CONTACT
     kept = (rows["tare_q4"][-1] / 16.0 - pressed[-1])[[1, 11, 16]]
     # The roll-back is to a tare of at most two seconds before, half a count of drift.

@@ -128,7 +128,7 @@ class Script:
             rest=_middle(rest),
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
-            pressure=sampling.PDC_REST + _middle(sampling.Pressure()(sampling.spring_load(states))),
+            pressure=self.sensor.pdc_rest + _middle(sampling.Pressure()(sampling.spring_load(states))),
             warm_c=_middle(states.warm_c),
         )
 
@@ -150,7 +150,7 @@ def resting(sensor: physics.Finger, seconds: float, seed: int, start_s: float = 
     hit = rng.random((frames, 19), dtype=np.float32) < sensor.glitch_share
     hit[1:] &= ~hit[:-1]  # never two in a row
     counts -= hit * rng.uniform(30.0, 66.0, (frames, 19))
-    pdc = sampling.PDC_REST + rng.standard_normal(frames) * sampling.PDC_NOISE
+    pdc = sensor.pdc_rest + rng.standard_normal(frames) * sampling.PDC_NOISE
     return {"counts": np.rint(counts).astype(np.uint16), "pdc": np.rint(pdc).astype(np.uint16)}
 
 

@@ -46,6 +46,7 @@ BULGE_SHARE = 0.8  # of the displaced volume shows up as bulge within the mesh
 BULGE_HOLE = 1.5  # footprints around the contact do not bulge
 FIXED_RESISTANCE_SHARE = 0.35  # path through fluid that no contact moves
 TEMPERATURE_PER_C = -0.02  # of log resistance
+PDC_REST = (1300, 2700)  # counts of static pressure at rest: real sensors' is 1326, 2412, and 2582 to 2695
 
 _BLOCK = 256  # states at a time: keeps the (states x mesh points) arrays inside the cache
 
@@ -214,7 +215,7 @@ class Finger:
     ``profile``: "new" has the paper's rest resistance and a quiet converter, "worn" what the public
     recordings show (numerics.md 1.1 and 1.4: 1.4 to 3.9 kOhm, sigma 5, 0.5 % glitches).
     With ``scale`` it is a finger that the population map knows, but for that correction (known_finger.py).
-    ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and 30 C, and gap sensitivity.
+    ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and 30 C, and gap sensitivity. ``pdc_rest`` is in counts.
     """
 
     def __init__(self, seed: int, profile: Profile = "new", scale: Scale | None = None) -> None:
@@ -229,6 +230,7 @@ class Finger:
         # real drift is one-dimensional: one rate a finger, loadings 0.82 to 1.16 (biotac.md finding 6)
         self.drift_per_min: Floats = rng.uniform(-15.0, 15.0) * rng.uniform(0.82, 1.16, ELECTRODES)
         self.creep_share = float(rng.uniform(0.02, 0.05))
+        self.pdc_rest = float(np.random.default_rng([seed, 6]).integers(*PDC_REST))
         self.noise_counts = 5.0 if worn else 1.5
         self.glitch_share = 0.005 if worn else 0.0
 

@@ -19,7 +19,7 @@ from .stick_slip import Ringing
 Words = npt.NDArray[np.uint16]
 
 CREEP_S = 10.0
-PDC_REST, PDC_PER_N, PDC_NOISE = 1326.0, 100.0, 1.0
+PDC_PER_N, PDC_NOISE = 100.0, 1.0
 # What real skin does to the static pressure besides (17 presses of robotic_finger/trial_15330 and 10 of another trial):
 # it is 3 to 9 counts low after a press, whatever the press was, and comes back in 0.3 to 2.9 s; and each press leaves
 # up to 5.6 counts (5 s at 500), which add up, 24 to 30 after 17 presses in 75 s. How it creeps beyond is not measured.
@@ -100,7 +100,7 @@ class _Reading:
         pdc = self._pressure(self._load[rows])
         slow_noise = self._slow_rng.normal(0.0, (PDC_NOISE, TAC_NOISE, TDC_NOISE), (frames, 3))
         at_slot = np.array([PDC_SLOT, TAC_SLOT, TDC_SLOT]) / SLOTS_PER_FRAME
-        slow = np.column_stack([PDC_REST + pdc, np.full(frames + 1, TAC_REST), self._tdc[rows]])
+        slow = np.column_stack([finger.pdc_rest + pdc, np.full(frames + 1, TAC_REST), self._tdc[rows]])
         words[:, [PDC_SLOT, TAC_SLOT, TDC_SLOT]] = _between(slow, at_slot) + slow_noise
 
         rattle = PAC_RATTLE_PER_N_S * np.abs(np.diff(self._force_n[rows])) / FRAME_S
