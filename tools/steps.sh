@@ -1,5 +1,5 @@
 # Sourced by tools/test and tools/nightly: the steps that they are made of, and what each needs installed.
-# shellcheck shell=bash
+# shellcheck shell=bash disable=SC2086
 . tools/venv.sh
 export BIOTAC_CI=1 # a proof or a rig whose tool is missing fails instead of being skipped
 PATH="$PWD/.venv/bin:$PATH"
@@ -14,11 +14,11 @@ step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells how lon
     echo "-- $((SECONDS - begin)) s"
 }
 
-both() { # both "WHAT" FUNCTION "WHAT ELSE" FUNCTION: two steps at once, each of which keeps one core busy
+both() { # both "WHAT" "COMMAND" "WHAT ELSE" "COMMAND": two steps at once, each of which keeps one core busy
     local output result=0
     output=$(mktemp)
-    step "$3" "$4" >"$output" 2>&1 &
-    step "$1" "$2"
+    step "$3" $4 >"$output" 2>&1 &
+    step "$1" $2
     wait $! || result=$?
     cat "$output"
     rm "$output"
@@ -34,13 +34,6 @@ install_for_proofs_and_fuzzing() {
     need "command -v gappa" gappa
     need "echo 'int LLVMFuzzerTestOneInput(void){return 0;}' | clang -fsanitize=fuzzer,address -xc - -o /dev/null" \
         clang libclang-rt-dev
-}
-
-install_for_memory_proofs() {
-    need "command -v frama-c" frama-c-base
-    need "command -v why3" why3
-    need "test -x /usr/bin/z3" z3
-    why3 config detect >/dev/null # which provers there are
 }
 
 install_for_boards_and_pages() {
@@ -96,16 +89,4 @@ python_tests() { # arguments go to pytest; processes with whole files each, for 
     # Three on two cores: almost half of the time a test waits for a board whose time is real. Skipped tests say why,
     # once a reason. What hangs is named with where it stands, after longer than any test takes on a busy computer.
     pytest -rsfE -n 3 --dist loadfile --no-loadscope-reorder --timeout 900 "$@"
-}
-
-fuzzing() {
-    python tools/fuzz --seconds 5
-}
-
-same_bits() {
-    tools/bench/run --bits
-}
-
-sanitized_board() {
-    BIOTAC_SIM="$PWD/build/sanitize/biotac-sim" python_tests tests/hil --rig posix
 }

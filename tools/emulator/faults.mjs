@@ -67,6 +67,8 @@ const ALARM3 = 0x1c
 const TIMERAWH = 0x24
 const TIMERAWL = 0x28
 const TICK_NS = 1000
+const SPIN_NS = 100 // a loop that reads the time this often, and so often in a row, does nothing but wait for it
+const SPIN_READS = 8
 
 /**
  * The TIMER: alarms on whole microseconds, and a hold like the debugger's pause.
@@ -76,7 +78,9 @@ const TICK_NS = 1000
  */
 export class DeviceTime {
   constructor(mcu) {
+    this.mcu = mcu
     this.clock = mcu.clock
+    this.spin = { pc: 0, reads: 0, untilNanos: 0 } // where the time was read last, how often, until when it may be again
     this.lost = mcu.clock.nanos // counts from the reset
     this.heldAt = null
     this.onHold = [] // what else is to stand still
@@ -132,6 +136,7 @@ export class DeviceTime {
         case TIMERAWH:
           return Math.floor(ticks / 2 ** 32)
         case TIMERAWL:
+          this.#skipSpin((ticks + 1) * TICK_NS - this.nanos)
           return ticks >>> 0
         case TIMEHR:
           return timer.latchedTimeHigh
@@ -145,6 +150,17 @@ export class DeviceTime {
       alarm.targetMicros = value >>> 0
       if (!this.held) this.#schedule(alarm)
     }
+  }
+
+  /** Such a loop goes on when the next time is there, or an alarm: its turns were most of what a boot costs here. */
+  #skipSpin(leftNanos) {
+    const { mcu, clock, spin } = this
+    spin.reads = mcu.core.PC === spin.pc && clock.nanos <= spin.untilNanos ? spin.reads + 1 : 0
+    const nanos = Math.min(leftNanos, clock.nanosToNextAlarm || Infinity)
+    const cycles = spin.reads < SPIN_READS ? 0 : Math.floor((nanos * mcu.clkSys) / 1e9)
+    mcu.core.owedCycles += cycles
+    spin.pc = mcu.core.PC
+    spin.untilNanos = clock.nanos + (cycles * 1e9) / mcu.clkSys + SPIN_NS
   }
 
   #stopWatchdog() {
