@@ -37,7 +37,7 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{path} was not written; the partial file was removed") from None
     except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another part") from error
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
 
 
 def _replace(part: Path, path: Path) -> None:
