@@ -50,9 +50,9 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
             if rig is not None:
                 why = report.longrepr[2].removeprefix(f"Skipped: {rig}: ") if outcome == "skipped" else ""
                 counts[rig][f"left out: {why.removeprefix('Skipped: ')}" if why else outcome] += 1
-    for rig, told in counts.items():
+    for rig, reported in counts.items():
         terminalreporter.section(f"rig {rig}")
-        for what, count in told.items():
+        for what, count in reported.items():
             terminalreporter.line(f"{count:5} {what}")
 
 

@@ -61,11 +61,11 @@ def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess
 
 def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
     size = 320 + len(NOTE) + 7
-    told = told_by_the_build(tmp_path, bytes(320) + NOTE + b"program")
+    answer = told_by_the_build(tmp_path, bytes(320) + NOTE + b"program")
     # Of the image with its size in it, and zeros for the CRC itself.
     sized = bytes(320) + NOTE[:-8] + struct.pack("<II", size, 0) + b"program"
     crc32 = zlib.crc32(sized)
-    assert (told.returncode, told.stdout) == (0, f"note  board 2, firmware 3.4.5, wire 6.7, CRC-32 {crc32:08x}\n")
+    assert (answer.returncode, answer.stdout) == (0, f"note  board 2, firmware 3.4.5, wire 6.7, CRC-32 {crc32:08x}\n")
     sealed = bytes(320) + NOTE[:-8] + struct.pack("<II", size, crc32) + b"program"
     assert (tmp_path / "image.bin").read_bytes() == sealed
 
@@ -81,9 +81,9 @@ def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
     ],
 )
 def test_an_image_that_does_not_say_what_it_is_is_not_built(tmp_path: Path, image: bytes, why: str) -> None:
-    told = told_by_the_build(tmp_path, image)
-    assert told.returncode == 1
-    assert why in told.stderr
+    answer = told_by_the_build(tmp_path, image)
+    assert answer.returncode == 1
+    assert why in answer.stderr
 
 
 LISTING = """

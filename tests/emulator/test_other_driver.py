@@ -50,13 +50,13 @@ def run(
     image: Path, folder: Path, samples: list[int], course: list[dict[str, Any]], *, then: bytes = b""
 ) -> dict[str, Any]:
     """``then``: what the host says behind the tape."""
-    said = encode(wire.EmuPlug.ID, wire.EmuPlug(1, 0, 1, (0,) * 16).pack())
-    said += encode(wire.EmuTape.ID, wire.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
-    (folder / "said").write_bytes(said + then)
+    heard = encode(wire.EmuPlug.ID, wire.EmuPlug(1, 0, 1, (0,) * 16).pack())
+    heard += encode(wire.EmuTape.ID, wire.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
+    (folder / "said").write_bytes(heard + then)
     (folder / "course").write_text(json.dumps(course))
     words = ["node", Path(__file__).with_name("other_driver.mjs"), image, folder / "said", folder / "course"]
-    told: dict[str, Any] = json.loads(subprocess.run(words, check=True, capture_output=True).stdout)
-    return told
+    answer: dict[str, Any] = json.loads(subprocess.run(words, check=True, capture_output=True).stdout)
+    return answer
 
 
 def reading(slot: int, *, theirs: bool = False) -> list[dict[str, Any]]:
@@ -74,11 +74,11 @@ def test_both_ways_of_reading_get_the_tape(image: Path, tmp_path: Path) -> None:
     rng = np.random.default_rng(19)
     samples = [int(count) for count in rng.integers(0, 4096, SLOTS)]
     course = [step for k in range(SLOTS) for step in reading(k, theirs=k < SLOTS // 2)]
-    told = run(image, tmp_path, samples, course)
-    assert told["words"][1::2] == [word_of(count) for count in samples]
-    assert told["counters"]["late_edges"] == 0
-    print({name: told["counters"][name] for name in ("answer_ns", "answer_left_ns")})
-    assert told["counters"]["answer_ns"] < 500  # what this driver leaves between select and clock
+    answer = run(image, tmp_path, samples, course)
+    assert answer["words"][1::2] == [word_of(count) for count in samples]
+    assert answer["counters"]["late_edges"] == 0
+    print({name: answer["counters"][name] for name in ("answer_ns", "answer_left_ns")})
+    assert answer["counters"]["answer_ns"] < 500  # what this driver leaves between select and clock
 
 
 def test_the_fifty_microseconds_are_kept_and_a_sample_is_given_once(image: Path, tmp_path: Path) -> None:
@@ -100,15 +100,15 @@ def digest(samples: list[int]) -> int:
     return zlib.crc32(np.array(samples, "<u2").tobytes())
 
 
-def answers(told: dict[str, Any]) -> list[Any]:
-    return [wire.MESSAGES[kind].unpack(payload) for kind, payload in Deframer().feed(bytes.fromhex(told["said"]))]
+def answers(answer: dict[str, Any]) -> list[Any]:
+    return [wire.MESSAGES[kind].unpack(payload) for kind, payload in Deframer().feed(bytes.fromhex(answer["said"]))]
 
 
 def test_a_tape_that_is_kept_is_played_over_and_over_from_power_up_on(image: Path, tmp_path: Path) -> None:
     course = [{"power": True}] + [step for slot in range(3 * ROUND) for step in reading(slot)]
-    told = run(image, tmp_path, KEPT, course, then=keep(ROUND, digest(KEPT)))
-    assert isinstance(answers(told)[-1], wire.EmuStatus)
-    assert told["words"][1::2] == 3 * [word_of(count) for count in KEPT]
+    answer = run(image, tmp_path, KEPT, course, then=keep(ROUND, digest(KEPT)))
+    assert isinstance(answers(answer)[-1], wire.EmuStatus)
+    assert answer["words"][1::2] == 3 * [word_of(count) for count in KEPT]
 
 
 def test_what_is_not_whole_is_not_kept_and_what_was_is_forgotten_when_told_so(image: Path, tmp_path: Path) -> None:
@@ -119,11 +119,11 @@ def test_what_is_not_whole_is_not_kept_and_what_was_is_forgotten_when_told_so(im
         (2**32 - 1, 0),
     ]
     then = b"".join(keep(slots, crc32) for slots, crc32 in [*not_these, (ROUND, digest(KEPT)), (0, 0)])
-    told = run(image, tmp_path, KEPT, [{"power": True}, *reading(0)], then=then)
+    answer = run(image, tmp_path, KEPT, [{"power": True}, *reading(0)], then=then)
     refused = wire.Reply(3, wire.EmuKeep.ID, wire.Error.NOT_WHOLE)
-    assert answers(told)[-6:-2] == [refused] * 4
-    assert all(isinstance(one, wire.EmuStatus) for one in answers(told)[-2:])
-    assert told["words"][1] == 0x0000  # nothing is played
+    assert answers(answer)[-6:-2] == [refused] * 4
+    assert all(isinstance(one, wire.EmuStatus) for one in answers(answer)[-2:])
+    assert answer["words"][1] == 0x0000  # nothing is played
 
 
 def test_a_hostile_tape_is_refused_or_left_and_what_there_was_is_played(image: Path, tmp_path: Path) -> None:
@@ -131,12 +131,12 @@ def test_a_hostile_tape_is_refused_or_left_and_what_there_was_is_played(image: P
     other_fingers, again, a_gap = (2, 1, ROUND), (1, 1, 3), (1, 1, 99)
     tapes = (nobody, six, empty, too_long, other_fingers, again, a_gap)
     then = b"".join(encode(wire.EmuTape.ID, wire.EmuTape(7, *facts, (0,) * 220).pack()) for facts in tapes)
-    told = run(image, tmp_path, KEPT, [step for slot in range(ROUND + 1) for step in reading(slot)], then=then)
-    refused, left = answers(told)[-7:-3], answers(told)[-3:]
+    answer = run(image, tmp_path, KEPT, [step for slot in range(ROUND + 1) for step in reading(slot)], then=then)
+    refused, left = answers(answer)[-7:-3], answers(answer)[-3:]
     assert refused == [wire.Reply(7, wire.EmuTape.ID, wire.Error.OUT_OF_RANGE)] * 4
     assert [status.slots_taken for status in left] == [ROUND] * 3
     # Behind the last slot, as where a host was killed in the middle, a sensor is silent.
-    assert told["words"][1::2] == [*(word_of(count) for count in KEPT), 0x0000]
+    assert answer["words"][1::2] == [*(word_of(count) for count in KEPT), 0x0000]
 
 
 def test_by_time_a_bus_of_half_the_speed_gets_every_other_round(image: Path, tmp_path: Path) -> None:
@@ -149,9 +149,9 @@ def test_by_time_a_bus_of_half_the_speed_gets_every_other_round(image: Path, tmp
     course = [step for slot in range(2 * ROUND) for step in reading(slot)]
     for listen in course[1::2]:
         listen["wait_us"] = 2e6 / sensor.SLOT_HZ - SETTLE_US  # and the words themselves
-    told = run(image, tmp_path, tape[:ROUND], course, then=b"".join(more) + by_time)
+    answer = run(image, tmp_path, tape[:ROUND], course, then=b"".join(more) + by_time)
     served = tape[:ROUND] + tape[2 * ROUND : 3 * ROUND]
-    assert told["words"][1::2] == [word_of(count) for count in served]
+    assert answer["words"][1::2] == [word_of(count) for count in served]
 
 
 def padded(samples: list[int]) -> tuple[int, ...]:

@@ -19,6 +19,6 @@ def test_every_opcode_does_what_it_does_as_published() -> None:
         pytest.skip("node and npm missing; tools/test installs what the emulated rig needs")
     subprocess.run([ROOT / "tools/emulator/prepare"], check=True)
     run = subprocess.run(["node", Path(__file__).with_name("both_cores.mjs")], check=True, capture_output=True)
-    told = json.loads(run.stdout)
-    assert told["executed"] > 100_000
-    assert told["differences"] == []
+    answer = json.loads(run.stdout)
+    assert answer["executed"] > 100_000
+    assert answer["differences"] == []

@@ -38,8 +38,8 @@ def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> Non
         # A word has 7 + 5 bits of count beside parity.
         word = np.frombuffer(words[: len(words) // 2 * 2], ">u2")
         counts = ((word >> 9) * 32 + (word >> 3 & 31)).astype(np.uint16)
-        told = frames[frames["finger"] == finger]
-        rounds = [np.uint16([row["pdc"], row["tac"], row["tdc"], *row["counts"]]) for row in told]
+        finger_frames = frames[frames["finger"] == finger]
+        rounds = [np.uint16([row["pdc"], row["tac"], row["tdc"], *row["counts"]]) for row in finger_frames]
         # A slot has the command, whose answer means nothing, and the read; every second sample is PAC. The recording
         # may begin between any of them.
         others = [counts[first::4] for first in range(4)]

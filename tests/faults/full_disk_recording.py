@@ -17,7 +17,7 @@ import biotac
 
 
 def record(port: str, path: Path, size: int) -> dict[str, int]:
-    told = read = 0
+    answer = read = 0
     try:
         with biotac.open(port) as hand:  # which writes a file of its own first
             _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -26,8 +26,8 @@ def record(port: str, path: Path, size: int) -> dict[str, int]:
             for batch in hand.batches():
                 read += len(batch.frames)
     except OSError:
-        told = 1
-    return {"told": told, "read": read}
+        answer = 1
+    return {"told": answer, "read": read}
 
 
 def main(port: str, folder: str, *sizes: str) -> None:

@@ -31,13 +31,13 @@ def test_what_fitted_is_kept_but_for_a_second(tmp_path: Path, sizes: int) -> Non
     done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     for limit, line in zip(limits, done.stdout.splitlines(), strict=True):
-        told = json.loads(line)
-        assert told["told"] == 1
+        answer = json.loads(line)
+        assert answer["told"] == 1
         recording = biotac.Recording(tmp_path / f"{limit}.mcap")
         kept = recording.frames
         assert recording.cut_off and recording.counts.bad == 0 and recording.frames_lost == 0
         assert kept.tobytes() == frames[: len(kept)].tobytes()
-        assert len(kept) <= told["read"] + FINGERS * ROUNDS_PER_S
+        assert len(kept) <= answer["read"] + FINGERS * ROUNDS_PER_S
         assert len(kept) >= len(frames) * limit / whole_bytes - FINGERS * ROUNDS_PER_S
 
 

@@ -59,7 +59,7 @@ def test_every_frames_arrival_is_told_and_none_comes_before_its_round_is_over(ri
 def test_the_core_clocks_the_same_words_as_the_dma(rig: Rig) -> None:
     """By the setting slots_by_core, for an evening on which the DMA does not do what its data sheet says."""
     rig.need("counters")
-    told = []
+    runs = []
     for by_core in (0, 1):
         board = EmulatedBoard("pico", load_source("press.toml", fingers=5, seconds=1.0), pace=0.0, hold=True)
         rig.opened.append(board)
@@ -69,8 +69,8 @@ def test_the_core_clocks_the_same_words_as_the_dma(rig: Rig) -> None:
         board.do("cut power")  # the setting counts from the next start on
         board.until(1, usb={"state": "configured"})
         with shake_hands(SimLink("pico", board)) as hand:
-            told.append(hand.read_batch(1.0).wire)
+            runs.append(hand.read_batch(1.0).wire)
             assert hand.status().slots_late == 0
             assert (board.counters()["timing"]["interrupt_us"] > SLOT_US / 5) == (by_core == 1)
-    both = [rows[[name for name in rows.dtype.names if name != "t_us"]] for rows in told]
+    both = [rows[[name for name in rows.dtype.names if name != "t_us"]] for rows in runs]
     assert len(both[0]) > 400 and (both[0] == both[1]).all()

@@ -43,10 +43,10 @@ def info(finger: int, serial: str, flex: str = "20", software: str = "0210") -> 
 def rounds(fingers: tuple[int, ...] = (0, 1), n: int = 300, step_us: int = 10_000) -> np.ndarray:
     frames = np.zeros(n * len(fingers), FRAME_DTYPE)
     for k, finger in enumerate(fingers):
-        mine = slice(k, None, len(fingers))
-        frames["finger"][mine] = finger
-        frames["seq"][mine] = np.arange(n)
-        frames["t_us"][mine] = np.arange(n) * step_us
+        own = slice(k, None, len(fingers))
+        frames["finger"][own] = finger
+        frames["seq"][own] = np.arange(n)
+        frames["t_us"][own] = np.arange(n) * step_us
     noise = np.random.default_rng(7).integers(-1, 2, (len(frames), 22))
     frames["counts"] = 3000 + noise[:, :19]
     for k, name in enumerate(("pdc", "tac", "tdc")):

@@ -60,11 +60,11 @@ def test_five_fingers_with_pac_lose_nothing(tmp_path) -> None:
     assert facts["frames"] == facts["pac_blocks"] == 10_000
     assert facts["board_slots_late"] == facts["board_dropped"] == 0
     for finger in range(5):
-        mine = demo.batch.frames["finger"] == finger
-        assert np.array_equal(demo.batch.frames["seq"][mine], np.arange(2000))
-        assert np.array_equal(demo.batch.frames["counts"][mine], demo.source.samples[:, finger, 7::2])
-        mine = demo.batch.pac["finger"] == finger
-        assert np.array_equal(demo.batch.pac["pac"][mine], demo.source.samples[:, finger, 0::2])
+        own = demo.batch.frames["finger"] == finger
+        assert np.array_equal(demo.batch.frames["seq"][own], np.arange(2000))
+        assert np.array_equal(demo.batch.frames["counts"][own], demo.source.samples[:, finger, 7::2])
+        own = demo.batch.pac["finger"] == finger
+        assert np.array_equal(demo.batch.pac["pac"][own], demo.source.samples[:, finger, 0::2])
     assert facts["crosscheck"]["poc_um_max"] <= POC_BOUND_UM
     assert facts["crosscheck"]["force_mn_max"] <= FORCE_BOUND_MN
     assert facts["crosscheck"]["torque_nmm_max"] <= 0.02

@@ -73,8 +73,8 @@ def test_the_lead_that_is_wrong_is_told_by_what_either_end_heard(facts: Facts, e
 
 def evening(change: Callable[[Bringup], object] = lambda seen: None) -> list[Finding]:
     """What the first evening of a healthy board finds, but for a change; its fingers are pressed in the second half."""
-    told = {"usb_frame": 0, "flash_id": (0xEF, 0x40, 0x15), "supply_mv": 4800, "erase_us": 45_000}
-    first = message(wire.BoardFacts, **told)
+    answer = {"usb_frame": 0, "flash_id": (0xEF, 0x40, 0x15), "supply_mv": 4800, "erase_us": 45_000}
+    first = message(wire.BoardFacts, **answer)
     last = dataclasses.replace(first, t_us=10_000_000, usb_frame=10_000 % 2048, usb_starts=10_000)
     rows = rounds()
     half = rows[len(rows) // 2 :]
@@ -114,8 +114,8 @@ EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
         lambda seen: seen.rates.update({5000: np.array([[1, 0], [1, 9]])}),
         "finger 1 is clean up to 4.46 MHz",
     ),
-    ("not_pressed", rows("force_n", lambda its: 0.2), "finger 1"),
-    ("pressure_flat", rows("pdc", lambda its: 2000 + np.where(its["flags"], 6, 0)), "2.0 counts/N"),
+    ("not_pressed", rows("force_n", lambda own: 0.2), "finger 1"),
+    ("pressure_flat", rows("pdc", lambda own: 2000 + np.where(own["flags"], 6, 0)), "2.0 counts/N"),
     ("pdc_warm", lambda seen: warm(seen.frames[1::2]), "finger 1: +40 counts a degree"),
     ("restart", lambda seen: seen.restarts.append(Restart(1.0, 0b01, int(wire.FaultFlags.STARTED))), "after restart 3"),
     ("restart", lambda seen: seen.restarts.append(Restart(1.0, 0b11, int(wire.FaultFlags.HUNG))), "HUNG"),

@@ -382,9 +382,9 @@ def test_a_program_on_a_pty_is_not_blamed_for_its_clock(tmp_path: Path, capsys) 
 def test_a_report_is_one_file_with_findings_and_what_they_were_judged_by(tmp_path, capsys) -> None:
     place = tmp_path / "report.json"
     assert main(["doctor", "sim:press.toml?fingers=2&seconds=2&pace=0", "--seconds", "1", "--report", str(place)]) == 0
-    told = json.loads(place.read_text())
-    assert told["findings"] == []
-    assert told["library"] == __version__
-    assert told["board"]["hello"]["fingers_present"] == 0b11
-    assert len(told["board"]["sensors_after"]) == 5
-    assert told["sensor_board"] is None
+    answer = json.loads(place.read_text())
+    assert answer["findings"] == []
+    assert answer["library"] == __version__
+    assert answer["board"]["hello"]["fingers_present"] == 0b11
+    assert len(answer["board"]["sensors_after"]) == 5
+    assert answer["sensor_board"] is None

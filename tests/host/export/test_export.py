@@ -66,8 +66,8 @@ def first_us(recording: biotac.Recording, block: int) -> int:
 
 def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
     """What biotac.load gives, from the wire's integers by MESSAGES.md's units; the stamps are the recording's."""
-    mine = recording.frames["finger"] == finger
-    frames, sent = recording.frames[mine], recording.wire[mine]
+    own = recording.frames["finger"] == finger
+    frames, sent = recording.frames[own], recording.wire[own]
 
     since_us = frames["t_us"] - recording.frames["t_us"].min()
 
@@ -164,12 +164,12 @@ def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None
         times = [int(row["t_us"]) for row in rows]
         assert times == sorted(times)
         for finger in range(FINGERS):
-            mine = [row for row in rows if row["frame_id"] == f"biotac_finger{finger}"]
-            assert {row["finger"] for row in mine} == {str(finger)}
+            own = [row for row in rows if row["frame_id"] == f"biotac_finger{finger}"]
+            assert {row["finger"] for row in own} == {str(finger)}
             for column in columns:
                 names = column.flat_names()
-                wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
-                got = np.array([[row[n] for n in names] for row in mine])
+                wanted = wanted_of(recorded, finger)[column.name].reshape(len(own), -1)
+                got = np.array([[row[n] for n in names] for row in own])
                 kind_of = got.dtype if column.dtype == "U" else float
                 assert same(got.astype(kind_of), wanted.astype(kind_of)), column.name
 
@@ -179,14 +179,14 @@ def test_parquet_says_units_and_frames(recorded, tmp_path) -> None:
     for kind, columns, wanted_of in KINDS:
         table = pq.read_table(tmp_path / f"a{kind}.parquet")
         for finger in range(FINGERS):
-            mine = table.filter([i.as_py() == f"biotac_finger{finger}" for i in table["frame_id"]])
-            assert set(mine["finger"].to_pylist()) == {finger}
+            own = table.filter([i.as_py() == f"biotac_finger{finger}" for i in table["frame_id"]])
+            assert set(own["finger"].to_pylist()) == {finger}
             for column in columns:
-                wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
+                wanted = wanted_of(recorded, finger)[column.name].reshape(len(own), -1)
                 for k, flat in enumerate(column.flat_names()):
                     missing = np.isnan(wanted[:, k]) if wanted.dtype.kind == "f" else wanted[:, k] == column.invalid
-                    assert mine[flat].is_null().to_numpy().tolist() == missing.tolist(), flat
-                    assert same(mine[flat].drop_null().to_numpy(), wanted[:, k][~missing]), flat
+                    assert own[flat].is_null().to_numpy().tolist() == missing.tolist(), flat
+                    assert same(own[flat].drop_null().to_numpy(), wanted[:, k][~missing]), flat
                     assert table.schema.field(flat).metadata[b"unit"].decode() == column.unit
 
 

@@ -319,13 +319,13 @@ def test_the_whole_command_over_a_drive(
     monkeypatch.setattr(loader_drive.os, "fsync", fsync)
     fake.settings[9] = 250
     assert main(["flash", str(image), "--json"]) == 0
-    said = capsys.readouterr()
-    facts = json.loads(said.out)
+    heard = capsys.readouterr()
+    facts = json.loads(heard.out)
     assert (facts["firmware_before"], facts["firmware"]) == ("0.1.0", "0.2.0")
     assert (facts["boot_id_before"], facts["boot_id"]) == (7, 8)
     assert facts["settings_restored"] == ["idle_period_ms"]
     assert Path(facts["backup"]).is_file()
-    assert "writing 20 blocks to the drive RPI-RP2" in said.err
+    assert "writing 20 blocks to the drive RPI-RP2" in heard.err
 
 
 def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, tmp_path, monkeypatch) -> None:

@@ -291,8 +291,8 @@ def test_check_runs_the_crosscheck_over_all_of_it(sources, lake, capsys) -> None
         assert main(["check", str(source), "--json"]) == 0
         one_by_one.append(json.loads(capsys.readouterr().out)["crosscheck"])
     for name in ("poc_um_max", "force_mn_max", "torque_nmm_max"):
-        assert facts[name] == max(its[name] for its in one_by_one)
-    assert facts["frames"] == sum(its["frames"] for its in one_by_one)
+        assert facts[name] == max(part[name] for part in one_by_one)
+    assert facts["frames"] == sum(part["frames"] for part in one_by_one)
 
 
 def test_what_threads_of_arrow_read_is_in_memory_of_arrow(lake, monkeypatch) -> None:

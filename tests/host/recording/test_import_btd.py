@@ -68,10 +68,10 @@ def test_results_are_those_of_the_boards_own_code(imported) -> None:
         for setting, value in recording.settings.items():
             hand.board.set_setting(setting, value)  # the scenario brings gains of its own
         sent = hand.read_batch(100)
-    mine = recording.wire["finger"] == 1  # without the bad word
+    own = recording.wire["finger"] == 1  # without the bad word
     theirs = sent.wire["finger"] == 1
     for name in ("counts", "tare_q4", "poc_um", "force_100un", "torque_mnmm", "flags", "tare_state", "seq"):
-        assert np.array_equal(recording.wire[mine][name], sent.wire[theirs][name]), name
+        assert np.array_equal(recording.wire[own][name], sent.wire[theirs][name]), name
     tares = [m for m in recording.messages if isinstance(m, wire.Tare) and m.finger == 1]
     live = [m for m in sent.messages if isinstance(m, wire.Tare) and m.finger == 1]
     assert [m.tare_q16 for m in tares] == [m.tare_q16 for m in live] != []

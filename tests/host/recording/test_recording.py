@@ -167,9 +167,9 @@ def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:
 def test_a_finger_that_told_only_bands_is_there(recorded, tmp_path) -> None:
     bands = wire.Bands(3, 30_227, 1, 22, (1, 2, 3, 4, 5, 6))
     rewrite(recorded[0], tmp_path / "bands.mcap", lambda _: encode(bands.ID, bands.pack()))
-    told = biotac.Recording(tmp_path / "bands.mcap")
-    assert told.fingers == [1] and len(told.frames) == 0
-    assert set(told.bands["finger"]) == {1}
+    answer = biotac.Recording(tmp_path / "bands.mcap")
+    assert answer.fingers == [1] and len(answer.frames) == 0
+    assert set(answer.bands["finger"]) == {1}
 
 
 def test_another_mcap_file_is_not_taken_for_a_recording(tmp_path) -> None:
@@ -256,9 +256,9 @@ def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
     with pytest.warns(biotac.RecordingWarning, match=r"2 gap\(s\)"):
         biotac.load(path)
     assert main(["check", str(path)]) == 0
-    told = capsys.readouterr()
-    assert "good, 2 gap(s)" in told.out and {gap.line(), at_the_end.line()} <= {
-        line.removeprefix("biotac: ") for line in told.err.splitlines()
+    answer = capsys.readouterr()
+    assert "good, 2 gap(s)" in answer.out and {gap.line(), at_the_end.line()} <= {
+        line.removeprefix("biotac: ") for line in answer.err.splitlines()
     }
     assert main(["check", str(path), "--json"]) == 0
     assert [Gap(**facts) for facts in json.loads(capsys.readouterr().out)["gaps"]] == [gap, at_the_end]

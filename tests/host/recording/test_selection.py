@@ -77,8 +77,8 @@ def test_a_damaged_second_is_kept_as_it_came(recorded: Path, tmp_path: Path) -> 
     same(biotac.load(path), whole.frames)
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, told: bool) -> None:
+@pytest.mark.parametrize("size_is_true", [True, False])
+def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, size_is_true: bool) -> None:
     bomb = tmp_path / "bomb.mcap"
     with bomb.open("wb") as stream:
         writer = Writer(stream, chunk_size=1, compression=CompressionType.ZSTD)
@@ -91,7 +91,7 @@ def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, tol
         writer.finish()
     data = bomb.read_bytes()
     assert len(data) < 200_000
-    if not told:  # the chunk says another size than its zstd frame
+    if not size_is_true:  # the chunk says another size than its zstd frame
         at = data.index((200_000_000 + 31).to_bytes(8, "little"))
         bomb.write_bytes(data[:at] + (1000).to_bytes(8, "little") + data[at + 8 :])
     tracemalloc.start()

@@ -41,7 +41,7 @@ def link_is(page: Any, link: str) -> None:
     page.wait_for_selector(f'#link[data-link="{link}"]')
 
 
-def told(page: Any, words: str) -> None:
+def await_text(page: Any, words: str) -> None:
     until(page, "w => told.textContent.includes(w)", words)
 
 
@@ -124,15 +124,15 @@ def test_a_recording_is_sought_marked_and_saved_by_keys_alone(view, open_page, t
     until(page, "() => numbers.dataset.seq < 500")
     page.focus("#pace")
     page.keyboard.press("5")
-    told(page, "Playing at 5 times its pace.")
+    await_text(page, "Playing at 5 times its pace.")
     page.focus("#mark-text")
     page.keyboard.type("tar")  # none of them is a command here
     page.focus("#mark")
     page.keyboard.press("m")
-    told(page, "Marked 'tar' at ")
+    await_text(page, "Marked 'tar' at ")
     until(page, "() => document.querySelectorAll('#marks li').length === 2")
     page.keyboard.press("s")
-    told(page, "saved to ")
+    await_text(page, "saved to ")
     (saved,) = set(tmp_path.glob("*.mcap")) - {path}
     assert biotac.Recording(saved).problems == []
     assert {label.text for label in biotac.Recording(path).labels} == {"slip", "tar"}
@@ -169,11 +169,11 @@ def test_tare_by_button_and_by_key(view, open_page) -> None:
     page = open_page(view("sim:drift.toml?fingers=2"))
     page.wait_for_selector("#tare-state:text('REST')")
     page.click("#tare")
-    told(page, "Tared finger 0.")
+    await_text(page, "Tared finger 0.")
     until(page, "w => document.getElementById('tare-reason').textContent === w", "TARE_NOW command")
     assert float(page.get_attribute("#tare-age", "data-value")) < 10_000
     page.keyboard.press("a")
-    told(page, "Tared fingers 0, 1.")
+    await_text(page, "Tared fingers 0, 1.")
 
 
 def test_a_refused_command_says_why_and_moves_nothing(make_player, view_of, open_page, touch) -> None:
@@ -186,7 +186,7 @@ def test_a_refused_command_says_why_and_moves_nothing(make_player, view_of, open
     page.keyboard.press("1")
     before = page.locator("main").bounding_box()
     page.keyboard.press("t")
-    told(page, "NOT_STILL")
+    await_text(page, "NOT_STILL")
     assert page.get_attribute("#told", "data-kind") == "bad"
     assert page.locator("main").bounding_box() == before
     assert player.commands == [("tare", 1)]
@@ -196,11 +196,11 @@ def test_recording_starts_and_stops_by_key_and_is_whole(view, open_page, tmp_pat
     page = open_page(view("sim:drift.toml?fingers=2"))
     link_is(page, "live")
     page.keyboard.press("r")
-    told(page, "Recording to ")
+    await_text(page, "Recording to ")
     page.wait_for_selector("#record[aria-pressed=true]")
     until(page, "() => parseFloat(document.getElementById('record-words').textContent.split(' ')[1]) >= 1")
     page.click("#record")
-    told(page, "Recorded to ")
+    await_text(page, "Recorded to ")
     page.wait_for_selector("#record[aria-pressed=false]")
     (path,) = tmp_path.glob("biotac-*.mcap")
     assert path.name in page.text_content("#told")
@@ -282,9 +282,9 @@ def test_a_missing_board_is_told_and_found_again(make_player, view_of, open_page
     players[1].script.put(touch)
     ready.append(players[1])
     link_is(page, "live")
-    told(page, "The board is connected again.")
+    await_text(page, "The board is connected again.")
     page.keyboard.press("a")
-    told(page, "Done as told.")
+    await_text(page, "Done as told.")
     assert players[1].commands == [("tare", None)]
 
 
@@ -312,7 +312,7 @@ def test_the_page_finds_a_restarted_server(view, open_page) -> None:
     page.wait_for_selector("#tare-state:text('REST')")
     page.goto(second.url)  # commands need the new one's token
     page.keyboard.press("t")
-    told(page, "Tared finger 0.")
+    await_text(page, "Tared finger 0.")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -388,7 +388,7 @@ def test_keys_are_listed_and_do_nothing_behind_the_list(make_player, view_of, op
     page.keyboard.press("Escape")
     page.wait_for_selector("#keys", state="hidden")
     page.keyboard.press("a")
-    told(page, "Done as told.")
+    await_text(page, "Done as told.")
     assert player.commands == [("tare", None)]
 
 

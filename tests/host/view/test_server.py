@@ -84,8 +84,8 @@ def test_the_secret_is_in_the_pages_address_and_nowhere_that_is_served(make_play
     stream = socket.create_connection(("127.0.0.1", viewing.server.server_port))
     stream.sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{viewing.server.server_port}\r\n\r\n".encode())
     with stream, stream.makefile("rb") as lines:
-        told = b"".join(next(lines) for _ in range(20))
-    assert b"token_header" in told and token.encode() not in told
+        reported = b"".join(next(lines) for _ in range(20))
+    assert b"token_header" in reported and token.encode() not in reported
 
 
 def malformed(draw: random.Random, host: bytes, token: bytes) -> bytes:
@@ -155,10 +155,10 @@ def test_requests_that_are_none_are_refused_and_forgotten(make_player, view_of, 
             with contextlib.suppress(OSError):
                 while len(got) < 1 << 20 and (part := one.recv(1 << 16)):
                     got += part
-        told = re.match(rb"HTTP/\S+ (\d+)", got) or re.search(
+        reported = re.match(rb"HTTP/\S+ (\d+)", got) or re.search(
             rb"Error code: (\d+)", got
         )  # without a head, as 0.9 had it
-        status = told[1] if told else b""
+        status = reported[1] if reported else b""
         answers[status] += 1
         assert status in {b"", b"100", b"200", b"400", b"403", b"404", b"409", b"414", b"431", b"501", b"505"}, (
             k,
