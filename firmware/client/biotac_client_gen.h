@@ -50,7 +50,7 @@ enum bt_sensor_fault {
     BT_SENSOR_FAULT_ALONE = 3, // it moved while the rest of the skin did not: it floats, drifts or is loose
     BT_SENSOR_FAULT_STUCK = 4, // it repeats one count while the skin moves
     BT_SENSOR_FAULT_FROZEN = 5, // every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
-    BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure, or PDC jumped and PAC did not: supply, reference or another sensor; the tare is wrong until the next one
+    BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     BT_SENSOR_FAULT_NOISY = 7, // at least five electrodes jump from round to round, too much for a tare to be taken
 };
 
@@ -155,7 +155,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
 #define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
-#define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not, or jumped while PAC was quiet: an edge as narrow as an electrode, or a fault
+#define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
 #define BT_FRAME_FLAGS 0xFFFFFFFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.

@@ -113,8 +113,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
-    finger->health.gone = UINT32_MAX; // a jump in the gap was not heard
-    finger->bands.begun = false;      // samples before and after the gap do not belong together
+    finger->bands.begun = false; // samples before and after the gap do not belong together
     if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
         finger->silent_rounds++;
     }

@@ -51,9 +51,6 @@ static inline bt_round course_frame(emulated_finger *finger, int k)
         bool gone = random_unit(&finger->seed) < 0.002 || (between(k, 1180, 1200) && i % 5 == 2);
         frame.electrode[i] = gone ? BT_INVALID_COUNT : frame.electrode[i];
     }
-    for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
-        frame.pac[i] = (uint16_t)(2048 + (k == 600 ? 60 * i : 0)); // the release is heard
-    }
     frame.pdc = random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : frame.pdc;
     frame.tdc = (uint16_t)(random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : 1000 + k / 20);
     frame.tac = (uint16_t)(random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : 2000 + k % 7);
@@ -65,7 +62,7 @@ static inline uint16_t course_word(const bt_round *frame, uint8_t slot)
     unsigned channel = bt_slot_channel[slot];
     switch (channel) {
     case BT_CHANNEL_PAC:
-        return frame->pac[bt_slot_pac[slot]];
+        return 2048;
     case BT_CHANNEL_PDC:
         return frame->pdc;
     case BT_CHANNEL_TAC:

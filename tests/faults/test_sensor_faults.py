@@ -39,8 +39,8 @@ UNSEEN: dict[str, tuple[str, dict[str, tuple[str, ...]]]] = {
     "all electrodes drift 1 count/s": ("so does warmth", {"fitted": WHEN}),
     "all electrodes drift 5 counts/s": ("warmth does as much, before the thermometer", dict.fromkeys(MODELS, WHEN)),
     "all electrodes drift 20 counts/s": ("up to 5 counts it is warmth, too", {"fitted": WHEN}),
-    "two electrodes' wires exchanged": (SQUEEZED, {"fitted": ("touch",)}),
-    "channels shifted by a slot": ("PAC for pressure may read as a finger let go", {"fitted": ("rest",)}),
+    "two electrodes' wires exchanged": (SQUEEZED, {"fitted": ("touch",), "population": ("touch",)}),
+    "two fingers exchanged": ("the counts are a finger's", dict.fromkeys(MODELS, WHEN)),
     "cross-talk of 30 % between fingers": (PRESSED, {"fitted": WHEN}),
     "cross-talk of 100 % between fingers": (PRESSED, dict.fromkeys(MODELS, WHEN)),
 }  # fmt: skip
@@ -209,11 +209,9 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "pressure is stuck, or at an end of its range": (
         ("PDC stuck", "PDC 0", "PDC 4095"), "PDC_MISSING, if not stuck", "looks at `biotac doctor`",
     ),
-    "two fingers exchanged without a silence": (
-        ("two fingers exchanged",), "SENSOR_FAULT, if at rest their PDCs differ by 48 counts", "lets go, to tare",
-    ),
-    "two fingers coupled": (
-        ("cross-talk of 30 % between fingers", "cross-talk of 100 % between fingers"), "none", "keeps cables apart",
+    "two fingers exchanged without a silence, or coupled": (
+        ("two fingers exchanged", "cross-talk of 30 % between fingers", "cross-talk of 100 % between fingers"), "none",
+        "keeps cables apart",
     ),
 }  # fmt: skip
 

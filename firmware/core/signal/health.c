@@ -34,7 +34,6 @@
 #define TOGETHER_WINDOWS 9   // 14 counts/s: a hot cup does up to 10
 
 #define FLIP_WINDOWS 8 // in which no live electrode jumps back and forth three times
-#define SOUND 256u     // counts of PAC: a third of the least that is left of a jump of pressure a round later
 
 void bt_health_reset(bt_health *health)
 {
@@ -56,9 +55,9 @@ static uint8_t counted(uint8_t count)
     return (uint8_t)(count + (count < UINT8_MAX));
 }
 
-// ---- words that jump ------------------------------------------------------------------------------
+// ---- words that jump back and forth --------------------------------------------------------------
 
-static void judge_flips(bt_health *health, uint32_t flips)
+static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips)
 {
     health->flips[2] |= health->flips[1] & flips;
     health->flips[1] |= health->flips[0] & flips;
@@ -69,31 +68,6 @@ static void judge_flips(bt_health *health, uint32_t flips)
         if (!bt_usable_without(health->out)) {
             health->sensor_fault = BT_SENSOR_FAULT_NOISY;
         }
-    }
-}
-
-// A missing word is far from every other.
-static bool quiet(const uint16_t pac[BT_PAC_PER_FRAME])
-{
-    unsigned k = 0;
-    while (k < BT_PAC_PER_FRAME && pac[k] - pac[0] + SOUND <= 2 * SOUND) {
-        k++;
-    }
-    return k == BT_PAC_PER_FRAME && pac[0] - SOUND <= BT_FULL_SCALE_COUNT - 2 * SOUND;
-}
-
-static BT_NOINLINE void judge_jumps(bt_health *health, const bt_round *round, const bt_trigger *trigger)
-{
-    uint32_t back = (trigger->up & health->down) | (trigger->down & health->up);
-    uint32_t stay = ((trigger->up & health->up) | (trigger->down & health->down)) & health->unheard;
-    health->unheard = quiet(round->pac) ? (trigger->up | trigger->down) & ~health->gone : 0;
-    if (back != 0) {
-        judge_flips(health, back);
-    }
-    if (stay >> BT_LANE_PDC != 0) {
-        health->sensor_fault = BT_SENSOR_FAULT_TOGETHER;
-    } else if (bt_usable_without(stay)) { // more may jump as sheared skin comes free
-        health->alone |= stay;
     }
 }
 
@@ -416,12 +390,12 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     bt_lanes *before = &health->sum[!health->filling];
     uint32_t without = (trigger->unknown | health->out) & BT_ALL_ELECTRODES;
     uint32_t lone = 0;
-    if ((trigger->up | trigger->down) != 0) {
-        judge_jumps(health, round, trigger);
-    }
+    uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
     health->down = trigger->down;
-    health->gone = trigger->without | (uint32_t)!trigger->pressure_now << BT_LANE_PDC;
+    if (flips != 0) {
+        judge_flips(health, flips);
+    }
     switch (++health->rounds) {
     case 1:
         health->same = bt_window_begin(sum, before, smooth) & ~without;

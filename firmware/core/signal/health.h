@@ -6,10 +6,6 @@
 // electrode that moves by more than 8 times their sum is broken, and so is one that keeps saying one count
 // while they move, or jumps back and forth. And no living sensor repeats all its words: each has its noise.
 //
-// Nor does a touch move a word by a leap without a sound: PAC hears every jump of the pressure. In 78 000
-// rounds of real slides one electrode or two leapt by 60 to 230 counts unheard, a loose contact, and pressure
-// never.
-//
 // A condemned electrode is given back at rest, with a new tare, once it has been calm for two seconds.
 //
 // Four rounds are a window. No round pays for everything: while a window fills, the one before is searched
@@ -35,8 +31,6 @@ typedef struct {
     uint8_t electrode_fault; // enum bt_sensor_fault of the latest of these
     uint8_t sensor_fault;    // enum bt_sensor_fault
     uint32_t up, down;       // trigger's, of the round before
-    uint32_t gone;           // lanes without a usable word in the round before; all after a silence
-    uint32_t unheard;        // lanes that jumped in the round before, without a sound
     uint32_t flips[3];       // electrodes that jumped back and forth once, twice, three times lately
     bt_lanes anchor;         // a window's sums when the skin last moved
     bt_lanes mean;           // running: goes a quarter of the way to every second window

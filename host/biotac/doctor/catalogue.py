@@ -328,11 +328,9 @@ CATALOGUE: dict[str, Entry] = {
         "Reseat the flex connector. If it stays, do not trust forces of this sensor, and have it repaired.",
     ),
     "electrodes_shifted": error(
-        "All electrodes moved alike and faster than anything warms, without pressure, or the static pressure jumped "
-        "and PAC, which hears every touch, was quiet: supply or reference dropped, or another sensor answers. Forces "
-        "are off by it until the next tare.",
-        "Let go of the finger, so that the board takes a new tare. Measure V+ at the sensor; look whether fingers were "
-        "exchanged.",
+        "All electrodes moved alike and faster than anything warms, without pressure: their supply or reference "
+        "dropped. Forces are off by it until the next tare.",
+        "Let go of the finger, so that the board takes a new tare. Measure V+ at the sensor.",
     ),
     "pressure_flat": warning(
         "Static pressure hardly moves when the finger is pressed: fluid has leaked, there is a bubble in it, or the "

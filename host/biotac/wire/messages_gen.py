@@ -65,7 +65,7 @@ class SensorFault(IntEnum):
     ALONE = 3  # it moved while the rest of the skin did not: it floats, drifts or is loose
     STUCK = 4  # it repeats one count while the skin moves
     FROZEN = 5  # every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
-    TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure, or PDC jumped and PAC did not: supply, reference or another sensor; the tare is wrong until the next one
+    TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     NOISY = 7  # at least five electrodes jump from round to round, too much for a tare to be taken
 
 
@@ -179,7 +179,7 @@ class FrameFlags(IntFlag):
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
     ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
     SENSOR_FAULT = 1 << 30  # the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
-    ELECTRODE_ALONE = 1 << 31  # in a touch, one electrode or two moved and the rest of the skin did not, or jumped while PAC was quiet: an edge as narrow as an electrode, or a fault
+    ELECTRODE_ALONE = 1 << 31  # in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
 
 
 class FaultFlags(IntFlag):
@@ -257,7 +257,7 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     3: "it moved while the rest of the skin did not: it floats, drifts or is loose",
     4: "it repeats one count while the skin moves",
     5: "every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s",
-    6: "all electrodes moved alike, faster than any warmth and without pressure, or PDC jumped and PAC did not: supply, reference or another sensor; the tare is wrong until the next one",
+    6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
     7: "at least five electrodes jump from round to round, too much for a tare to be taken",
 }
 
@@ -363,7 +363,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
     536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",
     1073741824: "the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results",
-    2147483648: "in a touch, one electrode or two moved and the rest of the skin did not, or jumped while PAC was quiet: an edge as narrow as an electrode, or a fault",
+    2147483648: "in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault",
 }
 
 
