@@ -28,7 +28,6 @@
 
 #define TOGETHER         5u  // counts
 #define TOGETHER_BLIND   25u // while static pressure has not shown that it works
-#define SUDDEN           25u // counts: as no press does, over an electrode or not
 #define WARMED           3   // counts of TDC
 #define PRESSED          12u // counts: static pressure that has moved so far works
 #define TOGETHER_WINDOWS 9   // 14 counts/s: a hot cup does up to 10
@@ -173,12 +172,11 @@ static bool together(bt_health *health, uint32_t noise, uint32_t pressure, int t
     uint32_t mean = along / BT_ELECTRODES;
     uint32_t least = (health->pressure_alive ? TOGETHER : TOGETHER_BLIND) << SUM_BITS;
     uint32_t alike = along + along / 8;
-    bool sudden = health->pressure_alive && mean >= SUDDEN << SUM_BITS;
     bool warmed = tdc - health->anchor_tdc > WARMED || health->anchor_tdc - tdc > WARMED;
     if (warmed || health->moved_windows > TOGETHER_WINDOWS || moves->total > alike + noise) {
         return false;
     }
-    if (mean >= least + pressure / 4 && moves->top < (sudden ? 3 : 2) * mean + noise / 8
+    if (mean >= least + pressure / 4 && 2 * moves->top < 3 * mean + noise / 4
         && moves->total < alike + noise / 8) {
         health->sensor_fault = BT_SENSOR_FAULT_TOGETHER;
         return false;
