@@ -87,7 +87,7 @@ static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 
 // A press has fallen to a quarter by its pressure; or by its energy where pressure is no witness, or may have
 // risen with the temperature.
-static BT_NOINLINE bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
+static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
 {
     int32_t quarter = release->pdc_peak / BT_FALLEN_SHARE;
     bool low = sweep->witness && sweep->above < (quarter > BT_QUIET_PDC ? quarter : BT_QUIET_PDC);
