@@ -201,7 +201,8 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
         ("all electrodes drift 1 count/s", "all electrodes drift 5 counts/s"), "none", "lets go from time to time",
     ),
     "all electrodes drift by 20 counts/s, or jump by 50": (
-        ("all electrodes drift 20 counts/s", "all electrodes jump by 50"), "SENSOR_FAULT, none in a squeeze", "lets go, to tare",
+        ("all electrodes drift 20 counts/s", "all electrodes jump by 50"), "SENSOR_FAULT, none in a squeeze",
+        "lets go, to tare",
     ),
     "a sensor repeats its words for ever": (
         ("the same words for ever", "electrodes frozen, pressure alive"), "FAULT, SENSOR_FAULT", "holds its actuators",
