@@ -1,6 +1,7 @@
 #include "signal/silence.h"
 
 #include "fixed_point.h"
+#include "signal/sweep.h"
 
 #include <string.h>
 
@@ -24,7 +25,7 @@ bool bt_silence_add(bt_silence *silence, uint32_t t_us, const bt_lanes *smooth)
 {
     uint32_t gap_us = t_us - silence->last_us;
     silence->last_us = t_us;
-    if (gap_us >= BT_SILENCE_US) {
+    if (gap_us >= ROUND_US + SWEEP_US) {
         begin(silence, gap_us);
     }
     if (silence->sweeps == 0 || silence->rounds == BT_SILENCE_ROUNDS) {

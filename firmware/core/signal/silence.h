@@ -6,13 +6,10 @@
 #ifndef BIOTAC_SILENCE_H
 #define BIOTAC_SILENCE_H
 
-#include "signal/sweep.h"
+#include "signal/trigger.h"
 
 // Rounds after a silence that tell what the finger reads now: results are good 50 ms after the first.
 #define BT_SILENCE_ROUNDS 5
-
-// From one round that is used to the next: a silence, if at least a sweep is missing between them.
-#define BT_SILENCE_US ((1 + BT_SWEEP_ROUNDS) * BT_FRAME_MS * 1000u)
 
 typedef struct {
     uint32_t last_us; // device time of the last round that was used

@@ -55,7 +55,7 @@ static void follow_contact(bt_tare *tare)
     }
 }
 
-// Nothing of a faulty round may reach a tare: the sweep goes on without it.
+// Nothing of a faulty round may reach a tare: the sweep goes on without it, and starts over at the next one.
 static BT_NOINLINE void fault(bt_tare *tare)
 {
     if (tare->state != BT_TARE_STATE_FAULT) {
@@ -67,6 +67,9 @@ static BT_NOINLINE void fault(bt_tare *tare)
     tare->thermal.step_q16 = 0; // some lanes have had it: better lost for the rest than added twice
     tare->state = BT_TARE_STATE_FAULT;
     tare->hits = 0;
+    if (tare->partial) {
+        bt_sweep_restart(&tare->sweep);
+    }
     tare->partial = true;
 }
 
@@ -121,9 +124,6 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         // A tare from before the fault still holds. Whether something touches now, the trigger sees from the
         // coming words: lost words are no touch.
         tare->state = tare->tared ? tare->before_fault : BT_TARE_STATE_INIT;
-        if (t_us - tare->silence.last_us >= BT_SILENCE_US) {
-            bt_sweep_restart(&tare->sweep); // means of what was there before it say nothing now
-        }
         bt_adopt_aim(tare);
         tare->release.quiet_sweeps = 0;
     } else if (tare->state == BT_TARE_STATE_REST || tare->state == BT_TARE_STATE_DOUBT) {

@@ -161,19 +161,22 @@ TEST(the_machine_serves_the_means_of_what_the_gate_let_through)
     finger.sigma = 4;
     finger.glitch_chance = 0.02;
     past.rounds = 0;
+    int since = 0;
     for (int k = 0; k < 4000; k++) {
         finger.load = k % 700 > 500 ? 300 : 0;
         bool fault = random_unit(&seed) < 0.01;
         unsigned first = bt_sweep_first(&finger.tare.sweep), end = bt_sweep_end(&finger.tare.sweep);
+        bool starts_over = fault && finger.tare.partial;
         bt_round frame = fault ? frame_without(&finger, 5, 3, 0) : next_frame(&finger);
         (void)feed(&finger, &frame);
         memcpy(past.smooth[past.rounds++], finger.tare.trigger.smooth.lane, sizeof past.smooth[0]);
-        if (fault) { // a sweep goes on with the next good round
+        if (fault) { // a sweep goes on with the next good round, if nothing had broken it yet
             past.rounds--;
+            since = starts_over ? past.rounds : since;
             continue;
         }
         for (unsigned i = first; i < end; i++) {
-            assert_int_equal(finger.tare.sweep.mean_q3.lane[i], brute_q3(i, 0));
+            assert_int_equal(finger.tare.sweep.mean_q3.lane[i], brute_q3(i, since));
         }
     }
 }
