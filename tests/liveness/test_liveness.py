@@ -182,17 +182,17 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
         gaps = recording.gaps
         assert program.of("frames")[0]["frames"] == len(recording.frames)
     elif way == "views":
-        assert bool(program.of("counted")) == (next_us - last_us > JUMP_US)
+        assert program.of("counted") or next_us - last_us <= JUMP_US
         return
     elif way == "page":
-        assert bool(program.of("marked")) == (next_us - last_us > JUMP_US)
+        assert program.of("marked") or next_us - last_us <= JUMP_US
         return
     else:
         gaps = [biotac.Gap(**one["gap"]) for one in program.of("gap")]
     if way == "callbacks":
         assert len(program.of("on_gap")) == len(gaps)
-    if next_us - last_us <= JUMP_US:
-        assert pause_s < 1.0 and not gaps
+    if next_us - last_us <= JUMP_US:  # on a busy computer the board may have stopped, too, and been started at once
+        assert pause_s < 1.0 and all(gap.reason == "paused" for gap in gaps)
         return
     (gap,) = gaps
     assert gap.reason == ("paused" if pause_s > 1 else "lost")
