@@ -54,7 +54,7 @@ static uint64_t largest(const bt_map_coefficient *first, int columns, int width,
     return (uint64_t)sum * most;
 }
 
-// A sum shifted down by cut, plus one for first rounding.
+// A sum shifted down by cut, plus one for its rounding.
 static uint64_t left(uint64_t sum, int cut)
 {
     return (sum >> cut) + 1;

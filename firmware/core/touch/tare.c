@@ -55,7 +55,8 @@ static void follow_contact(bt_tare *tare)
     }
 }
 
-// Nothing of a faulty round may reach a tare: the sweep goes on without it, and starts over at the next one.
+// Nothing of a faulty round may reach a tare: the sweep goes on without it. It starts over if something else
+// had broken it before, such as another fault: what words that are often lost leave is no history.
 static BT_NOINLINE void fault(bt_tare *tare)
 {
     if (tare->state != BT_TARE_STATE_FAULT) {

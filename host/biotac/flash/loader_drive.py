@@ -93,6 +93,6 @@ def linux_folders(root: Path) -> list[Path]:
         mounts = []
     for line in mounts:
         device, mounted_at, *_ = [*line.split(), "", ""]
-        if device.startswith("/dev/"):
+        if device.startswith("/dev/"):  # a space in its folder is \040
             folders.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), mounted_at)))
     return list(dict.fromkeys(folder.resolve() for folder in folders))

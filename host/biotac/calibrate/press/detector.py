@@ -274,9 +274,10 @@ class Procedure:
     @property
     def step(self) -> Step | None:
         """What to do now; None when all is done."""
-        if self._turn is None:
+        turn = self._turn
+        if turn is None:
             return None
-        machine, forces_n = self._turn
+        machine, forces_n = turn
         number = len(machine.presses) + (machine.phase is not Phase.RELEASE)
         return Step(machine.finger, machine.phase, number, len(forces_n), forces_n[number - 1])
 
@@ -312,11 +313,11 @@ class Procedure:
         Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
         """
         for row in rows:
-            if self._turn is None:
+            turn = self._turn
+            if turn is None:
                 return
-            machine, _ = self._turn
-            if row["finger"] == machine.finger:
-                machine.take(row)
+            if row["finger"] == turn[0].finger:
+                turn[0].take(row)
 
     def finish(self, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
         """End: no more rows come. The presses by finger, each with what a scale showed in asked()'s order, if given.
