@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x9CB21262u
+#define BT_SCHEMA_HASH 0xB3FEBD21u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -52,6 +52,7 @@ enum bt_sensor_fault {
     BT_SENSOR_FAULT_FROZEN = 5, // every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
     BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     BT_SENSOR_FAULT_NOISY = 7, // at least five electrodes jump from round to round, too much for a tare to be taken
+    BT_SENSOR_FAULT_EXCHANGED = 8, // its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; a host's tare ends it, or another sensor
 };
 
 // The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE.

@@ -113,6 +113,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
+    memset(&finger->health.leap, 0, sizeof finger->health.leap);
     finger->bands.begun = false; // samples before and after the gap do not belong together
     if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
         finger->silent_rounds++;
@@ -138,6 +139,7 @@ static void close_round(bt_finger *finger)
 
 void bt_finger_pass(bt_finger *finger)
 {
+    memset(&finger->health.leap, 0, sizeof finger->health.leap);
     close_round(finger);
 }
 
@@ -157,8 +159,8 @@ static void recover(bt_finger *finger)
     if (rests) {
         finger->health.alone = 0;
     }
-    if (rests && finger->tare.changed) {
-        bt_health_tared(&finger->health);
+    if (rests && finger->tare_unsent) {
+        bt_health_tared(&finger->health, finger->tare.reason == BT_TARE_REASON_HOST_NOW);
     }
     if (finger->health.out != 0 && (rests || !bt_usable_without(finger->health.out))) {
         uint32_t back = bt_health_back(&finger->health);
@@ -187,10 +189,10 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
         finger->tare.trigger.without = BT_ALL_ELECTRODES;
     }
     bt_tare_end(&finger->tare, finger->round.t_us, settings);
-    recover(finger);
-    bt_trigger_leave_out(&finger->tare.trigger, finger->health.out);
     finger->tare_unsent = finger->tare_unsent || finger->tare.changed;
     finger->tare.changed = false;
+    recover(finger);
+    bt_trigger_leave_out(&finger->tare.trigger, finger->health.out);
     return true;
 }
 

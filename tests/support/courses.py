@@ -97,7 +97,8 @@ class Script:
         place = at or self.track.pose
         seconds = max(abs(force_n - self.track.pose.force_n) / n_per_s, slots.FRAME_S)
         start = replace(place, force_n=self.track.pose.force_n, celsius=self.track.pose.celsius) if at else None
-        self.track.ramp(seconds, replace(place, force_n=force_n, celsius=self.track.pose.celsius), start)
+        end = place if force_n else place.released()  # what lets go drags no longer
+        self.track.ramp(seconds, replace(end, force_n=force_n, celsius=self.track.pose.celsius), start)
         return self
 
     def warm(self, celsius: float, seconds: float) -> Script:
@@ -123,6 +124,7 @@ class Script:
                 "pdc": samples[:, slots.PDC_SLOT],
                 "tac": samples[:, slots.TAC_SLOT],
                 "tdc": samples[:, slots.TDC_SLOT],
+                "pac": samples[:, slots.PAC_SLOT],
             },
             force_n=np.maximum(states.force_n[:-1], states.force_n[1:]),
             rest=_middle(rest),

@@ -49,6 +49,14 @@ static void condemn(bt_health *health, uint32_t electrodes, uint8_t fault)
     health->alone &= ~electrodes;
 }
 
+// What was exchanged stays so, whatever its words are taken for.
+static void distrust(bt_health *health, uint8_t fault)
+{
+    if (health->sensor_fault != BT_SENSOR_FAULT_EXCHANGED) {
+        health->sensor_fault = fault;
+    }
+}
+
 static uint8_t counted(uint8_t count)
 {
     return (uint8_t)(count + (count < UINT8_MAX));
@@ -65,7 +73,7 @@ static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips)
     if (noisy & ~health->out) {
         condemn(health, noisy, BT_SENSOR_FAULT_NOISY);
         if (!bt_usable_without(health->out)) {
-            health->sensor_fault = BT_SENSOR_FAULT_NOISY;
+            distrust(health, BT_SENSOR_FAULT_NOISY);
         }
     }
 }
@@ -106,7 +114,7 @@ static void judge_repeats(bt_health *health, uint32_t missing)
             health->sensor_fault = BT_SENSOR_FAULT_NONE;
         }
     } else if (frozen && (alive || (dead && health->unchanged_windows >= DEAD_WINDOWS))) {
-        health->sensor_fault = BT_SENSOR_FAULT_FROZEN;
+        distrust(health, BT_SENSOR_FAULT_FROZEN);
     }
     // A worn sensor's electrode hardly ever repeats its word four times, a quiet one's did so 64 times.
     bool lasts =
@@ -178,7 +186,7 @@ static bool together(bt_health *health, uint32_t noise, uint32_t pressure, int t
     }
     if (mean >= least + pressure / 4 && 2 * moves->top < 3 * mean + noise / 4
         && moves->total < alike + noise / 8) {
-        health->sensor_fault = BT_SENSOR_FAULT_TOGETHER;
+        distrust(health, BT_SENSOR_FAULT_TOGETHER);
         return false;
     }
     return pressure <= PRESSURE << SUM_BITS;
@@ -310,7 +318,7 @@ uint32_t bt_health_back(bt_health *health)
     uint32_t back = health->out;
     health->out = 0;
     health->electrode_fault = BT_SENSOR_FAULT_NONE;
-    health->sensor_fault = BT_SENSOR_FAULT_NONE;
+    distrust(health, BT_SENSOR_FAULT_NONE);
     health->windows = 0;
     memset(health->flips, 0, sizeof health->flips);
     return back;
@@ -388,6 +396,10 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     bt_lanes *before = &health->sum[!health->filling];
     uint32_t without = (trigger->unknown | health->out) & BT_ALL_ELECTRODES;
     uint32_t lone = 0;
+    uint8_t leap = bt_leap_round(&health->leap, round, trigger);
+    if (leap != BT_SENSOR_FAULT_NONE) {
+        distrust(health, leap);
+    }
     uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
     health->down = trigger->down;

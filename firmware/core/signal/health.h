@@ -16,11 +16,13 @@
 #ifndef BIOTAC_HEALTH_H
 #define BIOTAC_HEALTH_H
 
+#include "signal/leap.h"
 #include "signal/moves.h"
 #include "signal/noise.h"
 #include "signal/trigger.h"
 
 typedef struct {
+    bt_leap leap;
     bt_lanes sum[2];         // of a window's filtered counts: the one that fills, and the one before
     uint8_t filling;         // which
     uint8_t rounds;          // in it
@@ -63,11 +65,13 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
 // it while the finger rests, or while too many are out.
 uint32_t bt_health_back(bt_health *health);
 
-// There is a new tare: whatever has moved together is in it.
+// There is a new tare: whatever has moved together is in it. What was exchanged stays so, unless the tare is
+// a host's, who knows.
 #ifndef BT_CDEF
-static inline void bt_health_tared(bt_health *health)
+static inline void bt_health_tared(bt_health *health, bool by_host)
 {
-    if (health->sensor_fault == BT_SENSOR_FAULT_TOGETHER) {
+    if (health->sensor_fault == BT_SENSOR_FAULT_TOGETHER
+        || (by_host && health->sensor_fault == BT_SENSOR_FAULT_EXCHANGED)) {
         health->sensor_fault = BT_SENSOR_FAULT_NONE;
     }
 }

@@ -332,6 +332,12 @@ CATALOGUE: dict[str, Entry] = {
         "dropped. Forces are off by it until the next tare.",
         "Let go of the finger, so that the board takes a new tare. Measure V+ at the sensor.",
     ),
+    "sensor_exchanged": error(
+        "From one round to the next the finger's words leapt further than any blow or warmth moves them: they are "
+        "another channel's or another finger's, or its thermometer broke. Forces are not this finger's.",
+        "Look whether cables were exchanged or are loose. If all is in order, tare the finger, which ends this; a "
+        "power cycle makes the board look again at which sensor is where.",
+    ),
     "pressure_flat": warning(
         "Static pressure hardly moves when the finger is pressed: fluid has leaked, there is a bubble in it, or the "
         "pressure element is cracked. A healthy finger gives 50 to 120 counts a newton. The board then judges contact "

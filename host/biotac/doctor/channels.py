@@ -33,7 +33,11 @@ ELECTRODE_FAULTS = {
     wire.SensorFault.STUCK: "channel_stuck",
     wire.SensorFault.NOISY: "channel_noisy",
 }
-SENSOR_FAULTS = {wire.SensorFault.FROZEN: "sensor_frozen", wire.SensorFault.TOGETHER: "electrodes_shifted"}
+SENSOR_FAULTS = {
+    wire.SensorFault.FROZEN: "sensor_frozen",
+    wire.SensorFault.TOGETHER: "electrodes_shifted",
+    wire.SensorFault.EXCHANGED: "sensor_exchanged",
+}
 
 # Presses of real fingers move the static pressure by 50 to 120 counts a newton; without a calibration the newtons may
 # be off by half.

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x9CB21262
+SCHEMA_HASH = 0xB3FEBD21
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -67,6 +67,7 @@ class SensorFault(IntEnum):
     FROZEN = 5  # every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
     TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     NOISY = 7  # at least five electrodes jump from round to round, too much for a tare to be taken
+    EXCHANGED = 8  # its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; a host's tare ends it, or another sensor
 
 
 class TareReason(IntEnum):
@@ -259,6 +260,7 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     5: "every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s",
     6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
     7: "at least five electrodes jump from round to round, too much for a tare to be taken",
+    8: "its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; a host's tare ends it, or another sensor",
 }
 
 
