@@ -16,8 +16,44 @@
 
 #define LINE_BYTES 4096
 
-// A test, of which no state is left to the next.
-#define TEST(name) static void name(void **state __attribute__((unused)))
+// ---- tests -------------------------------------------------------------------------------------
+
+#define MAX_TESTS 40 // of a file
+
+static struct CMUnitTest test_list[MAX_TESTS];
+static size_t test_count;
+
+static inline void add_test(const char *name, CMUnitTestFunction test)
+{
+    if (test_count == MAX_TESTS) {
+        abort();
+    }
+    test_list[test_count].name = name;
+    test_list[test_count++].test_func = test;
+}
+
+// A test, of which no state is left to the next. Before main() begins it adds itself to the file's list.
+#define TEST(name)                                                                                           \
+    static void name(void **state);                                                                          \
+    __attribute__((constructor)) static void add_##name(void)                                                \
+    {                                                                                                        \
+        add_test(#name, name);                                                                               \
+    }                                                                                                        \
+    static void name(void **state __attribute__((unused)))
+
+// All of them, in their order; `first` is called before the first, `setup` before each; NULL: nothing is.
+static inline int run_all(CMFixtureFunction first, CMFixtureFunction setup)
+{
+    if (test_count == 0) {
+        return 1; // nothing has added them: a startup code without constructors
+    }
+    struct CMUnitTest tests[test_count];
+    for (size_t k = 0; k < test_count; k++) {
+        tests[k] = test_list[k];
+        tests[k].setup_func = setup;
+    }
+    return cmocka_run_group_tests(tests, first, NULL);
+}
 
 // ---- random numbers: xorshift64*, the same on every machine -----------------------------------
 

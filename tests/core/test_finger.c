@@ -437,27 +437,7 @@ TEST(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch)
     assert_false(torsion_ok((const int[4]){-900, -900, -900, 0}, 0, 0));
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_finger)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(every_slot_lands_in_its_place),
-        T(a_missing_slot_is_marked_and_never_stale),
-        T(slots_that_never_came_are_missing_too),
-        T(an_absent_sensor_sends_nothing_and_counts_nothing),
-        T(a_sensor_that_was_away_keeps_its_tare_until_it_is_told_to_be_another),
-        T(results_without_a_tare_are_invalid_and_not_zero),
-        T(a_new_tare_is_told_once_with_the_frame_that_first_uses_it),
-        T(a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on),
-        T(a_railed_electrode_is_flagged_and_three_are_a_fault),
-        T(a_held_press_is_flagged_by_its_shape_and_age),
-        T(seq_wraps_like_any_other_number),
-        T(an_electrode_without_a_tare_is_no_signal),
-        T(a_tare_set_before_the_sensor_answers_is_kept),
-        T(a_touch_that_shows_in_a_lost_slot_is_told_in_the_next),
-        T(a_move_of_any_electrode_alone_is_one),
-        T(more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise),
-        T(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_finger);
 }

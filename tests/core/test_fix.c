@@ -106,13 +106,5 @@ TEST(small_divisions_round_to_the_nearest)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(halves_go_away_from_zero),
-        cmocka_unit_test(extremes_do_not_wrap),
-        cmocka_unit_test(random_quotients_are_right),
-        cmocka_unit_test(magnitudes_hold_at_the_ends),
-        cmocka_unit_test(scaling_is_a_rounded_division),
-        cmocka_unit_test(small_divisions_round_to_the_nearest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -387,33 +387,7 @@ TEST(a_property_is_told_a_byte_further_on)
     assert_int_equal(bt_emu_word_ahead(&device, 16, true, 0), 0);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_device)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(fifty_microseconds_are_kept_to_the_nanosecond),
-        T(the_wait_counts_from_the_rising_edge_not_from_the_command),
-        T(every_count_comes_in_two_bytes_of_odd_parity),
-        T(no_other_word_is_taken_for_data),
-        T(every_single_bit_error_is_seen),
-        T(one_sample_is_never_answered_twice),
-        T(the_sample_is_taken_at_the_command_and_a_new_one_replaces_it),
-        T(only_odd_command_bytes_are_obeyed),
-        T(the_second_byte_of_a_sample_command_is_ignored),
-        T(unknown_commands_are_refused_by_word),
-        T(the_answer_does_not_depend_on_what_is_sent_meanwhile),
-        T(a_driver_that_listens_with_0x0100_reads_every_channel),
-        T(a_read_with_the_chip_select_still_low_has_no_answer),
-        T(resend_gives_the_last_word_again),
-        T(nothing_can_be_written),
-        T(a_mute_sensor_says_zeros_until_it_is_asked_for_a_property),
-        T(a_sensor_without_power_forgets_and_may_come_back_as_another),
-        T(every_fault_shows_on_the_bus_as_itself),
-        T(properties_are_plain_bytes_padded_with_zeros),
-        T(property_bytes_may_come_one_by_one),
-        T(the_list_of_channels_is_pairs_and_an_end),
-        T(what_it_will_say_is_told_ahead),
-        T(a_property_is_told_a_byte_further_on),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_device);
 }

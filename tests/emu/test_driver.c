@@ -212,17 +212,7 @@ TEST(bad_words_are_counted_by_kind_for_their_finger)
     assert_in_range(finger[2].words.good, 20 * 44 - 2, 20 * 44);
 }
 
-#define T(name) cmocka_unit_test_setup(name, no_trouble)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(all_command_bytes_are_right_on_the_wire),
-        T(the_slot_rate_is_exact_over_a_minute),
-        T(interrupt_latency_neither_drifts_nor_breaks_the_settling_time),
-        T(the_clock_may_wrap_in_the_middle),
-        T(one_finger_in_trouble_never_changes_another),
-        T(every_count_arrives_at_its_finger_and_channel),
-        T(bad_words_are_counted_by_kind_for_their_finger),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, no_trouble);
 }

@@ -183,17 +183,7 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
     }
 }
 
-#define T(name) cmocka_unit_test_setup(name, no_trouble)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_late_main_loop_loses_whole_slots_that_are_counted_and_marked),
-        T(rounds_lost_whole_leave_a_gap_in_time),
-        T(t_us_is_that_of_slot_0_even_when_it_was_lost),
-        T(a_held_off_interrupt_loses_slots_and_never_the_time_base),
-        T(a_hang_forgets_no_tare_and_no_hold),
-        T(sensors_are_known_by_name_and_absent_ones_stay_blank),
-        T(a_closed_port_ends_the_stream),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, no_trouble);
 }

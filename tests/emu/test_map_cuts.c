@@ -218,16 +218,7 @@ TEST(saved_maps_hold_for_their_own_sensors_alone)
     assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_IN_FORCE);
 }
 
-#define T(test) cmocka_unit_test_setup(test, powered)
-
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_cut_at_any_byte_leaves_the_old_map_or_the_new),
-        T(nor_do_half_done_bytes_matter),
-        T(nor_while_the_records_sector_changes),
-        T(nor_where_and_how_an_operation_is_cut),
-        T(saved_maps_hold_for_their_own_sensors_alone),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, powered);
 }

@@ -203,15 +203,7 @@ TEST(a_wrench_is_not_repeated_from_before_a_start)
     assert_false(host.frame[0][0].flags & BT_FRAME_FLAG_REPEATED);
 }
 
-#define T(name) cmocka_unit_test_setup(name, no_trouble)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(what_there_is_time_for_is_all_done),
-        T(sigma_goes_first),
-        T(then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age),
-        T(whole_frames_go_last),
-        T(a_wrench_is_not_repeated_from_before_a_start),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, no_trouble);
 }

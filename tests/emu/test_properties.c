@@ -145,17 +145,7 @@ TEST(a_serial_number_that_could_not_be_read_is_read_later)
     assert_true(host.frame[2][0].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_bus)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(all_are_read_with_gaps_between_the_bytes),
-        T(one_flipped_bit_anywhere_changes_nothing),
-        T(an_error_word_is_no_value),
-        T(a_line_that_is_stuck_is_nobody),
-        T(a_sensor_of_another_type_is_named_and_never_sure),
-        T(a_mute_sensor_finds_its_voice),
-        T(a_serial_number_that_could_not_be_read_is_read_later),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_bus);
 }

@@ -143,16 +143,7 @@ TEST(a_board_without_a_loader_says_so)
     assert_int_equal(fake.reboots, 2);
 }
 
-#define T(test) cmocka_unit_test_setup(test, no_trouble)
-
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(saved_settings_are_in_force_after_the_next_boot),
-        T(saved_calibrations_hold_for_their_own_sensors_alone),
-        T(a_cleared_calibration_stays_cleared_once_saved),
-        T(a_flash_that_takes_nothing_is_told),
-        T(a_board_without_a_loader_says_so),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, no_trouble);
 }

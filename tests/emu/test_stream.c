@@ -199,18 +199,5 @@ TEST(test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_every_finger_gets_every_slot_over_the_rings_end, empty),
-        cmocka_unit_test_setup(test_a_slot_that_is_left_out_moves_nothing, empty),
-        cmocka_unit_test_setup(test_what_has_not_come_is_silence_and_the_order_stays, empty),
-        cmocka_unit_test_setup(test_room_is_told_and_kept, empty),
-        cmocka_unit_test_setup(test_a_fault_hides_the_tape_and_does_not_hold_it_up, empty),
-        cmocka_unit_test_setup(
-            test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_they_are, empty),
-        cmocka_unit_test_setup(test_a_loop_has_no_end_and_takes_nothing, empty),
-        cmocka_unit_test_setup(test_a_tape_is_whole_until_some_of_it_is_overwritten, empty),
-        cmocka_unit_test_setup(test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice, empty),
-        cmocka_unit_test_setup(test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape, empty),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, empty);
 }

@@ -359,23 +359,5 @@ TEST(a_touch_that_no_electrode_shows_ends)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(touch_and_lift_are_told_in_the_slot_that_shows_them, new_course),
-        cmocka_unit_test_setup(touches_in_quick_succession_are_all_told, new_course),
-        cmocka_unit_test_setup(pressure_that_stays_is_no_lift, new_course),
-        cmocka_unit_test_setup(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds, new_course),
-        cmocka_unit_test_setup(held_for_ten_minutes_in_noise_nothing_is_told, new_course),
-        cmocka_unit_test_setup(a_resting_worn_finger_tells_nothing, new_course),
-        cmocka_unit_test_setup(noise_at_rest_raises_what_it_takes, new_course),
-        cmocka_unit_test_setup(a_glitch_is_no_event, new_course),
-        cmocka_unit_test_setup(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip, new_course),
-        cmocka_unit_test_setup(squeezing_harder_is_no_slip, new_course),
-        cmocka_unit_test_setup(a_steep_pull_is_a_slip, new_course),
-        cmocka_unit_test_setup(a_landing_is_no_slip, new_course),
-        cmocka_unit_test_setup(a_slip_ends_with_the_hold, new_course),
-        cmocka_unit_test_setup(missing_words_are_no_event, new_course),
-        cmocka_unit_test_setup(the_rails_do_not_wrap, new_course),
-        cmocka_unit_test_setup(a_touch_that_no_electrode_shows_ends, new_course),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_course);
 }

@@ -354,23 +354,7 @@ TEST(an_onset_is_told_in_samples_of_2200_a_second)
     assert_true(touch.onset_us == 5000000 && touch.peak_count == BT_INVALID_COUNT);
 }
 
-#define T(name) cmocka_unit_test_setup(name, held)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_slip_goes_both_ways_by_more_than_twenty_levels),
-        T(a_jolt_is_more_than_25_levels_and_told_once),
-        T(a_side_begins_at_the_first_sample_that_moved_its_way),
-        T(while_it_slips_both_sides_are_one),
-        T(what_was_told_of_shakes_on_until_it_is_over),
-        T(what_has_just_been_touched_lands),
-        T(a_drag_is_a_slip_of_one_sign),
-        T(a_slip_began_with_its_vibration),
-        T(noise_is_half_a_level_and_no_more),
-        T(a_first_stretch_that_was_missed_is_no_change),
-        T(the_level_is_the_noise_at_rest),
-        T(the_strongest_electrode_is_watched_until_half_is_gone),
-        T(an_onset_is_told_in_samples_of_2200_a_second),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, held);
 }

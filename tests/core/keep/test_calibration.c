@@ -254,17 +254,7 @@ TEST(a_record_is_read_back_and_a_strange_one_passed_over)
     assert_int_equal(bt_calibration_pack(&out, record), 0);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(one_finger_has_its_own_and_the_others_the_settings),
-        T(another_sensors_is_refused_unless_it_is_forced),
-        T(every_value_keeps_its_settings_range),
-        T(a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none),
-        T(every_end_of_a_stream_counts),
-        T(only_what_has_changed_is_stored),
-        T(a_record_is_read_back_and_a_strange_one_passed_over),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

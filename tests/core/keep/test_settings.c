@@ -30,8 +30,5 @@ TEST(settings_come_back_and_others_keep_their_defaults)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(settings_come_back_and_others_keep_their_defaults),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

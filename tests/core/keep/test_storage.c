@@ -269,21 +269,7 @@ TEST(no_more_is_read_than_there_is_or_there_is_room_for)
     }
 }
 
-#define T(test) cmocka_unit_test_setup(test, new_flash)
-
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_new_flash_holds_nothing),
-        T(the_latest_record_of_each_id_is_found_over_many_writes),
-        T(a_damaged_page_is_told),
-        T(the_same_again_wears_nothing),
-        T(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record),
-        T(what_does_not_fit_is_refused),
-        T(generations_may_wrap),
-        T(a_cut_at_any_byte_leaves_the_old_record_or_the_new),
-        T(nor_where_and_how_an_operation_is_cut),
-        T(no_more_is_read_than_there_is_or_there_is_room_for),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_flash);
 }

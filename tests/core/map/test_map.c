@@ -182,14 +182,7 @@ TEST(blocks_are_bounded_together)
     }
 }
 
-#define T(name) cmocka_unit_test(name)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_blob_is_read_where_it_lies),        T(every_byte_of_the_head_is_judged),
-        T(every_length_but_one_is_refused),     T(a_block_comes_once),
-        T(coefficients_are_bounded_sum_by_sum), T(rows_are_bounded_together),
-        T(blocks_are_bounded_together),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

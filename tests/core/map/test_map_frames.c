@@ -149,13 +149,7 @@ TEST(what_is_not_asked_for_changes_nothing_that_is)
     assert_int_equal(msg.torsion_mnmm, BT_INVALID_I32);
 }
 
-#define T(name) cmocka_unit_test(name)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_mapped_frame_has_the_maps_force_and_says_so),
-        T(without_pressure_a_map_that_needs_it_gives_nothing),
-        T(what_is_not_asked_for_changes_nothing_that_is),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -321,19 +321,7 @@ TEST(torsion_is_summed_as_the_others_are)
     }
 }
 
-#define T(name) cmocka_unit_test(name)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_sum_worked_by_hand),
-        T(every_pair_has_a_place_in_the_ring),
-        T(an_offset_and_pressure_stand_alone),
-        T(conductance_is_right_at_every_count),
-        T(gates_are_the_compressions_centroid),
-        T(no_count_overflows_a_map_at_its_bounds),
-        T(results_saturate_with_their_sign),
-        T(torque_is_the_second_three_and_only_where_there_is_one),
-        T(torsion_is_summed_as_the_others_are),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

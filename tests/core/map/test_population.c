@@ -254,16 +254,5 @@ TEST(an_electrode_that_is_estimated_stays_in_its_range)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_map_is_as_it_is_opened),
-        cmocka_unit_test(extremes_do_not_overflow),
-        cmocka_unit_test(the_likeness_is_what_it_is_defined_as),
-        cmocka_unit_test(a_mirrored_finger_is_as_like),
-        cmocka_unit_test(a_poke_presses_in_along_the_skins_normal),
-        cmocka_unit_test(any_gain_of_ones_own_takes_the_population_away),
-        cmocka_unit_test(sigma_is_mixed_as_force_is),
-        cmocka_unit_test(what_only_bulges_is_outside),
-        cmocka_unit_test(an_electrode_that_is_estimated_stays_in_its_range),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -250,14 +250,5 @@ TEST(the_worst_of_all_is_within_what_is_promised)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(single_electrodes_at_every_size),
-        cmocka_unit_test(all_electrodes_equal),
-        cmocka_unit_test(corners_of_the_box),
-        cmocka_unit_test(corners_that_make_every_sum_largest),
-        cmocka_unit_test(contacts_at_the_seam),
-        cmocka_unit_test(random_frames_in_all_sizes),
-        cmocka_unit_test(the_worst_of_all_is_within_what_is_promised),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -114,10 +114,5 @@ TEST(x_on_the_cylinder_is_correctly_rounded)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(moments_of_squares_lose_only_what_is_cut),
-        cmocka_unit_test(linear_moments_are_exact_or_cut_once),
-        cmocka_unit_test(x_on_the_cylinder_is_correctly_rounded),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -89,11 +89,5 @@ TEST(without_pressure_or_rest_or_a_gain_there_is_no_force)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_filter_is_the_papers_within_its_rounding),
-        cmocka_unit_test(a_missing_or_railed_word_is_invalid_and_the_next_begins_anew),
-        cmocka_unit_test(the_force_is_the_exact_product_rounded_once),
-        cmocka_unit_test(without_pressure_or_rest_or_a_gain_there_is_no_force),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -163,12 +163,5 @@ TEST(without_weight_there_is_no_point_of_contact)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_points_of_contact_worked_by_hand),
-        cmocka_unit_test(force_sums_worked_by_hand),
-        cmocka_unit_test(what_nobody_wants_is_invalid),
-        cmocka_unit_test(mirrored_signals_give_exactly_mirrored_results),
-        cmocka_unit_test(without_weight_there_is_no_point_of_contact),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -339,16 +339,5 @@ TEST(the_noise_is_that_of_nineteen_electrodes)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sigmas_are_those_of_a_monte_carlo),
-        cmocka_unit_test(sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range),
-        cmocka_unit_test(one_electrodes_sigma_is_the_root_of_its_share),
-        cmocka_unit_test(a_point_of_one_electrode_is_where_it_is),
-        cmocka_unit_test(what_is_not_known_is_marked),
-        cmocka_unit_test(sigmas_saturate_below_the_mark),
-        cmocka_unit_test(noise_leaves_the_sigma_of_the_population_alone),
-        cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
-        cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -220,13 +220,5 @@ TEST(no_electrode_is_above_the_one_nearest_to_the_axis)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_sums_are_those_over_table_1),
-        cmocka_unit_test(split_sums_are_those_over_table_1),
-        cmocka_unit_test(force_sums_are_those_over_table_1),
-        cmocka_unit_test(torque_sums_are_those_over_table_1_to_their_rounding),
-        cmocka_unit_test(an_arm_is_the_place_times_the_normal),
-        cmocka_unit_test(no_electrode_is_above_the_one_nearest_to_the_axis),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -162,16 +162,7 @@ TEST(a_tare_from_the_host_is_told_as_it_was_sent)
     assert_int_equal(bt_tare_q4(tare->base.pdc_q16), sent.pdc_tare_q4);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(settings_hold_their_ranges_and_refused_values_change_nothing),
-        T(a_board_saves_all_or_says_that_it_cannot),
-        T(a_board_leaves_for_a_magic_number_alone),
-        T(a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port),
-        T(a_hold_lapses_after_so_many_milliseconds_of_silence),
-        T(a_tare_from_the_host_is_told_as_it_was_sent),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

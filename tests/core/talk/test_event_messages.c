@@ -110,10 +110,5 @@ TEST(they_come_with_pac_alone_and_end_with_the_subscription)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(who_subscribes_is_told_in_the_slot_that_shows_it, new_session),
-        cmocka_unit_test_setup(nobody_is_told_who_did_not_ask_or_does_not_stream, new_session),
-        cmocka_unit_test_setup(they_come_with_pac_alone_and_end_with_the_subscription, new_session),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

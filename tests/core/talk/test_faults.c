@@ -128,17 +128,7 @@ TEST(the_link_and_the_host_have_faults_of_their_own)
     assert_int_equal(status().faults, 0);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_session)
-
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_good_finger_has_none_and_nor_has_one_that_never_was_there),
-        T(a_round_that_lacks_a_word_is_told_until_it_is_cleared),
-        T(what_came_after_the_host_looked_stays),
-        T(what_goes_on_is_set_again),
-        T(a_tare_that_is_lost_is_one_but_none_yet_is_not),
-        T(the_link_and_the_host_have_faults_of_their_own),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

@@ -269,20 +269,7 @@ TEST(a_noisy_finger_at_rest_is_as_silent)
     assert_in_range(host_count(BT_FRAME_ID), 0, 100);
 }
 
-#define T(name) cmocka_unit_test_setup(name, an_idle_session)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(heartbeats_come_in_their_period),
-        T(a_start_is_answered_with_a_frame_at_every_phase),
-        T(a_finger_without_a_tare_is_idle_too),
-        T(a_rest_that_has_moved_beyond_noise_is_shown),
-        T(the_energy_of_a_heartbeat_is_that_of_its_round),
-        T(asking_for_frames_at_rest_ends_the_silence_with_its_account),
-        T(a_lost_heartbeat_is_a_gap),
-        T(unknown_fingers_are_refused_and_change_nothing),
-        T(at_first_everything_but_sigmas_and_touches_is_sent),
-        T(a_noisy_finger_at_rest_is_as_silent),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, an_idle_session);
 }

@@ -225,17 +225,7 @@ static int at_time_0(void **state)
     return new_session(state);
 }
 
-#define T(name) cmocka_unit_test_setup(name, at_time_0)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(who_streams_with_a_keep_alive_keeps_the_link),
-        T(a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told),
-        T(the_next_program_at_a_port_does_not_inherit_a_subscription),
-        T(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent),
-        T(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses),
-        T(a_controller_does_not_notice_what_happens_at_the_other_port),
-        T(a_link_that_is_taken_in_turns_tells_both_and_lets_go_of_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, at_time_0);
 }

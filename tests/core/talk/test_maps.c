@@ -195,20 +195,7 @@ TEST(a_map_is_not_whole_until_its_last_byte_has_come)
     }
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_board)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_map_of_any_size_comes_back_as_it_was_sent),
-        T(parts_may_come_in_any_order_and_more_than_once),
-        T(what_is_no_map_or_damaged_never_holds_and_the_old_one_stays),
-        T(a_part_that_differs_from_what_is_there_is_refused_and_does_no_harm),
-        T(nothing_is_written_that_was_not_begun),
-        T(what_is_out_of_range_is_refused),
-        T(every_way_out_ends_an_upload),
-        T(another_sensors_is_refused_unless_it_is_for_any),
-        T(another_sensor_has_not_the_map_but_not_while_streaming),
-        T(a_map_is_not_whole_until_its_last_byte_has_come),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_board);
 }

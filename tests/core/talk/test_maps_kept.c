@@ -158,16 +158,7 @@ TEST(a_record_cut_short_is_no_map_and_one_of_none_is_right)
     assert_true(map.place.bytes == 0 && map.map.axes == 0);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_board)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(a_record_that_cannot_be_is_no_map),
-        T(flash_that_takes_nothing_is_told_and_passed_by),
-        T(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored),
-        T(whatever_happens_nothing_that_is_kept_is_written_to),
-        T(a_map_whose_flash_is_gone_is_none),
-        T(a_record_cut_short_is_no_map_and_one_of_none_is_right),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_board);
 }

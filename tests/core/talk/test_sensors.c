@@ -184,19 +184,7 @@ TEST(a_refused_finger_stays_so_whatever_becomes_of_the_others)
     assert_int_equal(session.other, 1 << 1 | 1 << 3);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(each_finger_has_its_own_flags_of_who_is_there),
-        T(another_sensor_has_nothing_of_the_one_before),
-        T(a_sensor_that_is_unplugged_is_not_present),
-        T(who_is_silent_for_half_a_round_is_in_doubt),
-        T(who_does_not_say_who_it_is_is_asked_again),
-        T(who_is_refused_has_no_results),
-        T(a_point_is_that_of_what_is_read_now),
-        T(a_tares_age_is_told_in_milliseconds),
-        T(a_refused_finger_stays_so_whatever_becomes_of_the_others),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

@@ -202,18 +202,7 @@ TEST(an_echo_of_our_own_messages_is_not_answered)
     assert_int_equal(host.count, 0);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(hello_tells_who_is_there_and_echoes_the_nonce),
-        T(a_board_tells_what_it_can_and_refuses_the_rest),
-        T(every_command_gets_exactly_one_reply_with_its_req_id),
-        T(a_finger_that_no_board_has_is_refused_and_so_is_what_would_change_a_stream),
-        T(errors_are_told_by_name),
-        T(unknown_commands_are_answered_as_such),
-        T(a_wrong_length_is_answered_and_does_nothing),
-        T(an_echo_of_our_own_messages_is_not_answered),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

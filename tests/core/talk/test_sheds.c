@@ -189,15 +189,7 @@ TEST(who_is_not_known_is_forgotten_when_it_is_unplugged)
     assert_true(session.finger[3].tare.tared && session.finger[3].answered);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_stream)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(sigma_goes_first),
-        T(then_a_map_is_not_computed_but_its_wrench_repeated),
-        T(whole_frames_go_last),
-        T(who_went_without_comes_first_in_the_next_round),
-        T(who_is_not_known_is_forgotten_when_it_is_unplugged),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_stream);
 }

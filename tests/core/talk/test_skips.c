@@ -306,10 +306,5 @@ TEST(what_finds_no_room_is_missing_and_nothing_else_changes)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_course_has_everything_in_it),
-        cmocka_unit_test(what_is_left_out_leaves_no_trace_in_what_is_not),
-        cmocka_unit_test(what_finds_no_room_is_missing_and_nothing_else_changes),
-    };
-    return cmocka_run_group_tests(tests, the_full_course, NULL);
+    return run_all(the_full_course, NULL);
 }

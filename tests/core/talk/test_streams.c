@@ -129,17 +129,7 @@ TEST(a_closed_port_ends_the_stream_and_half_a_command)
     assert_int_equal(host.message[0].payload[0], 0x31);
 }
 
-#define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(only_what_was_asked_for_is_streamed),
-        T(the_keep_alive_stops_the_stream_and_any_good_frame_keeps_it),
-        T(the_keep_alive_holds_across_the_wrap_of_time),
-        T(uptime_does_not_wrap_with_the_clock),
-        T(status_comes_in_its_period_and_with_every_present_sensor),
-        T(frames_that_find_no_room_are_dropped_whole_and_counted),
-        T(a_closed_port_ends_the_stream_and_half_a_command),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, new_session);
 }

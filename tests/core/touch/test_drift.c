@@ -278,19 +278,5 @@ TEST(a_hold_without_drift_stays_as_it_is)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_tare_of_a_worn_finger_does_not_lag_behind_its_drift),
-        cmocka_unit_test(without_pressure_nothing_is_learned),
-        cmocka_unit_test(a_slow_load_is_not_learned),
-        cmocka_unit_test(a_hold_drifts_on),
-        cmocka_unit_test(an_hour_of_hold_keeps_a_force_down_to_the_noise),
-        cmocka_unit_test(what_is_held_at_rest_follows_each_electrodes_own_drift),
-        cmocka_unit_test(drift_that_stops_in_a_hold_is_found_out),
-        cmocka_unit_test(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it),
-        cmocka_unit_test(a_hold_of_unknown_drift_follows_a_silence_too),
-        cmocka_unit_test(a_load_that_changed_in_a_silence_is_no_drift),
-        cmocka_unit_test(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch),
-        cmocka_unit_test(a_hold_without_drift_stays_as_it_is),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -21,8 +21,5 @@ TEST(a_touch_goes_back_to_what_was_a_second_ago)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_touch_goes_back_to_what_was_a_second_ago),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -65,9 +65,5 @@ TEST(electrodes_without_a_tare_or_a_word_say_nothing)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(less_pressure_than_at_rest_is_no_touch),
-        cmocka_unit_test(electrodes_without_a_tare_or_a_word_say_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -46,11 +46,7 @@ TEST(pressure_is_a_witness_once_a_press_has_moved_it)
     }
 }
 
-#define T(name) cmocka_unit_test(name)
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(pressure_is_a_witness_once_a_press_has_moved_it),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -185,19 +185,5 @@ TEST(pressure_keeps_a_held_object_from_being_tared)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_first_tare_needs_two_still_sweeps),
-        cmocka_unit_test(nothing_is_tared_while_one_electrode_moves),
-        cmocka_unit_test(a_restored_tare_carries_a_grip_over_a_reset),
-        cmocka_unit_test(one_missing_pressure_word_does_not_forget_the_pressure_at_rest),
-        cmocka_unit_test(three_frames_over_the_threshold_make_a_contact_and_two_do_not),
-        cmocka_unit_test(pressure_alone_makes_a_contact),
-        cmocka_unit_test(without_pressure_the_tare_is_frozen_in_contact),
-        cmocka_unit_test(a_clean_release_is_tared_after_two_calm_sweeps),
-        cmocka_unit_test(residue_is_tared_once_the_pressure_is_back_and_nothing_moves),
-        cmocka_unit_test(more_energy_than_residue_is_a_hold),
-        cmocka_unit_test(residue_that_moves_is_a_hold),
-        cmocka_unit_test(pressure_keeps_a_held_object_from_being_tared),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

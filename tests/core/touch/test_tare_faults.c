@@ -242,22 +242,5 @@ TEST(an_electrode_that_came_late_is_rolled_back_too)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sudden_release_never_tares_the_press),
-        cmocka_unit_test(one_lost_pressure_word_does_not_end_a_light_contact),
-        cmocka_unit_test(railed_electrodes_are_never_tared),
-        cmocka_unit_test(a_fault_freezes_the_tare_and_leaves_things_as_they_were),
-        cmocka_unit_test(lost_words_at_rest_are_no_touch),
-        cmocka_unit_test(a_touch_that_began_in_a_fault_is_found_by_its_tare),
-        cmocka_unit_test(a_second_faulty_round_in_a_sweep_starts_the_history_over),
-        cmocka_unit_test(a_first_word_in_a_faulty_round_is_met_once_the_fault_clears),
-        cmocka_unit_test(tare_now_is_refused_while_the_signals_move),
-        cmocka_unit_test(published_tares_round_half_away_from_zero),
-        cmocka_unit_test(a_held_load_is_kept_while_the_pressure_undershoots),
-        cmocka_unit_test(an_electrode_that_was_railed_is_never_tared_at_its_end),
-        cmocka_unit_test(pressure_that_moves_is_no_reason_to_refuse_tare_now),
-        cmocka_unit_test(what_the_host_has_set_is_lost_if_it_was_wrong),
-        cmocka_unit_test(an_electrode_that_came_late_is_rolled_back_too),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

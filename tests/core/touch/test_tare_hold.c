@@ -322,26 +322,5 @@ TEST(pressure_that_comes_back_beyond_its_rest_is_no_contact)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour),
-        cmocka_unit_test(the_next_contact_is_seen_after_any_number_of_doubtful_ones),
-        cmocka_unit_test(pressure_that_returns_from_its_undershoot_is_no_contact),
-        cmocka_unit_test(a_touch_right_after_a_doubt_is_one),
-        cmocka_unit_test(pressure_alone_is_no_touch_after_two_seconds),
-        cmocka_unit_test(what_all_electrodes_share_is_no_touch),
-        cmocka_unit_test(a_pattern_is_kept_where_the_pressure_is_shifted),
-        cmocka_unit_test(what_a_working_pressure_never_saw_is_tared_only_if_it_is_little),
-        cmocka_unit_test(a_press_that_the_pressure_does_not_see_is_not_judged_by_it),
-        cmocka_unit_test(while_held_nothing_is_tared_down_to_nothing),
-        cmocka_unit_test(what_is_held_and_not_seen_is_kept),
-        cmocka_unit_test(release_settles_what_was_in_doubt),
-        cmocka_unit_test(a_lapsed_hold_is_judged_by_its_signals),
-        cmocka_unit_test(the_hosts_word_is_told_before_what_follows_from_it),
-        cmocka_unit_test(a_held_finger_takes_no_first_tare),
-        cmocka_unit_test(a_frame_says_what_is_known_of_its_tare),
-        cmocka_unit_test(a_tare_taken_of_a_hold_is_lost_when_it_ends),
-        cmocka_unit_test(a_first_tare_taken_of_a_hold_is_lost_when_it_ends),
-        cmocka_unit_test(pressure_that_comes_back_beyond_its_rest_is_no_contact),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -204,15 +204,5 @@ TEST(counters_near_their_ends_do_not_wrap_into_nonsense)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slow_loads_keep_their_signal_at_detection_without_pressure),
-        cmocka_unit_test(pressure_saves_even_the_slowest_loads),
-        cmocka_unit_test(a_load_slower_than_the_slew_is_taken_for_drift),
-        cmocka_unit_test(ten_minutes_of_rest_have_no_contact),
-        cmocka_unit_test(the_threshold_rises_with_measured_noise_and_only_with_it),
-        cmocka_unit_test(a_growing_vibration_does_not_raise_the_threshold_out_of_reach),
-        cmocka_unit_test(a_press_after_hours_of_drift_is_seen_whole),
-        cmocka_unit_test(counters_near_their_ends_do_not_wrap_into_nonsense),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -320,16 +320,5 @@ TEST(warmth_before_a_fault_is_not_added_after_it)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_tare_follows_the_temperature_in_contact),
-        cmocka_unit_test(the_ends_of_gain_and_temperature_are_bounded),
-        cmocka_unit_test(nothing_follows_at_rest_or_without_a_gain),
-        cmocka_unit_test(a_missing_or_railed_temperature_holds),
-        cmocka_unit_test(a_first_temperature_in_contact_moves_nothing),
-        cmocka_unit_test(a_degree_is_flagged_in_contact_alone),
-        cmocka_unit_test(nothing_leaks_into_the_next_contact),
-        cmocka_unit_test(a_fault_in_contact_never_adds_a_step_twice),
-        cmocka_unit_test(warmth_before_a_fault_is_not_added_after_it),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

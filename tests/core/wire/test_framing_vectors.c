@@ -175,12 +175,5 @@ TEST(any_block_comes_back_from_any_address)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_case_gives_its_frames_and_counts),
-        cmocka_unit_test(chunks_of_any_size_give_the_same),
-        cmocka_unit_test(what_is_not_cobs_has_no_length),
-        cmocka_unit_test(after_any_noise_one_delimiter_is_enough_to_go_on),
-        cmocka_unit_test(any_block_comes_back_from_any_address),
-    };
-    return cmocka_run_group_tests(tests, load_cases, NULL);
+    return run_all(load_cases, NULL);
 }

@@ -9,6 +9,7 @@
 
 extern uint32_t image_data_from[], image_data_start[], image_data_end[], image_bss_start[], image_bss_end[];
 extern uint32_t image_stack_bottom[], image_stack_top[];
+extern void (*const image_constructors[])(void), (*const image_constructors_end[])(void);
 
 int main(void);
 void image_reset(void);
@@ -57,6 +58,9 @@ __attribute__((noreturn, used)) static void start(void)
     }
     if (initialise_monitor_handles != NULL) {
         initialise_monitor_handles();
+    }
+    for (void (*const *add)(void) = image_constructors; add < image_constructors_end; add++) {
+        (*add)();
     }
     exit(main());
 }
