@@ -12,8 +12,6 @@ from biotac.core.finger import EVENT_DTYPE
 from biotac.wire import messages_gen as wire
 from biotac.wire.native import ffi, lib
 
-_SLOTS = (14, 28, 42)  # in which jolts and slips are looked for
-
 
 def pac_events(pac: Any) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
     """EVENT_DTYPE (k,) of a finger that holds something throughout, and whether it slips at each round's end (n,).
@@ -26,8 +24,8 @@ def pac_events(pac: Any) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
     events, slips = [], []
     for k, words in enumerate(checked_words("pac", pac, None, 22).tolist()):
         finger.seq = k % 2**16
-        for slot in _SLOTS:
-            there = lib.bt_slot_pac[slot] + 1  # as the words come
+        for slot, before in enumerate(lib.bt_slot_pac):  # in those that are not due, nothing is found
+            there = min(before + 1, len(words))  # as the words come
             finger.round.pac[0:there] = words[:there]
             found = lib.bt_finger_events(finger, slot, False)
             for kind in (kind for kind in range(found.bit_length()) if found >> kind & 1):
