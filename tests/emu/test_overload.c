@@ -112,18 +112,6 @@ TEST(what_there_is_time_for_is_all_done)
     slots_and_commands_are_kept();
 }
 
-TEST(sigma_goes_first)
-{
-    start();
-    map_ns = 1240000;
-    sigma_ns = 1700000; // 150 % together, 70 % without it
-    run_ms(3000);
-    assert_true(gateway.session.scheduler.sheds.sigma > 100);
-    assert_int_equal(gateway.session.scheduler.sheds.wrench, 0);
-    assert_int_equal(gateway.session.scheduler.sheds.frames, 0);
-    slots_and_commands_are_kept();
-}
-
 TEST(then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age)
 {
     uint32_t repeated = 0;
