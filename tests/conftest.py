@@ -19,6 +19,8 @@ import pytest
 from deframer import Deframer
 
 from biotac.link.serial_port import SerialLink
+from biotac.sim.loading import load_source
+from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
@@ -175,6 +177,15 @@ def scripted_board() -> Iterator[Callable[..., ScriptedBoard]]:
     yield make
     for board in boards:
         board.close()
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    """Where a simulated board with two fingers answers, to one program after another."""
+    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
+    board.release()
+    yield board.path
+    board.close()
 
 
 @pytest.fixture(scope="session")

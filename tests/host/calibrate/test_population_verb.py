@@ -14,16 +14,6 @@ from biotac import ForceModel, FrameFlags, Setting
 from biotac.calibrate import population as population_map
 from biotac.cli.main import main
 from biotac.map.board_map import from_blob
-from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard
-
-
-@pytest.fixture
-def port() -> object:
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
-    board.release()
-    yield board.path
-    board.close()
 
 
 def test_a_map_of_our_own_fingers_gives_the_force(port: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -315,14 +315,6 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
     assert map_file.load(path) == blob
 
 
-@pytest.fixture
-def port() -> Iterator[str]:
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
-    board.release()
-    yield board.path
-    board.close()
-
-
 def test_the_verb_puts_shows_gets_and_clears(port: str, recorded: Path, tmp_path: Path, capsys) -> None:
     own, other, back = (tmp_path / f"{name}.json" for name in ("mine", "other", "back"))
     blob = make_map(1_763_731_310)

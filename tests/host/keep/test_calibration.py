@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,8 +22,6 @@ from biotac.map import file as map_file
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.facts import Facts
 from biotac.recording.reader import Recording
-from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
 
 SERIAL = "BTEMU00000000042"
@@ -237,14 +234,6 @@ def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path:
 
 
 # ---- command line --------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def port() -> Iterator[str]:
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
-    board.release()
-    yield board.path
-    board.close()
 
 
 def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp_path: Path) -> None:
