@@ -84,27 +84,6 @@ def test_core_and_reference_meet_the_formulas_on_any_counts(counts, tare_q4, wei
     within(board.torque_nmm, torque, 1, max(arms, lever) / 1000, norm=False)
 
 
-@pytest.mark.parametrize("weights", list(PocWeights))
-def test_no_weight_is_no_point_of_contact(weights) -> None:
-    counts = np.full((1, 19), 2000)
-    board = on_board(counts, 2000.0, settings_with(weights))
-    assert np.isnan(board.poc_mm).all()
-    assert np.isnan(board.torque_nmm[0, 0])
-    assert board.force_n.tolist() == [[0, 0, 0]]
-    bulged = on_board(counts + 5, 2000.0, settings_with(weights))
-    assert np.isnan(bulged.poc_mm).all() == (weights != PocWeights.ABS_N2)
-
-
-def test_a_missing_electrode_weighs_nothing() -> None:
-    counts = np.full(19, 2000)
-    counts[16] -= 300
-    with_all = on_board(counts, 2000.0)
-    counts[4] = 0xFFFF
-    without_one = on_board(counts, 2000.0)
-    assert np.array_equal(with_all.poc_mm, without_one.poc_mm)
-    assert np.array_equal(with_all.force_n, without_one.force_n)
-
-
 @pytest.mark.parametrize(
     "counts",
     [np.zeros((2, 18), int), np.zeros(19, int), np.full((1, 19), -1), np.full((1, 19), 65536), np.zeros((1, 19))],

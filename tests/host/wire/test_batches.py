@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 
+import live_board
 import numpy as np
 import pytest
 
@@ -15,31 +16,8 @@ from biotac.wire.framing import encode
 from biotac.wire.native import ffi, lib
 
 
-def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
-    facts: dict[str, object] = {
-        "seq": seq % 2**16,
-        "t_us": t_us % 2**32,
-        "finger": finger,
-        "tare_state": 1,
-        "flags": 0,
-        "counts": tuple(range(100, 119)),
-        "pdc": 2400,
-        "tac": 2000,
-        "tdc": 1000,
-        "poc_um": (1000, -2000, -5080),
-        "force_100un": (10000, -20000, 50000),
-        "torque_mnmm": (1000, 2000, -3000),
-        "tare_q4": (1600,) * 19,
-        "pdc_tare_q4": 2400 * 16,
-        "poc_sigma_um": wire.INVALID_COUNT,
-        "force_sigma_100un": (20, 30, 40),
-        "pdc_filtered_q4": 2412 * 16 + 8,
-        "pressure_force_100un": -1250,
-        "torsion_mnmm": -4750,
-        "wrench_age_ms": 0,
-        "electrodes_out": 0,
-    }
-    return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
+def frame(finger: int, seq: int, t_us: int, **fields: object) -> bytes:
+    return live_board.frame(seq, finger, t_us=t_us, **fields)
 
 
 def status(uptime_s: int) -> bytes:
@@ -53,7 +31,18 @@ def idle(finger: int, seq: int, t_us: int, frames: int) -> bytes:
 
 
 def test_integers_become_mm_n_and_nmm() -> None:
-    row = StreamDecoder().feed(frame(0, 0, 0)).frames[0]
+    sent = frame(
+        0,
+        0,
+        0,
+        poc_um=(1000, -2000, -5080),
+        force_100un=(10000, -20000, 50000),
+        torque_mnmm=(1000, 2000, -3000),
+        pdc_filtered_q4=2412 * 16 + 8,
+        pressure_force_100un=-1250,
+        torsion_mnmm=-4750,
+    )
+    row = StreamDecoder().feed(sent).frames[0]
     assert row["poc_mm"].tolist() == [1.0, -2.0, -5.08]
     assert row["force_n"].tolist() == [1.0, -2.0, 5.0]
     assert row["torque_nmm"].tolist() == [1.0, 2.0, -3.0]
@@ -71,6 +60,8 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
                 0,
                 poc_um=(wire.INVALID_I16,) * 3,
                 torque_mnmm=(wire.INVALID_I32, 0, 5),
+                poc_sigma_um=wire.INVALID_COUNT,
+                force_sigma_100un=(20, 30, 40),
                 pdc_filtered_q4=wire.INVALID_COUNT,
                 pressure_force_100un=wire.INVALID_I32,
                 torsion_mnmm=wire.INVALID_I32,
