@@ -40,5 +40,4 @@ def pac_t_us(t_us: ArrayLike) -> NDArray[np.float64]:
 
 
 def _add(t_us: ArrayLike, later_us: NDArray[np.float64]) -> NDArray[np.float64]:
-    out: NDArray[np.float64] = np.asarray(t_us, np.float64)[..., None] + later_us
-    return out
+    return np.asarray(t_us, np.float64)[..., None] + later_us

@@ -46,8 +46,7 @@ def pac_bands(pac: Any) -> NDArray[np.float64]:
     sent = np.zeros(len(words), _WIRE)
     sent["good"], sent["energy_q4"] = _energies(words)
     rounds = np.arange(len(words))
-    energy: NDArray[np.float64] = bands_from_wire(sent, rounds, rounds)["energy_count2"]
-    return energy
+    return bands_from_wire(sent, rounds, rounds)["energy_count2"]
 
 
 def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:

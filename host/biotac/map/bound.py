@@ -101,8 +101,7 @@ def error_bound(
 ) -> Floats:
     """Bound (n, axes) on the board's error in N and N mm: against ``wanted``, as WrenchMap.blocks(), or exact()."""
     off = [bound_of(board_map, wanted, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
-    result: Floats = np.concatenate(off) / result_units(board_map.axes)
-    return result
+    return np.concatenate(off) / result_units(board_map.axes)
 
 
 # ---- in the units of the board's integers ------------------------------------------------------
@@ -137,8 +136,7 @@ def _factor_off(kind: Kind, factor: Floats) -> Floats:
     if kind == Kind.OFFSET:
         return np.zeros_like(factor)
     share = _CONDUCTANCE_OFF / FACTOR["conductance"] if kind == Kind.CONDUCTANCE else 0.0
-    result: Floats = 0.5 + share * np.abs(factor)
-    return result
+    return 0.5 + share * np.abs(factor)
 
 
 def _line(block: BoardBlock, exact: Floats, factors: dict[Kind, Floats]) -> tuple[Floats, Floats]:

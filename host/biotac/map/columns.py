@@ -150,5 +150,4 @@ def _conductance(count: Floats) -> Floats:
 
 
 def _products(factors: Floats) -> Floats:
-    products: Floats = factors[:, _UPPER[0]] * factors[:, _UPPER[1]]
-    return products
+    return factors[:, _UPPER[0]] * factors[:, _UPPER[1]]

@@ -96,8 +96,7 @@ def exact(
     ]
     parts = [summed(blocks, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
-    result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(board_map.axes)
-    return result
+    return np.clip(np.concatenate(parts), -limit, limit) / result_units(board_map.axes)
 
 
 def tared_chunks(

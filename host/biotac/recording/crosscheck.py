@@ -236,8 +236,7 @@ def _population_bound_n(messages: StructArray) -> NDArray[np.float64]:
     part = (_likeness(messages).share / population.ALL)[:, None]
     wanted = {block: values * FORCE_LSB_PER_N for block, values in population.blocks().items()}
     off = bound_of(population.on_board(), wanted, tared(messages["counts"], messages["tare_q4"])) / FORCE_LSB_PER_N
-    result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + 0.5 / FORCE_LSB_PER_N
-    return result
+    return np.where(part > 0, part * off, 0.0) + 0.5 / FORCE_LSB_PER_N
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

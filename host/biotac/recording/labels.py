@@ -109,8 +109,7 @@ def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uin
         for before in np.unique(code[at]).tolist():
             code[at[code[at] == before]] = len(texts)
             texts.append("; ".join(filter(None, (texts[before], label.line()))))
-    made: NDArray[np.str_] = np.array(texts)[code]
-    return made
+    return np.array(texts)[code]
 
 
 def spans_us(labels: list[Label], wanted: str | Iterable[str]) -> list[tuple[int, int]]:

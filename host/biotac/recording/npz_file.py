@@ -78,8 +78,7 @@ def counts_field(
     if not right.all():
         row = int(np.argwhere(~right)[0][0])
         raise RecordingError(f"{path}: field {name} row {row} holds {array[~right][0]}: {expected}")
-    counts: npt.NDArray[np.uint16] = array.astype(np.uint16)
-    return counts
+    return array.astype(np.uint16)
 
 
 def to_lin_frame(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -113,8 +113,7 @@ def compliance(points_mm: Floats) -> Floats:
     """How freely the skin over core points (n, 3) moves: (n,), 0 to 1."""
     anchored = 1.0 - ANCHOR_SHARE * (1.0 + points_mm[:, 2] / surface.RADIUS_MM)
     sealed = 1.0 - np.exp(-(points_mm[:, 0] - SEAL_MM) / SEAL_REACH_MM)
-    product: Floats = anchored * np.clip(sealed, 0.0, 1.0)
-    return product
+    return anchored * np.clip(sealed, 0.0, 1.0)
 
 
 _MESH_MM, _MESH_NORMAL, _MESH_AREA_MM2 = surface.ventral_mesh()
@@ -153,12 +152,10 @@ def _squeeze_and_bulge(state: Floats) -> tuple[Floats, Floats]:
         return result
 
     def squeeze(away2: Floats, facing: Floats) -> Floats:
-        result: Floats = depth * np.exp(-away2 / 2.0) * np.maximum(facing, 0.0)
-        return result
+        return depth * np.exp(-away2 / 2.0) * np.maximum(facing, 0.0)
 
     def outside(away2: Floats) -> Floats:
-        result: Floats = 1.0 - np.exp(-away2 / (2.0 * BULGE_HOLE**2))
-        return result
+        return 1.0 - np.exp(-away2 / (2.0 * BULGE_HOLE**2))
 
     far = footprints2(_MESH_MM, _distance2(_MESH_MM, contact))
     pressed = squeeze(far, normal @ _MESH_NORMAL.T)
@@ -262,5 +259,4 @@ class Finger:
 
 
 def _divider(resistance_ohm: Floats) -> Floats:
-    counts: Floats = _sensor.FULL_SCALE_COUNT * _sensor.LOAD_OHM / (resistance_ohm + _sensor.LOAD_OHM)
-    return counts
+    return _sensor.FULL_SCALE_COUNT * _sensor.LOAD_OHM / (resistance_ohm + _sensor.LOAD_OHM)

@@ -42,8 +42,7 @@ def tdc_counts(celsius: Floats) -> Floats:
     """Temperature to TDC counts, not rounded: the inverse of the conversion in sensor.toml."""
     kelvin = celsius + 273.15
     share = _sensor.TDC_A / (np.exp(_sensor.TDC_BETA_K / kelvin) + _sensor.TDC_B)
-    counts: Floats = _sensor.FULL_SCALE_COUNT * share
-    return counts
+    return _sensor.FULL_SCALE_COUNT * share
 
 
 def sample(finger: Finger, states: States, rows: npt.NDArray[np.int64] | None = None) -> Words:
@@ -123,14 +122,12 @@ class _Reading:
 
 def _between(boundary: Floats, share: Floats) -> Floats:
     """Values (n, k) at ``share`` (k,) of the way between rows of ``boundary`` (n + 1, k)."""
-    values: Floats = boundary[:-1] * (1.0 - share) + boundary[1:] * share
-    return values
+    return boundary[:-1] * (1.0 - share) + boundary[1:] * share
 
 
 def spring_load(states: States) -> Floats:
     """Static pressure above rest (n,), in counts, as if skin were a spring: numerics.md 3.1."""
-    load: Floats = PDC_PER_N * states.force_n * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
-    return load
+    return PDC_PER_N * states.force_n * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
 
 
 class Pressure:
@@ -146,8 +143,7 @@ class Pressure:
     def __call__(self, load: Floats) -> Floats:
         low = PDC_UNDERSHOOT * np.tanh(self._undershoot(load[:, None])[:, 0] / PDC_UNDERSHOOT_AT)
         creep = PDC_CREEP_SHARE * self._creep(load[:, None])[:, 0]
-        above: Floats = load - low + creep
-        return above
+        return load - low + creep
 
 
 class Lag:
@@ -185,5 +181,4 @@ class _HighPass:
         start = self._lag(np.append(self._settled, settled)[:, None])[:-1]
         self._settled = settled[-1:]
         decay = np.exp(-PAC_SLOT / _sensor.SLOT_HZ / self._seconds)
-        passed: Floats = settled[:, None] + (start - settled[:, None]) * decay
-        return passed
+        return settled[:, None] + (start - settled[:, None]) * decay

@@ -51,5 +51,4 @@ class Ringing:
         blow[begins, 0] = AMPLITUDE_COUNTS * np.sign(sway[begins, 0])
         blows = np.concatenate([self._blows, blow.ravel()])
         self._blows = blows[-len(self._blows) :]
-        rung: Floats = np.convolve(blows, self._ring, "valid").reshape(blow.shape)
-        return rung
+        return np.convolve(blows, self._ring, "valid").reshape(blow.shape)

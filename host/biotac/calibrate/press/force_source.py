@@ -118,8 +118,7 @@ class Series:
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
         """See ForceSource.at; the force is the same for all fingers, as they share one plate."""
-        force_n: Floats = np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan)
-        return force_n
+        return np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan)
 
 
 def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
