@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,8 @@ from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
 from ..core.compiled import completed, on_board_q4, pressure_force_100un
-from ..errors import InputError
+from ..core.finger import Finger
+from ..errors import CommandRefusedError, InputError
 from ..keep.calibration import own_settings
 from ..map import board_map
 from ..map.board_map import BoardMap, opened
@@ -27,7 +30,7 @@ from .block import Packet
 from .facts import in_force
 from .reader import Recording
 from .rewrite import rewrite
-from .rounds import HostTare, Rounds, frames_and_tares, with_silence
+from .rounds import Command, Rounds, frames_and_tares, with_silence
 
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
@@ -192,19 +195,16 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     sent = recording.wire[at]
     finger = int(sent["finger"][0])
     row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
-    tares: dict[int, HostTare] = {}
+    tares: dict[int, Command] = {}
     # Hold, release and lapsed hold of the finger, by row: from the flag HELD, release from its TARE message.
     edges = np.diff(((sent["flags"] & wire.FrameFlags.HELD) != 0).astype(np.int8), prepend=np.int8(0))
-    words = {
-        int(row): wire.TareReason.HOST_HOLD if edges[row] > 0 else wire.TareReason.HOLD_LAPSED
-        for row in np.flatnonzero(edges)
-    }
+    holds = {row: Finger.hold if edges[row] > 0 else Finger.lapse for row in np.flatnonzero(edges).tolist()}
     for message in recording.messages:
         if not isinstance(message, wire.Tare) or message.finger != finger or message.seq not in row_of:
             continue
         row = row_of[message.seq]
         if message.reason == wire.TareReason.HOST_RELEASE:
-            words[row] = wire.TareReason.HOST_RELEASE
+            holds[row] = Finger.release
         elif message.reason in (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET):
             q16 = np.array([*message.tare_q16, message.pdc_tare_q16])
             counts = np.where(q16 == INVALID_U32, np.nan, q16 / 65536)
@@ -218,15 +218,24 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
-    return Rounds(
-        finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, words, quantities, own_map
-    )
+    commands = {row: [told[row] for told in (tares, holds) if row in told] for row in {*tares, *holds}}
+    pdc, tac, tdc = (sent[name] for name in ("pdc", "tac", "tdc"))
+    return Rounds(finger, sent["counts"], pdc, tac, tdc, t_us, commands, quantities, own_map)
 
 
-def _give(tares: dict[int, HostTare], row: int, values: NDArray[np.float64], now: bool) -> None:
+def _give(tares: dict[int, Command], row: int, values: NDArray[np.float64], now: bool) -> None:
     """Add a tare of 19 electrodes and pressure to ``tares``; one without all electrodes cannot be set again."""
     if not np.isnan(values[:-1]).any():
-        tares[row] = HostTare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]), now)
+        tares[row] = partial(_tare, values, now)
+
+
+def _tare(values: NDArray[np.float64], now: bool, finger: Finger) -> None:
+    """``now``: the host asked for the latest means; a finger that has none gets those that the board took."""
+    with suppress(CommandRefusedError):
+        if now:
+            finger.tare_now()
+            return
+    finger.set_tare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]))
 
 
 def _replaced(new: StructArray, tares: dict[int, wire.Tare] | None) -> Callable[[Packet], bytes]:

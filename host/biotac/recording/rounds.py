@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -11,44 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.finger import FINGER_DTYPE, ROUND_US, Finger
-from ..errors import CommandRefusedError
 from ..map.board_map import BoardMap
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray
 
 _FRAME_FIELDS = list(DTYPES[wire.Frame.ID].names or ())
-_WORDS = {
-    wire.TareReason.HOST_HOLD: Finger.hold,
-    wire.TareReason.HOST_RELEASE: Finger.release,
-    wire.TareReason.HOLD_LAPSED: Finger.lapse,
-}
 _ROWS = 2000  # between two calls of show
 
-
-@dataclass(frozen=True)
-class HostTare:
-    """A tare that the host set: ``counts`` (19,) and ``pdc``; with ``now``, the host asked for the latest means."""
-
-    counts: NDArray[np.float64]
-    pdc: float | None
-    now: bool = False
-
-    def give(self, finger: Finger) -> None:
-        """Set it on ``finger``; if that has no means to tare now, it gets those that the board took."""
-        with suppress(CommandRefusedError):
-            if self.now:
-                finger.tare_now()
-                return
-        finger.set_tare(self.counts, self.pdc)
+#: What a host, or its silence, tells a finger.
+Command = Callable[[Finger], object]
 
 
 @dataclass(frozen=True)
 class Rounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
 
-    ``tares``: by the round from which each holds. ``words``: HOST_HOLD, HOST_RELEASE or HOLD_LAPSED, likewise.
-    ``wrench_map``: in force throughout.
+    ``commands``: by the round before which they came, in order. ``wrench_map``: in force throughout.
     """
 
     finger: int
@@ -57,8 +35,7 @@ class Rounds:
     tac: NDArray[np.uint16]
     tdc: NDArray[np.uint16]
     t_us: NDArray[np.int64]
-    tares: dict[int, HostTare] = field(default_factory=dict)
-    words: dict[int, wire.TareReason] = field(default_factory=dict)
+    commands: dict[int, list[Command]] = field(default_factory=dict)
     quantities: wire.QuantityFlags | None = None
     wrench_map: BoardMap | None = None
 
@@ -83,8 +60,7 @@ def with_silence(rounds: Rounds) -> Rounds:
         tac=filled(rounds.tac),
         tdc=filled(rounds.tdc),
         t_us=np.insert(rounds.t_us, late, rounds.t_us[late] - ROUND_US),
-        tares={at(row): tare for row, tare in rounds.tares.items()},
-        words={at(row): word for row, word in rounds.words.items()},
+        commands={at(row): commands for row, commands in rounds.commands.items()},
     )
 
 
@@ -116,14 +92,12 @@ def frames_and_tares(
 
 
 def _run(rounds: Rounds, finger: Finger, ends: list[int], show: Callable[[int], None]) -> Iterator[StructArray]:
-    """Rows in parts that end at ``ends``, before each tare or word from the host, and every _ROWS rounds."""
+    """Rows in parts that end at ``ends``, before commands, and every _ROWS rounds."""
     n = len(rounds.counts)
-    cuts = sorted({0, n, *ends, *rounds.tares, *rounds.words, *range(0, n, _ROWS)})
+    cuts = sorted({0, n, *ends, *rounds.commands, *range(0, n, _ROWS)})
     for begin, end in pairwise(cuts):
-        if begin in rounds.tares:
-            rounds.tares[begin].give(finger)
-        if begin in rounds.words:
-            _WORDS[rounds.words[begin]](finger)
+        for command in rounds.commands.get(begin, ()):
+            command(finger)
         part = slice(begin, end)
         yield finger.feed(
             rounds.counts[part], rounds.pdc[part], rounds.tac[part], rounds.tdc[part], t_us=rounds.t_us[part]
