@@ -42,10 +42,7 @@ class StreamWatch:
         # At the last look; looks without rows since, and how often the stream was started again for that.
         self._rows = self._idle = self._faults = self._looks = self._restarts = 0
         self._thread = self._reader.thread(self._run, "stream watch")
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
+        self.start = self._thread.start
 
     def close(self) -> None:
         """Wait for the thread to end; the reader is closing."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..documents import parse_json
-from ..errors import InputError, PortError, printable
+from ..errors import InputError, PortError, imported, printable
 
 ROOT = "biotac"
 LOOPBACK = "127.0.0.1"
@@ -149,13 +149,7 @@ def _is_loopback(endpoint: str) -> bool:
 
 
 def _zenoh() -> Any:
-    try:
-        import zenoh
-    except ImportError as error:
-        raise InputError(
-            "boards on a network need Zenoh, which is not installed; pip install 'biotac-gateway[zenoh]'"
-        ) from error
-    return zenoh
+    return imported("zenoh", "a board on a network", "zenoh")
 
 
 def _short(error: Exception) -> str:

@@ -72,27 +72,24 @@ def open_devices(port: str) -> list[Any]:
     opened = [spidev.SpiDev() for _ in devices]
     with ExitStack() as on_failure:
         for spi, (bus, device) in zip(opened, devices, strict=True):
+            path = f"/dev/spidev{bus}.{device}"
             try:
                 spi.open(bus, device)
                 on_failure.callback(spi.close)
                 spi.mode = 0
                 spi.max_speed_hz = sensor.SPI_HZ
                 spi.bits_per_word = 8  # two bytes per 16-bit word: the Raspberry Pi's bus cannot do 16 bits
+            except FileNotFoundError as error:
+                cure = "enable SPI (raspi-config, Interface Options) and check ls /dev/spidev*"
+                raise PortError(f"no SPI device {path}; {cure}") from error
+            except PermissionError as error:
+                cure = "sudo usermod -aG spi $USER, and log in again"
+                raise PortError(f"no permission to open {path}; {cure}") from error
             except OSError as error:
-                raise PortError(describe_open_error(f"/dev/spidev{bus}.{device}", error)) from error
+                cure = f"check that it is an SPI device of mode 0 and up to {sensor.SPI_HZ / 1e6} MHz"
+                raise PortError(f"{path} cannot be used ({error}); {cure}") from error
         on_failure.pop_all()
     return opened
-
-
-def describe_open_error(path: str, error: OSError) -> str:
-    """One line with the error and the cure."""
-    if isinstance(error, FileNotFoundError):
-        return f"no SPI device {path}; enable SPI (raspi-config, Interface Options) and check ls /dev/spidev*"
-    if isinstance(error, PermissionError):
-        return f"no permission to open {path}; sudo usermod -aG spi $USER, and log in again"
-    return (
-        f"{path} cannot be used ({error}); check that it is an SPI device of mode 0 and up to {sensor.SPI_HZ / 1e6} MHz"
-    )
 
 
 class SpidevLink(Link):

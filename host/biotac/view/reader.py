@@ -27,13 +27,10 @@ class Reader:
         self._go_on = threading.Event()  # ends a rest
         self._stopping = self._seeking = False
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
+        self.start = self._thread.start
         #: Set before ``over`` when nothing can be played at all: the source is malformed or missing.
         self.failure: BaseException | None = None
         self.over = threading.Event()
-
-    def start(self) -> None:
-        """Start playing."""
-        self._thread.start()
 
     def stop(self) -> None:
         """Close what is open, and wait for the thread to end."""

@@ -14,7 +14,7 @@ import numpy as np
 from mcap.reader import make_reader
 
 from ...documents import parse_json
-from ...errors import BiotacError, InputError, RecordingError
+from ...errors import BiotacError, RecordingError, imported
 from .mounting import Mounting
 from .samples import Reference, Samples, check
 
@@ -64,13 +64,8 @@ def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:
         return lambda data: parse_json(data, lambda fields: SimpleNamespace(**fields))
     if encoding != "cdr":
         raise RecordingError(f"{path}: messages are {encoding!r}: expected json or cdr (ROS 2); convert the bag")
-    try:
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise InputError(
-            f"{path} is a ROS 2 bag, which needs the package rosbags; install it: pip install 'biotac-gateway[export]'"
-        ) from None
-    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = imported("rosbags.typesys", f"{path}, a ROS 2 bag,", "export")
+    store = types.get_typestore(types.Stores.ROS2_HUMBLE)
     return lambda data: store.deserialize_cdr(data, SCHEMAS[0])
 
 
