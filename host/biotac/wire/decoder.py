@@ -92,22 +92,14 @@ class Decoder:
             self._ids[:n_ids],
         )
 
+    def accept_newer_minor(self) -> None:
+        """As StreamDecoder's. Fields are only ever appended, so the known ones come first; the rest is cut off."""
+        self._state.allow_longer = True
+
     @property
     def counts(self) -> FramingCounts:
         """What became of the bytes so far."""
         return counts_of(self._state)
-
-    @property
-    def allow_longer(self) -> bool:
-        """Accept payloads longer than this library knows, for a peer whose wire minor is newer.
-
-        Fields are only ever appended, so the known ones come first; the rest is cut off.
-        """
-        return bool(self._state.allow_longer)
-
-    @allow_longer.setter
-    def allow_longer(self, allow: bool) -> None:
-        self._state.allow_longer = allow
 
 
 def counts_of(decoder: Any) -> FramingCounts:
