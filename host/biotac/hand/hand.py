@@ -79,8 +79,8 @@ class Hand:
         self._watch = StreamWatch(board, self._stream, self._callbacks, reconnect=reconnect)
         self._watch.start()
         # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
-        parts = board, self._stream, self._watch, self._callbacks, self._recorders
-        self._finalizer = weakref.finalize(self, _end, *parts)
+        self._parts = board, self._stream, self._watch, self._callbacks, self._recorders
+        self._finalizer = weakref.finalize(self, _end, *self._parts)
         #: The link that carries the bytes.
         self.link = link
         #: Converts device time to host time, fed by whatever is read. A simulated board's time is not a real clock: it
@@ -176,9 +176,10 @@ class Hand:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        self._end()
         if error is None:
-            self._report_at_end()
+            self.close()
+        else:
+            _end(*self._parts)
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
@@ -194,13 +195,7 @@ class Hand:
         running callback is waited for; the rest is counted in ``stats.batches_skipped``. A hand that is
         garbage-collected, or still open when its program ends, is closed too.
         """
-        self._end()
-        self._report_at_end()
-
-    def _end(self) -> None:
-        _end(self._board, self._stream, self._watch, self._callbacks, self._recorders)
-
-    def _report_at_end(self) -> None:
+        _end(*self._parts)
         if not self._reader.reported:
             self._reader.check()
         self._troubles.report()
@@ -258,9 +253,6 @@ class Hand:
         self._stream.stop()
         self._latest.report()
 
-    def _go(self) -> None:
-        self._reading.go()
-
     def batches(self) -> Iterator[Batch]:
         """Yield batches as they arrive, starting the stream if need be.
 
@@ -276,6 +268,7 @@ class Hand:
             for row in batch.frames:
                 yield Frame.from_row(row)
 
+    _go = _of("_reading", Reading.go)
     read = _of("_reading", Reading.read)
     read_batch = _of("_reading", Reading.read_batch)
 
