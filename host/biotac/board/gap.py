@@ -91,16 +91,14 @@ class Gaps:
     def begin(self, reason: Reason) -> None:
         """The stream has stopped. Two losses without a row in between are one gap."""
         if self._begun is None:
-            self._begun = reason, max(self._seen_us.values(), default=None), self._lost_at_ns()
+            lost_at_ns = time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
+            self._begun = reason, max(self._seen_us.values(), default=None), lost_at_ns
         elif reason == "rebooted":
             self._begun = (reason, *self._begun[1:])
 
     def forget(self) -> None:
         """The stream was stopped on purpose, and all of it has come: what follows is no gap."""
         self._seen_us = {}
-
-    def _lost_at_ns(self) -> int:
-        return time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
 
     def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> Batch:
         """``batch``, whose latest row is of ``last_us``, with a Gap if one ends here.

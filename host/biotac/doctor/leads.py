@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..wire.identity import ascii_text
 from .catalogue import Finding
-from .facts import BoardFacts, Facts, PairFacts
+from .facts import BoardFacts, Facts
 from .sensors import WORDS
 
 
@@ -19,21 +19,17 @@ def check(facts: Facts) -> Iterator[Finding]:
     bad = [sum(board.more(finger, kind) for kind in WORDS) for finger in range(board.hello.fingers)]
     good = [finger for finger in range(board.hello.fingers) if board.more(finger, "words_good") > bad[finger]]
     if good:
-        yield from _selects(board, pair, good)
+        others = ", ".join(map(str, good))
+        for finger in range(board.hello.fingers):
+            if finger not in good:
+                yield Finding("lead_select", f"finger {finger} gives few good words or none, unlike fingers {others}")
+        yield from crossed(board, pair.serials)
     elif not (words := pair.more("words")):
         yield Finding("lead_clock", "the sensor board saw no clock while any of its selects was low")
     elif sum(board.more(finger, "words_error") for finger in range(board.hello.fingers)):
         yield Finding("lead_mosi", f"{words} words were read, but the sensors understood no command")
     else:
         yield Finding("lead_miso", f"the sensors sent {words} words, but none reached the gateway")
-
-
-def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Finding]:
-    for finger in range(board.hello.fingers):
-        if finger not in good:
-            others = ", ".join(map(str, good))
-            yield Finding("lead_select", f"finger {finger} gives few good words or none, unlike fingers {others}")
-    yield from crossed(board, pair.serials)
 
 
 def crossed(board: BoardFacts, serials: tuple[str, ...]) -> Iterator[Finding]:

@@ -114,7 +114,7 @@ class _Guide:
     """A Face that prints instructions on stderr, leaving stdout to the result; ``press`` words a press."""
 
     def __init__(self, press: Callable[[Step], str], force_n: Callable[[Step], float], held: str) -> None:
-        self._press, self._force_n, self._held = press, force_n, held
+        self._press, self.force_n, self._held = press, force_n, held
 
     def show(self, step: Step | None) -> None:
         if step is None:
@@ -126,9 +126,6 @@ class _Guide:
         else:
             text = f"held: {self._held.format(finger=step.finger)}"
         print(text, file=sys.stderr)
-
-    def force_n(self, step: Step) -> float:
-        return self._force_n(step)
 
 
 def _typed_n(step: Step, unit: str = "N") -> float:

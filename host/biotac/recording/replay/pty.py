@@ -8,7 +8,7 @@ import select
 import tty
 from contextlib import suppress
 
-from ...clock.host_clock import HostClock, SystemClock
+from ...clock.host_clock import SystemClock
 from ...errors import PortError
 from .link import CHUNK_BYTES, Pacer
 from .playback import Playback
@@ -17,8 +17,8 @@ from .playback import Playback
 class ReplayPty:
     """A pty on which any serial program finds the recorded board, at ``path``."""
 
-    def __init__(self, playback: Playback, pace: float, *, clock: HostClock | None = None) -> None:
-        self._pacer = Pacer(playback, pace, clock or SystemClock())
+    def __init__(self, playback: Playback, pace: float) -> None:
+        self._pacer = Pacer(playback, pace, SystemClock())
         self._out = b""
         try:
             self._master, self._slave = pty.openpty()
