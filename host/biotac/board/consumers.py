@@ -28,7 +28,7 @@ Unsubscribe = Callable[[], None]
 
 
 class Queue:
-    """Batches on their way to one consumer, who may be slow: first in, first out.
+    """A reader.Consumer: batches on their way to one who may be slow, first in, first out.
 
     A full queue drops its oldest batches and counts them; their Gaps are kept, and a Gap says what is missing. A board
     whose time waits for its reader waits instead. While nobody takes from it yet, what it drops is nobody's loss.
@@ -61,13 +61,11 @@ class Queue:
             self._on_news()
 
     def wake(self) -> None:
-        """See reader.Consumer."""
         self._waiting.put(None)
         if self._on_news is not None:
             self._on_news()
 
     def is_full(self) -> bool:
-        """See reader.Consumer."""
         return self._has_rows and self._put_rows > self._taken_rows
 
     def take(self, *, wait: bool = False) -> Batch | None:
@@ -170,7 +168,7 @@ class Troubles:
 
 
 class Callbacks:
-    """Functions that are called with batches, or with messages of one kind.
+    """A reader.Last: functions that are called with batches, or with messages of one kind.
 
     They are called on the reading thread, which costs no switch between threads, until one of them has taken longer
     than SLOW_S, or gives a command: from then on that thread calls them, another one reads, and what they are too slow
@@ -211,7 +209,6 @@ class Callbacks:
         self.queue.leave()
 
     def put(self, batch: Batch) -> None:
-        """See reader.Consumer."""
         if self._is_slow:
             self.queue.put(batch)
             return
@@ -224,11 +221,9 @@ class Callbacks:
         self._go_on()
 
     def wake(self) -> None:
-        """See reader.Consumer."""
         self.queue.wake()
 
     def is_full(self) -> bool:
-        """See reader.Consumer."""
         return self.queue.is_full()
 
     def relieve(self, *, at_once: bool = False) -> None:

@@ -25,7 +25,6 @@ class Finding:
 
     @property
     def entry(self) -> Entry:
-        """This finding's entry in the catalogue."""
         return CATALOGUE[self.code]
 
 

@@ -58,7 +58,6 @@ class ZenohLink(Link):
         self.reopen(port)
 
     def ports(self) -> list[str]:
-        """The same name."""
         return [self.port]
 
     def reopen(self, port: str) -> None:

@@ -66,7 +66,7 @@ class Hand:
         self._board = board = Board(link, host_clock=host_clock)
         self._reader = reader = board.reader
         self._troubles = Troubles()
-        self._latest = Latest(reader, names, max_age_s=max_age_s, report=_reporter(board, self._troubles))
+        self._latest = Latest(reader, names, max_age_s=max_age_s, troubles=self._troubles)
         reader.add(self._latest)  # before every queue: who takes a batch finds its frames here, too
         self._commands = Commands(board, self._latest)
         #: Settings, calibrations and wrench maps that the board keeps, and its faults.
@@ -325,17 +325,6 @@ class Hand:
         if note or facts:
             recorder.mark(note, None, facts, timed=False)
         return recorder
-
-
-def _reporter(board: Board, troubles: Troubles) -> Callable[[], None]:
-    """Raises what the program has not been told yet; callbacks and recorders are not the program."""
-
-    def report() -> None:
-        board.reader.check()
-        if not board.reader.is_own():
-            troubles.report()
-
-    return report
 
 
 def _end(board: Board, stream: Stream, watch: StreamWatch, callbacks: Callbacks, recorders: list[Recorder]) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..board.board import Board
 from ..board.consumers import Troubles
@@ -31,11 +31,21 @@ WRITE_BYTES = 8 << 10
 LIMIT_BYTES = 8 << 20
 
 
+def _of_writer(name: str, doc: str) -> Any:
+    return property(lambda recorder: getattr(recorder._writer, name), doc=doc)
+
+
 class Recorder:
     """An open recording, made by ``Hand.record``: everything that arrives, until it or the hand is closed.
 
     ``path`` is the file being written; ``paths`` lists all files so far: when the board restarts, a new one is begun.
     """
+
+    path: Path = _of_writer("path", "The file being written.")
+    paths: list[Path] = _of_writer("paths", "All files so far.")
+    frames: int = _of_writer("frames", "How many frames the files hold; those that wait count when they are written.")
+    frames_lost: int = _of_writer("frames_lost", "How many frames are missing in the files, by their sequence numbers.")
+    closed: bool = _of_writer("closed", "Whether nothing more is written.")
 
     def __init__(self, board: Board, commands: Commands, kept: Configuration, troubles: Troubles, path: Path, *,
                  overwrite: bool, mid_stream: bool) -> None:  # fmt: skip
@@ -57,31 +67,6 @@ class Recorder:
         self._thread = board.reader.thread(self._run, "recorder")
         self._thread.start()
         board.reader.add(self)
-
-    @property
-    def path(self) -> Path:
-        """The file being written."""
-        return self._writer.path
-
-    @property
-    def paths(self) -> list[Path]:
-        """All files so far."""
-        return self._writer.paths
-
-    @property
-    def frames(self) -> int:
-        """How many frames the files hold; those that wait to be written count when they are."""
-        return self._writer.frames
-
-    @property
-    def frames_lost(self) -> int:
-        """How many frames are missing in the files, by their sequence numbers; see ``frames``."""
-        return self._writer.frames_lost
-
-    @property
-    def closed(self) -> bool:
-        """Whether nothing more is written."""
-        return self._writer.closed
 
     def mark(self, text: str, finger: int | None, facts: Mapping[str, str | float], *, timed: bool = True) -> Mark:
         """See Hand.mark; without ``timed``, about the whole recording."""
@@ -122,10 +107,9 @@ class Recorder:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
 
-    # ---- on the reading thread -----------------------------------------------------------------
+    # ---- as a reader.Tap, on the reading thread ------------------------------------------------
 
     def put_raw(self, chunk: bytes) -> None:
-        """See reader.Tap."""
         if self._put_bytes - self._taken_bytes > LIMIT_BYTES:
             reader = self._board.reader
             self._dropped = self._dropped or Gap("slow", reader.last_t_us, None, time.time_ns(), 0, self._boot_id)
@@ -137,7 +121,6 @@ class Recorder:
         self._chunk = chunk
 
     def put(self, batch: Batch) -> None:
-        """See reader.Consumer."""
         for message in batch.messages:
             if isinstance(message, Gap):
                 self._append(message)
@@ -155,7 +138,6 @@ class Recorder:
         """See reader.Consumer."""
 
     def is_full(self) -> bool:
-        """See reader.Consumer."""
         return self._put_bytes - self._taken_bytes > WRITE_BYTES
 
     # ---- on its own thread ---------------------------------------------------------------------

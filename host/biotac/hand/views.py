@@ -12,6 +12,7 @@ from typing import Any, NoReturn, SupportsIndex, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..board.consumers import Troubles
 from ..board.gap import FINGERS_IN
 from ..board.reader import Reader
 from ..errors import InputError
@@ -53,23 +54,26 @@ def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
 
 
 class Latest:
-    """The newest frame or heartbeat of each finger, and how old it is.
+    """A reader.Consumer: the newest frame or heartbeat of each finger, and how old it is.
 
     The reading thread only notes the batch: searching it costs as much as decoding, and most are never looked at.
-    ``max_age_s`` is the age beyond which values are not shown any more. ``report`` raises what the program has not been
-    told yet: the board is lost, or a callback or a recording failed.
+    ``max_age_s`` is the age beyond which values are not shown any more.
     """
 
-    def __init__(
-        self, reader: Reader, names: Mapping[str, int], *, max_age_s: float, report: Callable[[], None]
-    ) -> None:
+    def __init__(self, reader: Reader, names: Mapping[str, int], *, max_age_s: float, troubles: Troubles) -> None:
         self.names = names
         self.max_age_s = max_age_s
-        self.report = report
+        self._troubles = troubles
         self._reader = reader
         self._batches: dict[int, Batch] = {}  # by finger: the latest that has it
         self._news = threading.Condition()
         self._waiters = 0
+
+    def report(self) -> None:
+        """Raise what failed and the program was not told yet; callbacks and recorders are not the program."""
+        self._reader.check()
+        if not self._reader.is_own():
+            self._troubles.report()
 
     def name(self, finger: int) -> str:
         """The name of a chip select, or its number as text if it has no name."""
@@ -92,19 +96,16 @@ class Latest:
         return index(fingers)
 
     def put(self, batch: Batch) -> None:
-        """See reader.Consumer."""
         for finger in FINGERS_IN[batch.fingers]:
             self._batches[finger] = batch
         if self._waiters:
             self.wake()
 
     def wake(self) -> None:
-        """See reader.Consumer."""
         with self._news:
             self._news.notify_all()
 
     def is_full(self) -> bool:
-        """See reader.Consumer."""
         return False
 
     def state(self, finger: int) -> tuple[StructArray, float, str]:

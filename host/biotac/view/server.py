@@ -99,7 +99,6 @@ class ViewServer(ThreadingHTTPServer):
             return True
 
     def shutdown_request(self, request: Any) -> None:
-        """See socketserver."""
         with self._counting:
             self._asking.pop(request, None)
             self._pages.discard(request)
@@ -176,15 +175,12 @@ class Handler(BaseHTTPRequestHandler):
         state = self.server.state
         cursor = state.cursor()
         about = facts() | {"token_header": TOKEN_HEADER, "recording": state.recording}
-        self._send(f"retry: 500\nevent: about\ndata: {compact(about)}\n\n")
+        self.wfile.write(f"retry: 500\nevent: about\ndata: {compact(about)}\n\n".encode())
         while not state.closed:
             begin_s = time.monotonic()
             text = state.wait(cursor, QUIET_S)
-            self._send(f"data: {text}\n\n" if text else ": nothing new\n\n")
+            self.wfile.write((f"data: {text}\n\n" if text else ": nothing new\n\n").encode())
             time.sleep(max(0.0, begin_s + EVENT_S - time.monotonic()))
-
-    def _send(self, text: str) -> None:
-        self.wfile.write(text.encode())
 
     def _words(self, status: int, words: str) -> None:
         self._answer(status, "application/json", compact({"words": words}).encode())

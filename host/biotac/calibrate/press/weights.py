@@ -32,7 +32,6 @@ class Load:
 
     @property
     def size_n(self) -> float:
-        """Size of the force."""
         return self.mass_g * 1e-3 * STANDARD_GRAVITY
 
     @property

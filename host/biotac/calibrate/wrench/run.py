@@ -69,7 +69,6 @@ class Run:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the truth's columns."""
         return AXES[: self.truth.shape[1]]
 
 

@@ -82,7 +82,6 @@ class ReplayLink(Link):
 
     @property
     def recording(self) -> Recording:
-        """The recording being played."""
         return self.pacer.playback.recording
 
     def read(self, timeout_s: float) -> bytes:
