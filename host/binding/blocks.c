@@ -192,9 +192,8 @@ SPECIALISED void to_sides(const int32_t *restrict e, int weights, sides *restric
     (SUM_PAIRS(rows, factors) + DOT(rows, 7, factors) + DOT(rows, 8, factors) + DOT(rows, 9, factors)        \
      + DOT(rows, 10, factors) + DOT(rows, 11, factors))
 #define SUM_LINES(rows, factors)                                                                             \
-    (AT(rows, 0) * (factors)[0] + LINE_1(rows) * (factors)[1] + LINE_2(rows) * (factors)[2]                  \
-     + AT(rows, 6) * (factors)[3] + AT(rows, 7) * (factors)[4] + AT(rows, 8) * (factors)[5]                  \
-     + LINE_6(rows) * (factors)[6])
+    (SUM_SIDES(rows, factors) + AT(rows, 6) * (factors)[3] + AT(rows, 7) * (factors)[4]                      \
+     + AT(rows, 8) * (factors)[5] + LINE_6(rows) * (factors)[6])
 #define SUM_TIP(rows, factors)                                                                               \
     (AT(rows, 0) * (factors)[0] + AT(rows, 6) * (factors)[3] + AT(rows, 7) * (factors)[4]                    \
      + AT(rows, 8) * (factors)[5])
@@ -219,8 +218,7 @@ SPECIALISED void sums(const bt_block_plan *restrict plan, const sides *restrict 
 }
 
 // Eq 2 on the negated sums, scales, lever. With no weight at all 0/0 makes the PoC and the lever NaN.
-// Several loops, because one with a choice or
-// a sqrt() in it is not made into vectors.
+// Several loops, because one with a choice or a sqrt() in it is not made into vectors.
 SPECIALISED void finish(const bt_block_plan *restrict plan, columns *restrict c, int width)
 {
     double tip_x[BLOCK];
@@ -319,18 +317,6 @@ SPECIALISED bool block(const bt_block_plan *plan, const uint8_t *rows, int64_t s
     return true;
 }
 
-static bool block_of_many(const bt_block_plan *plan, const uint8_t *rows, int64_t stride,
-                          const int32_t *tare_q4, double *results)
-{
-    return block(plan, rows, stride, tare_q4, results, BLOCK);
-}
-
-static bool block_of_one(const bt_block_plan *plan, const uint8_t *row, const int32_t *tare_q4,
-                         double *results)
-{
-    return block(plan, row, 0, tare_q4, results, 1);
-}
-
 int64_t bt_blocks(const bt_block_plan *plan, int64_t n, const void *counts, int64_t counts_stride,
                   const void *tare, int64_t tare_stride, void *results)
 {
@@ -355,8 +341,8 @@ int64_t bt_blocks(const bt_block_plan *plan, int64_t n, const void *counts, int6
             good &= tare_row(tares + (done + k) * tare_stride, tare_q4 + k, BLOCK);
         }
         if (!good
-            || !block_of_many(plan, rows + done * counts_stride, counts_stride, tare_q4,
-                              out + BT_RESULTS * done)) {
+            || !block(plan, rows + done * counts_stride, counts_stride, tare_q4, out + BT_RESULTS * done,
+                      BLOCK)) {
             break; // the loop below finds the row
         }
     }
@@ -364,7 +350,7 @@ int64_t bt_blocks(const bt_block_plan *plan, int64_t n, const void *counts, int6
         if (tare_stride != 0 && !tare_row(tares + done * tare_stride, one_tare_q4, 1)) {
             return done;
         }
-        if (!block_of_one(plan, rows + done * counts_stride, one_tare_q4, out + BT_RESULTS * done)) {
+        if (!block(plan, rows + done * counts_stride, 0, one_tare_q4, out + BT_RESULTS * done, 1)) {
             return done;
         }
     }

@@ -2,15 +2,8 @@
 
 #include "kernel_bounds.h"
 
-double bt_poc_bound_um(void)
-{
-    return POC_BOUND_UM;
-}
-
-double bt_force_bound_mn(void)
-{
-    return FORCE_BOUND_MN;
-}
+const double bt_poc_bound_um = POC_BOUND_UM;
+const double bt_force_bound_mn = FORCE_BOUND_MN;
 
 void bt_torque_bounds_mnmm(int64_t n, const double *size, const double *sum_yz, const double *force_yz_n,
                            const double *gain_n, double *out)

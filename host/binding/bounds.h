@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-double bt_poc_bound_um(void);
-double bt_force_bound_mn(void); // of each axis
+extern const double bt_poc_bound_um;
+extern const double bt_force_bound_mn; // of each axis
 
 // For n frames: size (n) is sum |e| in count, sum_yz (n, 2) those of Eq 4 in count*um, force_yz_n (n) is
 // |F_y| + |F_z|, none negative; gain_n (2) in N per count. out (n, 3): x, y, z.

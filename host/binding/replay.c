@@ -29,11 +29,6 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
                  | BT_FRAME_FLAG_ELECTRODE_OUT;
 }
 
-int64_t bt_replay_row_bytes(void)
-{
-    return BT_REPLAY_BYTES;
-}
-
 void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map, int64_t n,
                const uint16_t *words, const uint32_t *t_us, uint8_t *rows)
 {

@@ -129,18 +129,15 @@ size_t port_link_read(bt_port *board, unsigned link, uint8_t *data, size_t bytes
 
 uint32_t port_link_turns(bt_port *board, unsigned link)
 {
-    (void)board;
     return link == 0; // the host is this process
 }
 
 void port_link_uart(bt_port *board, uint32_t bits_per_s)
 {
-    (void)board, (void)bits_per_s;
 }
 
 bool port_link_touched(bt_port *board)
 {
-    (void)board;
     return false;
 }
 
@@ -169,13 +166,11 @@ bool port_flash_program(bt_port *board, uint32_t page_offset, const uint8_t *pag
 
 void port_flash_read(bt_port *board, uint32_t offset, uint8_t *data, size_t bytes)
 {
-    (void)board, (void)offset;
     memset(data, 0xFF, bytes);
 }
 
 bool port_reboot(bt_port *board, bool into_bootloader)
 {
-    (void)board;
     return false;
 }
 

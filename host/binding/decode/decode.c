@@ -110,11 +110,6 @@ static enum bt_deframed finish_rest(bt_decoder *decoder, const uint8_t *data, si
     return outcome;
 }
 
-size_t bt_decode_bytes(void)
-{
-    return BT_DECODE_BYTES;
-}
-
 size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes)
 {
     size_t taken = bytes < BT_DECODE_BYTES ? bytes : BT_DECODE_BYTES;

@@ -9,7 +9,7 @@
 #include "decode/crc_fast.h"
 #include "wire/framing.h"
 
-#define BT_DECODE_BYTES    65536                   // what one call takes
+enum { BT_DECODE_BYTES = 65536 };                  // what one call takes
 #define BT_DECODE_ROOM     (BT_DECODE_BYTES + 512) // its bytes and the rest of the call before
 #define BT_DECODE_OUTCOMES 6                       // enum bt_deframed
 #define BT_UNKNOWN_ID      (-1)
@@ -47,9 +47,7 @@ typedef struct {
 // To be called first; nothing of the struct needs a value before.
 void bt_decoder_reset(bt_decoder *decoder);
 
-size_t bt_decode_bytes(void); // BT_DECODE_BYTES
-
-// Takes at most that many and returns how many. What the call before completed is gone.
+// Takes at most BT_DECODE_BYTES and returns how many. What the call before completed is gone.
 size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes);
 
 #endif

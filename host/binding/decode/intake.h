@@ -41,7 +41,7 @@ typedef struct {
 
 void bt_intake_reset(bt_intake *intake);
 
-// Takes at most bt_decode_bytes() and returns how many. What the call before completed is gone.
+// Takes at most BT_DECODE_BYTES and returns how many. What the call before completed is gone.
 size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes);
 
 // Waits for bytes of a port and takes what is there: returns as bt_descriptor_read(), after bytes with all

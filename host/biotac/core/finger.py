@@ -40,7 +40,7 @@ FINGER_DTYPE = np.dtype([
 ])  # fmt: skip
 
 _ELECTRODES = len(sensor.ELECTRODE_NAMES)
-if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
+if FINGER_DTYPE.itemsize != lib.BT_REPLAY_BYTES:
     raise ImportError(
         "the compiled core's rows differ in size from this Python code's; reinstall the package: pip install ."
     )

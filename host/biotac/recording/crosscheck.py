@@ -27,8 +27,8 @@ from ..wire.sensor_gen import CORE_RADIUS_UM
 from .pressure_check import FORCE_BOUND_N, PressureCheck
 
 #: Of the PoC's distance and of each axis of force, see firmware/reference/kernel_bounds.h.
-POC_BOUND_UM: float = lib.bt_poc_bound_um()
-FORCE_BOUND_MN: float = lib.bt_force_bound_mn()
+POC_BOUND_UM: float = lib.bt_poc_bound_um
+FORCE_BOUND_MN: float = lib.bt_force_bound_mn
 
 #: Name, unit, value sent, steps per unit, true value, and largest difference allowed; each (n, axes).
 Quantity = tuple[str, str, NDArray[Any], int, NDArray[np.float64], NDArray[np.float64] | float]

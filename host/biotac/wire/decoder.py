@@ -26,7 +26,7 @@ FRAME, PAC, IDLE = (DTYPES[message_id] for message_id in STREAMED)
 NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC, IDLE))
 _KINDS = int(lib.BT_DECODED_KINDS)
 _ROWS = ("frames", "pacs", "idles")
-ONE_STEP_BYTES = int(lib.bt_decode_bytes())
+ONE_STEP_BYTES = int(lib.BT_DECODE_BYTES)
 
 # Not cleared, because the reset sets what is read: most of the memory is never touched by a short connection.
 new = ffi.new_allocator(should_clear_after_alloc=False)

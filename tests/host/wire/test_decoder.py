@@ -18,7 +18,7 @@ from biotac.wire.native import ffi, lib
 
 Message = tuple[int, bytes]
 UNKNOWN_ID = 0x7E
-STEP_BYTES = lib.bt_decode_bytes()  # where the decoder itself cuts
+STEP_BYTES = lib.BT_DECODE_BYTES  # where the decoder itself cuts
 
 
 def messages(random: np.random.Generator, n: int, longer_by: int = 0) -> list[Message]:
