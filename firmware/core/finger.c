@@ -113,7 +113,6 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
-    memset(&finger->health.leap, 0, sizeof finger->health.leap);
     finger->bands.begun = false; // samples before and after the gap do not belong together
     if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
         finger->silent_rounds++;
@@ -139,7 +138,6 @@ static void close_round(bt_finger *finger)
 
 void bt_finger_pass(bt_finger *finger)
 {
-    memset(&finger->health.leap, 0, sizeof finger->health.leap);
     close_round(finger);
 }
 
@@ -155,12 +153,14 @@ static bool may_be_touched(const bt_finger *finger)
 // What the tare begins anew with, electrodes that rest again, and what a new tare ends.
 static void recover(bt_finger *finger)
 {
+    uint8_t reason = finger->tare.reason;
     bool rests = finger->tare.state == BT_TARE_STATE_REST;
+    bool by_host = reason == BT_TARE_REASON_HOST_NOW || reason == BT_TARE_REASON_HOST_SET;
     if (rests) {
         finger->health.alone = 0;
     }
     if (rests && finger->tare_unsent) {
-        bt_health_tared(&finger->health, finger->tare.reason == BT_TARE_REASON_HOST_NOW);
+        bt_health_tared(&finger->health, by_host);
     }
     if (finger->health.out != 0 && (rests || !bt_usable_without(finger->health.out))) {
         uint32_t back = bt_health_back(&finger->health);
@@ -216,7 +216,7 @@ bool bt_finger_moved(const bt_finger *finger)
 
 static uint32_t health_flags(const bt_health *health)
 {
-    return (health->sensor_fault != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
+    return (bt_health_sensor_fault(health) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
            | (health->alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }
 

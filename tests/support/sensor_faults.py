@@ -213,7 +213,9 @@ def _cross_talk(share: float) -> Fault:
 _PARITY = np.array([bin(byte).count("1") & 1 for byte in range(256)], bool)
 
 
-def _noisy_line(a_bit: float) -> Fault:
+def noisy_line(a_bit: float) -> Fault:
+    """Every bit flips with this chance; what parity does not show is believed."""
+
     def fault(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
         bad = words.copy()
         counts = words[begin:].astype(np.uint16)
@@ -252,8 +254,8 @@ FAULTS: dict[str, Fault] = {
     "two fingers exchanged": _exchanged_fingers,
     "cross-talk of 30 % between fingers": _cross_talk(0.3),
     "cross-talk of 100 % between fingers": _cross_talk(1.0),
-    "noisy line, 1e-3 a bit": _noisy_line(1e-3),
-    "noisy line, 3e-3 a bit": _noisy_line(3e-3),
+    "noisy line, 1e-3 a bit": noisy_line(1e-3),
+    "noisy line, 3e-3 a bit": noisy_line(3e-3),
     "TDC jumps by 300 counts": _channel(slots.TDC_SLOT, lambda x: x + 300),
     "PDC stuck": _channel(slots.PDC_SLOT, lambda x: x[0]),
     "PDC 0": _channel(slots.PDC_SLOT, lambda x: 0.0),

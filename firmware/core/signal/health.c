@@ -25,6 +25,7 @@
 #define TRAVEL_Q2     (100 * 4) // sum of what the others move by while an electrode is stuck
 #define CALM_WINDOWS  50        // two seconds
 #define CALM_Q2       (5 * 4)
+#define CALM_ROUNDS   50 // by then a running mean has forgotten a touch
 
 #define TOGETHER         5u  // counts
 #define TOGETHER_BLIND   25u // while static pressure has not shown that it works
@@ -32,7 +33,8 @@
 #define PRESSED          12u // counts: static pressure that has moved so far works
 #define TOGETHER_WINDOWS 9   // 14 counts/s: a hot cup does up to 10
 
-#define FLIP_WINDOWS 8 // in which no live electrode jumps back and forth three times
+#define SHAKEN_ROUNDS 8
+#define FLIP_WINDOWS  8 // in which no live electrode jumps back and forth three times
 
 void bt_health_reset(bt_health *health)
 {
@@ -47,14 +49,6 @@ static void condemn(bt_health *health, uint32_t electrodes, uint8_t fault)
     health->calm_windows = 0;
     health->suspect = health->mean_suspect = 0;
     health->alone &= ~electrodes;
-}
-
-// What was exchanged stays so, whatever its words are taken for.
-static void distrust(bt_health *health, uint8_t fault)
-{
-    if (health->sensor_fault != BT_SENSOR_FAULT_EXCHANGED) {
-        health->sensor_fault = fault;
-    }
 }
 
 static uint8_t counted(uint8_t count)
@@ -73,7 +67,7 @@ static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips)
     if (noisy & ~health->out) {
         condemn(health, noisy, BT_SENSOR_FAULT_NOISY);
         if (!bt_usable_without(health->out)) {
-            distrust(health, BT_SENSOR_FAULT_NOISY);
+            health->sensor_fault = BT_SENSOR_FAULT_NOISY;
         }
     }
 }
@@ -114,7 +108,7 @@ static void judge_repeats(bt_health *health, uint32_t missing)
             health->sensor_fault = BT_SENSOR_FAULT_NONE;
         }
     } else if (frozen && (alive || (dead && health->unchanged_windows >= DEAD_WINDOWS))) {
-        distrust(health, BT_SENSOR_FAULT_FROZEN);
+        health->sensor_fault = BT_SENSOR_FAULT_FROZEN;
     }
     // A worn sensor's electrode hardly ever repeats its word four times, a quiet one's did so 64 times.
     bool lasts =
@@ -186,7 +180,7 @@ static bool together(bt_health *health, uint32_t noise, uint32_t pressure, int t
     }
     if (mean >= least + pressure / 4 && 2 * moves->top < 3 * mean + noise / 4
         && moves->total < alike + noise / 8) {
-        distrust(health, BT_SENSOR_FAULT_TOGETHER);
+        health->sensor_fault = BT_SENSOR_FAULT_TOGETHER;
         return false;
     }
     return pressure <= PRESSURE << SUM_BITS;
@@ -318,7 +312,7 @@ uint32_t bt_health_back(bt_health *health)
     uint32_t back = health->out;
     health->out = 0;
     health->electrode_fault = BT_SENSOR_FAULT_NONE;
-    distrust(health, BT_SENSOR_FAULT_NONE);
+    health->sensor_fault = BT_SENSOR_FAULT_NONE;
     health->windows = 0;
     memset(health->flips, 0, sizeof health->flips);
     return back;
@@ -397,13 +391,16 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     uint32_t without = (trigger->unknown | health->out) & BT_ALL_ELECTRODES;
     uint32_t lone = 0;
     uint8_t leap = bt_leap_round(&health->leap, round, trigger);
-    if (leap != BT_SENSOR_FAULT_NONE) {
-        distrust(health, leap);
+    health->exchanged = health->exchanged || leap == BT_SENSOR_FAULT_EXCHANGED;
+    if (leap == BT_SENSOR_FAULT_TOGETHER) {
+        health->sensor_fault = leap;
     }
     uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
     health->down = trigger->down;
-    if (flips != 0) {
+    bool shaken = trigger->far >> BT_LANE_PDC & 1; // then skin jumps, too
+    health->still_rounds = shaken ? 0 : counted(health->still_rounds);
+    if (flips != 0 && health->still_rounds > SHAKEN_ROUNDS) {
         judge_flips(health, flips);
     }
     switch (++health->rounds) {
@@ -427,7 +424,9 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
         health->rounds = 0;
     }
     health->alone |= lone;
-    if (lone != 0 && !touched) { // else a tip no wider than an electrode may slide over it
+    health->calm_rounds = touched ? 0 : counted(health->calm_rounds);
+    if (lone != 0
+        && health->calm_rounds >= CALM_ROUNDS) { // else a tip no wider than an electrode may move it
         condemn(health, lone, BT_SENSOR_FAULT_ALONE);
     }
 }

@@ -31,7 +31,10 @@ typedef struct {
     bool pressure_alive;     // static pressure has moved
     uint32_t out;            // electrodes condemned, a bit mask
     uint8_t electrode_fault; // enum bt_sensor_fault of the latest of these
-    uint8_t sensor_fault;    // enum bt_sensor_fault
+    uint8_t sensor_fault;    // enum bt_sensor_fault of what passes by itself
+    bool exchanged;          // until a host tares
+    uint8_t calm_rounds;     // since something may have touched; saturates
+    uint8_t still_rounds;    // since pressure was far off; saturates
     uint32_t up, down;       // trigger's, of the round before
     uint32_t flips[3];       // electrodes that jumped back and forth once, twice, three times lately
     bt_lanes anchor;         // a window's sums when the skin last moved
@@ -65,13 +68,19 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
 // it while the finger rests, or while too many are out.
 uint32_t bt_health_back(bt_health *health);
 
-// There is a new tare: whatever has moved together is in it. What was exchanged stays so, unless the tare is
-// a host's, who knows.
 #ifndef BT_CDEF
+// What is wrong with the whole sensor, an enum bt_sensor_fault.
+static inline uint8_t bt_health_sensor_fault(const bt_health *health)
+{
+    bool exchanged = health->exchanged && health->sensor_fault == BT_SENSOR_FAULT_NONE;
+    return exchanged ? BT_SENSOR_FAULT_EXCHANGED : health->sensor_fault;
+}
+
+// There is a new tare: whatever has moved together is in it. Only a host knows whose words are tared.
 static inline void bt_health_tared(bt_health *health, bool by_host)
 {
-    if (health->sensor_fault == BT_SENSOR_FAULT_TOGETHER
-        || (by_host && health->sensor_fault == BT_SENSOR_FAULT_EXCHANGED)) {
+    health->exchanged = health->exchanged && !by_host;
+    if (health->sensor_fault == BT_SENSOR_FAULT_TOGETHER) {
         health->sensor_fault = BT_SENSOR_FAULT_NONE;
     }
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #define TDC_LEAP 64   // two degrees
+#define HEARD    64   // far above a quiet PAC's noise
 #define ALIKE    608  // in sum, 32 each
 #define FAR      1216 // in sum, with pressure's
 #define PRESSURE 4    // so often pressure counts
@@ -20,16 +21,22 @@ static bool pac_swings(const uint16_t *pac, uint32_t swing)
         least = pac[k] < least ? pac[k] : least;
         most = pac[k] > most ? pac[k] : most;
     }
-    return most == least || (uint32_t)(most - least) >= swing; // one that has died says nothing
+    return (uint32_t)(most - least) >= swing;
+}
+
+static bool swung(uint16_t one, uint16_t other)
+{
+    return bt_count_usable(one) && bt_count_usable(other) && bt_abs32(one - other) > HEARD;
 }
 
 // Measure how far the words leapt that the filter holds back until the next round.
-static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth, uint32_t held)
+static void measure(bt_leap *leap, const bt_round *round, const bt_trigger *trigger, uint32_t far)
 {
+    const bt_lanes *smooth = &trigger->smooth;
     uint32_t total = 0, top = 0;
     int32_t along = 0;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        if (held >> i & 1) {
+        if (far >> i & 1) {
             int32_t move = round->electrode[i] - smooth->lane[i];
             uint32_t size = bt_abs32(move);
             total += size;
@@ -37,42 +44,56 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth
             top = size > top ? size : top;
         }
     }
-    bool alike = bt_abs32(along) >= total - total / 8 && BT_ELECTRODES * top < 2 * total;
-    bool pressed = held >> BT_LANE_PDC & 1;
-    leap->alike = total >= ALIKE && alike && !pressed;
-    if (pressed) {
+    bool one_way = bt_abs32(along) >= total - total / 8;
+    bool pressed = trigger->far >> BT_LANE_PDC & 1;
+    leap->alike = total >= ALIKE && one_way && BT_ELECTRODES * top < 2 * total && !pressed;
+    if (far & (trigger->up | trigger->down)
+        & 1u << BT_LANE_PDC) { // skin that was stuck may snap back without pressure
         total += PRESSURE * bt_abs32(round->pdc - smooth->lane[BT_LANE_PDC]);
+        leap->swing = (uint16_t)(total >= FAR && leap->heard ? total / SWINGS : 0);
     }
-    leap->swing = (uint16_t)(total >= FAR ? total / SWINGS : 0);
 }
 
 static bool tdc_leaps(bt_leap *leap, uint16_t tdc)
 {
-    uint16_t read = bt_count_usable(tdc) ? tdc : 0;
-    bool far = read != 0 && leap->tdc != 0 && bt_abs32(read - leap->tdc) > TDC_LEAP;
-    bool confirmed = far && leap->tdc_leapt;
-    leap->tdc_leapt = far && !confirmed;
-    leap->tdc = leap->tdc_leapt ? leap->tdc : read;
-    return confirmed;
+    if (!bt_count_usable(tdc)) {
+        leap->settled = (uint8_t)(leap->settled - (leap->settled != 0));
+        return false;
+    }
+    bool near = bt_abs32(tdc - leap->tdc) <= TDC_LEAP;
+    if (!near && leap->settled == BT_LEAP_ROUNDS && ++leap->off < BT_LEAP_ROUNDS) {
+        return false;
+    }
+    bool leaps = leap->off == BT_LEAP_ROUNDS;
+    leap->tdc = tdc;
+    leap->off = 0;
+    leap->settled = (uint8_t)(near ? leap->settled + (leap->settled < BT_LEAP_ROUNDS) : 0);
+    return leaps;
 }
 
 uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *trigger)
 {
+    if (round->t_us - leap->t_us > BT_FRAME_MS * 1500u) {
+        bool heard = leap->heard;
+        memset(leap, 0, sizeof *leap);
+        leap->heard = heard;
+    }
     bool lasts = !bt_usable_without(trigger->far & trigger->far_before & BT_ALL_ELECTRODES);
     bool exchanged = lasts && leap->swing != 0 && !pac_swings(round->pac, leap->swing);
     bool together = lasts && leap->alike;
-    uint32_t used = (BT_ALL_ELECTRODES & ~trigger->without) | (uint32_t)trigger->pressure_now << BT_LANE_PDC;
-    uint32_t held = trigger->far & ~trigger->far_before & leap->read & used;
-    leap->read = used;
+    uint32_t far = trigger->far & leap->read;
+    leap->t_us = round->t_us;
+    leap->read = (BT_ALL_ELECTRODES & ~trigger->without) | (uint32_t)trigger->pressure_now << BT_LANE_PDC;
     leap->swing = 0;
     leap->alike = false;
-    if (!bt_usable_without(held & BT_ALL_ELECTRODES)) {
-        measure(leap, round, &trigger->smooth, held);
+    if (!bt_usable_without(far & BT_ALL_ELECTRODES) && leap->settled == BT_LEAP_ROUNDS) {
+        measure(leap, round, trigger, far);
         if (pac_swings(leap->pac, leap->swing) || pac_swings(round->pac, leap->swing)) {
             leap->swing = 0;
         }
     }
     memcpy(leap->pac, round->pac, sizeof leap->pac);
+    leap->heard = leap->heard || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
     if (tdc_leaps(leap, round->tdc) || exchanged) {
         return BT_SENSOR_FAULT_EXCHANGED;
     }

@@ -1,10 +1,11 @@
 // What no living sensor's words do from one round to the next; they are another channel's or sensor's, or the
-// supply's. A temperature does not leap. A blow that moves the skin far is heard: of real fingers, tapped,
-// what all electrodes moved by in sum, and four times pressure, was up to 11 times the swing of PAC. And no
-// blow moves all electrodes one way and alike, and pressure not: of real fingers, pressed and sheared on
-// plates, in each round that moved them one way so far, one moved by over four times the mean.
+// supply's. A temperature does not leap. Pressure that leaps is heard: of real fingers, tapped, what all
+// electrodes moved by in sum, and four times pressure, was up to 11 times the swing of PAC. And no blow moves
+// all electrodes one way and alike, and pressure not: of real fingers, pressed and sheared on plates, in each
+// round that moved them one way so far, one moved by over four times the mean.
 //
-// The next round has to confirm it, because a glitch is one round's.
+// The next round has to confirm what electrodes do, because a glitch is one round's, and seven more what TDC
+// does, because nobody else does. What moved while nothing was read did not leap.
 //
 // Units: counts.
 #ifndef BIOTAC_LEAP_H
@@ -13,15 +14,21 @@
 #include "signal/trigger.h"
 
 typedef struct {
-    uint16_t pac[BT_PAC_PER_FRAME]; // of the round before
-    uint32_t read;                  // lanes whose words of the round before were used
+    uint32_t t_us; // of the round before
+    uint32_t read; // lanes whose words of it were used
+    uint16_t pac[BT_PAC_PER_FRAME];
     uint16_t swing; // below which PAC is too quiet for how far they leapt in it; 0: not too far
     bool alike;     // they leapt in it, all alike
-    bool tdc_leapt; // in it
-    uint16_t tdc;   // of the latest round in which it did not; 0: unknown
+    bool heard;     // PAC has swung: it works
+    uint16_t tdc;   // of the latest round in which it did not leap
+    uint8_t
+        settled; // rounds in which it did not, less those in which it was not read; at most BT_LEAP_ROUNDS
+    uint8_t off; // rounds since
 } bt_leap;
 
-// End a round: an enum bt_sensor_fault. What moved while nothing was read did not leap: memset to 0 then.
+#define BT_LEAP_ROUNDS 8
+
+// End a round. Returns an enum bt_sensor_fault.
 uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *trigger);
 
 #endif

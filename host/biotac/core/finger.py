@@ -95,10 +95,10 @@ class Finger:
         """Give the finger n rounds of 10 ms and return FINGER_DTYPE (n,), one row per round.
 
         ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,) and ``pac`` (n, 22) are integers 0..4095, or 0xFFFF where no
-        valid word came; a channel that is not given is missing throughout. PAC has no effect on any result. ``t_us``
-        (n,), the rounds' device times in us, wraps at 2^32 like the board's; by default each is 10 ms after the one
-        before. A jump of 90 ms or more is a silence, during which drift went on. Raises ValueError for other shapes,
-        types and ranges, before any round is processed.
+        valid word came; a channel that is not given is missing throughout. PAC shows only whether words leapt
+        (SENSOR_FAULT). ``t_us`` (n,), the rounds' device times in us, wraps at 2^32 like the board's; by default each
+        is 10 ms after the one before. A jump of 90 ms or more is a silence, during which drift went on. Raises
+        ValueError for other shapes, types and ranges, before any round is processed.
         """
         words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
         rows = np.empty(len(words), FINGER_DTYPE)

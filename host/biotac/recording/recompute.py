@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
 from ..core.compiled import completed, on_board_q4, pressure_force_100un
-from ..core.finger import Finger
+from ..core.finger import ROUND_US, Finger
 from ..errors import CommandRefusedError, InputError
 from ..keep.calibration import own_settings
 from ..map import board_map
@@ -22,6 +22,7 @@ from ..map.board_map import BoardMap, opened
 from ..version import __version__
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
+from ..wire import slots
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
 from ..wire.framing import encode
@@ -218,9 +219,21 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
+    channels = (sent[name] for name in ("counts", "pdc", "tac", "tdc"))
+    pac = _pac_at(t_us, recording.pac[recording.pac["finger"] == finger])
+    if (sent["flags"] & wire.FrameFlags.SENSOR_FAULT).any() and (pac == wire.INVALID_COUNT).all():
+        notes.append(f"finger {finger}: PAC was not recorded, by which the board knows another sensor's words")
     commands = {row: [told[row] for told in (tares, holds) if row in told] for row in {*tares, *holds}}
-    pdc, tac, tdc = (sent[name] for name in ("pdc", "tac", "tdc"))
-    return Rounds(finger, sent["counts"], pdc, tac, tdc, t_us, commands, quantities, own_map)
+    return Rounds(finger, *channels, pac, t_us, commands, quantities, own_map)
+
+
+def _pac_at(t_us: NDArray[np.int64], rows: StructArray) -> NDArray[np.uint16]:
+    """PAC (n, 22) of the rounds that began at ``t_us`` (n,), INVALID_COUNT where none was recorded."""
+    pac = np.full((len(t_us), len(slots.PAC_SLOT)), wire.INVALID_COUNT, np.uint16)
+    at = np.searchsorted(t_us, rows["t_us"], "right") - 1
+    there = (at >= 0) & (rows["t_us"] - t_us[at] < ROUND_US)
+    pac[at[there]] = rows["pac"][there]
+    return pac
 
 
 def _give(tares: dict[int, Command], row: int, values: NDArray[np.float64], now: bool) -> None:

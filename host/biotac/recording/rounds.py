@@ -24,7 +24,7 @@ Command = Callable[[Finger], object]
 
 @dataclass(frozen=True)
 class Rounds:
-    """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
+    """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc``, device time ``t_us`` (n,), ``pac`` (n, 22).
 
     ``commands``: by the round before which they came, in order. ``wrench_map``: in force throughout.
     """
@@ -34,6 +34,7 @@ class Rounds:
     pdc: NDArray[np.uint16]
     tac: NDArray[np.uint16]
     tdc: NDArray[np.uint16]
+    pac: NDArray[np.uint16]
     t_us: NDArray[np.int64]
     commands: dict[int, list[Command]] = field(default_factory=dict)
     quantities: wire.QuantityFlags | None = None
@@ -59,6 +60,7 @@ def with_silence(rounds: Rounds) -> Rounds:
         pdc=filled(rounds.pdc),
         tac=filled(rounds.tac),
         tdc=filled(rounds.tdc),
+        pac=filled(rounds.pac),
         t_us=np.insert(rounds.t_us, late, rounds.t_us[late] - ROUND_US),
         commands={at(row): commands for row, commands in rounds.commands.items()},
     )
@@ -99,9 +101,8 @@ def _run(rounds: Rounds, finger: Finger, ends: list[int], show: Callable[[int], 
         for command in rounds.commands.get(begin, ()):
             command(finger)
         part = slice(begin, end)
-        yield finger.feed(
-            rounds.counts[part], rounds.pdc[part], rounds.tac[part], rounds.tdc[part], t_us=rounds.t_us[part]
-        )
+        channels = (rounds.counts, rounds.pdc, rounds.tac, rounds.tdc, rounds.pac)
+        yield finger.feed(*(words[part] for words in channels), t_us=rounds.t_us[part])
         show(end - begin)
     if n == 0:
         yield np.empty(0, FINGER_DTYPE)

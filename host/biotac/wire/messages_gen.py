@@ -66,8 +66,8 @@ class SensorFault(IntEnum):
     STUCK = 4  # it repeats one count while the skin moves
     FROZEN = 5  # every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
     TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
-    NOISY = 7  # at least five electrodes jump from round to round, too much for a tare to be taken
-    EXCHANGED = 8  # its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; a host's tare ends it, or another sensor
+    NOISY = 7  # it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
+    EXCHANGED = 8  # its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
 
 
 class TareReason(IntEnum):
@@ -259,8 +259,8 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     4: "it repeats one count while the skin moves",
     5: "every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s",
     6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
-    7: "at least five electrodes jump from round to round, too much for a tare to be taken",
-    8: "its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; a host's tare ends it, or another sensor",
+    7: "it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken",
+    8: "its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor",
 }
 
 

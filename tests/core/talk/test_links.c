@@ -166,7 +166,7 @@ TEST(a_controller_does_not_notice_what_happens_at_the_other_port)
         const int of_id = bt_wire_payload_bytes(id);
         size_t length = bt_frame_encode(id, payload, of_id < 0 ? 1 : (size_t)of_id, bytes);
         length = draw >> 28 == 0 ? length / 2 : length; // cut off
-        if (draw >> 24 % 16 == 1) {
+        if ((draw >> 24) % 16 == 1) {
             bt_session_link_down(&session, USB);
         }
         if (id != BT_TAKE_LINK_ID) {
