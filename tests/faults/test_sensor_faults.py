@@ -20,6 +20,7 @@ import wrong_by
 from sensor_faults import FAULTS, MODELS, SILENT_ROUNDS, WHEN, outcome
 
 from biotac import Finger, FrameFlags
+from biotac.core.geometry import ELECTRODE_MM
 from biotac.sim import sampling
 from biotac.sim.loading import load_source
 from biotac.sim.timeline import Pose
@@ -103,6 +104,13 @@ def struck(script: courses.Script, rng: np.random.Generator, force_n: float) -> 
     script.load(0, float(np.exp(rng.uniform(3, 8)))).rest(float(rng.uniform(0.01, 3)))
 
 
+def poked(script: courses.Script, rng: np.random.Generator, force_n: float) -> None:
+    """Just over an electrode, with a tip no wider than it."""
+    x_mm, y_mm, _ = ELECTRODE_MM[rng.integers(len(ELECTRODE_MM))]
+    script.track.pose = Pose(float(x_mm), float(y_mm), tip_mm=0.5)
+    struck(script, rng, force_n)
+
+
 def dragged(script: courses.Script, rng: np.random.Generator, force_n: float) -> None:
     """Sideways and turned, until the skin snaps back within a round."""
     script.load(force_n, 30)
@@ -123,14 +131,14 @@ def shaken(script: courses.Script, rng: np.random.Generator, force_n: float) -> 
     script.load(0, 20).rest(1)
 
 
-@pytest.mark.parametrize("do", [struck, dragged, shaken])
+@pytest.mark.parametrize("do", [struck, poked, dragged, shaken])
 def test_a_finger_that_is_used_roughly_is_never_condemned(
     do: Callable[[courses.Script, np.random.Generator, float], None],
 ) -> None:
     for seed in range(8):
         rng, script = np.random.default_rng(seed), courses.script(seed, "worn" if seed % 2 else "new")
         for _ in range(6):
-            x_mm, y_mm, tip_mm = rng.uniform((-11, -2.5, 1), (2, 2.5, 4))
+            x_mm, y_mm, tip_mm = rng.uniform((-11, -2.5, 0.5), (2, 2.5, 4))
             script.track.pose = Pose(x_mm, y_mm, tip_mm=tip_mm)
             do(script, rng, float(rng.uniform(1, 12)))
         assert not condemned(script.make().run()).any(), f"seed {seed}"

@@ -425,8 +425,10 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     }
     health->alone |= lone;
     health->calm_rounds = touched ? 0 : counted(health->calm_rounds);
-    if (lone != 0
-        && health->calm_rounds >= CALM_ROUNDS) { // else a tip no wider than an electrode may move it
+    if (health->calm_rounds == CALM_ROUNDS) {
+        health->windows = 0; // where each was in the touch, a tip no wider than it has moved it alone
+    }
+    if (lone != 0 && health->calm_rounds > CALM_ROUNDS) {
         condemn(health, lone, BT_SENSOR_FAULT_ALONE);
     }
 }

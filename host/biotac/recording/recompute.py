@@ -219,12 +219,12 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
-    channels = (sent[name] for name in ("counts", "pdc", "tac", "tdc"))
     pac = _pac_at(t_us, recording.pac[recording.pac["finger"] == finger])
     if (sent["flags"] & wire.FrameFlags.SENSOR_FAULT).any() and (pac == wire.INVALID_COUNT).all():
         notes.append(f"finger {finger}: PAC was not recorded, by which the board knows another sensor's words")
     commands = {row: [told[row] for told in (tares, holds) if row in told] for row in {*tares, *holds}}
-    return Rounds(finger, *channels, pac, t_us, commands, quantities, own_map)
+    pdc, tac, tdc = (sent[name] for name in ("pdc", "tac", "tdc"))
+    return Rounds(finger, sent["counts"], pdc, tac, tdc, pac, t_us, commands, quantities, own_map)
 
 
 def _pac_at(t_us: NDArray[np.int64], rows: StructArray) -> NDArray[np.uint16]:

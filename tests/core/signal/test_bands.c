@@ -146,11 +146,5 @@ TEST(of_no_good_word_are_invalid_and_begin_with_the_first)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(are_what_six_smoothers_take_away, anew),
-        cmocka_unit_test_setup(are_octaves, anew),
-        cmocka_unit_test_setup(hold_the_last_good_word_for_a_lost_one, anew),
-        cmocka_unit_test_setup(of_no_good_word_are_invalid_and_begin_with_the_first, anew),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, anew);
 }

@@ -200,21 +200,7 @@ TEST(a_condemned_electrode_comes_back_after_two_calm_seconds)
     expect_out(0, BT_SENSOR_FAULT_NONE);
 }
 
-#define T(test) cmocka_unit_test_setup(test, begin)
-
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        T(skin_that_is_pressed_is_never_condemned),
-        T(an_electrode_that_drifts_alone_is_condemned_unless_something_touches),
-        T(one_bump_condemns_nothing_while_pressure_is_unproven),
-        T(three_electrodes_at_once_are_no_electrode_alone),
-        T(all_that_move_together_are_a_fault_unless_it_got_warmer),
-        T(what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second),
-        T(what_halts_in_a_squeeze_is_suspected_within_fifteen_rounds),
-        T(what_sticks_is_condemned_once_the_skin_moves),
-        T(words_that_all_repeat_are_a_frozen_sensor_until_one_changes),
-        T(a_condemned_electrode_comes_back_after_two_calm_seconds),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, begin);
 }

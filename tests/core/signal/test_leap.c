@@ -145,10 +145,5 @@ TEST(a_wrong_word_beside_lost_ones_is_no_temperature)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_leap_is_told_once_when_later_rounds_confirm_it),
-        cmocka_unit_test(what_moved_while_nothing_was_read_or_heard_did_not_leap),
-        cmocka_unit_test(a_wrong_word_beside_lost_ones_is_no_temperature),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -91,12 +91,5 @@ TEST(what_does_not_fit_stays_at_its_largest)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rounds_that_are_lost_are_no_silence),
-        cmocka_unit_test(a_silence_is_counted_in_whole_sweeps_and_told_once),
-        cmocka_unit_test(one_after_another_is_counted_alone),
-        cmocka_unit_test(one_in_the_middle_of_coming_back_adds_to_it),
-        cmocka_unit_test(what_does_not_fit_stays_at_its_largest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

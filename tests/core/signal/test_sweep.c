@@ -182,12 +182,5 @@ TEST(the_machine_serves_the_means_of_what_the_gate_let_through)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_mean_is_that_of_its_last_eight_rounds),
-        cmocka_unit_test(a_lane_met_at_any_phase_has_its_first_word_for_what_was_before),
-        cmocka_unit_test(still_sweeps_are_counted_and_saturate),
-        cmocka_unit_test(any_mean_that_leaves_the_span_ends_the_stillness),
-        cmocka_unit_test(the_machine_serves_the_means_of_what_the_gate_let_through),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

@@ -303,17 +303,5 @@ TEST(the_ends_of_the_range_do_not_overflow)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lone_glitches_of_any_size_reach_neither_energy_nor_means),
-        cmocka_unit_test(a_jump_and_a_gap_are_forgotten),
-        cmocka_unit_test(the_slot_told_is_that_in_which_the_sum_passes_the_threshold),
-        cmocka_unit_test(pressure_opens_the_gate_and_leaves_the_energy_alone),
-        cmocka_unit_test(the_edges_of_pressure_and_room_are_no_touch),
-        cmocka_unit_test(pressure_without_a_known_rest_opens_nothing),
-        cmocka_unit_test(the_gate_stays_shut_where_nobody_rests),
-        cmocka_unit_test(an_electrode_that_is_left_out_is_not_used),
-        cmocka_unit_test(the_energy_is_the_brute_force_sum_of_squares),
-        cmocka_unit_test(the_ends_of_the_range_do_not_overflow),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all(NULL, NULL);
 }

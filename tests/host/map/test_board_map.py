@@ -327,7 +327,8 @@ def mapped_frames(stored: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
     counts = np.rint(TARE + np.concatenate([np.zeros((60, 19)), rng.normal(-150.0, 90.0, (200, 19))])).astype(np.uint16)
     slow = np.full(len(counts), 2000, np.uint16)
     slow_pdc = np.where(np.arange(len(counts)) < 60, 2000, pdc).astype(np.uint16)
-    rounds = Rounds(3, counts, slow_pdc, slow, slow, np.arange(len(counts)) * 10_000, wrench_map=stored)
+    pac, t_us = np.repeat(slow[:, None], 22, axis=1), np.arange(len(counts)) * 10_000
+    rounds = Rounds(3, counts, slow_pdc, slow, slow, pac, t_us, wrench_map=stored)
     return frames_and_tares(rounds, default_settings())[0]
 
 

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sensor_faults
 
 import biotac
 from biotac.cli.main import main
 from biotac.core.compiled import FORCE_GAINS, reference_q4
 from biotac.recording.crosscheck import FORCE_BOUND_MN
 from biotac.wire import messages_gen as wire
+from biotac.wire import slots
 
 
 def record(path: Path, source: str, *, rest: bool = True, **settings: int) -> biotac.Recording:
@@ -57,6 +59,19 @@ def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: 
     assert tares(again) == tares(was) != []
     assert again.pac.tobytes() == was.pac.tobytes()
     (folder / "same.mcap").unlink()
+
+
+def test_another_sensors_words_are_distrusted_again(folder) -> None:
+    """By PAC and pressure, which both have to be given to the core."""
+    of = sensor_faults.press(1)
+    words = of.words.copy()
+    words[of.begins("rest") :] = of.other[of.begins("rest") :]
+    slot = {"E": slots.ELECTRODE_SLOT, "PDC": slots.PDC_SLOT, "TDC": slots.TDC_SLOT, "PAC": slots.PAC_SLOT}
+    np.savez(folder / "exchanged.npz", **{name: words[:, at] for name, at in slot.items()})
+    was = record(folder / "exchanged.mcap", f"sim:{folder / 'exchanged.npz'}")
+    assert (was.wire["flags"] & wire.FrameFlags.SENSOR_FAULT).any()
+    assert main(["export", "--recompute", str(folder / "exchanged.mcap"), str(folder / "exchanged_again.mcap")]) == 0
+    assert biotac.Recording(folder / "exchanged_again.mcap").wire.tobytes() == was.wire.tobytes()
 
 
 def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:

@@ -47,7 +47,7 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
     for finger in range(fingers):
         own = words[:, finger]
         pdc, tac, tdc = (own[:, slot] for slot in (slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT))
-        rounds = Rounds(finger, own[:, slots.ELECTRODE_SLOT], pdc, tac, tdc, t_us)
+        rounds = Rounds(finger, own[:, slots.ELECTRODE_SLOT], pdc, tac, tdc, own[:, slots.PAC_SLOT], t_us)
         rows, tares = frames_and_tares(rounds, settings, ran_rows)
         answered = np.flatnonzero((own != wire.INVALID_COUNT).any(axis=1))
         for k, row in enumerate(rows):
