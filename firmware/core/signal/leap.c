@@ -47,8 +47,8 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_trigger *trig
     bool one_way = bt_abs32(along) >= total - total / 8;
     bool pressed = trigger->far >> BT_LANE_PDC & 1;
     leap->alike = total >= ALIKE && one_way && BT_ELECTRODES * top < 2 * total && !pressed;
-    if (far & (trigger->up | trigger->down)
-        & 1u << BT_LANE_PDC) { // skin that was stuck may snap back without pressure
+    uint32_t jumped = far & (trigger->up | trigger->down);
+    if (jumped >> BT_LANE_PDC & 1) { // else skin that was stuck may have snapped back
         total += PRESSURE * bt_abs32(round->pdc - smooth->lane[BT_LANE_PDC]);
         leap->swing = (uint16_t)(total >= FAR && leap->heard ? total / SWINGS : 0);
     }
