@@ -142,6 +142,29 @@ TEST(what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second)
     expect_out(1u << 4 | 1u << 7, BT_SENSOR_FAULT_NOISY);
 }
 
+TEST(skin_that_is_shaken_jumps_to_and_fro_as_pressure_does)
+{
+    touched = true;
+    for (int k = 0; k < 100; k++) {
+        one_round(k % 3 == 0 ? 300 : k % 3 == 1 ? 700 : -100, 0);
+        expect_out(0, BT_SENSOR_FAULT_NONE);
+    }
+}
+
+TEST(what_was_exchanged_stays_so_until_a_host_tares)
+{
+    sampled.tdc = 2000;
+    rounds(200, 0, 0);
+    sampled.tdc = 1000;
+    rounds(8, 0, 0);
+    for (int by_host = 0; by_host < 2; by_host++) {
+        assert_int_equal(bt_health_sensor_fault(&health), BT_SENSOR_FAULT_EXCHANGED);
+        bt_health_tared(&health, by_host);
+        rounds(4, 0, 0);
+    }
+    assert_int_equal(bt_health_sensor_fault(&health), BT_SENSOR_FAULT_NONE);
+}
+
 TEST(what_halts_in_a_squeeze_is_suspected_within_fifteen_rounds)
 {
     touched = true;

@@ -26,9 +26,8 @@ static uint8_t end_round(int pac_swing)
     return bt_leap_round(&leap, &now, &trigger);
 }
 
-static int begin(void **state)
+static void begin(int first_swing)
 {
-    (void)state;
     memset(&leap, 0, sizeof leap);
     bt_trigger_reset(&trigger);
     now.pdc = 1500;
@@ -37,9 +36,8 @@ static int begin(void **state)
         now.electrode[i] = (uint16_t)(2500 + 20 * i);
     }
     for (int k = 0; k < 10; k++) {
-        assert_int_equal(end_round(k == 0 ? 65 : QUIET), NONE);
+        assert_int_equal(end_round(k == 0 ? first_swing : QUIET), NONE);
     }
-    return 0;
 }
 
 // All electrodes move by `counts`, every `against`th to the other side, the last of them by `more`.
@@ -70,7 +68,8 @@ static void move(const leap_case *by, int sign)
 
 static const leap_case cases[] = {
     {"all leap while PAC is quiet", 54, 0, 2, -49, 0, {HEARD, HEARD, HEARD}, EXCHANGED},
-    {"not far enough", 53, 0, 2, -49, 0, {HEARD, HEARD, HEARD}, NONE},
+    {"all leap, PAC at rest", 54, 0, 2, -49, 0, {QUIET, QUIET, QUIET}, EXCHANGED},
+    {"not far enough", 53, 0, 2, -49, 0, {QUIET, QUIET, QUIET}, NONE},
     {"stuck skin snaps back", 200, 0, 2, -48, 0, {QUIET, QUIET, QUIET}, NONE},
     {"a blow heard before", 54, 0, 2, 49, 0, {LOUD, QUIET, QUIET}, NONE},
     {"a blow heard at once", 54, 0, 2, 49, 0, {QUIET, LOUD, QUIET}, NONE},
@@ -82,10 +81,12 @@ static const leap_case cases[] = {
     {"alike, and pressed", -50, 0, NEVER, 25, 0, {LOUD, LOUD, LOUD}, NONE},
     {"one moves twice as far", -50, -60, NEVER, 24, 0, {LOUD, LOUD, LOUD}, NONE},
     {"some the other way", -50, 0, 5, 24, 0, {LOUD, LOUD, LOUD}, NONE},
-    {"TDC leaps", 0, 0, NEVER, 0, -65, {LOUD, LOUD, LOUD}, EXCHANGED},
+    {"TDC leaps down", 0, 0, NEVER, 0, -65, {LOUD, LOUD, LOUD}, EXCHANGED},
     {"TDC leaps up", 0, 0, NEVER, 0, 65, {LOUD, LOUD, LOUD}, EXCHANGED},
     {"TDC, not far enough", 0, 0, NEVER, 0, 64, {LOUD, LOUD, LOUD}, NONE},
 };
+
+static const leap_case snap = {.counts = 200, .against = 2};
 
 TEST(a_leap_is_told_once_when_later_rounds_confirm_it)
 {
@@ -93,10 +94,11 @@ TEST(a_leap_is_told_once_when_later_rounds_confirm_it)
         const leap_case *by = &cases[k];
         int when = by->tdc != 0 ? BT_LEAP_ROUNDS : 2;
         for (int glitch = 0; glitch < 2; glitch++) {
-            begin(NULL);
+            begin(65);
             assert_int_equal(end_round(by->pac[0]), NONE);
             move(by, 1);
             for (int round = 1; round < 12; round++) {
+                move(&snap, round == 6 && glitch ? 1 : 0);
                 uint8_t want = round == when && !glitch ? by->fault : NONE;
                 if (end_round(round < 3 ? by->pac[round] : QUIET) != want) {
                     fail_msg("%s%s, round %d", by->what, glitch ? ", for one round" : "", round);
@@ -107,40 +109,51 @@ TEST(a_leap_is_told_once_when_later_rounds_confirm_it)
     }
 }
 
-// No word of the round before, then none of a whole round; a PAC that never swings.
 TEST(what_moved_while_nothing_was_read_or_heard_did_not_leap)
 {
-    for (int why = 0; why < 3; why++) {
-        begin(NULL);
+    enum { NO_ELECTRODES, NO_PRESSURE, NO_ROUND, NOT_HEARD, JUST_STARTED, REASONS };
+    for (int why = 0; why < REASONS; why++) {
+        begin(why == NOT_HEARD ? 64 : 65);
         bt_round before = now;
-        if (why == 0) {
+        if (why == NO_ELECTRODES) {
             memset(now.electrode, 0xFF, sizeof now.electrode);
-            now.pdc = BT_INVALID_COUNT;
-            (void)end_round(QUIET);
-            before.t_us = now.t_us;
         }
+        now.pdc = why == NO_PRESSURE ? BT_INVALID_COUNT : now.pdc;
+        if (why == JUST_STARTED) {
+            memset(&leap, 0, sizeof leap);
+            leap.heard = true;
+        }
+        (void)end_round(QUIET);
+        before.t_us = now.t_us + (why == NO_ROUND ? BT_FRAME_MS * 1000 : 0);
         now = before;
-        now.t_us += why == 1 ? BT_FRAME_MS * 1000 : 0;
-        leap.heard = why != 2;
         move(&(leap_case){.counts = 300, .against = 2, .pdc = 300}, 1);
-        assert_int_equal(end_round(QUIET), NONE);
-        assert_int_equal(end_round(QUIET), NONE);
+        for (int round = 0; round < 3; round++) {
+            if (end_round(QUIET) != NONE) {
+                fail_msg("reason %d", why);
+            }
+        }
     }
 }
 
-TEST(a_wrong_word_beside_lost_ones_is_no_temperature)
+// TDC's words, W: another temperature's, -: lost. The last is told to be a leap if `leaps`.
+static void expect_temperatures(const char *words, bool leaps)
 {
-    for (int first = 0; first < 2; first++) {
-        begin(NULL);
-        if (first) {
-            memset(&leap, 0, sizeof leap);
-        }
-        for (int round = 0; round < 40; round++) {
-            now.tdc = round % 10 == 0 ? BT_INVALID_COUNT : round % 10 == 1 ? 1300 : 1000;
-            now.tdc = round == 0 && first ? 900 : now.tdc;
-            assert_int_equal(end_round(QUIET), NONE);
-        }
+    begin(65);
+    memset(&leap, 0, sizeof leap);
+    for (; *words; words++) {
+        now.tdc = *words == 'W' ? 1300 : *words == '-' ? BT_INVALID_COUNT : 1000;
+        assert_int_equal(end_round(QUIET), words[1] == 0 && leaps ? EXCHANGED : NONE);
     }
+}
+
+TEST(a_temperature_leaps_after_eight_rounds_of_another)
+{
+    expect_temperatures(".........WWWWWWWW", true);
+    expect_temperatures(".........WWWWWWW.WWWWWWW", false);
+    expect_temperatures("........WWWWWWWWWWWWWWWW", false); // it was not settled
+    expect_temperatures("W.........-W.-W.-WW...", false);
+    expect_temperatures("..........-.WWWWWWWW", true);
+    expect_temperatures(".........--------WWWWWWWWWWWW", false); // too long ago
 }
 
 int main(void)
