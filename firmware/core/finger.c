@@ -141,12 +141,11 @@ void bt_finger_pass(bt_finger *finger)
     close_round(finger);
 }
 
-// Without pressure nothing touches, whatever the electrodes say, if pressure has shown that it works.
+// Without pressure nothing touches, whatever the electrodes say, if presses have shown that they move it.
 static bool may_be_touched(const bt_finger *finger)
 {
     const bt_tare *tare = &finger->tare;
-    bool free =
-        finger->health.pressure_alive && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) < PDC_FREE;
+    bool free = tare->witness.moves && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) < PDC_FREE;
     return tare->state != BT_TARE_STATE_REST && !free;
 }
 

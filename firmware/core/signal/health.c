@@ -25,7 +25,8 @@
 #define TRAVEL_Q2     (100 * 4) // sum of what the others move by while an electrode is stuck
 #define CALM_WINDOWS  50        // two seconds
 #define CALM_Q2       (5 * 4)
-#define CALM_ROUNDS   50 // by then a running mean has forgotten a touch
+#define CALM_ROUNDS   12 // since a touch
+#define CALM_LOST     4  // of them, by a round of one
 
 #define TOGETHER         5u  // counts
 #define TOGETHER_BLIND   25u // while static pressure has not shown that it works
@@ -58,13 +59,16 @@ static uint8_t counted(uint8_t count)
 
 // ---- words that jump back and forth --------------------------------------------------------------
 
-static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips)
+// Shaken skin does so, too, with pressure: then it is only suspected.
+static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips, bool shaken)
 {
     health->flips[2] |= health->flips[1] & flips;
     health->flips[1] |= health->flips[0] & flips;
     health->flips[0] |= flips;
-    uint32_t noisy = health->flips[2] & BT_ALL_ELECTRODES;
-    if (noisy & ~health->out) {
+    uint32_t noisy = flips & health->flips[2] & BT_ALL_ELECTRODES & ~health->out;
+    if (shaken) {
+        health->alone |= noisy;
+    } else if (noisy != 0) {
         condemn(health, noisy, BT_SENSOR_FAULT_NOISY);
         if (!bt_usable_without(health->out)) {
             health->sensor_fault = BT_SENSOR_FAULT_NOISY;
@@ -398,10 +402,9 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
     health->down = trigger->down;
-    bool shaken = trigger->far >> BT_LANE_PDC & 1; // then skin jumps, too
-    health->still_rounds = shaken ? 0 : counted(health->still_rounds);
-    if (flips != 0 && health->still_rounds > SHAKEN_ROUNDS) {
-        judge_flips(health, flips);
+    health->still_rounds = trigger->far >> BT_LANE_PDC & 1 ? 0 : counted(health->still_rounds);
+    if (flips != 0) {
+        judge_flips(health, flips, health->still_rounds <= SHAKEN_ROUNDS);
     }
     switch (++health->rounds) {
     case 1:
@@ -424,11 +427,16 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
         health->rounds = 0;
     }
     health->alone |= lone;
-    health->calm_rounds = touched ? 0 : counted(health->calm_rounds);
-    if (health->calm_rounds == CALM_ROUNDS) {
-        health->windows = 0; // where each was in the touch, a tip no wider than it has moved it alone
+    if (touched) { // by noise of pressure, too, which is no touch
+        health->calm_rounds =
+            health->calm_rounds < CALM_LOST ? 0 : (uint8_t)(health->calm_rounds - CALM_LOST);
+        health->was_touched = health->was_touched || health->calm_rounds == 0;
+    } else if (health->calm_rounds < CALM_ROUNDS && ++health->calm_rounds == CALM_ROUNDS
+               && health->was_touched) {
+        health->was_touched = false;
+        anchor_all(health, before, round->tdc); // where a tip no wider than an electrode moved it is over
     }
-    if (lone != 0 && health->calm_rounds > CALM_ROUNDS) {
+    if (lone != 0 && health->calm_rounds == CALM_ROUNDS) {
         condemn(health, lone, BT_SENSOR_FAULT_ALONE);
     }
 }

@@ -33,7 +33,8 @@ typedef struct {
     uint8_t electrode_fault; // enum bt_sensor_fault of the latest of these
     uint8_t sensor_fault;    // enum bt_sensor_fault of what passes by itself
     bool exchanged;          // until a host tares
-    uint8_t calm_rounds;     // since something may have touched; saturates
+    uint8_t calm_rounds;     // in which nothing touched
+    bool was_touched;        // before these
     uint8_t still_rounds;    // since pressure was far off; saturates
     uint32_t up, down;       // trigger's, of the round before
     uint32_t flips[3];       // electrodes that jumped back and forth once, twice, three times lately

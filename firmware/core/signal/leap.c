@@ -21,7 +21,7 @@ static bool pac_swings(const uint16_t *pac, uint32_t swing)
         least = pac[k] < least ? pac[k] : least;
         most = pac[k] > most ? pac[k] : most;
     }
-    return (uint32_t)(most - least) >= swing;
+    return most == least || (uint32_t)(most - least) >= swing; // constant: it has died, or is at its end
 }
 
 static bool swung(uint16_t one, uint16_t other)
@@ -78,21 +78,24 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
         memset(leap, 0, sizeof *leap);
         leap->heard = heard;
     }
-    bool lasts = !bt_usable_without(trigger->far & trigger->far_before & BT_ALL_ELECTRODES);
-    bool exchanged = lasts && leap->swing != 0 && !pac_swings(round->pac, leap->swing);
+    uint32_t stays = trigger->far & trigger->far_before;
+    bool lasts = !bt_usable_without(stays & BT_ALL_ELECTRODES);
+    bool exchanged =
+        lasts && stays >> BT_LANE_PDC & 1 && leap->swing != 0 && !pac_swings(round->pac, leap->swing);
     bool together = lasts && leap->alike;
     uint32_t far = trigger->far & leap->read;
     leap->t_us = round->t_us;
     leap->read = (BT_ALL_ELECTRODES & ~trigger->without) | (uint32_t)trigger->pressure_now << BT_LANE_PDC;
     leap->swing = 0;
     leap->alike = false;
-    if (!bt_usable_without(far & BT_ALL_ELECTRODES) && leap->settled == BT_LEAP_ROUNDS) {
+    if (!bt_usable_without(far & BT_ALL_ELECTRODES) && leap->rounds == BT_LEAP_ROUNDS) {
         measure(leap, round, trigger, far);
         if (pac_swings(leap->pac, leap->swing) || pac_swings(round->pac, leap->swing)) {
             leap->swing = 0;
         }
     }
     memcpy(leap->pac, round->pac, sizeof leap->pac);
+    leap->rounds = (uint8_t)(leap->rounds + (leap->rounds < BT_LEAP_ROUNDS));
     leap->heard = leap->heard || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
     if (tdc_leaps(leap, round->tdc) || exchanged) {
         return BT_SENSOR_FAULT_EXCHANGED;

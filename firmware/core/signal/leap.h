@@ -14,8 +14,9 @@
 #include "signal/trigger.h"
 
 typedef struct {
-    uint32_t t_us; // of the round before
-    uint32_t read; // lanes whose words of it were used
+    uint32_t t_us;  // of the round before
+    uint8_t rounds; // since a gap; at most BT_LEAP_ROUNDS
+    uint32_t read;  // lanes whose words of it were used
     uint16_t pac[BT_PAC_PER_FRAME];
     uint16_t swing; // below which PAC is too quiet for how far they leapt in it; 0: not too far
     bool alike;     // they leapt in it, all alike

@@ -24,6 +24,11 @@ void bt_trigger_reset(bt_trigger *trigger)
 
 void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes)
 {
+    for (unsigned i = 0; electrodes >> i != 0; i++) {
+        if (electrodes >> i & 1) { // as if it rested: what it said last is no touch
+            trigger->smooth.lane[i] = trigger->rest.lane[i];
+        }
+    }
     trigger->out = electrodes;
     trigger->usable = electrodes == 0 ? BT_RAIL_COUNT - 1 : 0;
 }

@@ -216,6 +216,8 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
         notes.append(
             f"finger {finger} was tared before the recording began; its first frame's tare is used at the start"
         )
+    if int(sent["flags"][0]) & (wire.FrameFlags.SENSOR_FAULT | wire.FrameFlags.ELECTRODE_OUT):
+        notes.append(f"finger {finger} was broken before the recording began, by what the recording does not show")
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]

@@ -147,7 +147,7 @@ TEST(skin_that_is_shaken_jumps_to_and_fro_as_pressure_does)
     touched = true;
     for (int k = 0; k < 100; k++) {
         one_round(k % 3 == 0 ? 300 : k % 3 == 1 ? 700 : -100, 0);
-        expect_out(0, BT_SENSOR_FAULT_NONE);
+        expect_out(0, BT_SENSOR_FAULT_NONE); // only suspected
     }
 }
 
