@@ -162,10 +162,7 @@ static void recover(bt_finger *finger)
         bt_health_tared(&finger->health, by_host);
     }
     if (finger->health.out != 0 && (rests || !bt_usable_without(finger->health.out))) {
-        uint32_t back = bt_health_back(&finger->health);
-        if (rests) {
-            bt_adopt_forget(&finger->tare, back);
-        }
+        bt_health_back(&finger->health);
     }
 }
 

@@ -148,7 +148,7 @@ def test_an_electrode_that_jumps_at_rest_is_no_touch_and_comes_back() -> None:
     script = courses.script(5).load(2, 20).hold(1).load(0, 20).rest(5)
     begin = round(script.track.seconds / slots.FRAME_S)
     course = script.rest(20).make()
-    course.words["counts"][begin:, 4] += 300
+    course.words["counts"][begin : begin + 100, 4] += 300
     rows = course.run()[begin:]
     assert condemned(rows).any() and not (rows["flags"][-1000:] & (FrameFlags.CONTACT | FrameFlags.ELECTRODE_OUT)).any()
 

@@ -284,9 +284,11 @@ static uint32_t judge_means(bt_health *health)
 
 // ---- condemned electrodes --------------------------------------------------------------------------
 
-static void watch_condemned(bt_health *health, const bt_round *round)
+// Calm, and where it rests: what pressed an electrode alone may still press it, if static pressure has
+// failed.
+static void watch_condemned(bt_health *health, const bt_round *round, const bt_lanes *rest)
 {
-    bool calm = true, repeats = false;
+    bool calm = true, repeats = false, few = bt_usable_without(health->out);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         if (!(health->out >> i & 1)) {
             continue;
@@ -298,6 +300,7 @@ static void watch_condemned(bt_health *health, const bt_round *round)
             health->anchor.lane[i] = count_q2;
             calm = false;
         }
+        calm = calm && !(few && bt_abs32(count - rest->lane[i]) > BT_TRIGGER_FAR);
         repeats = repeats || count_q2 == health->mean_anchor.lane[i];
         health->mean_anchor.lane[i] = count_q2;
     }
@@ -308,18 +311,16 @@ static void watch_condemned(bt_health *health, const bt_round *round)
     }
 }
 
-uint32_t bt_health_back(bt_health *health)
+void bt_health_back(bt_health *health)
 {
-    if (health->out == 0 || health->calm_windows < CALM_WINDOWS) {
-        return 0;
+    if (health->calm_windows < CALM_WINDOWS) {
+        return;
     }
-    uint32_t back = health->out;
     health->out = 0;
     health->electrode_fault = BT_SENSOR_FAULT_NONE;
     health->sensor_fault = BT_SENSOR_FAULT_NONE;
     health->windows = 0;
     memset(health->flips, 0, sizeof health->flips);
-    return back;
 }
 
 // ---- a round ---------------------------------------------------------------------------------------
@@ -357,7 +358,7 @@ static BT_NOINLINE uint32_t judge(bt_health *health, const bt_round *round, cons
         health->alone |= halted(health, sum);
     }
     if (health->out != 0) {
-        watch_condemned(health, round);
+        watch_condemned(health, round, &trigger->rest);
     }
     if (++health->judged % FLIP_WINDOWS == 0) {
         memset(health->flips, 0, sizeof health->flips);

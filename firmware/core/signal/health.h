@@ -6,7 +6,7 @@
 // electrode that moves by more than 8 times their sum is broken, and so is one that keeps saying one count
 // while they move, or jumps back and forth. And no living sensor repeats all its words: each has its noise.
 //
-// A condemned electrode is given back at rest, with a new tare, once it has been calm for two seconds.
+// A condemned electrode is used again at rest, once it has been calm near its tare for two seconds.
 //
 // Four rounds are a window. No round pays for everything: while a window fills, the one before is searched
 // in the first round for words that repeat, and enters half of the running means; in the second for moves;
@@ -65,9 +65,9 @@ void bt_health_reset(bt_health *health);
 void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
                      const bt_noise *noise, bool touched);
 
-// Returns the electrodes to be used again from the next round on, and forgets that they were condemned. Call
-// it while the finger rests, or while too many are out.
-uint32_t bt_health_back(bt_health *health);
+// Forget that electrodes were condemned, if they may be used again. Call it while the finger rests, or while
+// too many are out.
+void bt_health_back(bt_health *health);
 
 #ifndef BT_CDEF
 // What is wrong with the whole sensor, an enum bt_sensor_fault.

@@ -135,19 +135,6 @@ static void take_first_word(bt_tare *tare, unsigned lane)
     bt_adopt_aim_pressure(tare);
 }
 
-void bt_adopt_forget(bt_tare *tare, uint32_t electrodes)
-{
-    for (unsigned i = 0; electrodes >> i != 0; i++) {
-        if (electrodes >> i & 1) {
-            tare->trigger.unknown |= 1u << i;
-            tare->trigger.smooth.lane[i] = BT_TRIGGER_UNREAD;
-            tare->trigger.rest.lane[i] = BT_TRIGGER_UNREAD;
-            tare->base.electrode_q16[i] = BT_TARE_UNKNOWN;
-            tare->electrode_q4[i] = BT_INVALID_COUNT;
-        }
-    }
-}
-
 BT_NOINLINE void bt_adopt_first_words(bt_tare *tare)
 {
     for (unsigned lane = 0; tare->trigger.met >> lane != 0; lane++) {

@@ -54,9 +54,6 @@ void bt_adopt_contact(bt_tare *tare);
 // Drop the tare: it proved wrong, and there is no other.
 void bt_adopt_none(bt_tare *tare);
 
-// These electrodes' next words are first words: what they were at rest is no longer known.
-void bt_adopt_forget(bt_tare *tare, uint32_t electrodes);
-
 // Take note of channels whose first word has come.
 void bt_adopt_first_words(bt_tare *tare);
 
