@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define TDC_LEAP 64   // two degrees
-#define HEARD    64   // far above a quiet PAC's noise
+#define HEARD    48   // far above a quiet PAC's noise
 #define ALIKE    608  // in sum, 32 each
 #define FAR      1216 // in sum, with pressure's
 #define PRESSURE 4    // so often pressure counts
@@ -30,9 +30,8 @@ static bool swung(uint16_t one, uint16_t other)
 }
 
 // Measure how far the words leapt that the filter holds back until the next round.
-static void measure(bt_leap *leap, const bt_round *round, const bt_trigger *trigger, uint32_t far)
+static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth, uint32_t far)
 {
-    const bt_lanes *smooth = &trigger->smooth;
     uint32_t total = 0, top = 0;
     int32_t along = 0;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
@@ -45,10 +44,9 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_trigger *trig
         }
     }
     bool one_way = bt_abs32(along) >= total - total / 8;
-    bool pressed = trigger->far >> BT_LANE_PDC & 1;
+    bool pressed = far >> BT_LANE_PDC & 1;
     leap->alike = total >= ALIKE && one_way && BT_ELECTRODES * top < 2 * total && !pressed;
-    uint32_t jumped = far & (trigger->up | trigger->down);
-    if (jumped >> BT_LANE_PDC & 1) { // else skin that was stuck may have snapped back
+    if (pressed) { // else skin that was stuck may have snapped back
         total += PRESSURE * bt_abs32(round->pdc - smooth->lane[BT_LANE_PDC]);
         leap->swing = (uint16_t)(total >= FAR && leap->heard ? total / SWINGS : 0);
     }
@@ -89,7 +87,7 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
     leap->swing = 0;
     leap->alike = false;
     if (!bt_usable_without(far & BT_ALL_ELECTRODES) && leap->rounds == BT_LEAP_ROUNDS) {
-        measure(leap, round, trigger, far);
+        measure(leap, round, &trigger->smooth, far);
         if (pac_swings(leap->pac, leap->swing) || pac_swings(round->pac, leap->swing)) {
             leap->swing = 0;
         }

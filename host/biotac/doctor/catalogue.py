@@ -333,7 +333,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "sensor_exchanged": error(
         "From one round to the next the finger's words leapt further than any blow or warmth moves them: they are "
-        "another channel's or another finger's, or its thermometer broke. Forces are not this finger's.",
+        "another channel's or another finger's, or its thermometer or PAC broke. Forces are not this finger's.",
         "Look whether cables were exchanged or are loose. If all is in order, tare the finger, which ends this; a "
         "power cycle makes the board look again at which sensor is where.",
     ),
