@@ -67,9 +67,11 @@ class Program:
         pipe, paths = subprocess.PIPE, [str(ROS), os.environ.get("PYTHONPATH", "")]
         env = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "ROS_LOG_DIR": str(folder)}
         env["ROS_DOMAIN_ID"] = str(os.getpid() % 100 + 1)  # nodes beside this one do not hear it
-        self._process = subprocess.Popen(
-            [sys.executable, str(PROGRAM), *words], stdin=pipe, stdout=pipe, text=True, env=env
-        )
+        self._errors = folder / "stderr"
+        with self._errors.open("w") as errors:
+            self._process = subprocess.Popen(
+                [sys.executable, str(PROGRAM), *words], stdin=pipe, stdout=pipe, stderr=errors, text=True, env=env
+            )
         self.events: list[dict[str, Any]] = []
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
@@ -94,10 +96,13 @@ class Program:
         time.sleep(seconds)
         self._process.send_signal(signal.SIGCONT)
 
+    def has_ended(self) -> bool:
+        return self._process.poll() is not None
+
     def end(self) -> None:
         assert self._process.stdin is not None and self._process.stdout is not None
         self._process.stdin.close()
-        assert self._process.wait(300) == 0
+        assert self._process.wait(300) == 0, self._errors.read_text()
         self._thread.join()
         self._process.stdout.close()
 
@@ -167,7 +172,7 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
     program.pause(pause_s)
     resumed_s = time.monotonic()
     before = len(board.passed)
-    board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
+    board.wait_for(lambda: program.has_ended() or len(board.passed) >= before + STEADY_FRAMES)
     program.end()
     assert not program.of("lost")
     stamps_us = [t_us for t_us, _ in board.passed]
