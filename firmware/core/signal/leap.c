@@ -1,6 +1,7 @@
 #include "signal/leap.h"
 
 #include "fixed_point.h"
+#include "signal/moves.h"
 
 #include <string.h>
 
@@ -32,20 +33,16 @@ static bool swung(uint16_t one, uint16_t other)
 // Measure how far the words leapt that the filter holds back until the next round.
 static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth, uint32_t far)
 {
-    uint32_t total = 0, top = 0;
-    int32_t along = 0;
+    bt_lanes now = *smooth;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        if (far >> i & 1) {
-            int32_t move = round->electrode[i] - smooth->lane[i];
-            uint32_t size = bt_abs32(move);
-            total += size;
-            along += move;
-            top = size > top ? size : top;
-        }
+        now.lane[i] = far >> i & 1 ? round->electrode[i] : now.lane[i];
     }
-    bool one_way = bt_abs32(along) >= total - total / 8;
+    bt_moves moves;
+    bt_moves_add(&moves, &now, smooth, 0, BT_ELECTRODES);
+    uint32_t total = moves.total;
+    bool one_way = bt_abs32(moves.along) >= total - total / 8;
     bool pressed = far >> BT_LANE_PDC & 1;
-    leap->alike = total >= ALIKE && one_way && BT_ELECTRODES * top < 2 * total && !pressed;
+    leap->alike = total >= ALIKE && one_way && BT_ELECTRODES * moves.top < 2 * total && !pressed;
     if (pressed) { // else skin that was stuck may have snapped back
         total += PRESSURE * bt_abs32(round->pdc - smooth->lane[BT_LANE_PDC]);
         leap->swing = (uint16_t)(total >= FAR && leap->heard ? total / SWINGS : 0);

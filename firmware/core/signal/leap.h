@@ -18,13 +18,12 @@ typedef struct {
     uint8_t rounds; // since a gap; at most BT_LEAP_ROUNDS
     uint32_t read;  // lanes whose words of it were used
     uint16_t pac[BT_PAC_PER_FRAME];
-    uint16_t swing; // below which PAC is too quiet for how far they leapt in it; 0: not too far
-    bool alike;     // they leapt in it, all alike
-    bool heard;     // PAC has swung: it works
-    uint16_t tdc;   // of the latest round in which it did not leap
-    uint8_t
-        settled; // rounds in which it did not, less those in which it was not read; at most BT_LEAP_ROUNDS
-    uint8_t off; // rounds since
+    uint16_t swing;  // below which PAC is too quiet for how far they leapt in it; 0: not too far
+    bool alike;      // they leapt in it, all alike
+    bool heard;      // PAC has swung: it works
+    uint16_t tdc;    // of the latest round in which it did not leap
+    uint8_t settled; // rounds in which it did not, less those without it; at most BT_LEAP_ROUNDS
+    uint8_t off;     // rounds since
 } bt_leap;
 
 #define BT_LEAP_ROUNDS 8
