@@ -41,7 +41,8 @@ EXPORT("serials") char *serials_at(void)
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     // The tape's last sample is over when somebody asks for the next one.
-    sampled_behind_the_end = sampled_behind_the_end || (channel != BT_EMU_LINE && bt_emu_stream_lacks(&stream, t_ns));
+    sampled_behind_the_end =
+        sampled_behind_the_end || (channel != BT_EMU_LINE && bt_emu_stream_lacks(&stream, t_ns));
     return bt_emu_stream_by_clock(context, finger, channel, t_ns);
 }
 

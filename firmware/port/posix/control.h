@@ -1,6 +1,6 @@
-// How a program feeds the simulated board's sensors while it runs: a TCP socket on the loopback interface that
-// carries the commands of emu/feed.h, framed as on a gateway's link. One program at a time; the next one may
-// connect when it has gone.
+// How a program feeds the simulated board's sensors while it runs: a TCP socket on the loopback interface
+// that carries the commands of emu/feed.h, framed as on a gateway's link. One program at a time; the next one
+// may connect when it has gone.
 #ifndef BIOTAC_POSIX_CONTROL_H
 #define BIOTAC_POSIX_CONTROL_H
 

@@ -5,12 +5,13 @@
 //              [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
-// --live: a program feeds the sensors round by round (control.h), and device time stands still until it has sent
+// --live: a program feeds the sensors round by round (control.h), and device time stands still until it has
+// sent
 //   the next round. Writes "control PORT" before "pty PATH".
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
 // --flash: where saved settings and maps are kept; without it they are gone with the process.
-// --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a host's
-// command does. End of stdin ends the process.
+// --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a
+// host's command does. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "only_board.h"
 #include "spi_word_by_word.h"

@@ -34,7 +34,8 @@ void restart_process(const restart_state *state)
 {
     char text[160];
     (void)snprintf(text, sizeof text, "%d,%d,%d,%d,%u,%d,%" PRIu64 ",%" PRIu32, state->pty, state->flash,
-                   state->listening, state->program, before.times + 1, state->started, state->start_ns, state->taken);
+                   state->listening, state->program, before.times + 1, state->started, state->start_ns,
+                   state->taken);
     (void)setenv(NAME, text, 1);
     (void)execv("/proc/self/exe", arguments);
     (void)execvp(arguments[0], arguments); // where there is no /proc

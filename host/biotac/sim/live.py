@@ -48,7 +48,7 @@ class LiveFingers:
         words = np.stack([sampler.step(*state) for sampler, state in zip(self._samplers, states, strict=True)])
         if not self._faults:
             return words
-        spoilt = words.copy()
+        spoilt: Words = words.copy()
         for (number, _), (fault, faulty) in self._faults.items():
             beside = words[(number + 1) % len(words)]
             spoilt[number] = on_the_bus(fault(faulty, spoilt[None, number], beside[None]))[0]

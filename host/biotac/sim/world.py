@@ -1,4 +1,4 @@
-"""Physics in the loop: a program gives the simulated fingers their load round by round, and gets what the board made of it.
+"""Physics in the loop: a program gives the simulated fingers their load round by round, and gets the board's answer.
 
     from biotac.sim import SimFinger, Touch, world
 
@@ -112,8 +112,8 @@ class World:
     def fault(self, finger: str, kind: str | None, channel: str | None = None) -> None:
         """Lay a fault on a finger from the next round on; None ends all of that finger's.
 
-        ``kind`` is one of biotac.sim.EVERY_FAULT; ``channel`` the electrode that breaks, "E17" by default, or for a fault of
-        the bus the channel that it hits, by default all. Raises InputError for an unknown fault or channel.
+        ``kind`` is one of biotac.sim.EVERY_FAULT; ``channel`` the electrode that breaks, "E17" by default, or for a
+        fault of the bus the channel that it hits, by default all. Raises InputError for an unknown fault or channel.
         """
         self._fingers.fault(finger, kind, channel)
 
