@@ -34,8 +34,8 @@ static void go_on(bt_emu_stream *stream, uint32_t slots)
     stream->served = 0;
 }
 
-// The round before the bus is still in the ring, as bt_emu_stream_room leaves it there. In the first round the
-// place wraps for the moment until the bus goes on.
+// The round before the bus is still in the ring, as bt_emu_stream_room leaves it there. In the first round
+// the place wraps for the moment until the bus goes on.
 static void go_back(bt_emu_stream *stream)
 {
     stream->at = stream->at - BT_SLOTS;

@@ -24,6 +24,7 @@ COMPILERS = [
     *([compiler, "-std=c++17", "-x", "c++"] for compiler in ("g++", "clang++")),
     [*M4, "-std=c99"], [*M4, "-std=c++17", "-x", "c++"],
 ]  # fmt: skip
+EXAMPLES = CLIENT.parents[1] / "host/docs/guides/examples"
 MOST_BYTES = 4096
 FRAMES = 150
 
@@ -79,7 +80,10 @@ def test_the_example_prints_the_frames_that_python_reads(program: Path) -> None:
 def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) -> None:
     """It presses until it feels 2 N; which load that takes, this computer's own world says."""
     build = ["cc", "-std=gnu11", *WARNINGS, "-fsanitize=address,undefined"]
-    subprocess.run([*build, CLIENT / "example_loop.c", CLIENT / "biotac_client.c", "-o", tmp_path / "loop"], check=True)
+    subprocess.run(
+        [*build, f"-I{CLIENT}", EXAMPLES / "press_loop.c", CLIENT / "biotac_client.c", "-o", tmp_path / "loop"],
+        check=True,
+    )
     command = [sys.executable, "-m", "biotac", "sim", "--live", "index", "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as board:
         assert board.stdout is not None
@@ -91,7 +95,7 @@ def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) 
     assert [seq for seq, *_ in rounds] == list(range(1, 801))
     assert all(abs(felt_n - 2.0) < 0.2 for *_, felt_n in rounds[-50:])
     with world({"index": SimFinger(1)}) as w:
-        w.rest(5.0)
+        w.run(5.0)
         felt = w.run(1.0, index=Touch(rounds[-1][1]))["index"].frame
         assert felt is not None and abs(felt.force_n[2] - 2.0) < 0.4
 

@@ -212,9 +212,9 @@ def fault_named(name: str, channel: str | None = None) -> Fault:
     return fault
 
 
-def broken_electrode(channel: str | None) -> int:
-    """The index of the electrode that ``channel`` names; without one, E17, the pad's middle."""
-    name = channel or "E17"
+def broken_electrode(kind: str, channel: str | None) -> int:
+    """The index of the electrode that ``channel`` names; without one, and for faults of the bus, E17's, on the pad."""
+    name = "E17" if channel is None or kind in BUS_FAULTS else channel
     if name not in _sensor.ELECTRODE_NAMES:
         raise InputError(f"channel is {name!r}, expected an electrode, E1 to E19")
     return _sensor.ELECTRODE_NAMES.index(name)

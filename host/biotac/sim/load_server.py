@@ -1,6 +1,6 @@
 """Loads for a live board from a program in any language: a line of JSON a round, over a loopback socket.
 
-host/docs/guides/live_load.md describes the lines. One program at a time; the next may connect when it has gone, and
+host/docs/guides/controller_tests.md describes the lines. One program at a time; the next may connect when it has gone, and
 until then the board's time stands still.
 """
 
@@ -13,7 +13,8 @@ from dataclasses import fields
 from typing import Any
 
 from ..errors import BiotacError, DeviceLostError, InputError
-from .live import LiveBoard, LiveFingers
+from .live import LiveFingers
+from .process import SimBoard
 from .touch import Course, Load, Touch
 
 LINE_BYTES = 65536
@@ -23,9 +24,12 @@ _KEYS = [field.name for field in fields(Touch)]
 class LoadServer:
     """Listens at ``port`` on the loopback interface for loads of a board."""
 
-    def __init__(self, fingers: LiveFingers, board: LiveBoard) -> None:
+    def __init__(self, fingers: LiveFingers, board: SimBoard) -> None:
+        assert board.sensors is not None
         self._fingers = fingers
-        self._board = board
+        self._sensors = board.sensors
+        board.release()
+        self._sensors.wait_still()
         self._rounds = 0
         self._listening = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listening.getsockname()[1]
@@ -59,7 +63,8 @@ class LoadServer:
             raise
         except (BiotacError, KeyError, TypeError, ValueError, AttributeError) as error:
             return {"error": str(error.args[0] if error.args else error)}
-        self._board.compute(words)
+        self._sensors.put(words)
+        self._sensors.wait_still()
         self._rounds += 1
         return {"round": self._rounds}
 

@@ -115,7 +115,7 @@ def with_fault(source: Source, finger: int, kind: str, channel: str | None = Non
         raise InputError(f"finger {finger}: {source.name} has {fingers}, expected 0 to {fingers - 1}")
     samples, beside = source.samples.copy(), (finger + 1) % fingers
     rest, other_rest = (samples[0, k, slots.ELECTRODE_SLOT].astype(np.float64) for k in (finger, beside))
-    electrode = broken_electrode(channel if kind not in BUS_FAULTS else None)
+    electrode = broken_electrode(kind, channel)
     faulty = Faulty(electrode, rest, other_rest, np.random.default_rng(7))
     lay = fault_named(kind, channel)
     samples[:, finger] = on_the_bus(lay(faulty, samples[:, finger], source.samples[:, beside]))
@@ -130,7 +130,9 @@ def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k:
     lay = fault_named(fault.kind)
     for first in range(0, len(samples) - begin, period):
         rows = slice(first + begin, first + end)
-        faulty = Faulty(broken_electrode(fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7]))
+        faulty = Faulty(
+            broken_electrode(fault.kind, fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7])
+        )
         samples[rows, k] = on_the_bus(lay(faulty, samples[rows, k], samples[rows, beside]))
 
 

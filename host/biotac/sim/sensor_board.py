@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..board.board import Board
+from ..board.consumers import Queue
 from ..errors import BiotacError, DeviceLostError, InputError, PortError
 from ..link import Link
 from ..wire import messages_gen as wire
@@ -25,7 +26,7 @@ from .source import Source
 SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
 BURST = 16  # messages sent before the board is asked for its status
-LOOK_ROUNDS = 20
+STILL_S = 60.0
 REST_S = 0.05  # wait while the board has no room
 NOT_HELD = 0xFFFFFFFF
 KEEP_S = 20.0  # 39 sectors of flash, each at its longest
@@ -44,7 +45,8 @@ class SensorBoard:
         self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in
         self.held_at = NOT_HELD  #: the slot before which its tape waits
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
-        self._before = 0  # slots of the tape that are not kept any more
+        self._before = 0  # slots of the tape that were sent and are not kept
+        self._reports: Queue | None = None  # of standstills
 
     def plug(self, source: Source) -> None:
         """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
@@ -131,21 +133,30 @@ class SensorBoard:
         return status
 
     def put(self, words: npt.NDArray[np.uint16]) -> None:
-        """Append a round of every finger, uint16 (fingers, 44), to the tape, and send it without waiting.
+        """Send the next round of every finger, uint16 (fingers, 44), without waiting, behind what was sent before."""
+        self._samples, self._before = words.T, self._before + len(self._samples)
+        slots, fingers = self._samples.shape
+        size = SAMPLES_A_MESSAGE // fingers
+        for first in range(0, slots, size):
+            self._board.send(self._part(self._before + first, min(size, slots - first)))
 
-        Once in LOOK_ROUNDS the board is asked what it has, and what was lost on the way is sent again.
+    def wait_still(self) -> wire.EmuStatus:
+        """Wait until a simulated gateway has computed all that was sent, and its time stands still.
+
+        Raises DeviceLostError when it has ended, or takes longer than STILL_S.
         """
-        slots = self._before + len(self._samples)
-        self._samples = np.concatenate([self._samples, words.T])
-        if slots // len(sensor.SLOTS) % LOOK_ROUNDS == 0:
-            self.feed()
-            kept = len(self._samples) - LOOK_ROUNDS * len(sensor.SLOTS)
-            if kept > 0:
-                self._samples, self._before = self._samples[kept:], self._before + kept
-            return
-        size = SAMPLES_A_MESSAGE // self._samples.shape[1]
-        for first in range(slots, slots + len(sensor.SLOTS), size):
-            self._board.send(self._part(first, min(size, slots + len(sensor.SLOTS) - first)))
+        reports = self._reports
+        if reports is None:
+            reports = self._reports = Queue(self._board.reader)
+            self._board.reader.add(reports)
+        until_s, sent = time.monotonic() + STILL_S, self._before + len(self._samples)
+        while time.monotonic() < until_s:
+            batch = reports.take(wait=True)
+            self._board.reader.check()
+            for message in batch.messages if batch else ():
+                if isinstance(message, wire.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:
+                    return message
+        raise DeviceLostError(f"the simulated board computed nothing for {STILL_S:g} s; start another world")
 
     @contextmanager
     def feeding(self) -> Iterator[wire.EmuStatus]:

@@ -133,7 +133,7 @@ def test_the_same_loads_give_the_same_bytes_and_each_step_gives_one_round(finger
 def test_a_controller_closes_its_loop(biotac_world: Callable[..., Any]) -> None:
     """By the force that it feels, at half the board's rate: it is told of every event, and ends where it wants."""
     w = biotac_world({"settings": {**LIN, "force_gain_z_nn": 100_000_000}}, index=1)
-    w.rest(REST_S)
+    w.run(REST_S)
     press, events = 0.0, []
     for _ in range(300):
         now = w.run(0.02, index=Touch(press))
@@ -159,7 +159,7 @@ def test_what_a_program_gets_wrong_costs_no_time(biotac_world: Callable[..., Any
 
 def test_faults_begin_and_end(biotac_world: Callable[..., Any]) -> None:
     w = biotac_world(index=1, thumb=2)
-    w.rest(REST_S)
+    w.run(REST_S)
     w.fault("index", "open", channel="E3")
     now = w.run(0.3)
     assert now["index"].frame.counts[2] == 4095 and now["thumb"].frame.counts[2] < 4090
@@ -172,7 +172,7 @@ def test_faults_begin_and_end(biotac_world: Callable[..., Any]) -> None:
 
 def test_a_board_that_restarts_hangs_or_loses_its_cable_comes_back(biotac_world: Callable[..., Any]) -> None:
     w = biotac_world(index=1)
-    w.rest(1.0)
+    w.run(1.0)
     t_us, boots = w.step().t_us, {w.hand.info.boot_id}
     w.unplug(0.3)
     assert [w.step().seq for _ in range(29)] == [-1] * 29 and not w.hand.connected
@@ -191,11 +191,11 @@ def test_a_board_that_restarts_hangs_or_loses_its_cable_comes_back(biotac_world:
 
 def test_settings_survive_a_restart_as_the_library_promises(biotac_world: Callable[..., Any]) -> None:
     w = biotac_world({"settings": LIN}, index=1)
-    w.rest(REST_S)
+    w.run(REST_S)
     before = w.run(0.3, index=Touch(3.0))["index"].frame.force_n
-    w.rest(REST_S)
+    w.run(REST_S)
     w.restart()
-    w.rest(REST_S + 1)
+    w.run(REST_S + 1)
     after = w.run(0.3, index=Touch(3.0))["index"].frame
     assert not after.flags & FrameFlags.MAPPED
     np.testing.assert_allclose(after.force_n, before, atol=0.15)
@@ -203,7 +203,7 @@ def test_settings_survive_a_restart_as_the_library_promises(biotac_world: Callab
 
 def test_a_program_that_stands_still_gets_every_event_afterwards(biotac_world: Callable[..., Any]) -> None:
     w = biotac_world(index=1)
-    w.rest(REST_S)
+    w.run(REST_S)
     w.stall_host(0.5)
     assert all(w.step(index=Touch(2.0)).seq == -1 for _ in range(50))
     now = w.step(index=Touch(2.0))
@@ -215,8 +215,8 @@ import os, sys
 from biotac.sim import SimFinger, Touch, world
 w = world({"index": SimFinger(1)})
 w.step(index=Touch(1.0))
-print(w._board.board._process.pid, flush=True)
-w._board.control.feed(w._fingers.read({}))  # in the middle of a step
+print(w._board._process.pid, flush=True)
+w.sensors.put(w._fingers.read({}))  # in the middle of a step
 os.kill(os.getpid(), %d)
 """
 

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...hand.opening import shake_hands
 from ...link.serial_port import SerialLink
 from ...recording.replay.playback import Playback
-from ...sim.live import LiveBoard, LiveFingers
+from ...sim.live import LiveFingers, live_board
 from ...sim.load_server import LoadServer
 from ...sim.loading import bundled_scenario, load_source
 from ...sim.physics import Finger
@@ -112,12 +112,10 @@ def serve_loads(args: argparse.Namespace) -> int:
     """Run a board whose fingers another program loads, until Ctrl-C."""
     names = [name for name in args.live.split(",") if name]
     fingers = LiveFingers({name: Finger(1 + number) for number, name in enumerate(names)})
-    live = LiveBoard(fingers, args.board or "posix", args.image)
-    with until_ctrl_c(live.board, args.link):
-        server = LoadServer(fingers, live)
-        live.board.release()
-        live.control.wait_still()
-        tell(live.board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
+    board = live_board(fingers, args.board or "posix", args.image)
+    with until_ctrl_c(board, args.link):
+        server = LoadServer(fingers, board)
+        tell(board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
         server.serve()
     return 0
 

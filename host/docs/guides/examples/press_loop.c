@@ -1,6 +1,6 @@
 // Closes a loop over a simulated finger: presses until it feels 2 N. `biotac sim --live index` prints its
 // arguments.
-//   cc -o loop example_loop.c biotac_client.c && ./loop /dev/pts/4 43817
+//   cc -I firmware/client -o loop press_loop.c firmware/client/biotac_client.c && ./loop /dev/pts/4 43817
 #define _DEFAULT_SOURCE // cfmakeraw
 #include "biotac_client.h"
 
