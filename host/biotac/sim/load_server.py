@@ -1,7 +1,7 @@
 """Loads for a live board from a program in any language: a line of JSON a round, over a loopback socket.
 
-host/docs/guides/controller_tests.md describes the lines. One program at a time; the next may connect when it has gone, and
-until then the board's time stands still.
+host/docs/guides/controller_tests.md describes the lines. One program at a time; the next may connect when it has gone,
+and until then the time of the board stands still.
 """
 
 from __future__ import annotations
