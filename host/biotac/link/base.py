@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -21,10 +20,6 @@ class Played(Protocol):
     @property
     def samples(self) -> NDArray[np.uint16]:
         """(frames, fingers, 44), 0..4095 where a count came."""
-
-    @property
-    def settings(self) -> Mapping[str, int]:
-        """Settings to make before streaming, by their names in link.toml."""
 
     @property
     def tare_q4(self) -> NDArray[np.uint16] | None:

@@ -11,7 +11,6 @@ from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
-from .gains import fit_gains
 from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
@@ -39,7 +38,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     boundary = np.append(frame, frame[-1] + 1)
 
     samples = np.empty((frames, count, slots.SLOTS_PER_FRAME), dtype=np.uint16)
-    emulated = tuple(Finger(spec.seed, spec.profile, spec.scale) for spec in specs)
+    emulated = tuple(Finger(spec.seed, spec.profile) for spec in specs)
     for index, track in enumerate(scenario.tracks[:count]):
         states = track.states(_seconds(np.arange(played + 1)))
         codes = _codes([fault for fault in scenario.faults if fault.finger == index], period)
@@ -57,7 +56,6 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
         name=scenario.name,
         samples=samples,
         truth=_truth(middles(played), frame),
-        settings=_fit(emulated, middles(period)) if scenario.fit_gains else {},
         serials=tuple(spec.serial for spec in specs),
         emulated=emulated,
     )
@@ -97,13 +95,3 @@ def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
         else:
             hit[_IS_CHANNEL[fault.channel][np.arange(begin, begin + len(hit)) % slots.SLOTS_PER_FRAME]] = fault.code
     return codes
-
-
-def _fit(emulated: tuple[Finger, ...], middles: list[States]) -> dict[str, int]:
-    """Gains fitted over one whole timeline, even if only part of it is played, and over all fingers together."""
-    signals = [
-        finger.counts(states) - finger.rest_counts(states.warm_c)
-        for finger, states in zip(emulated, middles, strict=True)
-    ]
-    forces, torques = zip(*(states.wrench() for states in middles), strict=True)
-    return fit_gains(np.concatenate(signals), np.concatenate(forces), np.concatenate(torques))
