@@ -1,6 +1,6 @@
 """The scenario format: a TOML timeline of what touches the fingers.
 
-Top level: ``name``; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
+Top level: ``name``; ``about``, a clause; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
 ``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``.
 ``[[step]]``, played in order, each with ``seconds`` and optionally ``fingers = [0, ...]`` (others
 hold meanwhile):
@@ -91,6 +91,7 @@ class Scenario:
     tracks: tuple[Track, ...]
     faults: tuple[Fault, ...]
     seconds: float
+    about: str = ""
 
 
 def parse_scenario(data: bytes, *, file: str) -> Scenario:
@@ -99,7 +100,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     if not values:
         raise ScenarioError(f"{file}:1: the file is empty: expected a name and [[step]] tables; add them")
     top = Table(values, file, "", lines, 0)
-    top.only(("name", "seed", "fingers", "finger", "step", "fault"))
+    top.only(("name", "about", "seed", "fingers", "finger", "step", "fault"))
     name = top.text("name", r"[^\x00-\x1f]{1,64}", "1 to 64 printable characters")
     seed = top.integer("seed", 0, SEED_MAX) if "seed" in top else 1
     specs = _fingers(top, seed)
@@ -112,7 +113,8 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     faults = tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault"))
     if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
         raise top.error("fault", "lasts too long", f"at most {FAULTS_MAX_S:g} s in total", "remove some")
-    return Scenario(name=name, fingers=specs, tracks=tracks, faults=faults, seconds=tracks[0].seconds)
+    about = top.text("about", r"[^\x00-\x1f]{1,120}", "1 to 120 printable characters") if "about" in top else ""
+    return Scenario(name, specs, tracks, faults, tracks[0].seconds, about)
 
 
 def default_serial(seed: int) -> str:
