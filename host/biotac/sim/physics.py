@@ -42,7 +42,7 @@ TORSION_MAX_RAD = 0.6
 TEMPERATURE_PER_C = -0.02  # of log resistance
 PDC_REST = (1300, 2700)  # counts of static pressure at rest: real sensors' is 1326, 2412, and 2582 to 2695
 MESH_MM = 1.2
-OTHERWISE = 0.04  # of log sensitivity: half of what two halves of one recording differ by; more cannot be known
+OTHERWISE = 0.03  # of log sensitivity, as alike in neighbours; the prior of the fit, as more cannot be known
 SPREAD_REACH_MM = 6.0  # F1 and F2 differ alike in electrodes 5 mm apart, and by chance in those 7 mm apart
 WORN_LEVEL = -0.53  # of log resistance: trial_15330's finger against F1 and F2
 
