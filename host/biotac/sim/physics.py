@@ -37,12 +37,12 @@ PAD_MM, PAD_REACH_MM = -3.0, 4.0  # x of the pad's middle; towards the tip skin 
 SKIN_MM = 2.0  # fluid and skin spread what presses
 SQUEEZE_MAX = 4.2  # log compression: 10 MOhm
 SQUEEZE_MAX_PER_N = 2.0  # of an electrode that faces the contact: E1 of a third finger, 1.5 at about 1 N (trial_15330)
-TORSION_NMM_PER_RAD = 25.0
-TORSION_MAX_RAD = 0.6
+TORSION_NMM_PER_RAD = 75.0  # as stiff as skin that is dragged 5 mm from the middle
+TORSION_MAX_RAD = 0.2
 TEMPERATURE_PER_C = -0.02  # of log resistance
 PDC_REST = (1300, 2700)  # counts of static pressure at rest: real sensors' is 1326, 2412, and 2582 to 2695
 MESH_MM = 1.2
-OTHERWISE = 0.04  # of log sensitivity: half of what two halves of one recording differ by; more cannot be known
+OTHERWISE = 0.03  # of log sensitivity, as alike in neighbours; the prior of the fit, as more cannot be known
 SPREAD_REACH_MM = 6.0  # F1 and F2 differ alike in electrodes 5 mm apart, and by chance in those 7 mm apart
 WORN_LEVEL = -0.53  # of log resistance: trial_15330's finger against F1 and F2
 
@@ -187,7 +187,7 @@ def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
 
     along_mm = (shear * to_tip).sum(axis=1)[:, None] / skin.drag_along_n_mm
     across_mm = (shear * to_side).sum(axis=1)[:, None] / skin.drag_across_n_mm
-    length = np.hypot(along_mm, across_mm) + 1e-9
+    length = np.maximum(np.hypot(along_mm, across_mm), 1e-12)
     limited = skin.drag_max_mm * np.tanh(length / skin.drag_max_mm) / length
     along_mm, across_mm = limited * along_mm, limited * across_mm
     radial = _RADIAL[:ELECTRODES]
