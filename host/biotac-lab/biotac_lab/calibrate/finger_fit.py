@@ -143,7 +143,8 @@ class Fit:
         ohm = rest_ohm * resistance_share(compression, bulge, skin.fixed_share)
         stale = (own[19] + own[20] * part.time) * DRIFT_SIGMA_COUNTS
         counts: Floats = _sensor.FULL_SCALE_COUNT * _sensor.LOAD_OHM / (ohm + _sensor.LOAD_OHM)
-        return counts + stale[:, None] * part.drift
+        counts += stale[:, None] * part.drift
+        return counts
 
     def _residuals(self, x: Floats) -> Floats:
         skin = self._skin(x)
