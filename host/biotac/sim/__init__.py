@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from .gains import fit_gains
 from .loading import bundled_scenarios, load_source
-from .physics import GAP_MM, PROFILES, Finger, Footprints, Profile, States, deform
+from .physics import (
+    GAP_MM,
+    PLATE_MM,
+    PROFILES,
+    SKIN,
+    Finger,
+    Footprints,
+    Profile,
+    Skin,
+    States,
+    counts_at,
+    deform,
+    resistance_at,
+    resistance_share,
+)  # fmt: skip
 from .random_loads import plate_recording, random_loads
 from .sampling import sample, tdc_counts
 from .scenario import FLAT_MM
@@ -12,7 +26,7 @@ from .source import Source, Truth
 from .timeline import Pose, Track
 
 __all__ = [
-    "FLAT_MM", "GAP_MM", "PROFILES", "Finger", "Footprints", "Pose", "Profile", "Source", "States", "Track", "Truth",
-    "bundled_scenarios", "deform", "fit_gains", "load_source", "plate_recording", "random_loads", "sample",
-    "tdc_counts",
+    "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Finger", "Footprints", "Pose", "Profile", "Skin", "Source",
+    "States", "Track", "Truth", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source",
+    "plate_recording", "random_loads", "resistance_at", "resistance_share", "sample", "tdc_counts",
 ]  # fmt: skip

@@ -17,8 +17,7 @@ from biotac import InputError
 from biotac.calibrate.population import Population
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.press import scale_of
-from biotac.calibrate.wrench import Run, load, rmse, validate
-from biotac.calibrate.wrench.run import run_of
+from biotac.calibrate.wrench import Run, load, rmse, run_of, validate
 from biotac.core import geometry as surface
 from biotac.sim import Finger, States, plate_recording
 
