@@ -250,9 +250,7 @@ def test_the_same_seed_gives_the_same_words_and_a_longer_run_begins_with_them() 
     np.testing.assert_array_equal(sampling.sample(Finger(7, "worn"), shorter), words[:30])
 
 
-@pytest.mark.parametrize(
-    ("profile", "rest_counts", "sigma"), [("new", 2862, 1.5), ("worn", 3256, 5.0)]
-)
+@pytest.mark.parametrize(("profile", "rest_counts", "sigma"), [("new", 2862, 1.5), ("worn", 3256, 5.0)])
 def test_profiles_rest_where_real_fingers_do(profile: str, rest_counts: int, sigma: float) -> None:
     """The mean of the electrodes' rest counts of F1 and F2, and of trial_15330's finger for "worn"."""
     rest = np.array([Finger(seed, profile).rest_counts(np.zeros(1))[0] for seed in range(50)])

@@ -17,8 +17,7 @@ from biotac import InputError
 from biotac.calibrate.population import Population
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.press import scale_of
-from biotac.calibrate.wrench import Run, load, rmse, validate
-from biotac.calibrate.wrench.run import run_of
+from biotac.calibrate.wrench import Run, load, rmse, run_of, validate
 from biotac.core import geometry as surface
 from biotac.sim import Finger, States, plate_recording
 
@@ -197,6 +196,12 @@ def _alike(parts: Sequence[Half], touched: Sequence[Touched], names: Sequence[st
     def bulge(e: Floats, k: int) -> Any:
         return np.median((np.maximum(e, 0.0) ** 2).sum(axis=1) / (e**2).sum(axis=1))
 
+    default = load_population(None).population
+
+    def z_slope(e: Floats, k: int) -> Any:
+        tare = parts[2 * k].tare
+        return np.polyfit(force[k][:, 2], default.published(tare + e, tare)[:, 2], 1)[0]
+
     upper = np.triu_indices(19, 1)
     corr = [np.corrcoef(one.T)[upper] for one in real]
 
@@ -209,6 +214,7 @@ def _alike(parts: Sequence[Half], touched: Sequence[Touched], names: Sequence[st
     rows = [
         ["signal per newton [count/N], median", *both(per_n)],
         ["share of bulges in the energy, median", *both(bulge)],
+        ["slope of the default map's z, trained on both, over the plate's", *both(z_slope)],
         ["correlations of electrodes, alike those of the other real finger", *both(pattern)],
         ["swings of electrodes, alike those of the other real finger", *both(swing)],
     ]

@@ -19,9 +19,7 @@ from scipy.sparse import csr_matrix
 
 from biotac.calibrate.wrench import Run
 from biotac.core import geometry as surface
-from biotac.sim import States, deform
-from biotac.sim.physics import PLATE_MM, SKIN, Skin, resistance_share
-from biotac.wire import sensor_gen as _sensor
+from biotac.sim import PLATE_MM, SKIN, Skin, States, counts_at, deform, resistance_at, resistance_share
 
 from .training import MIRROR
 
@@ -139,11 +137,10 @@ class Fit:
     def _counts(self, x: Floats, k: int, skin: Skin) -> Floats:
         part, own = self.parts[k], x[self._own(k)]
         compression, bulge = (np.exp(own[:19]) * one for one in deform(part.states(self._place(x, k)), skin=skin))
-        rest_ohm = (_sensor.FULL_SCALE_COUNT / part.tare - 1.0) * _sensor.LOAD_OHM
-        ohm = rest_ohm * resistance_share(compression, bulge, skin.fixed_share)
+        counts: Floats = counts_at(resistance_at(part.tare) * resistance_share(compression, bulge, skin.fixed_share))
         stale = (own[19] + own[20] * part.time) * DRIFT_SIGMA_COUNTS
-        counts: Floats = _sensor.FULL_SCALE_COUNT * _sensor.LOAD_OHM / (ohm + _sensor.LOAD_OHM)
-        return counts + stale[:, None] * part.drift
+        counts += stale[:, None] * part.drift
+        return counts
 
     def _residuals(self, x: Floats) -> Floats:
         skin = self._skin(x)
@@ -170,11 +167,17 @@ class Fit:
 
 
 def completed(fit: Fit, runs: Sequence[Run]) -> Skin:
-    """The skin with the mean resistances of two runs, whose halves the fit's parts are, and what they differ by."""
-    rest = np.log([(_sensor.FULL_SCALE_COUNT / run.tare - 1.0) * _sensor.LOAD_OHM for run in runs])
-    gain, mean = fit.own.reshape(len(runs), 2, 19).mean(axis=1), rest.mean(axis=0)
+    """The skin with the mean resistances of two runs, whose halves the fit's parts are, and what they differ by.
+
+    Sensitivities differ by chance, too: the share that two halves of one run differ by is taken away.
+    """
+    own = fit.own.reshape(len(runs), 2, 19)
+    chance, apart = ((own[:, 0] - own[:, 1]) ** 2).mean() / 4.0, own[0].mean(axis=0) - own[1].mean(axis=0)
+    apart *= np.sqrt(max(1.0 - chance / (apart**2 / 2.0).mean(), 0.0) / 2.0)
+    rest = np.log([resistance_at(run.tare) for run in runs])
+    mean = rest.mean(axis=0)
     return replace(
-        fit.skin, r0_ohm=np.exp((mean + mean[MIRROR]) / 2.0), gain_apart=(gain[0] - gain[1]) / np.sqrt(2.0),
+        fit.skin, r0_ohm=np.exp((mean + mean[MIRROR]) / 2.0), gain_apart=apart,
         r0_apart=(rest[0] - rest[1]) / np.sqrt(2.0),
     )  # fmt: skip
 
