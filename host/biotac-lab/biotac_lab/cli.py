@@ -13,6 +13,7 @@ from .bench import command as bench
 from .calibrate import direction_command as direction
 from .calibrate import population_command as population
 from .experiments import command as experiments
+from .grasp import command as grasp
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,6 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="biotac-lab", description=__doc__.splitlines()[0], allow_abbrev=False)
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     known = {"experiment": experiments, "population": population, "direction": direction, "bench": bench}
+    known["grasp"] = grasp
     for name, module in known.items():
         verb = verbs.add_parser(name, help=module.ABOUT, description=module.ABOUT, allow_abbrev=False)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")

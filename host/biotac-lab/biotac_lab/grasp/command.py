@@ -1,0 +1,110 @@
+"""biotac-lab grasp"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biotac import InputError
+
+from ..report import Facts, Report, Show, Table, check, check_free, claim, write
+from . import law, picture, runs
+from .runs import CONTROLLERS, Case
+
+ABOUT = "Grip, lift and let go of things by what the fingers feel, and count what is dropped and crushed."
+EXAMPLE = "biotac-lab grasp --objects 20 --out gripped"
+NAME = "grasp"
+HEAD = ("controller", "fault", "n", "dropped %", "crushed %", "lost %", "hold / need", "slides", "missed", "SLIPs",
+        "used", "false", "reaction ms", "felt - applied N")  # fmt: skip
+TRUE_PERCENT, WORSE_POINTS, CONSTANT_PERCENT = 10.0, 10.0, 25.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is tried and where it goes."""
+    about = "; ".join(f"{name}: {text}" for name, text in CONTROLLERS.items())
+    parser.add_argument("--objects", metavar="N", type=_count, default=6, help="things for each pair (default 6)")
+    parser.add_argument("--seed", metavar="N", type=int, default=7, help="of the things (default 7)")
+    parser.add_argument(
+        "--pairs", metavar="N", type=_count, default=1, help="pairs of fingers with things of their own"
+    )
+    parser.add_argument("--jobs", metavar="N", type=_count, default=1, help="processes (default 1)")
+    parser.add_argument("--controllers", metavar="NAME,...", default=",".join(CONTROLLERS), help=about)
+    parser.add_argument("--law", metavar="FILE", type=Path, default=law.EXAMPLE, help="a law in place of the example")
+    parser.add_argument("--out", metavar="FOLDER", type=Path, help="grasp.md, .png, .json and grasps.jsonl go here")
+    parser.add_argument("--force", action="store_true", help="overwrite the first three; the last one is gone on with")
+    parser.add_argument("--check", action="store_true", help="exit 1 when the experiment cannot tell good from bad")
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 10_000:
+        raise argparse.ArgumentTypeError(f"seen {text!r}; expected 1 to 10000")
+    return int(text)
+
+
+def run(args: argparse.Namespace, show: Show) -> int:
+    """Return 0, or 1 if --check finds a limit missed."""
+    names = args.controllers.split(",")
+    unknown = sorted(set(names) - set(CONTROLLERS))
+    if unknown:
+        raise InputError(f"--controllers has {', '.join(unknown)}; expected some of {', '.join(CONTROLLERS)}")
+    if args.out is not None:
+        check_free(args.out, NAME, overwrite=args.force)
+        args.out.mkdir(parents=True, exist_ok=True)
+    code = runs.digest(args.law)
+    cases = [
+        Case(name, fault, pair, args.seed, "numpy", 2, code)
+        for name in names for fault in [""] for pair in range(args.pairs)
+    ]  # fmt: skip
+    kept = None if args.out is None else args.out / "grasps.jsonl"
+    outcomes = runs.run(cases, args.objects, args.law, args.jobs, kept, show)
+    show("")
+    report = _report(outcomes, args.law)
+    written = [] if args.out is None else write(report, args.out, NAME, ABOUT, overwrite=args.force)
+    if args.json:
+        print(json.dumps(report.facts(NAME) | {"written": [str(path) for path in written]}))
+    else:
+        print(report.page(NAME, ABOUT) + "".join(f"\nwritten: {path}" for path in written))
+    return 1 if args.check and not all(one["met"] for one in report.checks) else 0
+
+
+def _report(outcomes: dict[Case, list[Facts]], law_file: Path) -> Report:
+    together: dict[tuple[str, str], list[Facts]] = {}
+    for case, rows in outcomes.items():
+        together.setdefault((case.controller, case.fault), []).extend(rows)
+    figures = {key: _figures(rows) for key, rows in together.items()}
+    lines = [(CONTROLLERS[name], fault or "-", *row) for (name, fault), row in figures.items()]
+    lost = {name: row[3] for (name, fault), row in figures.items() if not fault}
+    checks = [check("true force loses", lost["true"], TRUE_PERCENT, "%")] if "true" in lost else []
+    for name, least in (("low", WORSE_POINTS), ("high", WORSE_POINTS), ("constant", CONSTANT_PERCENT)):
+        if "true" in lost and name in lost:
+            least += 0.0 if name == "constant" else lost["true"]
+            text = f"{CONTROLLERS[name]} loses {lost[name]:.1f} %, at least {least:.1f}"
+            checks.append(claim(text, lost[name] >= least))
+    case = next(iter(outcomes))
+    source = f"{len(outcomes[case])} things of seed {case.seed} for each pair of fingers, law {law_file.name}"
+    draw = partial(picture.draw, outcomes=outcomes, law_file=law_file)
+    return Report(source, [Table("Lost", HEAD, lines, digits=2)], checks, [], draw)
+
+
+def _figures(rows: list[Facts]) -> list[Any]:
+    def percent(hits: list[bool]) -> float:
+        return 100.0 * float(np.mean(hits))
+
+    def total(name: str) -> int:
+        return sum(row[name] for row in rows)
+
+    def middle(values: list[Any]) -> float | None:
+        known = [value for value in values if value is not None]
+        return float(np.median(known)) if known else None
+
+    dropped, crushed = [row["dropped"] for row in rows], [row["crushed"] for row in rows]
+    return [
+        len(rows), percent(dropped), percent(crushed), percent([a or b for a, b in zip(dropped, crushed, strict=True)]),
+        middle([row["hold_per_need"] for row in rows]), *map(total, ("slides", "missed", "told", "used", "false")),
+        middle([ms for row in rows for ms in row["reaction_ms"]]), middle([row["off_n"] for row in rows]),
+    ]  # fmt: skip
