@@ -39,7 +39,7 @@ def test_a_thing_is_lifted_where_friction_bears_it() -> None:
     need_n = WEIGHT_N / (2 * 0.5)
     held = lifted(1.05 * need_n)
     assert held.in_air and held.slid_mm == 0.0 and held.need_n == pytest.approx(need_n)
-    assert held.shear_n[0] == pytest.approx(WEIGHT_N / 2)
+    assert held.touch(0)[1] == pytest.approx(WEIGHT_N / 2)
     assert not lifted(0.9 * need_n).in_air
 
 

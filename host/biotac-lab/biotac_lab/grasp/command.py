@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--jobs", metavar="N", type=_count, default=1, help="processes (default 1)")
     parser.add_argument("--controllers", metavar="NAME,...", default=",".join(CONTROLLERS), help=about)
+    parser.add_argument("--plant", choices=("numpy", "mujoco"), default="numpy", help="what simulates the things")
     parser.add_argument("--law", metavar="FILE", type=Path, default=law.EXAMPLE, help="a law in place of the example")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="grasp.md, .png, .json and grasps.jsonl go here")
     parser.add_argument("--force", action="store_true", help="overwrite the first three; the last one is gone on with")
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
         args.out.mkdir(parents=True, exist_ok=True)
     code = runs.digest(args.law)
     cases = [
-        Case(name, fault, pair, args.seed, "numpy", 2, code)
+        Case(name, fault, pair, args.seed, args.plant, 2, code)
         for name in names for fault in [""] for pair in range(args.pairs)
     ]  # fmt: skip
     kept = None if args.out is None else args.out / "grasps.jsonl"

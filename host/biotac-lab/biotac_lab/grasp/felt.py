@@ -23,7 +23,7 @@ class TrueForce(Sense):
     def feel(self, plant: Plant) -> tuple[list[Frame | None], bool]:
         """See Sense."""
         normal_n, shear_n, slides = self._last
-        self._last = plant.normal_n, float(np.hypot(*plant.shear_n)), plant.slip_mm_s > 0
+        self._last = plant.normal_n, float(np.hypot(*plant.touch(0)[1:3])), plant.slip_mm_s > 0
         told, self._slid, self._seq = slides and not self._slid and not self._deaf, slides, self._seq + 1
         touched, none = normal_n > TOUCHED_N, np.full(3, np.nan)
         force_n = np.array([0.0, shear_n, max(normal_n + self._off_n, 0.0) if touched else 0.0])

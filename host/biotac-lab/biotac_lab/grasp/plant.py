@@ -17,7 +17,7 @@ SKIN_N_PER_MM, SHEAR_N_PER_MM = 2.5, 3.0  # one finger's skin
 CLOSED_MM = 2.0  # each finger touches there
 LAG_S, MOST_MM_S = 0.02, 40.0  # of the actuators
 KINETIC = 0.85  # of the static friction, once it slides
-DROPPED_MM, CREEP_MM_S = 15.0, 1.0
+DROPPED_MM = 15.0
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,12 @@ def things(count: int, seed: int) -> list[Thing]:
 class Plant:
     """A thing on a table between two sides that press alike, each with one finger or several.
 
-    Public after each step, of a side: ``normal_n`` and ``shear_n`` (up along the skin, and across it), ``torsion_nmm``;
-    of the thing: ``slip_mm_s`` over the skin, ``slid_mm`` altogether, ``in_air``, ``most_n`` it was pressed with.
+    Public after each step: the mean ``normal_n`` of the sides; of the thing, ``slip_mm_s`` over the skin, ``slid_mm``
+    altogether, ``in_air``, and ``most_n`` that it was pressed with. ``extra_kg`` and ``hit_n`` are set from outside.
     """
 
     def __init__(self, thing: Thing) -> None:
-        self.thing, self.extra_kg, self.hit_n = thing, 0.0, 0.0  # the latter two are set from outside
-        self.normal_n, self.shear_n, self.torsion_nmm = 0.0, (0.0, 0.0), 0.0
+        self.thing, self.extra_kg, self.hit_n, self.normal_n, self._shear_n = thing, 0.0, 0.0, 0.0, 0.0
         self.slip_mm_s, self.slid_mm, self.most_n, self.in_air = 0.0, 0.0, 0.0, False
         self._stiffness = 1 / (2 / SKIN_N_PER_MM + 1 / thing.stiffness)
         self._closed_mm = self._speed_mm_s = self._hand_mm = self._slide_mm_s = 0.0
@@ -91,4 +90,8 @@ class Plant:
                 held_n = max(min(stretched_n, can_n), -can_n)
                 self.in_air = held_n >= pull_n
             self.slip_mm_s = max(self.slip_mm_s, min(slid_mm / dt, 300.0))
-        self.shear_n = (held_n / 2, 0.0)
+        self._shear_n = held_n / 2
+
+    def touch(self, side: int) -> tuple[float, float, float, float]:
+        """Of a side, on its finger: normal N, shear N by which the thing pulls down and across, torsion N mm."""
+        return self.normal_n, self._shear_n, 0.0, 0.0

@@ -17,7 +17,7 @@ from typing import Any
 from ..report import Facts, Show
 from . import law
 from .felt import SHARES, TrueForce
-from .plant import Plant, things
+from .plant import Plant, Thing, things
 from .trial import grasp
 
 BLOCK = 10  # things that one hand grasps, one after the other
@@ -58,9 +58,17 @@ def grasps(case: Case, first: int, count: int, law_file: Path, trace: list[Any] 
     with _sense(case) as (sense, towards):
         for number, thing in enumerate(things(first + count, case.seed + case.pair)[first:], first):
             rule = make(towards=towards, shares=SHARES[case.fingers], **press)
-            outcome = grasp(Plant(thing), rule, sense, bool(case.fault), trace if number == first + count - 1 else None)
+            outcome = grasp(_plant(case.plant, thing), rule, sense, bool(case.fault), trace if number == first + count - 1 else None)
             rows.append({"case": asdict(case), "thing": number, **outcome})
     return rows
+
+
+def _plant(name: str, thing: Thing) -> Any:
+    if name == "numpy":
+        return Plant(thing)
+    from .mujoco_plant import MujocoPlant  # the extra
+
+    return MujocoPlant(thing)
 
 
 @contextmanager
