@@ -148,7 +148,7 @@ void answers_renew(void)
 void answers_plug(uint8_t finger, bool present, const char *serial)
 {
     interrupt_hold_off(PIO0_IRQ_1);
-    bt_emu_init(&sensor[finger], finger, present, serial, bt_emu_stream_count, source);
+    bt_emu_init(&sensor[finger], finger, present, serial, bt_emu_stream_in_order, source);
     offer(finger);
     interrupt_let_go(PIO0_IRQ_1);
 }
@@ -167,7 +167,7 @@ void answers_start(bt_emu_stream *stream)
     answers_forget();
     loop_play(stream);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_init(&sensor[f], f, true, "", bt_emu_stream_count, source);
+        bt_emu_init(&sensor[f], f, true, "", bt_emu_stream_in_order, source);
     }
     shifter_start(exchanged);
     answers_renew();

@@ -1,6 +1,7 @@
 #include "commands.h"
 
 #include "answers.h"
+#include "feed.h"
 #include "loop.h"
 #include "only_board.h"
 #include "pins.h"
@@ -38,22 +39,14 @@ static void reply(uint8_t req_id, uint8_t command, uint8_t error)
 static void send_status(uint8_t req_id)
 {
     bt_answer_counts counts = answers_counts();
-    uint32_t room = bt_emu_stream_room(stream);
-    bt_msg_emu_status status = {
-        .req_id = req_id,
-        .fingers = plugged,
-        .slots_taken = stream->taken,
-        .room_slots = (uint16_t)(room < UINT16_MAX ? room : UINT16_MAX),
-        .slots_served = stream->at + (stream->served != 0),
-        .elapsed_us = counts.latest_us - counts.first_us,
-        .words = counts.words,
-        .words_late = counts.late,
-        .samples_starved = stream->starved,
-        .slowest_us = (uint16_t)counts.slowest_us,
-        .rounds_moved = stream->moved,
-        .loop_slots = loop_slots(),
-        .looping = stream->loop != NULL,
-    };
+    bt_msg_emu_status status = bt_emu_status_of(stream);
+    status.req_id = req_id;
+    status.fingers = plugged;
+    status.elapsed_us = counts.latest_us - counts.first_us;
+    status.words = counts.words;
+    status.words_late = counts.late;
+    status.slowest_us = (uint16_t)counts.slowest_us;
+    status.loop_slots = loop_slots();
     uint8_t payload[BT_EMU_STATUS_BYTES];
     bt_msg_emu_status_pack(&status, payload);
     send(BT_EMU_STATUS_ID, payload);
@@ -102,37 +95,8 @@ static uint8_t plug(const bt_msg_emu_plug *command)
     return BT_ERROR_OK;
 }
 
-// What is not taken the status tells.
-static uint8_t take_tape(const bt_msg_emu_tape *command)
-{
-    if (command->fingers == 0 || command->fingers > BT_MAX_FINGERS || command->slots == 0
-        || 2 * command->slots * command->fingers > (int)sizeof command->samples) {
-        return BT_ERROR_OUT_OF_RANGE;
-    }
-    if (command->first_slot == stream->taken) {
-        (void)bt_emu_stream_put(stream, command->fingers, command->samples, command->slots);
-    }
-    return BT_ERROR_OK;
-}
-
-static uint8_t set_fault(const bt_msg_emu_set_fault *command)
-{
-    if (command->finger >= BT_MAX_FINGERS) {
-        return BT_ERROR_NO_SUCH_FINGER;
-    }
-    if (command->fault != BT_EMU_FAULT_NONE && command->fault < BT_EMU_FAULT_SWAPPED) {
-        return BT_ERROR_OUT_OF_RANGE;
-    }
-    stream->fault[command->finger] = command->fault;
-    answers_renew();
-    return BT_ERROR_OK;
-}
-
 static union {
     bt_msg_emu_plug plug;
-    bt_msg_emu_tape tape;
-    bt_msg_emu_set_fault fault;
-    bt_msg_emu_play play;
     bt_msg_emu_keep keep;
     bt_msg_hello_request hello;
     bt_msg_reboot_bootloader reboot;
@@ -158,28 +122,16 @@ static void obey(uint8_t id, const uint8_t *payload)
         bt_msg_emu_plug_unpack(&got.plug, payload);
         error = plug(&got.plug);
         break;
-    case BT_EMU_TAPE_ID:
-        bt_msg_emu_tape_unpack(&got.tape, payload);
-        error = take_tape(&got.tape);
-        break;
-    case BT_EMU_SET_FAULT_ID:
-        bt_msg_emu_set_fault_unpack(&got.fault, payload);
-        error = set_fault(&got.fault);
-        break;
-    case BT_EMU_PLAY_ID:
-        bt_msg_emu_play_unpack(&got.play, payload);
-        stream->hold = got.play.hold_slot;
-        stream->by_time = got.play.by_time;
-        break;
     case BT_EMU_KEEP_ID:
         bt_msg_emu_keep_unpack(&got.keep, payload);
         error = loop_keep(stream, got.keep.slots, got.keep.crc32);
         break;
-    case BT_EMU_GET_STATUS_ID:
-        break;
     default:
-        error = BT_ERROR_UNKNOWN_COMMAND;
+        error = bt_emu_obey(stream, id, payload);
         break;
+    }
+    if (id == BT_EMU_SET_FAULT_ID) {
+        answers_renew();
     }
     if (error == BT_ERROR_OK) {
         send_status(req_id);

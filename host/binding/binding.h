@@ -22,7 +22,7 @@
 #include "sbc.h"
 #include "signal/signals.h"
 #include "solve/solve.h"
-#include "tape.h"
+#include "stream.h"
 #include "touch/tare.h"
 #include "wire/cobs.h"
 #include "wire/crc32.h"

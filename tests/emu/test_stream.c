@@ -30,7 +30,7 @@ static uint32_t put(uint32_t from, uint32_t slots)
 static uint16_t ask(uint8_t finger, uint32_t slot)
 {
     uint8_t command = bt_channel_command[bt_slot_channel[slot % BT_SLOTS]];
-    return bt_emu_stream_count(&stream, finger, (uint8_t)((command & 0x7E) >> 1), 0);
+    return bt_emu_stream_in_order(&stream, finger, (uint8_t)((command & 0x7E) >> 1), 0);
 }
 
 static int empty(void **state)
@@ -91,23 +91,23 @@ TEST(test_a_fault_hides_the_tape_and_does_not_hold_it_up)
     (void)put(0, 4);
     stream.fault[1] = BT_EMU_FAULT_BAD_PARITY;
     assert_int_equal(ask(1, 0), BT_EMU_FAULT_BAD_PARITY);
-    assert_int_equal(bt_emu_stream_count(&stream, 1, BT_EMU_LINE, 0), BT_EMU_FAULT_BAD_PARITY);
+    assert_int_equal(bt_emu_stream_in_order(&stream, 1, BT_EMU_LINE, 0), BT_EMU_FAULT_BAD_PARITY);
     assert_int_equal(ask(0, 0), count_at(0, 0));
     stream.fault[1] = BT_EMU_FAULT_NONE;
     assert_int_equal(ask(1, 1), count_at(1, 1));
-    assert_int_equal(bt_emu_stream_count(&stream, 1, BT_EMU_LINE, 0), 0);
+    assert_int_equal(bt_emu_stream_in_order(&stream, 1, BT_EMU_LINE, 0), 0);
 }
 
 TEST(test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape)
 {
     (void)put(0, 4);
-    assert_int_equal(bt_emu_stream_count(&stream, 0, 63, 0), BT_EMU_FAULT_NO_CHANNEL);
+    assert_int_equal(bt_emu_stream_in_order(&stream, 0, 63, 0), BT_EMU_FAULT_NO_CHANNEL);
     assert_int_equal(ask(FINGERS, 0), BT_EMU_FAULT_STUCK_LOW);
 }
 
 static void ask_who(uint8_t finger)
 {
-    (void)bt_emu_stream_count(&stream, finger, BT_EMU_LINE, 0);
+    (void)bt_emu_stream_in_order(&stream, finger, BT_EMU_LINE, 0);
 }
 
 TEST(test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_they_are)
@@ -179,7 +179,7 @@ static uint32_t play_by_time(uint32_t rounds, uint32_t round_us)
         uint8_t command = bt_channel_command[bt_slot_channel[slot % BT_SLOTS]];
         uint64_t t_us = slot / BT_SLOTS * round_us + slot % BT_SLOTS * round_us / BT_SLOTS;
         uint16_t got =
-            bt_emu_stream_count(&stream, 0, (uint8_t)((command & 0x7E) >> 1), 1000 * (t_us % UINT32_MAX));
+            bt_emu_stream_in_order(&stream, 0, (uint8_t)((command & 0x7E) >> 1), 1000 * (t_us % UINT32_MAX));
         uint32_t place = stream.at % (8 * BT_SLOTS);
         assert_int_equal(got, count_at(place, 0));
         assert_int_equal(place % BT_SLOTS, slot % BT_SLOTS); // whole rounds are moved

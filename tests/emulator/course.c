@@ -2,15 +2,15 @@
 //   course TAPE < STEPS > WORDS
 // A step is u32 kind (0: chip selects, 1: transfer), u32 value, u64 ns, little-endian; a word is u16.
 #include "bus.h"
-#include "tape.h"
+#include "stream.h"
 
 #include <stdio.h>
 
-static unsigned char tape_bytes[1 << 20];
+static _Alignas(uint16_t) unsigned char tape_bytes[1 << 20];
 
 int main(int argc, char **argv)
 {
-    static bt_tape tape;
+    static bt_emu_stream stream;
     static bt_emu_bus bus;
     FILE *file = argc == 2 ? fopen(argv[1], "rb") : NULL;
     if (file == NULL) {
@@ -18,10 +18,10 @@ int main(int argc, char **argv)
     }
     size_t bytes = fread(tape_bytes, 1, sizeof tape_bytes, file);
     (void)fclose(file);
-    if (bt_tape_open(&tape, tape_bytes, bytes) != NULL) {
+    if (bt_emu_stream_open(&stream, tape_bytes, bytes) != NULL) {
         return 2;
     }
-    bt_emu_bus_init(&bus, tape.fingers, "BT12345678ABCDEF,,x", bt_tape_count, &tape);
+    bt_emu_bus_init(&bus, stream.fingers, "BT12345678ABCDEF,,x", bt_emu_stream_by_clock, &stream);
     struct {
         uint32_t kind, value;
         uint64_t t_ns;

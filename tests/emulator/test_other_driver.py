@@ -145,7 +145,7 @@ def test_by_time_a_bus_of_half_the_speed_gets_every_other_round(image: Path, tmp
         encode(wire.EmuTape.ID, wire.EmuTape(8, 1, ROUND, at, padded(tape[at : at + ROUND])).pack())
         for at in range(ROUND, len(tape), ROUND)
     ]
-    by_time = encode(wire.EmuPlay.ID, wire.EmuPlay(9, 2**32 - 1, 1).pack())
+    by_time = encode(wire.EmuPlay.ID, wire.EmuPlay(9, 2**32 - 1, 1, 0).pack())
     course = [step for slot in range(2 * ROUND) for step in reading(slot)]
     for listen in course[1::2]:
         listen["wait_us"] = 2e6 / sensor.SLOT_HZ - SETTLE_US  # and the words themselves

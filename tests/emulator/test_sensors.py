@@ -32,7 +32,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip(f"{', '.join(missing)} missing; tools/test installs what the emulated rig needs")
     subprocess.run([ROOT / "tools/emulator/prepare"], check=True)
     program = tmp_path_factory.mktemp("native") / "course"
-    sources = [FIRMWARE / "emu" / f"{name}.c" for name in ("bus", "device", "tape")]
+    sources = [FIRMWARE / "emu" / f"{name}.c" for name in ("bus", "device", "stream", "by_clock")]
     words = ["cc", "-std=c11", "-O1", f"-I{FIRMWARE / 'emu'}", f"-I{FIRMWARE / 'core'}", HERE / "course.c"]
     subprocess.run([*words, *sources, FIRMWARE / "core/wire/sensor_gen.c", "-o", program], check=True)
     return program

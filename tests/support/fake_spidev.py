@@ -63,15 +63,15 @@ class Bus:
         self.fault: OSError | None = None
         self.opened: list[FakeSpi] = []
         self.log: list[tuple[int, int, int]] = []  # device, first word, when; the latest calls
-        self._tape = ffi.new("bt_tape *")
+        self._stream = ffi.new("bt_emu_stream *")
         self._tape_bytes = ffi.new("uint8_t[]", tape_bytes)
-        assert lib.bt_tape_open(self._tape, self._tape_bytes, len(tape_bytes)) == ffi.NULL
+        assert lib.bt_emu_stream_open(self._stream, self._tape_bytes, len(tape_bytes)) == ffi.NULL
         self.sensors = []
         for f in range(source.samples.shape[1]):
             serial = source.serials[f] if source.serials else f"BTEMU0000000{f + 1:04}"
             emu = ffi.new("bt_emu_device *")
-            count = ffi.addressof(lib, "bt_tape_count")
-            lib.bt_emu_init(emu, f, f not in absent, serial.encode(), count, self._tape)
+            count = ffi.addressof(lib, "bt_emu_stream_by_clock")
+            lib.bt_emu_init(emu, f, f not in absent, serial.encode(), count, self._stream)
             self.sensors.append(emu)
 
     def module(self) -> ModuleType:

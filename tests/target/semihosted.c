@@ -11,7 +11,7 @@
 #include "bus.h"
 #include "keep/storage.h"
 #include "pins.h"
-#include "tape.h"
+#include "stream.h"
 #include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
@@ -19,7 +19,6 @@
 
 #include <string.h>
 
-#define HEADER_BYTES 24
 #define ROUND_BYTES  (2 * BT_SLOTS * BT_MAX_FINGERS)
 #define KEPT_BYTES   32768u // two sectors of up to 16 KiB
 #define LOOKS_FOR_GO 200u   // turns of the main loop between two looks
@@ -40,8 +39,8 @@ static volatile bool in_alarm;
 static uint64_t slot_ns;
 
 static bt_emu_bus bus;
-static bt_tape tape;
-static uint8_t window[ROUND_BYTES];
+static bt_emu_stream stream;
+static _Alignas(uint16_t) uint8_t window[ROUND_BYTES];
 static uint32_t in_window = UINT32_MAX;
 static uint8_t kept[KEPT_BYTES];
 
@@ -105,11 +104,13 @@ static void read_command_line(void)
         read_at(open_file(flash_name, READ), 0, kept, sizeof kept);
     }
     tape_file = open_file(tape_name, READ);
-    read_at(tape_file, 0, window, HEADER_BYTES);
-    const char *wrong = bt_tape_open(&tape, window, call(SYS_FLEN, tape_file, 0, 0));
+    read_at(tape_file, 0, window, BT_EMU_TAPE_HEADER_BYTES);
+    const char *wrong = bt_emu_stream_open(&stream, window, call(SYS_FLEN, tape_file, 0, 0));
     if (wrong != NULL) {
         stop(wrong);
     }
+    stream.tape = (const uint16_t *)(const void *)window; // a round at a time
+    stream.slots = BT_SLOTS;
 }
 
 // ---- time: the port's, but for where it stands still ------------------------------------------------------
@@ -179,7 +180,7 @@ void __wrap_port_alarm_at(bt_port *port, uint32_t at_us)
         behind_us = __real_clock_us() - now_us;
         begun = true;
     }
-    over = over || bt_tape_over(&tape, now_ns() + (uint64_t)(ahead_us > 0 ? ahead_us : 0) * 1000);
+    over = over || bt_emu_stream_lacks(&stream, now_ns() + (uint64_t)(ahead_us > 0 ? ahead_us : 0) * 1000);
     if ((held || over) && !stands) {
         stands_at_us = now_us;
         stands = true;
@@ -219,14 +220,13 @@ void __wrap_port_idle(bt_port *port)
 
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
-    const uint32_t round = bt_tape_round(&tape, t_ns);
+    const uint32_t round = bt_emu_stream_round(&stream, t_ns);
     if (round != in_window) {
-        const uint32_t bytes = tape.fingers * BT_SLOTS * 2;
-        read_at(tape_file, HEADER_BYTES + round * bytes, window, bytes);
-        tape.samples = window;
-        tape.first_round = in_window = round;
+        const uint32_t bytes = stream.fingers * BT_SLOTS * 2;
+        read_at(tape_file, BT_EMU_TAPE_HEADER_BYTES + round * bytes, window, bytes);
+        in_window = round;
     }
-    return bt_tape_count(context, finger, channel, t_ns);
+    return bt_emu_stream_by_clock(context, finger, channel, t_ns);
 }
 
 void port_spi_select(bt_port *port, uint8_t mask)
@@ -256,7 +256,7 @@ void spi_start(void);
 void spi_start(void)
 {
     read_command_line();
-    bt_emu_bus_init(&bus, tape.fingers, serials[0] == '-' ? "" : serials, count, &tape);
+    bt_emu_bus_init(&bus, stream.fingers, serials[0] == '-' ? "" : serials, count, &stream);
 }
 
 // ---- flash, as NOR flash is -------------------------------------------------------------------------------

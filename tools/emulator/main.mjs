@@ -9,6 +9,9 @@
 // port can be opened, and gives the first one power when stdin says "power". --endless: however long the tape is, what the
 // sensors play is somebody else's business, and time does not end with it.
 //
+// --live N in place of --tape: a program feeds N fingers round by round (control.mjs), and time stands still until it has
+// sent the next round. Writes "control PORT" first; the board boots once the first round has come.
+//
 // --uart-master has another pty on the pins of the UART that the image uses.
 //
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
@@ -23,6 +26,7 @@
 import fs from 'node:fs'
 import { parseArgs } from 'node:util'
 
+import { Control } from './control.mjs'
 import { Pty } from './pty.mjs'
 import { Rig } from './rig.mjs'
 import { SensorBoard } from './sensor_board.mjs'
@@ -40,6 +44,7 @@ const { values: options } = parseArgs({
     'sensor-pty': text,
     'sensor-master': text,
     tape: text,
+    live: text,
     pty: text,
     master: text,
     'uart-master': text,
@@ -61,9 +66,10 @@ const pty = new Pty(Number(options.master))
 const sensorPty = options.sensor === undefined ? null : new Pty(Number(options['sensor-master']))
 const uartPty = options['uart-master'] === undefined ? null : new Pty(Number(options['uart-master']))
 const ports = uartPty === null ? [pty] : [pty, uartPty]
-const tape = read(options.tape)
+const tape = options.live === undefined ? read(options.tape) : null
 let sensors = null
 let rig = null // once the gateway has power
+let control = null // where a program feeds the sensors
 
 function read(path) {
   try {
@@ -75,10 +81,10 @@ function read(path) {
 
 function plugIn() {
   try {
-    if (sensorPty === null) sensors = new Sensors(read(options.wasm), tape, options.serials)
+    if (sensorPty === null) sensors = new Sensors(read(options.wasm), tape, options.serials, Number(options.live))
     else sensors = new SensorBoard({ image: read(options.sensor), tape, endless: options.endless, port: sensorPty })
   } catch (error) {
-    die(options.sensor ?? options.tape, error.message)
+    die(options.sensor ?? options.tape ?? '--live', error.message)
   }
 }
 
@@ -90,6 +96,12 @@ function power() {
     die(options.image, error.message)
   }
   boot()
+}
+
+/** A program sent something to the sensors. The board samples as it boots: it gets power once there is a round. */
+function fed() {
+  if (rig !== null) rig.goOn()
+  else if (sensors.hasRound) power()
 }
 
 let asked = false // to end the hold
@@ -171,6 +183,7 @@ function turn() {
         console.log('end')
       }
       tellAwaited(true)
+      if (!rig.waiting) control?.report()
       return sensorsAlone()
     }
   }
@@ -214,6 +227,12 @@ function loop() {
 }
 
 plugIn()
-if (sensorPty === null) power()
-else console.log(`sensor ${options['sensor-pty']}`)
+if (sensors.live) {
+  control = new Control(sensors, () => pty.putBytes, fed)
+  await control.listen()
+} else if (sensorPty === null) {
+  power()
+} else {
+  console.log(`sensor ${options['sensor-pty']}`)
+}
 loop()

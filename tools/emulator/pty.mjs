@@ -12,6 +12,7 @@ export class Pty {
     this.received = [] // chunks on their way to the board
     this.pending = [] // chunks on their way to the program
     this.pendingBytes = 0
+    this.putBytes = 0 // in all
     this.buffer = Buffer.alloc(READ_BYTES)
   }
 
@@ -47,6 +48,7 @@ export class Pty {
   put(bytes) {
     this.pending.push(bytes)
     this.pendingBytes += bytes.length
+    this.putBytes += bytes.length
   }
 
   flush() {

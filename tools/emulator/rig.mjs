@@ -46,7 +46,9 @@ export class Rig {
     while (this.machine.nanos < end) {
       const world = this.machine.worldNanos
       while (this.events.length > 0 && this.events[0][0] <= world) this.act(this.events.shift()[1])
-      const next = this.events.length > 0 && !this.machine.time.held ? this.events[0][0] - world : Infinity
+      const stands = this.sensors.standsAt ?? Infinity
+      if (world >= stands) this.machine.time.hold() // the next round has not come
+      const next = this.machine.time.held ? Infinity : Math.min(stands, this.events[0]?.[0] ?? Infinity) - world
       this.machine.runUntil(Math.min(end, this.machine.nanos + next))
       if (this.powerFailed) {
         this.powerFailed = false
@@ -60,6 +62,11 @@ export class Rig {
   release() {
     this.waiting = false
     this.machine.time.release()
+  }
+
+  /** The next round came. */
+  goOn() {
+    if (!this.waiting && this.machine.worldNanos < (this.sensors.standsAt ?? Infinity)) this.machine.time.release()
   }
 
   /** Have a verb done at a time of the world; seconds since its first power-up. */

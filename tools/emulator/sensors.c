@@ -2,7 +2,9 @@
 //
 // Times cross as double, which is exact to 2^53 ns (104 days) and saves a BigInt per call.
 #include "bus.h"
-#include "tape.h"
+#include "feed.h"
+
+#include <string.h>
 
 #define EXPORT(name)  __attribute__((export_name(name)))
 #define PAGE_BYTES    65536u
@@ -10,8 +12,11 @@
 
 extern unsigned char __heap_base;
 
-static bt_tape tape;
+static bt_emu_stream stream;
+static bt_emu_feed feed;
 static bt_emu_bus bus;
+static uint8_t answers[4096]; // to the program that feeds
+static uint32_t answer_bytes;
 static char serials[SERIALS_BYTES];
 static bool sampled_behind_the_end;
 
@@ -36,24 +41,93 @@ EXPORT("serials") char *serials_at(void)
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     // The tape's last sample is over when somebody asks for the next one.
-    sampled_behind_the_end = sampled_behind_the_end || (channel != BT_EMU_LINE && bt_tape_over(&tape, t_ns));
-    return bt_tape_count(context, finger, channel, t_ns);
+    sampled_behind_the_end = sampled_behind_the_end || (channel != BT_EMU_LINE && bt_emu_stream_lacks(&stream, t_ns));
+    return bt_emu_stream_by_clock(context, finger, channel, t_ns);
+}
+
+static void plug_all_in(void)
+{
+    bt_emu_bus_init(&bus, stream.fingers, serials, count, &stream);
 }
 
 // Plug in: 0, or the address of what is wrong with the tape that lies at room().
 EXPORT("plug_in") const char *plug_in(uint32_t bytes)
 {
-    const char *wrong = bt_tape_open(&tape, &__heap_base, bytes);
+    const char *wrong = bt_emu_stream_open(&stream, &__heap_base, bytes);
     if (wrong == NULL) {
-        bt_emu_bus_init(&bus, tape.fingers, serials, count, &tape);
+        plug_all_in();
     }
     return wrong;
+}
+
+static void keep_answer(const uint8_t *frame, size_t bytes)
+{
+    if (bytes <= sizeof answers - answer_bytes) {
+        memcpy(answers + answer_bytes, frame, bytes);
+        answer_bytes += (uint32_t)bytes;
+    }
+}
+
+// Plug in so many fingers, which a program feeds through a ring at room(), of so many samples.
+EXPORT("plug_in_live") void plug_in_live(uint32_t fingers, uint32_t samples)
+{
+    bt_emu_stream_init(&stream, (uint16_t *)(void *)&__heap_base, samples);
+    (void)bt_emu_stream_put(&stream, (uint8_t)fingers, NULL, 0);
+    plug_all_in();
+}
+
+EXPORT("feed_begin") void feed_begin(void)
+{
+    bt_emu_feed_begin(&feed, &stream, keep_answer);
+}
+
+// The program sent so many bytes, which lie at fed(); what it is to be answered lies at answers().
+EXPORT("fed") uint8_t *fed(void)
+{
+    static uint8_t bytes[4096];
+    return bytes;
+}
+
+EXPORT("feed") void feed_bytes(uint32_t bytes, uint32_t link_bytes)
+{
+    feed.link_bytes = link_bytes;
+    bt_emu_feed_receive(&feed, fed(), bytes);
+}
+
+EXPORT("report") void report(uint32_t link_bytes)
+{
+    feed.link_bytes = link_bytes;
+    bt_emu_feed_report(&feed);
+}
+
+EXPORT("answers") uint8_t *answers_at(void)
+{
+    return answers;
+}
+
+// How many bytes of answers there are; they are forgotten then.
+EXPORT("answered") uint32_t answered(void)
+{
+    const uint32_t bytes = answer_bytes;
+    answer_bytes = 0;
+    return bytes;
+}
+
+// When time has to stand still for want of the next round, in ns.
+EXPORT("lacks_at") double lacks_at(void)
+{
+    return (double)bt_emu_stream_lacks_at_ns(&stream);
+}
+
+EXPORT("rounds") uint32_t rounds(void)
+{
+    return stream.taken / BT_SLOTS;
 }
 
 // Power lost and back: the sensors forget what they were asked, the world they feel goes on.
 EXPORT("power_cycle") void power_cycle(void)
 {
-    bt_emu_bus_init(&bus, tape.fingers, serials, count, &tape);
+    plug_all_in();
 }
 
 EXPORT("select") void select_sensors(uint32_t mask, double t_ns)
@@ -73,7 +147,7 @@ EXPORT("transfer_byte") uint32_t transfer_byte(uint32_t mosi, double t_ns)
 
 EXPORT("started") int started(void)
 {
-    return tape.started;
+    return stream.started;
 }
 
 EXPORT("over") int over(void)

@@ -14,9 +14,11 @@ const SPI_FUNCTION = 1
 export const WIDTHS = [8, 16] // of a property's byte; of all else
 const STRETCH_NS = 150e3
 const FASTEST_HZ = 10e6 // data sheet
-const COMMANDS = new Map(
-  JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.channel.map(({ name, command }) => [name, command]),
-)
+const SENSOR = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor
+const COMMANDS = new Map(SENSOR.channel.map(({ name, command }) => [name, command]))
+const SLOTS = SENSOR.frame.slots.length
+const LIVE_ROUNDS = 64 // that a program may be ahead, as in the posix port
+const LEAD_NS = 20e3 // before a slot: the words of the one before have been read
 const RESET_SPI0 = 1 << 16
 const SAMPLE_COMMAND = 0x80 // and above
 
@@ -25,15 +27,23 @@ const odd = (byte) => (byte.toString(2).split('1').length - 1) % 2 === 1
 
 /** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
 export class Sensors {
-  constructor(wasm, tape, serials) {
+  /** tape: what they play; null: a program feeds as many as there are `liveFingers` (control.mjs). */
+  constructor(wasm, tape, serials, liveFingers) {
     const module = new WebAssembly.Module(wasm)
     this.calls = new WebAssembly.Instance(module).exports
-    const at = this.calls.room(tape.length)
-    if (at === 0) throw new Error(`no memory for a tape of ${tape.length} bytes`)
-    this.#bytes().set(tape, at)
+    this.live = tape === null
+    const samples = LIVE_ROUNDS * SLOTS * liveFingers
+    const bytes = this.live ? 2 * samples : tape.length
+    const at = this.calls.room(bytes)
+    if (at === 0) throw new Error(`no memory for a tape of ${bytes} bytes`)
     this.#bytes().set(Buffer.from(`${serials}\0`), this.calls.serials())
-    const wrong = this.calls.plug_in(tape.length)
-    if (wrong !== 0) throw new Error(this.#text(wrong))
+    if (this.live) {
+      this.calls.plug_in_live(liveFingers, samples)
+    } else {
+      this.#bytes().set(tape, at)
+      const wrong = this.calls.plug_in(tape.length)
+      if (wrong !== 0) throw new Error(this.#text(wrong))
+    }
     this.overlaps = 0 // transfers with more than one chip select low: commands to all, else contention
     this.misconfigured = 0
     this.ends = CHIP_SELECTS.map((_, finger) => 1 << finger) // of the selects' leads: whom each selects
@@ -52,7 +62,40 @@ export class Sensors {
 
   /** Somebody has asked for a sample behind the tape's last. */
   get over() {
-    return this.calls.over() !== 0
+    return !this.live && this.calls.over() !== 0
+  }
+
+  /** When time has to stand still because the next round is missing; ns of the sensors' world. */
+  get standsAt() {
+    return this.live && this.started ? this.calls.lacks_at() - LEAD_NS : Infinity
+  }
+
+  /** A whole round has come. */
+  get hasRound() {
+    return this.calls.rounds() > 0
+  }
+
+  /** A program begins to feed. */
+  feedBegins() {
+    this.calls.feed_begin()
+  }
+
+  /** Have what a program sent carried out; the answer. */
+  feed(chunk, linkBytes) {
+    this.#bytes().set(chunk, this.calls.fed())
+    this.calls.feed(chunk.length, linkBytes)
+    return this.#answers()
+  }
+
+  /** What to say of a standstill, once for each length of what came. */
+  report(linkBytes) {
+    this.calls.report(linkBytes)
+    return this.#answers()
+  }
+
+  #answers() {
+    const at = this.calls.answers()
+    return Buffer.from(this.#bytes().slice(at, at + this.calls.answered()))
   }
 
   counters() {

@@ -1551,6 +1551,8 @@ void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STA
     at = put(at, (uint32_t)msg->rounds_moved, 4);
     at = put(at, (uint32_t)msg->loop_slots, 4);
     at = put(at, (uint32_t)msg->looping, 1);
+    at = put(at, (uint32_t)msg->rounds_late, 4);
+    at = put(at, (uint32_t)msg->link_bytes, 4);
     (void)at;
 }
 
@@ -1584,6 +1586,10 @@ void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_ST
     msg->loop_slots = (uint32_t)value;
     at = get(at, &value, 1);
     msg->looping = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->rounds_late = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->link_bytes = (uint32_t)value;
     (void)at;
 }
 
@@ -1692,6 +1698,7 @@ void bt_msg_emu_play_pack(const bt_msg_emu_play *msg, uint8_t out[BT_EMU_PLAY_BY
     at = put(at, (uint32_t)msg->req_id, 1);
     at = put(at, (uint32_t)msg->hold_slot, 4);
     at = put(at, (uint32_t)msg->by_time, 1);
+    at = put(at, (uint32_t)msg->live, 1);
     (void)at;
 }
 
@@ -1705,6 +1712,8 @@ void bt_msg_emu_play_unpack(bt_msg_emu_play *msg, const uint8_t in[BT_EMU_PLAY_B
     msg->hold_slot = (uint32_t)value;
     at = get(at, &value, 1);
     msg->by_time = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->live = (uint8_t)value;
     (void)at;
 }
 

@@ -7,22 +7,22 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-static _Alignas(4) uint8_t memory[BT_KEPT_BYTES];
-static uint8_t *flash = memory;
+static int file = -1;
+static uint8_t *flash;
 
 const char *flash_open(const char *path)
 {
+    static uint8_t erased[BT_KEPT_BYTES];
     struct stat s;
-    memset(memory, 0xFF, sizeof memory);
-    if (path == NULL) {
-        return NULL;
-    }
-    int fd = open(path, O_RDWR | O_CREAT, 0666);
+    memset(erased, 0xFF, sizeof erased);
+    FILE *nameless = path == NULL ? tmpfile() : NULL;
+    int fd = path != NULL ? open(path, O_RDWR | O_CREAT, 0666) : nameless != NULL ? fileno(nameless) : -1;
     if (fd < 0 || fstat(fd, &s) != 0) {
         return strerror(errno);
     }
@@ -31,16 +31,26 @@ const char *flash_open(const char *path)
         return "not a flash file: its size is not that of the simulated board's flash; choose another file";
     }
     size_t missing = BT_KEPT_BYTES - (size_t)s.st_size;
-    if (pwrite(fd, memory, missing, s.st_size) != (ssize_t)missing) {
+    if (pwrite(fd, erased, missing, s.st_size) != (ssize_t)missing) {
         return "cannot be extended to its full size; is the disk full?";
     }
+    return flash_resume(fd);
+}
+
+const char *flash_resume(int fd)
+{
     void *bytes = mmap(NULL, BT_KEPT_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-    (void)close(fd);
     if (bytes == MAP_FAILED) {
         return strerror(errno);
     }
     flash = bytes;
+    file = fd;
     return NULL;
+}
+
+int flash_fd(void)
+{
+    return file;
 }
 
 bool port_flash_erase(bt_port *port, uint32_t sector_offset)

@@ -1,22 +1,28 @@
 // The board that is a process: emulated sensors on an emulated bus, the link on a pty, device time
 // that passes only as the firmware spends it.
 //
-//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
+//   biotac-sim --tape FILE | --live FINGERS
+//              [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
+// --live: a program feeds the sensors round by round (control.h), and device time stands still until it has sent
+//   the next round. Writes "control PORT" before "pty PATH".
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
 // --flash: where saved settings and maps are kept; without it they are gone with the process.
-// --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
+// --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a host's
+// command does. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "only_board.h"
 #include "spi_word_by_word.h"
 
 #include "bus.h"
 #include "clock.h"
+#include "control.h"
 #include "flash.h"
 #include "map/store.h"
 #include "pty.h"
-#include "tape.h"
+#include "restart.h"
+#include "stream.h"
 #include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
@@ -33,13 +39,17 @@
 // How often the link is served, in device time: a USB board does so every millisecond.
 #define LINK_PERIOD_NS 1000000u
 #define SLOTS_PUT_OFF  1000u
+#define LIVE_ROUNDS    64u // that a program may be ahead
 
-static bt_tape tape;
+static bt_emu_stream stream;
+static uint16_t live_ring[LIVE_ROUNDS * BT_SLOTS * BT_MAX_FINGERS];
+static bool live;
 static bt_emu_bus bus;
 static uint32_t alarm_us;
 static bool armed;
 static bool held;
 static bool ended;
+static bool restart_due;
 static bool link_due = true;
 static uint64_t link_ns;
 static uint32_t boot_id;
@@ -62,20 +72,71 @@ static void load_tape(const char *path)
     if (bytes == MAP_FAILED) {
         die(path, strerror(errno));
     }
-    const char *wrong = bt_tape_open(&tape, bytes, (size_t)s.st_size);
+    const char *wrong = bt_emu_stream_open(&stream, bytes, (size_t)s.st_size);
     if (wrong != NULL) {
         die(path, wrong);
     }
     (void)close(fd);
 }
 
+static void feed_live(const char *fingers)
+{
+    const int count = atoi(fingers);
+    if (count < 1 || count > BT_MAX_FINGERS) {
+        die("--live", "expected 1 to 5 fingers");
+    }
+    live = true;
+    bt_emu_stream_init(&stream, live_ring, LIVE_ROUNDS * BT_SLOTS * (unsigned)count);
+    (void)bt_emu_stream_put(&stream, (uint8_t)count, NULL, 0); // so many fingers
+    control_init(&stream);
+    if (restarted() != NULL) {
+        control_resume(restarted()->listening, restarted()->program);
+        return;
+    }
+    const unsigned port = control_open();
+    if (port == 0) {
+        die("cannot listen on the loopback interface", strerror(errno));
+    }
+    printf("control %u\n", port);
+}
+
+// After a reset the world of the sensors goes on where it was, and whoever has the link open still has it.
+static void resume(void)
+{
+    if (live) { // a round that was not computed is the first that the board reads
+        stream.taken = stream.at = stream.begins_at = restarted()->taken;
+    } else {
+        stream.started = restarted()->started;
+        stream.start_ns = restarted()->start_ns;
+    }
+    boot_id += restarted()->times;
+    held = false;
+    pty_resume(restarted()->pty, !paced);
+}
+
+static void restart(void)
+{
+    restart_process(&(restart_state){
+        .pty = pty_fd(),
+        .flash = flash_fd(),
+        .listening = control_listening_fd(),
+        .program = control_program_fd(),
+        .started = stream.started,
+        .start_ns = stream.start_ns - clock_now_ns(), // a board's clock begins at 0
+        .taken = stream.taken,
+    });
+    die("cannot restart", strerror(errno));
+}
+
 bt_port *port_init(int argc, char **argv)
 {
     const char *tape_path = NULL;
+    const char *live_fingers = NULL;
     double pace = 1.0;
     const char *serials = "";
     const char *flash_path = NULL;
     boot_id = (uint32_t)getpid();
+    restart_init(argv);
     for (int k = 1; k < argc; k++) {
         if (strcmp(argv[k], "--hold") == 0) {
             held = true;
@@ -83,6 +144,8 @@ bt_port *port_init(int argc, char **argv)
             die(argv[k], "unknown option, or its value is missing");
         } else if (strcmp(argv[k], "--tape") == 0) {
             tape_path = argv[++k];
+        } else if (strcmp(argv[k], "--live") == 0) {
+            live_fingers = argv[++k];
         } else if (strcmp(argv[k], "--pace") == 0) {
             pace = atof(argv[++k]);
         } else if (strcmp(argv[k], "--boot-id") == 0) {
@@ -95,18 +158,26 @@ bt_port *port_init(int argc, char **argv)
             die(argv[k], "unknown option");
         }
     }
-    if (tape_path == NULL) {
-        die("--tape", "missing; expected a tape, which `biotac sim` makes and passes");
+    if ((tape_path == NULL) == (live_fingers == NULL)) {
+        die("--tape", "expected either a tape, which `biotac sim` makes and passes, or --live");
     }
-    load_tape(tape_path);
-    const char *wrong = flash_open(flash_path);
+    if (tape_path != NULL) {
+        load_tape(tape_path);
+    } else {
+        feed_live(live_fingers);
+    }
+    const char *wrong = restarted() != NULL ? flash_resume(restarted()->flash) : flash_open(flash_path);
     if (wrong != NULL) {
         die(flash_path, wrong);
     }
-    bt_emu_bus_init(&bus, tape.fingers, serials, bt_tape_count, &tape);
+    bt_emu_bus_init(&bus, stream.fingers, serials, bt_emu_stream_by_clock, &stream);
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     paced = pace > 0;
     clock_init(pace);
+    if (restarted() != NULL) {
+        resume();
+        return ONLY_BOARD;
+    }
     const char *path = pty_open(!paced);
     if (path == NULL) {
         die("cannot open a pty", strerror(errno));
@@ -144,14 +215,16 @@ static uint64_t alarm_ns(void)
 static void read_control(void)
 {
     char text[64];
-    ssize_t n = read(STDIN_FILENO, text, sizeof text);
+    ssize_t n = read(STDIN_FILENO, text, sizeof text - 1);
     if (n == 0) {
         exit(0); // whoever started us is gone
     }
-    if (n > 0 && memchr(text, 'r', (size_t)n) != NULL && held) { // "run"
+    text[n > 0 ? n : 0] = 0;
+    if (strstr(text, "run") != NULL && held) {
         held = false;
         clock_rebase();
     }
+    restart_due = restart_due || strstr(text, "restart") != NULL;
 }
 
 static void stand_still(void)
@@ -159,13 +232,24 @@ static void stand_still(void)
     static bool reported;
     link_due = true;
     pty_flush();
+    if (live && !held) {
+        control_report_stillness(pty_written());
+    }
     if (ended && !reported) {
         reported = true;
         printf("end\n");
         (void)fflush(stdout);
     }
-    pty_wait(STDIN_FILENO, -1);
-    read_control();
+    switch (pty_wait(STDIN_FILENO, control_fd(), -1)) {
+    case PTY_WAITED_OTHER:
+        read_control();
+        break;
+    case PTY_WAITED_ANOTHER:
+        control_poll(pty_written());
+        break;
+    default:
+        break;
+    }
 }
 
 void port_idle(bt_port *port)
@@ -173,9 +257,14 @@ void port_idle(bt_port *port)
     if (!armed) {
         return;
     }
+    if (restart_due) {
+        pty_flush(); // with the reply to the command
+        restart();
+    }
     uint64_t next_ns = alarm_ns();
-    ended = ended || bt_tape_over(&tape, next_ns);
-    if (held || ended) {
+    const bool lacks = bt_emu_stream_lacks(&stream, next_ns);
+    ended = ended || (lacks && !live);
+    if (held || lacks) {
         stand_still();
         return;
     }
@@ -188,7 +277,7 @@ void port_idle(bt_port *port)
     }
     int64_t wait_us = clock_wait_us(next_ns);
     if (wait_us > 1000) { // shorter waits are caught up with: device time is exact either way
-        pty_wait(-1, wait_us);
+        (void)pty_wait(-1, -1, wait_us);
     }
     if (next_ns > clock_now_ns()) {
         clock_advance_ns(next_ns - clock_now_ns());
@@ -269,7 +358,8 @@ bool port_link_touched(bt_port *port)
 
 bool port_reboot(bt_port *port, bool into_bootloader)
 {
-    return false; // a process has no loader
+    restart_due = restart_due || !into_bootloader;
+    return !into_bootloader; // a process has no loader
 }
 
 port_facts port_measure(bt_port *port)

@@ -17,6 +17,7 @@ static bool wait_for_host;
 static uint8_t ring[RING_BYTES];
 static size_t ring_start;
 static size_t ring_filled;
+static uint32_t written;
 
 const char *pty_open(bool lossless)
 {
@@ -42,6 +43,17 @@ const char *pty_open(bool lossless)
     (void)close(slave); // while nobody holds it, poll() on the master says POLLHUP: that is our DTR
     (void)fcntl(master, F_SETFL, O_NONBLOCK);
     return path;
+}
+
+void pty_resume(int fd, bool lossless)
+{
+    master = fd;
+    wait_for_host = lossless;
+}
+
+int pty_fd(void)
+{
+    return master;
 }
 
 bool pty_up(void)
@@ -93,7 +105,13 @@ bool pty_write(const uint8_t *data, size_t bytes)
         (void)poll(&p, 1, 100);
     }
     put(data, bytes);
+    written += (uint32_t)bytes;
     return true;
+}
+
+uint32_t pty_written(void)
+{
+    return written;
 }
 
 size_t pty_read(uint8_t *data, size_t bytes)
@@ -102,14 +120,16 @@ size_t pty_read(uint8_t *data, size_t bytes)
     return n > 0 ? (size_t)n : 0;
 }
 
-void pty_wait(int other, int64_t us)
+enum pty_waited pty_wait(int other, int another, int64_t us)
 {
     // While nobody has the port open, POLLHUP is always set and poll() would not wait on it.
     bool up = pty_up();
-    struct pollfd p[2] = {
+    struct pollfd p[3] = {
         {.fd = up ? master : -1, .events = (short)(POLLIN | (ring_filled > 0 ? POLLOUT : 0))},
         {.fd = other, .events = POLLIN},
+        {.fd = another, .events = POLLIN},
     };
     int64_t longest_us = up ? us : us < 0 || us > 2000 ? 2000 : us; // look for a new host every 2 ms
-    (void)poll(p, 2, longest_us < 0 ? -1 : (int)((longest_us + 999) / 1000));
+    (void)poll(p, 3, longest_us < 0 ? -1 : (int)((longest_us + 999) / 1000));
+    return p[1].revents ? PTY_WAITED_OTHER : p[2].revents ? PTY_WAITED_ANOTHER : PTY_WAITED;
 }

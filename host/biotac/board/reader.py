@@ -98,7 +98,7 @@ class Reader:
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._bytes = self._frames = 0
         self._arrivals = Arrivals(self.clock)
-        self._waits_for_room = link.pace == 0
+        self._waits_for_room = link.pace == 0 and not link.lock_step
         self._own: list[threading.Thread] = []
         self._thread = self.thread(self._run, "reader")
         self.start = self._thread.start

@@ -31,6 +31,7 @@ from .commands import Commands
 from .configuration import Configuration
 from .reading import Reading
 from .record import Mark, Recorder
+from .rounds import Round, Rounds
 from .subscriptions import Subscriptions
 from .views import Fingers, FingerView, Latest, checked_names, finger_index
 
@@ -76,6 +77,7 @@ class Hand:
         self._reading = Reading(board, self._stream, self._commands, self._latest)
         self._subscriptions = Subscriptions(reader, self._stream, self._callbacks, self._reading, self._latest)
         self._recorders: list[Recorder] = []  # the open one last
+        self._rounds: Rounds | None = None  # once a program asks for rounds
         self._watch = StreamWatch(board, self._stream, self._callbacks, reconnect=reconnect)
         self._watch.start()
         # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
@@ -271,6 +273,21 @@ class Hand:
     _go = _of("_reading", Reading.go)
     read = _of("_reading", Reading.read)
     read_batch = _of("_reading", Reading.read_batch)
+
+    def next_round(self, after: Round | None = None, timeout_s: float = 1.0) -> Round:
+        """The frames of all fingers of one round and the events up to its end, starting the stream if need be.
+
+        Waits for a round later than ``after``, or without it for one that is complete after this call; returns the
+        newest, and says how many were passed over. A loop that gives its last round each time gets every event once,
+        whatever it computes meanwhile. A finger that sends heartbeats (``rest=False``) has no frame. One thread at a
+        time may call this. Raises TimeoutError when no round comes in time, DeviceLostError when the board is lost for
+        good.
+        """
+        self._reading.set_aside()
+        if self._rounds is None:
+            self._rounds = Rounds(self._reader, self._latest)
+        self._go()
+        return self._rounds.wait(after, timeout_s)
 
     # ---- callbacks (subscriptions.py) ----------------------------------------------------------
 

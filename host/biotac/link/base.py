@@ -50,6 +50,10 @@ class Link(Protocol):
     #: Device seconds per second of this computer. 0: device time waits for the reader, and nothing has to be dropped.
     pace: float = 1.0
 
+    #: Whether device time waits for the program that feeds a simulated board's sensors round by round, besides
+    #: ``pace`` 0: then nothing needs to wait for a reader.
+    lock_step: bool = False
+
     #: Factor on all timeouts, 1 for a board on a cable. More where the board is a process on this computer: it slows
     #: down when the computer is busy, and its end is noticed at once.
     patience: float = 1.0

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from .faults import EVERY_FAULT, FAULTS
 from .gains import fit_gains
 from .loading import bundled_scenarios, load_source
 from .physics import GAP_MM, PROFILES, Finger, Footprints, Profile, States, deform
 from .random_loads import plate_recording, random_loads
-from .sampling import sample, tdc_counts
+from .sampling import Sampler, sample, tdc_counts
 from .scenario import FLAT_MM
 from .source import Source, Truth
 from .timeline import Pose, Track
+from .touch import Course, Load, Touch
+from .world import World, world
+
+SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 
 __all__ = [
-    "FLAT_MM", "GAP_MM", "PROFILES", "Finger", "Footprints", "Pose", "Profile", "Source", "States", "Track", "Truth",
-    "bundled_scenarios", "deform", "fit_gains", "load_source", "plate_recording", "random_loads", "sample",
-    "tdc_counts",
+    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PROFILES", "Course", "Finger", "Footprints", "Load", "Pose", "Profile",
+    "Sampler", "SimFinger", "Source", "States", "Touch", "Track", "Truth", "World", "bundled_scenarios", "deform",
+    "fit_gains", "load_source", "plate_recording", "random_loads", "sample", "tdc_counts", "world",
 ]  # fmt: skip

@@ -53,6 +53,7 @@ class EmulatedBoard(SimBoard):
         *,
         pace: float,
         hold: bool,
+        live: bool = False,
         image: str | None = None,
         uart: bool = False,
         verbs: Sequence[str] = (),
@@ -61,7 +62,7 @@ class EmulatedBoard(SimBoard):
         self._verbs = verbs
         self._has_uart = uart
         self.uart_path = ""
-        super().__init__(source, pace=pace, hold=hold)
+        super().__init__(source, pace=pace, hold=hold, live=live)
 
     def _start(self, options: list[str]) -> Any:
         tools = self._tools

@@ -11,6 +11,7 @@ from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
+from .faults import BUS_FAULTS, FAULTS, Faulty, broken_electrode, fault_named, on_the_bus
 from .gains import fit_gains
 from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
@@ -42,12 +43,18 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     emulated = tuple(Finger(spec.seed, spec.profile, spec.scale) for spec in specs)
     for index, track in enumerate(scenario.tracks[:count]):
         states = track.states(_seconds(np.arange(played + 1)))
-        codes = _codes([fault for fault in scenario.faults if fault.finger == index], period)
         for k in range(index, count, own):
             samples[:, k] = sampling.sample(emulated[k], states, boundary)
-            if codes is not None:
-                laid = codes[frame]
-                np.copyto(samples[:, k], laid, where=laid > 0)
+    for fault in scenario.faults:  # of the sensors first, which feel each other's
+        for k in range(fault.finger, count, own) if fault.kind in FAULTS else ():
+            _lay(fault, samples, emulated, k, period)
+    for index in range(min(own, count)):
+        codes = _codes(
+            [fault for fault in scenario.faults if fault.finger == index and fault.kind in BUS_FAULTS], period
+        )
+        for k in range(index, count, own) if codes is not None else ():
+            laid = codes[frame]  # type: ignore[index]
+            np.copyto(samples[:, k], laid, where=laid > 0)
 
     def middles(frames: int) -> list[States]:
         states = [track.states(_seconds(np.arange(frames) + 0.5)) for track in scenario.tracks[:count]]
@@ -84,7 +91,7 @@ def _repeated(spec: FingerSpec, repetition: int) -> FingerSpec:
 
 
 def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
-    """Codes that faults put in place of counts, (period, 44): in every slot that begins during a fault; otherwise 0."""
+    """Codes that bus faults put in place of counts, (period, 44): in every slot that begins during a fault; otherwise 0."""
     if not faults:
         return None
     codes = np.zeros((period, slots.SLOTS_PER_FRAME), np.uint16)
@@ -93,10 +100,24 @@ def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
         begin, end = (round(t * _sensor.SLOT_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
         hit = codes.reshape(-1)[begin:end]  # no more than it lasts: there may be many
         if fault.channel is None:
-            hit[:] = fault.code
+            hit[:] = BUS_FAULTS[fault.kind]
         else:
-            hit[_IS_CHANNEL[fault.channel][np.arange(begin, begin + len(hit)) % slots.SLOTS_PER_FRAME]] = fault.code
+            hit[_IS_CHANNEL[fault.channel][np.arange(begin, begin + len(hit)) % slots.SLOTS_PER_FRAME]] = BUS_FAULTS[
+                fault.kind
+            ]
     return codes
+
+
+def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k: int, period: int) -> None:
+    """Lay a fault of the sensor over finger ``k`` of samples (frames, fingers, 44), anew in each repetition."""
+    beside = (k + 1) % len(emulated)
+    rest, other_rest = (emulated[finger].rest_counts(np.zeros(1))[0] for finger in (k, beside))
+    begin, end = (round(t * slots.FRAME_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
+    lay = fault_named(fault.kind)
+    for first in range(0, len(samples) - begin, period):
+        rows = slice(first + begin, first + end)
+        faulty = Faulty(broken_electrode(fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7]))
+        samples[rows, k] = on_the_bus(lay(faulty, samples[rows, k], samples[rows, beside]))
 
 
 def _fit(emulated: tuple[Finger, ...], middles: list[States]) -> dict[str, int]:

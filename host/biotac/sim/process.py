@@ -18,6 +18,7 @@ from typing import Any
 from ..errors import DeviceLostError, PortError
 from ..link.serial_port import SerialLink
 from ..wire.native import BUILT
+from .control import Control
 from .source import Source
 from .tape import write_tape
 
@@ -25,34 +26,55 @@ from .tape import write_tape
 class SimBoard:
     """A running simulator process; ``path`` is a pty that any serial program can open."""
 
-    def __init__(self, source: Source, *, pace: float, hold: bool) -> None:
+    def __init__(
+        self, source: Source, *, pace: float, hold: bool, live: bool = False, flash: Path | None = None
+    ) -> None:
+        """Start it: it plays ``source``; ``live``: that is only the first rounds, and control.feed() has the next.
+
+        ``flash`` is the file in which it keeps settings and maps. Raises PortError when it does not start.
+        """
         self.source = source
         self.pace = pace
+        self.control: Control | None = None
         self.over = False  # the tape has been played, and everything handed over
         self._heard = b""
         self._answers: list[str] = []
         self._hearing = threading.Lock()
         self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
-        tape = Path(self._folder.name) / "counts.tape"
-        write_tape(tape, source)
-        options = ["--tape", str(tape), "--pace", str(pace)]
+        options = ["--pace", str(pace)]
+        if live:
+            options += ["--live", str(source.samples.shape[1])]
+        else:
+            write_tape(Path(self._folder.name) / "counts.tape", source)
+            options += ["--tape", str(Path(self._folder.name) / "counts.tape")]
         options += ["--serials", ",".join(source.serials)] if source.serials else []
+        options += ["--flash", str(flash)] if flash is not None else []
         options += ["--hold"] if hold else []
         try:
             self._process = self._start(options)
         except BaseException:
             self._folder.cleanup()
             raise
-        first = self._process.stdout.readline().decode().split()
-        if len(first) != 2 or first[0] != "pty":
-            error = self._last_lines()
+        try:
+            if live:
+                self.control = Control(int(self._announced("control")))
+                for words in source.samples:  # an emulated board samples as it boots
+                    self.control.feed(words)
+            self.path = self._announced("pty")
+        except BaseException:
             self.close()
-            raise PortError(f"the simulator did not start: {error or 'no message'}")
-        self.path = first[1]
+            raise
         #: Of the board's stdout: readable when it has something to say, or is gone.
         self.stdout_fd: int = self._process.stdout.fileno()
         # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()
+
+    def _announced(self, what: str) -> str:
+        """The value of the next line of its stdout, which says where ``what`` is."""
+        words = self._process.stdout.readline().decode().split()
+        if len(words) != 2 or words[0] != what:
+            raise PortError(f"the simulator did not start: {self._last_lines() or 'no message'}")
+        return str(words[1])
 
     def _start(self, options: list[str]) -> Any:
         """The board's process, with three pipes; the environment variable BIOTAC_SIM is the command of another one."""
@@ -91,11 +113,14 @@ class SimBoard:
 
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
+        if self.control is not None:
+            self.control.close()
         with self._process:  # which then closes its pipes and waits
             self._process.kill()
         self._folder.cleanup()  # again, for a board that did not start
 
     def _last_lines(self) -> str:
+        self._process.stdin.close()  # a board that is still there ends
         self._process.wait(timeout=60)
         return " ".join(self._process.stderr.read().decode(errors="replace").split("\n")).strip()
 

@@ -6,6 +6,8 @@ numerics.md 3.1 for the electrodes and PDC; biotac.md 2.1 for what PAC, TAC and 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -54,25 +56,76 @@ def sample(finger: Finger, states: States, rows: npt.NDArray[np.int64] | None = 
     same words, and a longer run begins with the words of a shorter one.
     """
     rows = np.arange(len(states)) if rows is None else rows
-    reading = _Reading(finger, states)
+    sampler, effects = Sampler(finger), Effects.of(finger, states)
     words: Words = np.empty((len(rows) - 1, SLOTS_PER_FRAME), dtype=np.uint16)
     for first in range(0, len(words), _BLOCK):
-        words[first : first + _BLOCK] = reading.on(rows[first : first + _BLOCK + 1])
+        words[first : first + _BLOCK] = sampler.read(effects.at(rows[first : first + _BLOCK + 1]))
     return words
 
 
-class _Reading:
-    """A finger read block by block: precomputed effects of its states, and what carries over between blocks."""
+@dataclass(frozen=True)
+class Effects:
+    """What states do to one finger at n instants, before time and noise: each attribute has n rows.
 
-    def __init__(self, finger: Finger, states: States) -> None:
+    ``exact`` (n, 19) are counts, ``pressed`` (n, 19) those above rest, ``force_n`` (n,) the normal force, ``load`` (n,)
+    and ``tdc`` (n,) are counts, ``slip_mm_s`` (n,) is a speed; None where nothing ever slides.
+    """
+
+    exact: Floats
+    pressed: Floats
+    force_n: Floats
+    load: Floats
+    tdc: Floats
+    slip_mm_s: Floats | None
+
+    @classmethod
+    def of(cls, finger: Finger, states: States, *more: States, slips: bool = False) -> Effects:
+        """Those of one contact, or of several at once, whose temperature is the first one's.
+
+        ``slips``: keep the speeds even if nothing slides here.
+        """
+        contacts = (states, *more)
+        if more:
+            compression, bulge = (sum(part) for part in zip(*(one.deformation for one in contacts), strict=True))
+            exact = finger.counts_of(compression, bulge, states.warm_c)
+        else:
+            exact = finger.counts(states)
+        speeds = [one.slip_mm_s for one in contacts if one.slip_mm_s is not None]
+        speed = np.max(speeds, axis=0) if speeds else np.zeros(len(states))
+        return cls(
+            exact,
+            exact - finger.rest_counts(states.warm_c),
+            np.sum([one.force_n for one in contacts], axis=0),
+            np.sum([spring_load(one) for one in contacts], axis=0),
+            tdc_counts(REST_CELSIUS + states.warm_c),
+            speed if slips or speed.any() else None,
+        )
+
+    def _columns(self) -> tuple[Floats | None, ...]:
+        return self.exact, self.pressed, self.force_n, self.load, self.tdc, self.slip_mm_s
+
+    def at(self, rows: Any) -> Effects:
+        """Those at some instants, a NumPy index."""
+        return Effects(*(None if column is None else column[rows] for column in self._columns()))  # type: ignore[arg-type]
+
+    def then(self, later: Effects) -> Effects:
+        """These, and ``later`` ones behind them."""
+        pairs = zip(self._columns(), later._columns(), strict=True)
+        return Effects(*(None if a is None or b is None else np.concatenate([a, b]) for a, b in pairs))  # type: ignore[arg-type]
+
+
+class Sampler:
+    """Reads one finger round by round: its noise, drift and creep go on from call to call.
+
+    The same finger and loads give the same words as sample(), however they are cut into calls.
+
+    >>> sampler = Sampler(Finger(1))
+    >>> sampler.step(touch.states(Touch(normal_n=2.0))).shape
+    (44,)
+    """
+
+    def __init__(self, finger: Finger) -> None:
         self._finger = finger
-        self._exact = finger.counts(states)
-        self._pressed = self._exact - finger.rest_counts(states.warm_c)
-        self._force_n = states.force_n
-        self._load = spring_load(states)
-        self._tdc = tdc_counts(REST_CELSIUS + states.warm_c)
-        slips = states.slip_mm_s is not None and states.slip_mm_s.any()
-        self._slip_mm_s = states.slip_mm_s if slips else None
         # one random stream per kind, drawn frame by frame, so that a shorter run is a prefix of a longer one
         rngs = [np.random.default_rng([finger.seed, kind]) for kind in (1, 2, 3, 4, 5)]
         self._electrode_rng, self._glitch_rng, self._pac_rng, self._slow_rng, slip_rng = rngs
@@ -80,33 +133,48 @@ class _Reading:
         self._creep, self._pressure, self._high_pass = Lag(CREEP_S), Pressure(), _HighPass()
         self._hit = np.zeros((1, len(ELECTRODE_SLOT)), np.bool_)
         self._frame = 0
+        self._last: Effects | None = None
 
-    def on(self, rows: npt.NDArray[np.int64]) -> Words:
-        """The next n frames, (n, 44), between these n + 1 states; the first is the last of the previous call."""
-        finger, frames = self._finger, len(rows) - 1
+    def step(self, states: States, *more: States) -> Words:
+        """Read the next round, (44,), at whose end are ``states`` of one contact, or ``more`` at once, each (1,).
+
+        Within the round the load goes straight there from where the round before ended; the first one is at its
+        end throughout. With m states each, it goes through them in m equal parts.
+        """
+        now = Effects.of(self._finger, states, *more, slips=True)
+        before = now.at(slice(0, 1)) if self._last is None else self._last
+        self._last = now.at(slice(-1, None))
+        words: Words = self.read(before.then(now), len(states))[0]
+        return words
+
+    def read(self, effects: Effects, pieces: int = 1) -> Words:
+        """The next n rounds, (n, 44), between n * ``pieces`` + 1 instants; the first is the last of the call before."""
+        finger, frames = self._finger, (len(effects.load) - 1) // pieces
         words = np.empty((frames, SLOTS_PER_FRAME))
 
-        clean = self._exact[rows] + finger.creep_share * self._creep(self._pressed[rows])
-        elapsed_s = (self._frame + np.arange(frames + 1)) * FRAME_S
+        crept = _within(self._creep(effects.pressed[::pieces]), pieces)
+        clean = effects.exact + finger.creep_share * crept
+        elapsed_s = (self._frame + np.arange(frames * pieces + 1) / pieces) * FRAME_S
         clean += finger.drift_per_min / 60.0 * elapsed_s[:, None]
         self._frame += frames
-        electrodes = _between(clean, ELECTRODE_SLOT / SLOTS_PER_FRAME)
+        electrodes = _between(clean, ELECTRODE_SLOT / SLOTS_PER_FRAME, pieces)
         electrodes += self._electrode_rng.normal(0.0, finger.noise_counts, electrodes.shape)
         if finger.glitch_share:
             electrodes -= self._glitches(frames)
         words[:, ELECTRODE_SLOT] = electrodes
 
-        pdc = self._pressure(self._load[rows])
+        pdc = self._pressure(effects.load, pieces)
         slow_noise = self._slow_rng.normal(0.0, (PDC_NOISE, TAC_NOISE, TDC_NOISE), (frames, 3))
         at_slot = np.array([PDC_SLOT, TAC_SLOT, TDC_SLOT]) / SLOTS_PER_FRAME
-        slow = np.column_stack([finger.pdc_rest + pdc, np.full(frames + 1, TAC_REST), self._tdc[rows]])
-        words[:, [PDC_SLOT, TAC_SLOT, TDC_SLOT]] = _between(slow, at_slot) + slow_noise
+        slow = np.column_stack([finger.pdc_rest + pdc, np.full(len(pdc), TAC_REST), effects.tdc])
+        words[:, [PDC_SLOT, TAC_SLOT, TDC_SLOT]] = _between(slow, at_slot, pieces) + slow_noise
 
-        rattle = PAC_RATTLE_PER_N_S * np.abs(np.diff(self._force_n[rows])) / FRAME_S
-        pac = PAC_REST + self._high_pass(PAC_PER_PDC * pdc)
-        pac += self._pac_rng.normal(0.0, 1.0, pac.shape) * (PAC_NOISE + rattle)[:, None]
-        if self._slip_mm_s is not None:
-            pac += self._ringing(self._slip_mm_s[rows[:-1]])
+        rattle = PAC_RATTLE_PER_N_S * np.abs(np.diff(effects.force_n)) * pieces / FRAME_S
+        pac = PAC_REST + self._high_pass(PAC_PER_PDC * pdc, pieces)
+        noise = PAC_NOISE + rattle.reshape(frames, pieces)[:, _piece_of(PAC_SLOT, pieces)]
+        pac += self._pac_rng.normal(0.0, 1.0, pac.shape) * noise
+        if effects.slip_mm_s is not None:
+            pac += self._ringing(effects.slip_mm_s[:-1:pieces])
         words[:, PAC_SLOT] = pac
 
         return np.clip(np.rint(words), 0, _sensor.FULL_SCALE_COUNT).astype(np.uint16)
@@ -120,9 +188,28 @@ class _Reading:
         return dips
 
 
-def _between(boundary: Floats, share: Floats) -> Floats:
-    """Values (n, k) at ``share`` (k,) of the way between rows of ``boundary`` (n + 1, k)."""
-    return boundary[:-1] * (1.0 - share) + boundary[1:] * share
+def _piece_of(slots: npt.NDArray[Any], pieces: int) -> npt.NDArray[np.int64]:
+    """In which of a round's equal parts each slot is."""
+    return np.asarray(slots, np.int64) * pieces // SLOTS_PER_FRAME
+
+
+def _within(boundary: Floats, pieces: int) -> Floats:
+    """Values (n * pieces + 1, k) that run straight between rows of ``boundary`` (n + 1, k)."""
+    if pieces == 1:
+        return boundary
+    share = (np.arange(pieces) / pieces)[None, :, None]
+    between = boundary[:-1, None] * (1.0 - share) + boundary[1:, None] * share
+    return np.concatenate([between.reshape(-1, boundary.shape[1]), boundary[-1:]])
+
+
+def _between(boundary: Floats, share: Floats, pieces: int = 1) -> Floats:
+    """Values (n, k) at ``share`` (k,) of the way through n rounds between rows of ``boundary`` (n * pieces + 1, k)."""
+    if pieces == 1:
+        return boundary[:-1] * (1.0 - share) + boundary[1:] * share
+    piece = np.floor(share * pieces).astype(np.int64)
+    at = piece + np.arange(0, len(boundary) - 1, pieces)[:, None]
+    column, rest = np.arange(len(share)), share * pieces - piece
+    return boundary[at, column] * (1.0 - rest) + boundary[at + 1, column] * rest
 
 
 def spring_load(states: States) -> Floats:
@@ -140,9 +227,10 @@ class Pressure:
     def __init__(self) -> None:
         self._undershoot, self._creep = Lag(PDC_UNDERSHOOT_S), Lag(PDC_CREEP_S)
 
-    def __call__(self, load: Floats) -> Floats:
-        low = PDC_UNDERSHOOT * np.tanh(self._undershoot(load[:, None])[:, 0] / PDC_UNDERSHOOT_AT)
-        creep = PDC_CREEP_SHARE * self._creep(load[:, None])[:, 0]
+    def __call__(self, load: Floats, pieces: int = 1) -> Floats:
+        rounds = load[::pieces, None]
+        low = PDC_UNDERSHOOT * np.tanh(_within(self._undershoot(rounds), pieces)[:, 0] / PDC_UNDERSHOOT_AT)
+        creep = PDC_CREEP_SHARE * _within(self._creep(rounds), pieces)[:, 0]
         return load - low + creep
 
 
@@ -151,20 +239,20 @@ class Lag:
 
     def __init__(self, seconds: float) -> None:
         # y_i = a y_{i-1} + (1 - a) x_i, summed up: y_i = a^i (a y_{-1} + (1 - a) sum of x_j a^-j up to i)
-        self._keep = math.exp(-FRAME_S / seconds)
+        self.keep = math.exp(-FRAME_S / seconds)
         most = min(_BLOCK + 1, round(50.0 * seconds / FRAME_S))  # rows at once: a^-i stays a moderate number
-        self._decay = self._keep ** np.arange(float(most))[:, None]
-        self._last: Floats | float = 0.0
+        self._decay = self.keep ** np.arange(float(most))[:, None]
+        self.last: Floats | float = 0.0
 
     def __call__(self, signal: Floats) -> Floats:
-        lagged, last = np.empty_like(signal), self._last
+        lagged, last = np.empty_like(signal), self.last
         for first in range(0, len(signal), len(self._decay)):
             part = signal[first : first + len(self._decay)]
             decay = self._decay[: len(part)]
-            follow = (1.0 - self._keep) * np.cumsum(part / decay, axis=0)
-            lagged[first : first + len(part)] = decay * (self._keep * last + follow)
+            follow = (1.0 - self.keep) * np.cumsum(part / decay, axis=0)
+            lagged[first : first + len(part)] = decay * (self.keep * last + follow)
             last = lagged[first + len(part) - 1]
-        self._last = lagged[-2]
+        self.last = lagged[-2]
         return lagged
 
 
@@ -176,9 +264,26 @@ class _HighPass:
         self._lag = Lag(self._seconds)
         self._settled = np.zeros(1)
 
-    def __call__(self, signal: Floats) -> Floats:
-        settled = np.diff(signal) / FRAME_S * self._seconds  # response to an endless ramp
-        start = self._lag(np.append(self._settled, settled)[:, None])[:-1]
+    def __call__(self, signal: Floats, pieces: int = 1) -> Floats:
+        piece_s = FRAME_S / pieces
+        settled = np.diff(signal) / piece_s * self._seconds  # response to an endless ramp
+        if pieces == 1:
+            start = self._lag(np.append(self._settled, settled)[:, None])[:-1]
+        else:
+            start = self._starts(settled, math.exp(-piece_s / self._seconds))
         self._settled = settled[-1:]
-        decay = np.exp(-PAC_SLOT / _sensor.SLOT_HZ / self._seconds)
-        return settled[:, None] + (start - settled[:, None]) * decay
+        piece = _piece_of(PAC_SLOT, pieces)
+        decay = np.exp(-(PAC_SLOT / _sensor.SLOT_HZ - piece * piece_s) / self._seconds)
+        now, begun = (values.reshape(-1, pieces)[:, piece] for values in (settled, start))
+        return now + (begun - now) * decay
+
+    def _starts(self, settled: Floats, keep: float) -> Floats:
+        """What is left at the start of each part of a round, of which ``keep`` is left at that part's end."""
+        lag = self._lag
+        left = lag.keep * float(np.sum(lag.last)) + (1.0 - lag.keep) * float(self._settled[0])
+        starts = []
+        for response in settled:
+            starts.append(left)
+            left = keep * left + (1.0 - keep) * response
+        lag.last = (left - (1.0 - lag.keep) * settled[-1]) / lag.keep  # as if it had been a whole round
+        return np.array(starts)

@@ -21,7 +21,8 @@ temperature    ``celsius``; contacts stay
 =============  ========================================================================
 
 Changes run straight over the step's time and stay until changed again. ``[[fault]]``: ``at_s``,
-``seconds``, ``finger``, ``kind`` (a key of FAULT_CODES), optionally ``channel`` (default: all).
+``seconds``, ``finger``, ``kind`` (a fault of faults.py: "unplugged", "electrode stuck"), optionally ``channel``: of
+the bus (default: all), or the electrode that breaks (default: E17).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from typing import TYPE_CHECKING
 from ..core import geometry as surface
 from ..errors import ScenarioError
 from ..wire import sensor_gen as _sensor
-from ..wire.messages_gen import EmuFault
+from .faults import EVERY_FAULT
 from .physics import PROFILES, Profile
 from .source import MAX_SECONDS
 from .tables import Table, parse_toml
@@ -53,16 +54,6 @@ SEED_MAX = 2**31 - 1
 FINGER_SECONDS_MAX = 900.0  # all fingers together
 MOVING_MAX_S = 160.0  # likewise, with a load that changes: each frame of it costs 0.15 ms
 FAULTS_MAX_S = 10_000.0  # all together; the time to play them grows with it
-
-FAULT_CODES = {
-    "bad_parity": EmuFault.BAD_PARITY,
-    "stuck_low": EmuFault.STUCK_LOW,
-    "stuck_high": EmuFault.STUCK_HIGH,
-    "error_word": EmuFault.TOO_EARLY,
-    "no_channel": EmuFault.NO_CHANNEL,
-    "unplugged": EmuFault.UNPLUGGED,
-    "swapped": EmuFault.SWAPPED,
-}
 
 STEP_KEYS: dict[str, tuple[str, ...]] = {
     "rest": (),
@@ -88,12 +79,12 @@ class FingerSpec:
 
 @dataclass(frozen=True)
 class Fault:
-    """Words replaced by a tape code; ``channel`` None: every channel."""
+    """A fault of faults.py while it lasts; ``channel`` None: every channel of the bus, or the pad's middle."""
 
     at_s: float
     seconds: float
     finger: int
-    code: int
+    kind: str
     channel: str | None
 
 
@@ -269,6 +260,6 @@ def _fault(table: Table, fingers: int, scenario_s: float) -> Fault:
         # a fault may not end after the scenario: the source would not play that part
         seconds=table.number("seconds", 0.001, round(scenario_s - at_s, 9), "s"),
         finger=table.integer("finger", 0, fingers - 1),
-        code=FAULT_CODES[table.choice("kind", tuple(FAULT_CODES))],
+        kind=table.choice("kind", EVERY_FAULT),
         channel=channel,
     )

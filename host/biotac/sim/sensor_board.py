@@ -64,7 +64,7 @@ class SensorBoard:
         """Give a finger this fault from now on, whatever its tape says; EmuFault.NONE ends it."""
         return self._board.ask(wire.EmuSetFault(0, finger, fault), wire.EmuStatus)
 
-    def play(self, *, hold_slot: int | None = None, by_time: bool = False) -> wire.EmuStatus:
+    def play(self, *, hold_slot: int | None = None, by_time: bool = False, live: bool = False) -> wire.EmuStatus:
         """Set how the tape is served, until the next plug().
 
         Before ``hold_slot``, a round's first, it waits until another play() names a later one or none, and then goes on
@@ -72,7 +72,7 @@ class SensorBoard:
         good. ``by_time``: the tape keeps to the board's clock, and rounds are left out or played again for that.
         """
         self.held_at = NOT_HELD if hold_slot is None else hold_slot
-        return self._board.ask(wire.EmuPlay(0, self.held_at, by_time), wire.EmuStatus)
+        return self._board.ask(wire.EmuPlay(0, self.held_at, by_time, live), wire.EmuStatus)
 
     def keep(self) -> wire.EmuStatus:
         """Store the whole plugged source in the board's flash, to be played in a loop from power-up on.

@@ -1,8 +1,8 @@
 """The tape: counts for the C simulator's sensors, one uint16 a slot.
 
-Little-endian: 8 bytes ``BTTAPE01``; u32 fingers, u32 rounds, u32 slots (44), u32 reserved (0); then
-uint16 samples [round][finger][slot]. 0..4095 are counts; CODES say what else the sensor puts on the
-bus. Nothing in between is legal.
+Little-endian: 8 bytes ``BTTAPE02``; u32 fingers, u32 rounds, u32 slots (44), u32 reserved (0); then
+uint16 samples [round][slot][finger], as EMU_TAPE has them. 0..4095 are counts; CODES say what else the sensor
+puts on the bus. Nothing in between is legal.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .source import Source
 
 CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/MESSAGES.md)
 
-MAGIC = b"BTTAPE01"
+MAGIC = b"BTTAPE02"
 _HEADER = struct.Struct("<8sIIII")
 _SLOTS = len(_sensor.SLOTS)
 _BLOCK = 10_000  # frames at a time, for memory
@@ -51,6 +51,6 @@ def write_tape(path: str | Path, source: Source) -> None:
         with Path(path).open("wb") as file:
             file.write(_HEADER.pack(MAGIC, fingers, frames, slots, 0))
             for block in blocks:
-                file.write(block.astype("<u2").tobytes())
+                file.write(block.transpose(0, 2, 1).astype("<u2").tobytes())
     except OSError as error:
         raise InputError(f"{path}: cannot write the tape: {error.strerror}; choose another place") from error

@@ -455,6 +455,8 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("rounds_moved", "<i4"),
             ("loop_slots", "<u4"),
             ("looping", "u1"),
+            ("rounds_late", "<u4"),
+            ("link_bytes", "<u4"),
         ]
     ),
     wire.EmuPlug.ID: np.dtype(
@@ -491,6 +493,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("req_id", "u1"),
             ("hold_slot", "<u4"),
             ("by_time", "u1"),
+            ("live", "u1"),
         ]
     ),
     wire.EmuKeep.ID: np.dtype(

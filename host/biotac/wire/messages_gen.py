@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0xB3FEBD21
+SCHEMA_HASH = 0x601B7537
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -2240,7 +2240,7 @@ class SetBusRate:
 
 @dataclass(frozen=True, slots=True)
 class EmuStatus:
-    """State of an emulated sensor board. Reply to every EMU command. Counters start at EMU_PLUG of finger 0."""
+    """State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/reference/live_load.md)."""
 
     req_id: int
     fingers: int
@@ -2255,12 +2255,14 @@ class EmuStatus:
     rounds_moved: int
     loop_slots: int
     looping: int
+    rounds_late: int
+    link_bytes: int
 
     ID: ClassVar[int] = 0x40
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIHiIB")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIHiIBII")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 39 bytes."""
+        """Payload without id and CRC, 47 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.fingers,
@@ -2275,6 +2277,8 @@ class EmuStatus:
             self.rounds_moved,
             self.loop_slots,
             self.looping,
+            self.rounds_late,
+            self.link_bytes,
         )
 
     @classmethod
@@ -2295,6 +2299,8 @@ class EmuStatus:
             v[10],
             v[11],
             v[12],
+            v[13],
+            v[14],
         )
 
 
@@ -2428,16 +2434,18 @@ class EmuPlay:
     req_id: int
     hold_slot: int
     by_time: int
+    live: int
 
     ID: ClassVar[int] = 0xC4
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIB")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIBB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 6 bytes."""
+        """Payload without id and CRC, 7 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.hold_slot,
             self.by_time,
+            self.live,
         )
 
     @classmethod
@@ -2448,6 +2456,7 @@ class EmuPlay:
             v[0],
             v[1],
             v[2],
+            v[3],
         )
 
 

@@ -23,12 +23,12 @@ def test_bytes_are_those_of_the_format(tmp_path: Path) -> None:
     path = tmp_path / "a.tape"
     tape.write_tape(path, small())
     data = path.read_bytes()
-    assert data[:24] == b"BTTAPE01" + struct.pack("<IIII", 2, 3, 44, 0)
+    assert data[:24] == b"BTTAPE02" + struct.pack("<IIII", 2, 3, 44, 0)
     assert len(data) == 24 + 2 * 3 * 2 * 44
-    # frame 0, finger 0 begins with 0, 1; finger 1 of frame 0 is next, at 44
-    assert data[24:28] == b"\x00\x00\x01\x00"
-    assert data[24 + 88 : 24 + 90] == struct.pack("<H", 44)
-    assert data[24 + 88 + 10 : 24 + 88 + 24] == bytes.fromhex("f9ff faff fbff fcff fdff feff ffff")
+    # slot 0 of frame 0: finger 0 has 0, finger 1 has 44; slot 1 is next
+    assert data[24:32] == struct.pack("<4H", 0, 44, 1, 45)
+    slot = struct.iter_unpack("<2H", data[24 + 4 * 5 : 24 + 4 * 12])
+    assert [finger_1 for _, finger_1 in slot] == [0xFFF9, 0xFFFA, 0xFFFB, 0xFFFC, 0xFFFD, 0xFFFE, 0xFFFF]
 
 
 @pytest.mark.parametrize(

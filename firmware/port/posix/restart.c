@@ -1,0 +1,41 @@
+#define _DEFAULT_SOURCE
+#include "restart.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#define NAME "BIOTAC_SIM_RESTARTED"
+
+static char **arguments;
+static restart_state before;
+static bool is_restarted;
+
+void restart_init(char **argv)
+{
+    const char *text = getenv(NAME);
+    int started = 0;
+    arguments = argv;
+    is_restarted = text != NULL
+                   && sscanf(text, "%d,%d,%d,%d,%u,%d,%" SCNu64 ",%" SCNu32, &before.pty, &before.flash,
+                             &before.listening, &before.program, &before.times, &started, &before.start_ns,
+                             &before.taken)
+                          == 8;
+    before.started = started != 0;
+}
+
+const restart_state *restarted(void)
+{
+    return is_restarted ? &before : NULL;
+}
+
+void restart_process(const restart_state *state)
+{
+    char text[160];
+    (void)snprintf(text, sizeof text, "%d,%d,%d,%d,%u,%d,%" PRIu64 ",%" PRIu32, state->pty, state->flash,
+                   state->listening, state->program, before.times + 1, state->started, state->start_ns, state->taken);
+    (void)setenv(NAME, text, 1);
+    (void)execv("/proc/self/exe", arguments);
+    (void)execvp(arguments[0], arguments); // where there is no /proc
+}

@@ -1,0 +1,133 @@
+"""Round by round: the frames of all fingers and what happened meanwhile, in one object."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from ..board.gap import Gap
+from ..board.reader import Reader
+from ..wire.batches import ROUND_US, Batch
+from ..wire.frames import Frame
+from ..wire.messages_gen import Event
+from .views import Latest
+
+MOST_EVENTS = 1024
+
+
+@dataclass(frozen=True)
+class FingerRound:
+    """One finger in one round: ``frame``, None when the board sent none, and its ``events``."""
+
+    frame: Frame | None
+    events: tuple[Event, ...]
+
+
+@dataclass(frozen=True)
+class Round:
+    """What a board made of 10 ms: ``now["index"].frame``, ``now.events``.
+
+    ``seq`` and ``t_us`` are those of its frames, -1 when there is none. ``missed`` is how many rounds were passed over
+    since the one before: theirs are the events that are older than this round, so that none is lost.
+    """
+
+    seq: int
+    t_us: int
+    missed: int
+    fingers: Mapping[str, FingerRound]
+    events: tuple[Event, ...]
+
+    def __getitem__(self, finger: str) -> FingerRound:
+        """A finger by name; one that sent nothing has no frame. Raises KeyError for an unknown name."""
+        return self.fingers[finger]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.fingers)
+
+
+class Rounds:
+    """A reader.Consumer that puts rows and events of a round together, for one program that takes them."""
+
+    def __init__(self, reader: Reader, latest: Latest) -> None:
+        self._reader = reader
+        self._latest = latest
+        self._rows: dict[int, dict[int, tuple[Batch, int]]] = {}  # by t_us, by finger
+        self._events: list[tuple[int, Event]] = []
+        self._expected: set[int] = set()  # fingers of the round before: with them a round is complete
+        self._news = threading.Condition()
+        self._given_us = -1
+        reader.add(self)
+
+    # ---- the reading thread --------------------------------------------------------------------
+
+    def put(self, batch: Batch) -> None:
+        with self._news:
+            if any(type(m) is Gap and m.reason == "rebooted" for m in batch.messages):  # its clock began anew
+                self._rows, self._events, self._given_us = {}, [], -1
+            for row, (t_us, finger) in enumerate(zip(batch.t_us.tolist(), batch.wire["finger"].tolist(), strict=True)):
+                self._rows.setdefault(t_us, {})[finger] = batch, row
+            for old in sorted(self._rows)[:-2]:  # a program that is behind gets the newest
+                del self._rows[old]
+            events = [(self._reader.unwrap_t_us(m.t_us), m) for m in batch.messages if type(m) is Event]
+            self._events = [*self._events, *events][-MOST_EVENTS:]
+            self._news.notify_all()
+
+    def wake(self) -> None:
+        with self._news:
+            self._news.notify_all()
+
+    def is_full(self) -> bool:
+        return False
+
+    # ---- the program ---------------------------------------------------------------------------
+
+    def wait(self, after: Round | None, timeout_s: float) -> Round:
+        """The newest complete round after ``after``, or after this call. Raises TimeoutError when none comes in time."""
+        after_us = max(self._rows, default=-1) if after is None else after.t_us
+        reader = self._reader
+
+        def is_there() -> bool:
+            gone = reader.failure is not None or reader.closing.is_set()
+            return gone or self._complete_us() > after_us
+
+        with self._news:
+            came = self._news.wait_for(is_there, timeout_s)
+        if reader.closing.is_set():
+            reader.raise_closed()
+        self._latest.report()
+        if not came:
+            raise TimeoutError(f"no new round in {timeout_s:g} s: is a finger there, and streamed with rest=True?")
+        return self.take(self._complete_us())
+
+    def _complete_us(self) -> int:
+        times = sorted(self._rows)
+        if times and (not self._expected or set(self._rows[times[-1]]) >= self._expected):
+            return times[-1]
+        return times[-2] if len(times) > 1 else -1
+
+    def take(self, t_us: int | None = None) -> Round:
+        """The round at ``t_us``, by default the newest that has come, and the events up to its end."""
+        with self._news:
+            newest = max(self._rows, default=None) if t_us is None else t_us
+            rows = {} if newest is None or newest <= self._given_us else self._rows[newest]
+            end_us = None if t_us is None else t_us + ROUND_US
+            taken = [event for at_us, event in self._events if end_us is None or at_us < end_us]
+            self._events = self._events[len(taken) :]
+            if rows:
+                self._expected = set(rows)
+                self._rows = {at: row for at, row in self._rows.items() if newest is not None and at > newest}
+        frames = {finger: Frame.from_row(batch.frames[row]) for finger, (batch, row) in rows.items()}
+        fingers = {}
+        for finger in sorted({*frames, *(event.finger for event in taken), *self._present()}):
+            own = tuple(event for event in taken if event.finger == finger)
+            fingers[self._latest.name(finger)] = FingerRound(frames.get(finger), own)
+        seq = next((frame.seq for frame in frames.values()), -1)
+        if not frames or newest is None:
+            return Round(-1, -1, 0, fingers, tuple(taken))
+        missed = round((newest - self._given_us) / ROUND_US) - 1 if self._given_us >= 0 else 0
+        self._given_us = newest
+        return Round(seq, newest, missed, fingers, tuple(taken))
+
+    def _present(self) -> list[int]:
+        return [finger for finger in range(self._reader.present.bit_length()) if self._reader.present >> finger & 1]

@@ -1,0 +1,224 @@
+"""What breaks in a sensor or on its wires, laid over a healthy finger's words round by round.
+
+Whoever lays one names the finger (``Faulty``) and passes words of n rounds at a time, (n, 44); what a fault remembers
+(the count at which an electrode sticks, how far a floating one has walked) goes on from call to call, so that the
+result does not depend on how the rounds are cut. INVALID_COUNT stands where no good word came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..core.geometry import Floats
+from ..errors import InputError
+from ..wire import sensor_gen as _sensor
+from ..wire.messages_gen import INVALID_COUNT, EmuFault
+from ..wire.slots import ELECTRODE_SLOT, FRAME_S, PDC_SLOT, SLOTS_PER_FRAME, TDC_SLOT
+from .sampling import Words
+
+
+@dataclass
+class Faulty:
+    """The finger that a fault is laid on.
+
+    ``electrode`` is the index, 0 to 18, of the one that breaks; ``rest`` (19,) are the finger's counts at rest and
+    ``other_rest`` (19,) those of the finger beside it, whose words are passed as ``other``.
+    """
+
+    electrode: int
+    rest: Floats
+    other_rest: Floats
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    rounds: int = 0  #: since the fault began
+    kept: Any = None  #: what it remembers of the rounds before
+
+    def time_s(self, n: int) -> Floats:
+        """The times (n,) of the next rounds since it began; they are counted."""
+        self.rounds += n
+        return (self.rounds - n + np.arange(n)) * FRAME_S
+
+    def first(self, now: Any) -> Any:
+        """``now`` of its first call, for ever."""
+        if self.kept is None:
+            self.kept = now
+        return self.kept
+
+
+#: Lays itself over words (n, 44) of a finger, given those of the finger beside it, and returns new ones.
+Fault = Callable[[Faulty, Words, Words], Words]
+
+
+def _electrodes(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
+    """A fault of the electrodes' counts (n, 19), given and returned as float64; ``t_s`` (n,) is the time."""
+
+    def fault(on: Faulty, words: Words, other: Words) -> Words:
+        bad = words.copy()
+        counts = change(on, words[:, ELECTRODE_SLOT].astype(float), on.time_s(len(words)))
+        bad[:, ELECTRODE_SLOT] = np.clip(np.rint(counts), 0, _sensor.FULL_SCALE_COUNT)
+        return bad
+
+    return fault
+
+
+def _one(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
+    """The same of the electrode that breaks: its counts (n,)."""
+
+    def electrodes(on: Faulty, counts: Floats, t_s: Floats) -> Floats:
+        counts[:, on.electrode] = change(on, counts[:, on.electrode].copy(), t_s)
+        return counts
+
+    return _electrodes(electrodes)
+
+
+def _walks(on: Faulty, x: Floats, _: Floats) -> Floats:
+    start, walked = on.first((x[0], 0.0))
+    path = walked + np.cumsum(on.rng.normal(0, 20, len(x)))
+    on.kept = start, path[-1]
+    result: Floats = start + path
+    return result
+
+
+def _exchange(on: Faulty, counts: Floats, _: Floats) -> Floats:
+    pair = [on.electrode, (on.electrode + 7) % counts.shape[1]]
+    counts[:, pair] = counts[:, pair[::-1]]
+    return counts
+
+
+def _half_gain(on: Faulty, x: Floats, _: Floats) -> Floats:
+    rest = on.rest[on.electrode]
+    return rest + (x - rest) / 2
+
+
+def _freeze(slots: Iterable[int]) -> Fault:
+    columns = np.array(list(slots))
+
+    def fault(on: Faulty, words: Words, other: Words) -> Words:
+        bad = words.copy()
+        bad[:, columns] = on.first(words[0, columns].copy())
+        return bad
+
+    return fault
+
+
+def _channel(slot: int, value: Callable[[Faulty, Floats], Floats | float]) -> Fault:
+    def fault(on: Faulty, words: Words, other: Words) -> Words:
+        bad = words.copy()
+        bad[:, slot] = np.clip(value(on, words[:, slot].astype(float)), 0, _sensor.FULL_SCALE_COUNT)
+        return bad
+
+    return fault
+
+
+def _shifted(on: Faulty, words: Words, other: Words) -> Words:
+    line = words.reshape(-1)
+    before = line[0] if on.kept is None else on.kept
+    on.kept = line[-1]
+    return np.concatenate([[before], line[:-1]]).astype(words.dtype).reshape(words.shape)
+
+
+def _cross_talk(share: float) -> Fault:
+    def fault(on: Faulty, words: Words, other: Words) -> Words:
+        bad = words.copy()
+        felt = words[:, ELECTRODE_SLOT] + share * (other[:, ELECTRODE_SLOT] - on.other_rest)
+        bad[:, ELECTRODE_SLOT] = np.clip(np.rint(felt), 0, _sensor.FULL_SCALE_COUNT)
+        return bad
+
+    return fault
+
+
+_PARITY = np.array([bin(byte).count("1") & 1 for byte in range(256)], bool)
+
+
+def noisy_line(a_bit: float) -> Fault:
+    """Every bit flips with this chance; what parity does not show is believed."""
+
+    def fault(on: Faulty, words: Words, other: Words) -> Words:
+        counts = words.astype(np.uint16)
+        sent = np.stack([counts >> 5 << 1, (counts & 31) << 3], axis=-1).astype(np.uint8)
+        sent |= ~_PARITY[sent]  # the last bit makes each byte's parity odd
+        sent ^= np.packbits(on.rng.random((*sent.shape, 8)) < a_bit, axis=-1)[..., 0]
+        good = _PARITY[sent].all(axis=-1)
+        read = (sent[..., 0].astype(np.uint16) >> 1 << 5) + (sent[..., 1] >> 3)
+        return np.where(good, read, INVALID_COUNT).astype(np.uint16)
+
+    return fault
+
+
+FAULTS: dict[str, Fault] = {
+    "electrode open": _one(lambda on, x, t: np.full_like(x, 4095)),
+    "electrode shorted": _one(lambda on, x, t: np.zeros_like(x)),
+    "electrode floating: walks 20 counts a round": _one(_walks),
+    "electrode floating: uniform noise": _one(lambda on, x, t: on.rng.uniform(1, 4089, len(x))),
+    "electrode with noise of 200 counts": _one(lambda on, x, t: x + on.rng.normal(0, 200, len(x))),
+    "electrode stuck": _one(lambda on, x, t: np.full_like(x, on.first(x[0]))),
+    "electrode at half gain": _one(_half_gain),
+    "electrode drifts 10 counts/s": _one(lambda on, x, t: x - 10 * t),
+    "electrode drifts 50 counts/s": _one(lambda on, x, t: x - 50 * t),
+    "electrode drifts 200 counts/s": _one(lambda on, x, t: x - 200 * t),
+    "all electrodes drift 1 count/s": _electrodes(lambda on, x, t: x - 1 * t[:, None]),
+    "all electrodes drift 5 counts/s": _electrodes(lambda on, x, t: x - 5 * t[:, None]),
+    "all electrodes drift 20 counts/s": _electrodes(lambda on, x, t: x - 20 * t[:, None]),
+    "all electrodes jump by 50": _electrodes(lambda on, x, t: x - 50),
+    "noise of 30 counts on all electrodes": _electrodes(lambda on, x, t: x + on.rng.normal(0, 30, x.shape)),
+    "two electrodes' wires exchanged": _electrodes(_exchange),
+    "the same words for ever": _freeze(range(SLOTS_PER_FRAME)),
+    "electrodes frozen, pressure alive": _freeze(ELECTRODE_SLOT),
+    "channels shifted by a slot": _shifted,
+    "two fingers exchanged": lambda on, words, other: other.copy(),
+    "cross-talk of 30 % between fingers": _cross_talk(0.3),
+    "cross-talk of 100 % between fingers": _cross_talk(1.0),
+    "noisy line, 1e-3 a bit": noisy_line(1e-3),
+    "noisy line, 3e-3 a bit": noisy_line(3e-3),
+    "TDC jumps by 300 counts": _channel(TDC_SLOT, lambda on, x: x + 300),
+    "PDC stuck": _channel(PDC_SLOT, lambda on, x: on.first(x[0])),
+    "PDC 0": _channel(PDC_SLOT, lambda on, x: 0.0),
+    "PDC 4095": _channel(PDC_SLOT, lambda on, x: 4095.0),
+}
+
+#: What a sensor or its lead does on the bus, in place of counts.
+BUS_FAULTS = {
+    "bad_parity": EmuFault.BAD_PARITY,
+    "stuck_low": EmuFault.STUCK_LOW,
+    "stuck_high": EmuFault.STUCK_HIGH,
+    "error_word": EmuFault.TOO_EARLY,
+    "no_channel": EmuFault.NO_CHANNEL,
+    "unplugged": EmuFault.UNPLUGGED,
+    "swapped": EmuFault.SWAPPED,
+}
+EVERY_FAULT = (*FAULTS, *BUS_FAULTS)
+_IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
+
+
+def fault_named(name: str, channel: str | None = None) -> Fault:
+    """A fault of FAULTS, with or without its leading "electrode", or of BUS_FAULTS, on ``channel`` or all.
+
+    A bus fault gives tape codes in place of counts. Raises InputError for an unknown name.
+    """
+    for known in (name, f"electrode {name}"):
+        if known in FAULTS:
+            return FAULTS[known]
+    if name not in BUS_FAULTS:
+        raise InputError(f"no fault {name!r}, expected one of: {', '.join(EVERY_FAULT)}")
+    code, hit = BUS_FAULTS[name], np.ones(SLOTS_PER_FRAME, bool) if channel is None else _IS_CHANNEL[channel]
+
+    def fault(on: Faulty, words: Words, other: Words) -> Words:
+        return np.where(hit, np.uint16(code), words)
+
+    return fault
+
+
+def broken_electrode(channel: str | None) -> int:
+    """The index of the electrode that ``channel`` names; without one, E17, the pad's middle."""
+    name = channel or "E17"
+    if name not in _sensor.ELECTRODE_NAMES:
+        raise InputError(f"channel is {name!r}, expected an electrode, E1 to E19")
+    return _sensor.ELECTRODE_NAMES.index(name)
+
+
+def on_the_bus(words: Words) -> Words:
+    """Words for a tape: a word that did not come good is one of bad parity there."""
+    return np.where(words == INVALID_COUNT, np.uint16(EmuFault.BAD_PARITY), words)

@@ -1,0 +1,145 @@
+"""Simulated fingers on a board that waits for them: each round's load becomes words, and the board computes it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import DeviceLostError, InputError, PortError
+from ..link.serial_port import SerialLink
+from ..wire.messages_gen import EmuStatus
+from ..wire.sensor_gen import MAX_SENSORS
+from . import touch
+from .control import Control
+from .emulated import EmulatedBoard
+from .faults import Fault, Faulty, broken_electrode, fault_named, on_the_bus
+from .physics import Finger
+from .process import SimBoard, SimLink
+from .sampling import Sampler, Words
+from .scenario import default_serial
+from .source import Source
+from .touch import Load
+
+
+class LiveFingers:
+    """Fingers by name, read a round at a time: chip select k is the k-th. Faults go on until they are ended."""
+
+    def __init__(self, fingers: Mapping[str, Finger]) -> None:
+        if not 1 <= len(fingers) <= MAX_SENSORS:
+            raise InputError(f"{len(fingers)} fingers are given, expected 1 to {MAX_SENSORS}")
+        self.fingers = dict(fingers)
+        self.names = {name: number for number, name in enumerate(self.fingers)}
+        self._samplers = [Sampler(finger) for finger in self.fingers.values()]
+        self._rest = [finger.rest_counts(np.zeros(1))[0] for finger in self.fingers.values()]
+        self._faults: dict[tuple[int, str], tuple[Fault, Faulty]] = {}
+
+    @property
+    def serials(self) -> tuple[str, ...]:
+        """The sensors' serial numbers."""
+        return tuple(default_serial(finger.seed) for finger in self.fingers.values())
+
+    def read(self, loads: Mapping[str, Load]) -> Words:
+        """The words of the next round, (fingers, 44). A finger that is not named is not touched."""
+        for name in loads:
+            self.number(name)
+        states = [touch.states(loads.get(name)) for name in self.names]
+        words = np.stack([sampler.step(*state) for sampler, state in zip(self._samplers, states, strict=True)])
+        if not self._faults:
+            return words
+        spoilt = words.copy()
+        for (number, _), (fault, faulty) in self._faults.items():
+            beside = words[(number + 1) % len(words)]
+            spoilt[number] = on_the_bus(fault(faulty, spoilt[None, number], beside[None]))[0]
+        return spoilt
+
+    def number(self, name: str) -> int:
+        """The chip select of a finger. Raises KeyError for an unknown name."""
+        if name not in self.names:
+            raise KeyError(f"no finger {name!r}, expected one of {', '.join(self.names)}")
+        return self.names[name]
+
+    def fault(self, name: str, kind: str | None, channel: str | None) -> None:
+        """See World.fault."""
+        number = self.number(name)
+        if kind is None:
+            self._faults = {key: laid for key, laid in self._faults.items() if key[0] != number}
+            return
+        rng = np.random.default_rng([self.fingers[name].seed, 7])
+        lay = fault_named(kind, channel)
+        faulty = Faulty(broken_electrode(channel) if channel and channel[0] == "E" else broken_electrode(None),
+                        self._rest[number], self._rest[(number + 1) % len(self._rest)], rng)  # fmt: skip
+        self._faults[number, f"{kind} {channel}"] = lay, faulty
+
+
+class LiveBoard:
+    """A simulated board whose time stands still until the next round of its fingers has come.
+
+    ``board`` is "posix", the firmware as a process, or "pico", its flash image in the emulator. Nothing touches in its
+    first round, which runs when ``release`` is called.
+    """
+
+    def __init__(self, fingers: LiveFingers, board: str = "posix", image: str | None = None) -> None:
+        rest = fingers.read({})
+        source = Source("live", rest[None], serials=fingers.serials, emulated=tuple(fingers.fingers.values()))
+        self.board: SimBoard = (
+            SimBoard(source, pace=0.0, hold=True, live=True)
+            if board == "posix"
+            else EmulatedBoard(board, source, pace=0.0, hold=True, live=True, image=image)
+        )
+        assert self.board.control is not None
+        self.control: Control = self.board.control
+
+    def compute(self, words: Words) -> EmuStatus:
+        """Have the next round computed; what was made of it has left the board when this returns."""
+        self.control.feed(words)
+        return self.control.wait_still()
+
+
+class LiveLink(SimLink):
+    """The link to a live board, which can say that all the board has sent was passed on to the hand.
+
+    While ``away`` its cable is out: the board has no host.
+    """
+
+    lock_step = True
+
+    def __init__(self, board: SimBoard) -> None:
+        self.away = False
+        self.reopened = False  #: since count_from
+        self._passed_on = threading.Condition()
+        self._read_bytes = self._passed_bytes = self._before_bytes = 0
+        super().__init__("sim:live", board)
+
+    def reopen(self, port: str) -> None:
+        if self.away:
+            raise PortError("the simulated cable is out")
+        super().reopen(port)
+        self.reopened = True
+
+    def read(self, timeout_s: float) -> bytes:
+        with self._passed_on:
+            self._passed_bytes = self._read_bytes  # who reads on has passed on what came before
+            self._passed_on.notify_all()
+        if self.away:
+            SerialLink.close(self)
+            raise DeviceLostError("the simulated cable is out")
+        chunk = super().read(timeout_s)
+        self._read_bytes += len(chunk)
+        return chunk
+
+    def count_from(self, status: EmuStatus) -> None:
+        """All that the board had sent by then has been read, and is on its way to the hand."""
+        self._before_bytes = status.link_bytes - self._read_bytes
+        self.reopened = False
+
+    def wait_passed_on(self, status: EmuStatus, timeout_s: float) -> bool:
+        """Wait until the hand has all that the board had sent by then; false when that takes too long."""
+        most = (status.link_bytes - self._before_bytes) % 2**32
+
+        def is_passed_on() -> bool:
+            return self.away or (self._passed_bytes - most) % 2**32 < 2**31
+
+        with self._passed_on:
+            return self._passed_on.wait_for(is_passed_on, timeout_s)

@@ -1,0 +1,109 @@
+"""What touches a simulated finger in one round, as a program says it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+
+from ..core import geometry as surface
+from ..core.geometry import Floats
+from ..errors import InputError
+from ..wire import sensor_gen as _sensor
+from .physics import REST_CELSIUS, States
+from .scenario import FLAT_MM, FORCE_MAX_N, SHEAR_MAX_N, SLIP_MAX_MM_S, TORSION_MAX_NMM
+
+Place: TypeAlias = str | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One contact at the end of a round.
+
+    ``normal_n`` >= 0 presses into the finger; ``shear_n`` is tangential, towards the tip and towards E11's side;
+    ``torsion_nmm`` is about the outward normal. ``at`` is an electrode, or x and y in mm on the ventral surface;
+    ``tip_mm`` the width of the flat that presses; ``slip_mm_s`` how fast it slides over the skin. ``celsius`` is the
+    finger's temperature, touched or not. Values beyond what a scenario may say are refused with InputError.
+    """
+
+    normal_n: float = 0.0
+    shear_n: tuple[float, float] = (0.0, 0.0)
+    at: Place = "E17"
+    torsion_nmm: float = 0.0
+    tip_mm: float = FLAT_MM
+    slip_mm_s: float = 0.0
+    celsius: float = REST_CELSIUS
+
+    def __post_init__(self) -> None:
+        limits = (
+            ("normal_n", self.normal_n, 0.0, FORCE_MAX_N),
+            ("shear_n", max(map(abs, self.shear_n)), 0.0, SHEAR_MAX_N),
+            ("torsion_nmm", self.torsion_nmm, -TORSION_MAX_NMM, TORSION_MAX_NMM),
+            ("tip_mm", self.tip_mm, 0.5, 10.0),
+            ("slip_mm_s", self.slip_mm_s, 0.0, SLIP_MAX_MM_S),
+            ("celsius", self.celsius, 5.0, 60.0),
+        )
+        for name, value, low, high in limits:
+            if not low <= value <= high:  # NaN too
+                raise InputError(f"Touch: {name} is {value:g}, expected {low:g} to {high:g}; correct what computes it")
+        _place(self.at)
+
+
+class Course(tuple["Touch | Sequence[Touch]", ...]):
+    """A round's course: what touches at the end of each of its equal parts, the last at the round's end."""
+
+
+#: What one finger feels in a round: a contact, several at once, or a course of either; None: nothing touches.
+Load: TypeAlias = "Touch | Sequence[Touch] | Course | None"
+
+
+@lru_cache(maxsize=256)
+def _place(at: Place) -> tuple[Floats, Floats, Floats]:
+    """The point on the surface (3,) in mm, and the unit tangents (3,) to the tip and to E11's side."""
+    if isinstance(at, str):
+        if at not in _sensor.ELECTRODE_NAMES:
+            raise InputError(f"Touch: at is {at!r}, expected an electrode, E1 to E19, or (x_mm, y_mm)")
+        x_mm, y_mm = surface.project(surface.ELECTRODE_MM[[_sensor.ELECTRODE_NAMES.index(at)]])[0][:2]
+    else:
+        x_mm, y_mm = at
+        if not surface.is_on_surface(x_mm, y_mm):
+            raise InputError(
+                f"Touch: at is ({x_mm:g}, {y_mm:g}) mm, expected a point on the ventral surface: x from "
+                f"{surface.PROXIMAL_END_MM:g}, |y| up to {surface.RADIUS_MM:g}"
+            )
+    point = surface.on_surface(np.array([[x_mm, y_mm]]))
+    to_tip, to_side = surface.tangents_at(surface.normals_at(point))
+    return point[0], to_tip[0], to_side[0]
+
+
+def states(load: Load) -> tuple[States, ...]:
+    """The states of each contact of a load, one row for each part of a course, else one."""
+    parts = [_contacts(part) for part in (load if isinstance(load, Course) else (load,))]
+    most = max(len(part) for part in parts)
+    columns = [[part[k] if k < len(part) else Touch(celsius=part[0].celsius) for part in parts] for k in range(most)]
+    return tuple(_column(column) for column in columns)
+
+
+def _contacts(load: Touch | Sequence[Touch] | None) -> tuple[Touch, ...]:
+    return (Touch(),) if not load else (load,) if isinstance(load, Touch) else tuple(load)
+
+
+def _column(touches: list[Touch]) -> States:
+    places = [_place(touch.at) for touch in touches]
+    return States(
+        contact_mm=np.array([point for point, _, _ in places]),
+        force_n=np.array([touch.normal_n for touch in touches], float),
+        shear_n=np.array(
+            [
+                (touch.shear_n[0] * to_tip + touch.shear_n[1] * to_side) * (touch.normal_n > 0.0)
+                for touch, (_, to_tip, to_side) in zip(touches, places, strict=True)
+            ]
+        ),
+        torsion_nmm=np.array([touch.torsion_nmm * (touch.normal_n > 0.0) for touch in touches]),
+        tip_radius_mm=np.array([touch.tip_mm / 2.0 for touch in touches]),
+        warm_c=np.array([touch.celsius - REST_CELSIUS for touch in touches]),
+        slip_mm_s=np.array([touch.slip_mm_s * (touch.normal_n > 0.0) for touch in touches], float),
+    )
