@@ -14,13 +14,15 @@ import pytest
 from biotac import FrameFlags
 from biotac_lab.cli import main
 from biotac_lab.grasp import law, runs
-from biotac_lab.grasp.felt import TrueForce
+from biotac_lab.grasp.felt import Board, TrueForce
 from biotac_lab.grasp.plant import KINETIC, ROUND_S, Plant, Thing, things
 from biotac_lab.grasp.runs import Case
 from biotac_lab.grasp.trial import Slides
 
 THING = Thing(mass_kg=0.2, friction=0.5, stiffness=5.0, added_kg=0.1, knock_n=1.0, limit_n=50.0)
 WEIGHT_N = 0.2 * 9.81
+CASE = Case("true", "", 0, 7, "numpy", 2, "new", "E17", "")
+GRIP_C = law.EXAMPLE.with_suffix(".c")
 
 
 def lifted(press_n: float) -> Plant:
@@ -88,22 +90,22 @@ def test_the_law_stays_where_nothing_is_known_and_is_deaf_while_it_squeezes() ->
 
 
 def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept, case = tmp_path / "grasps.jsonl", Case("true", "", 0, 3, "numpy", 2, "code")
+    kept, case = tmp_path / "grasps.jsonl", replace(CASE, seed=3)
 
     def run(objects: int) -> Any:
-        return runs.run([case], objects, law.EXAMPLE, 1, kept, lambda text: None)
+        return runs.run([case], objects, law.EXAMPLE, 1, kept, lambda text: None)[0]
 
     first = run(2)[case]
     whole = kept.read_bytes()
     kept.write_bytes(whole[:-9])  # stopped while it wrote
     assert run(2)[case] == first and json.loads(kept.read_text().splitlines()[-1]) == first[1]
-    monkeypatch.setattr(runs, "grasps", None)  # nothing is left to do
+    monkeypatch.setattr(runs, "one", None)  # nothing is left to do
     assert run(2)[case] == first
     assert runs.digest(law.EXAMPLE) != runs.digest(Path(__file__))
 
 
 def test_more_fingers_on_a_side_share_its_force() -> None:
-    two, three = (runs.grasps(Case("true", "", 0, 7, "numpy", n, ""), 0, 1, law.EXAMPLE)[0] for n in (2, 3))
+    two, three = (runs.one(replace(CASE, fingers=n), 0, law.EXAMPLE) for n in (2, 3))
     assert {**two, "case": 0} == {**three, "case": 0}
 
 
@@ -113,13 +115,78 @@ def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture
     true, high = json.loads(capsys.readouterr().out)["tables"][0]["rows"]
     kept = [json.loads(line) for line in (tmp_path / "grasps.jsonl").read_text().splitlines()]
     crushed = sum(row["crushed"] for row in kept if row["case"]["controller"] == "true")
-    assert true[2:6] == [6, 0, *[pytest.approx(100 * crushed / 6, abs=1e-3)] * 2] and crushed <= 1
-    assert high[3] == 100  # it never presses
+    assert true[3:7] == [6, 0, *[pytest.approx(100 * crushed / 6, abs=1e-3)] * 2] and crushed <= 1
+    assert high[4] == 100  # it never presses
     assert {path.name for path in tmp_path.iterdir()} == {"grasp.md", "grasp.png", "grasp.json", "grasps.jsonl"}
     assert main([*command[:2], "nobody"]) == 2
+
+
+def test_the_law_in_c_is_the_same() -> None:
+    """Round by round on the same frames, to what a wire message can say."""
+    python, in_c, plant, sense = law.load(law.EXAMPLE)(), law.load(GRIP_C)(), Plant(THING), TrueForce(2)
+    for k in range(400):
+        plant.step(python.speed_mm_s, 2.0 if k > 200 else 0.0)
+        felt = sense.feel(plant)
+        assert felt is not None
+        felt = ([None, None], False) if k in (150, 250) else felt
+        assert in_c.step(*felt) == pytest.approx(python.step(*felt), abs=2e-2)
+    assert (in_c.holds, in_c.slips, in_c.settled) == (python.holds, python.slips, python.settled) and python.slips > 0
+
+
+def test_a_hand_on_a_board_grasps_and_does_so_again() -> None:
+    case = replace(CASE, controller="default")
+    first = runs.one(case, 1, law.EXAMPLE)
+    assert first == runs.one(case, 1, law.EXAMPLE)  # lock-step: to the last digit
+    assert not first["dropped"] and first["off_n"] is not None and FrameFlags.HELD & FrameFlags(first["flags"])
+
+
+@pytest.mark.parametrize("fault", ["still program", "restart", "cable", "open"])
+def test_a_fault_in_mid_grasp_is_seen_and_outlived(fault: str) -> None:
+    """By the true force of the plant beside it: the board's own frames stop, or say so."""
+    plant, seen = Plant(THING), []
+    sense = Board(CASE.seeds, "new", "E17")
+    try:
+        for k in range(160):
+            plant.step(10.0 if plant.normal_n < 2 else 0.0, 0.0)
+            if k == 60:
+                sense.fault(fault)
+            seen.append(sense.feel(plant))
+    finally:
+        sense.close()
+    healthy, hit, after = seen[59], seen[61], seen[159]
+    assert healthy is not None and after is not None and healthy[0][0] is not None and after[0][0] is not None
+    if fault == "still program":
+        assert seen[60:110] == [None] * 50 and seen[110] is not None
+    elif fault == "open":
+        assert hit is not None and hit[0][0] is not None and hit[0][0].flags & FrameFlags.RAIL
+    else:
+        assert hit is not None and hit[0] == [None, None]
+    if fault == "restart":
+        assert after[0][0].flags & (FrameFlags.UNTARED | FrameFlags.TARE_UNSURE)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("seed", [1, 4, 11])
 def test_the_experiment_can_tell(seed: int) -> None:
     assert main(["grasp", "--objects", "200", "--seed", str(seed), "--jobs", "2", "--check"]) == 0
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("plant", ["numpy", "mujoco"])
+def test_boards_grasp_what_their_calibrations_let_them(plant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    if plant == "mujoco":
+        pytest.importorskip("mujoco", reason="pip install 'biotac-lab[mujoco]'")
+    wide = ["--profile", "new,worn", "--at", "E17,E3", "--fault", "all"] if plant == "numpy" else ["--fingers", "3"]
+    command = ["grasp", "--controllers", "true,own,lin,default", "--jobs", "2", "--plant", plant, "--json", *wide]
+    assert main(command) == 0
+    rows = json.loads(capsys.readouterr().out)["tables"][0]["rows"]
+    assert {row[3] for row in rows} == {6} and len(rows) == (1 + 3 * 4 * 18 if plant == "numpy" else 4)
+
+
+@pytest.mark.nightly
+def test_python_and_c_hold_the_same_things(capsys: pytest.CaptureFixture[str]) -> None:
+    pages = []
+    for path in (law.EXAMPLE, GRIP_C):
+        assert main(["grasp", "--controllers", "true,default", "--objects", "20", "--law", str(path)]) == 0
+        pages.append(capsys.readouterr().out)
+    assert pages[0] == pages[1]

@@ -4,36 +4,45 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from biotac import InputError
+from biotac.sim import PROFILES
 
 from ..report import Facts, Report, Show, Table, check, check_free, claim, write
 from . import law, picture, runs
-from .runs import CONTROLLERS, Case
+from .felt import BOARD_FAULTS, SENSOR_FAULTS
+from .runs import CONTROLLERS, TRUE, Case
 
 ABOUT = "Grip, lift and let go of things by what the fingers feel, and count what is dropped and crushed."
 EXAMPLE = "biotac-lab grasp --objects 20 --out gripped"
 NAME = "grasp"
-HEAD = ("controller", "fault", "n", "dropped %", "crushed %", "lost %", "hold / need", "slides", "missed", "SLIPs",
-        "used", "false", "reaction ms", "felt - applied N")  # fmt: skip
+FAULTS = (*SENSOR_FAULTS, *BOARD_FAULTS)
+HEAD = ("controller", "fingers", "fault", "n", "dropped %", "crushed %", "lost %", "hold / need", "slides",
+        "missed", "SLIPs", "used", "false", "reaction ms", "felt - applied N")  # fmt: skip
 TRUE_PERCENT, WORSE_POINTS, CONSTANT_PERCENT = 10.0, 10.0, 25.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is tried and where it goes."""
     about = "; ".join(f"{name}: {text}" for name, text in CONTROLLERS.items())
-    parser.add_argument("--objects", metavar="N", type=_count, default=6, help="things for each pair (default 6)")
+    count: dict[str, Any] = {"metavar": "N", "type": _count}
+    parser.add_argument("--objects", **count, default=6, help="things for each pair (default 6)")
     parser.add_argument("--seed", metavar="N", type=int, default=7, help="of the things (default 7)")
-    parser.add_argument(
-        "--pairs", metavar="N", type=_count, default=1, help="pairs of fingers with things of their own"
-    )
-    parser.add_argument("--jobs", metavar="N", type=_count, default=1, help="processes (default 1)")
-    parser.add_argument("--controllers", metavar="NAME,...", default=",".join(CONTROLLERS), help=about)
+    parser.add_argument("--pairs", **count, default=1, help="pairs of fingers, with things of their own (default 1)")
+    parser.add_argument("--jobs", **count, default=1, help="processes (default 1)")
+    some: dict[str, Any] = {"metavar": "NAME,...", "type": lambda text: text.split(",")}
+    parser.add_argument("--controllers", **some, default=list(CONTROLLERS), help=about)
+    parser.add_argument("--fault", **some, default=[], help=f"on boards, in mid-grasp: {', '.join(FAULTS)}, or all")
+    parser.add_argument("--profile", **some, default=["new"], help="fingers: new, worn")
+    parser.add_argument("--at", **some, default=["E17"], help="electrodes at which fingers are touched (default E17)")
+    parser.add_argument("--fingers", type=int, choices=(2, 3), default=2, help="a third shares a side")
     parser.add_argument("--plant", choices=("numpy", "mujoco"), default="numpy", help="what simulates the things")
     parser.add_argument("--law", metavar="FILE", type=Path, default=law.EXAMPLE, help="a law in place of the example")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="grasp.md, .png, .json and grasps.jsonl go here")
@@ -49,22 +58,31 @@ def _count(text: str) -> int:
 
 def run(args: argparse.Namespace, show: Show) -> int:
     """Return 0, or 1 if --check finds a limit missed."""
-    names = args.controllers.split(",")
-    unknown = sorted(set(names) - set(CONTROLLERS))
-    if unknown:
-        raise InputError(f"--controllers has {', '.join(unknown)}; expected some of {', '.join(CONTROLLERS)}")
+    faults = list(FAULTS) if args.fault == ["all"] else args.fault
+    electrodes = [f"E{k}" for k in range(1, 20)]
+    for option, given, known in (
+        ("controllers", args.controllers, CONTROLLERS), ("fault", faults, FAULTS),
+        ("profile", args.profile, PROFILES), ("at", args.at, electrodes),
+    ):  # fmt: skip
+        unknown = sorted(set(given) - set(known))
+        if unknown:
+            raise InputError(f"--{option} has {', '.join(unknown)}; expected some of {', '.join(known)}")
     if args.out is not None:
         check_free(args.out, NAME, overwrite=args.force)
         args.out.mkdir(parents=True, exist_ok=True)
     code = runs.digest(args.law)
+    hands = list(product(args.profile, args.at))
     cases = [
-        Case(name, fault, pair, args.seed, args.plant, 2, code)
-        for name in names for fault in [""] for pair in range(args.pairs)
-    ]  # fmt: skip
+        Case(name, fault, pair, args.seed, args.plant, args.fingers, *hand, code)
+        for name in args.controllers
+        for hand in (hands[:1] if name in TRUE else hands)
+        for fault in ("", *([] if name in TRUE else faults))
+        for pair in range(args.pairs)
+    ]
     kept = None if args.out is None else args.out / "grasps.jsonl"
-    outcomes = runs.run(cases, args.objects, args.law, args.jobs, kept, show)
+    outcomes, made = runs.run(cases, args.objects, args.law, args.jobs, kept, show)
     show("")
-    report = _report(outcomes, args.law)
+    report = _report(outcomes, partial(picture.draw, outcomes=outcomes, made=made, law_file=args.law))
     written = [] if args.out is None else write(report, args.out, NAME, ABOUT, overwrite=args.force)
     if args.json:
         print(json.dumps(report.facts(NAME) | {"written": [str(path) for path in written]}))
@@ -73,13 +91,16 @@ def run(args: argparse.Namespace, show: Show) -> int:
     return 1 if args.check and not all(one["met"] for one in report.checks) else 0
 
 
-def _report(outcomes: dict[Case, list[Facts]], law_file: Path) -> Report:
-    together: dict[tuple[str, str], list[Facts]] = {}
+def _report(outcomes: dict[Case, list[Facts]], draw: Any) -> Report:
+    together: dict[Case, list[Facts]] = {}
     for case, rows in outcomes.items():
-        together.setdefault((case.controller, case.fault), []).extend(rows)
-    figures = {key: _figures(rows) for key, rows in together.items()}
-    lines = [(CONTROLLERS[name], fault or "-", *row) for (name, fault), row in figures.items()]
-    lost = {name: row[3] for (name, fault), row in figures.items() if not fault}
+        together.setdefault(replace(case, pair=0), []).extend(rows)
+    figures = {case: _figures(rows) for case, rows in together.items()}
+    lines = []
+    for case, row in figures.items():
+        hand = "-" if case.controller in TRUE else f"{case.profile}, {case.at}"
+        lines.append((CONTROLLERS[case.controller], hand, case.fault or "-", *row))
+    lost = {case.controller: row[3] for case, row in reversed(figures.items()) if not case.fault}
     checks = [check("true force loses", lost["true"], TRUE_PERCENT, "%")] if "true" in lost else []
     for name, least in (("low", WORSE_POINTS), ("high", WORSE_POINTS), ("constant", CONSTANT_PERCENT)):
         if "true" in lost and name in lost:
@@ -87,8 +108,7 @@ def _report(outcomes: dict[Case, list[Facts]], law_file: Path) -> Report:
             text = f"{CONTROLLERS[name]} loses {lost[name]:.1f} %, at least {least:.1f}"
             checks.append(claim(text, lost[name] >= least))
     case = next(iter(outcomes))
-    source = f"{len(outcomes[case])} things of seed {case.seed} for each pair of fingers, law {law_file.name}"
-    draw = partial(picture.draw, outcomes=outcomes, law_file=law_file)
+    source = f"{len(outcomes[case])} things of seed {case.seed} for each pair of fingers, {case.plant} plant"
     return Report(source, [Table("Lost", HEAD, lines, digits=2)], checks, [], draw)
 
 

@@ -65,7 +65,7 @@ class _Grip(ctypes.Structure):
     """grip.c's ``struct grip``."""
 
     _floats = ("least_n", "most_n", "friction", "stiffness", "speed_mm_s", "normal_n", "shear_n", "way_mm", "first_n")
-    _ints = ("deaf_until", "round", "reflex_until", "holds", "settled", "slips")
+    _ints = ("deaf_until", "round", "reflex_until", "holds", "settled", "slips", "sure")
     _fields_ = (*((name, ctypes.c_float) for name in _floats), *((name, ctypes.c_int) for name in _ints))
 
 

@@ -28,7 +28,8 @@ SIDE = """<body pos="{x} 0 0"><joint name="close{name}" type="slide" axis="{axis
   <joint type="slide" axis="0 1 0" stiffness="{shear}" damping="4"/>
   <geom name="pad{name}" type="box" size=".002 .004 .004" mass=".01" condim="4" priority="1"
    friction="{friction} .003 .0001"/></body></body>"""
-MODEL = """<mujoco><option timestep="{dt}" cone="elliptic" impratio="20" integrator="implicitfast" noslip_iterations="4"/>
+MODEL = """<mujoco>
+<option timestep="{dt}" cone="elliptic" impratio="20" integrator="implicitfast" noslip_iterations="4"/>
 <default><geom solref=".004 1" solimp=".95 .99 .0005"/></default><worldbody>
  <geom type="plane" size=".5 .5 .01" friction=".5"/>
  <body name="thing" pos="0 0 .03"><freejoint/><geom name="thing" type="box" size=".03 .02 .03" mass="{mass}"/></body>

@@ -15,21 +15,22 @@ from .plant import things
 from .runs import CONTROLLERS, Case
 
 
-def draw(figure: Any, outcomes: dict[Case, list[Facts]], law_file: Path) -> None:
-    """Above one grasp of the last controller's first thing, below a panel for each controller."""
+def draw(figure: Any, outcomes: dict[Case, list[Facts]], made: dict[Case, Any], law_file: Path) -> None:
+    """Above a grasp of the first thing, by a board if one was tried; below, a panel for each controller."""
     cases = [case for case in outcomes if not case.fault]
     names = list(dict.fromkeys(case.controller for case in cases))
     figure.set_size_inches(max(8.0, 2.6 * len(names)), 8.0)
     above, below = figure.subfigures(2, 1, height_ratios=(3, 2))
-    _grasp(above, next(case for case in cases if case.controller == names[0]), law_file)
+    case = next((case for case in cases if case.controller not in runs.TRUE), cases[0])
+    _grasp(above, case, law_file, made[case])
     for axes, name in zip(below.subplots(1, len(names), sharey=True, squeeze=False)[0], names, strict=True):
         _outcomes(axes, {case: rows for case, rows in outcomes.items() if case.controller == name and not case.fault})
         axes.set_title(CONTROLLERS[name], fontsize=9)
 
 
-def _grasp(figure: Any, case: Case, law_file: Path) -> None:
+def _grasp(figure: Any, case: Case, law_file: Path, made: Any) -> None:
     trace: list[Any] = []
-    runs.grasps(case, 0, 1, law_file, trace)
+    runs.one(case, 0, law_file, made, trace)
     t_s, applied, felt, need, flags, told = (np.array(column) for column in zip(*trace, strict=True))
     forces, flagged = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     limit_n = things(1, case.seed + case.pair)[0].limit_n

@@ -7,30 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from biotac import Frame
-
 from ..report import Facts
-from .plant import DROPPED_MM, ROUND_S, Plant
+from .felt import TrueForce
+from .plant import DROPPED_MM, ROUND_S
 
 CLOSE_MM_S, OPEN_MM_S = 10.0, -20.0
 LIFT_AT_LATEST, SETTLED = 250, 10  # rounds: when a grip is lifted
 PUT_DOWN_S, OPEN_S, OPENING_ROUNDS = 4.0, 4.6, 25  # after the lift has begun, as FAULT_S: in the air, before the weight
 FAULT_S = 1.8
 ECHO_ROUNDS = 10  # a SLIP belongs to a slide until so long after it
-
-
-class Sense:
-    """What the law is given to feel."""
-
-    def feel(self, plant: Plant) -> tuple[list[Frame | None], bool] | None:
-        """Each finger's frame and whether a SLIP was told, of this round; None while the program stands still."""
-        raise NotImplementedError
-
-    def hold(self, held: bool) -> None:
-        """The law begins to hold the thing, or lets go."""
-
-    def fault(self) -> None:
-        """The case's fault begins."""
 
 
 class Slides:
@@ -66,7 +51,7 @@ class Slides:
         return counts | {"missed": self.missed + (not self._heard)}
 
 
-def grasp(plant: Plant, law: Any, sense: Sense, fault: bool = False, trace: list[Any] | None = None) -> Facts:
+def grasp(plant: Any, law: Any, sense: TrueForce, fault: str = "", trace: list[Any] | None = None) -> Facts:
     """Run it: what became of the thing, with Slides' counts.
 
     ``hold_per_need`` is a median, ``off_n``, what is felt less what is applied, a mean, both in the air. ``law`` is a
@@ -84,7 +69,7 @@ def grasp(plant: Plant, law: Any, sense: Sense, fault: bool = False, trace: list
             plant.hit_n = thing.knock_n if 3.2 <= since_s < 3.23 else 0.0
             opened = min(opened, k) if since_s >= OPEN_S else opened
             if fault and abs(since_s - FAULT_S) < ROUND_S / 2:
-                sense.fault()
+                sense.fault(fault)
         plant.step(speed if k < opened else OPEN_MM_S, up_mm_s)
         felt, before = sense.feel(plant), law.slips
         if felt is not None and k < opened:

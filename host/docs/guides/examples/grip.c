@@ -12,10 +12,9 @@ static const uint32_t BLIND = BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_FAULT | BT_F
 static const uint32_t WIDE = BT_FRAME_FLAG_ELECTRODE_OUT | BT_FRAME_FLAG_ELECTRODE_MISSING
                              | BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_ELECTRODE_ALONE | BT_FRAME_FLAG_OUTSIDE;
 static const uint32_t COARSE = BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_BASE_OLD;
-
 struct grip {
     float least_n, most_n, friction, stiffness, speed_mm_s, normal_n, shear_n, way_mm, first_n;
-    int deaf_until, round, reflex_until, holds, settled, slips;
+    int deaf_until, round, reflex_until, holds, settled, slips, sure;
 } grip;
 static struct felt {
     float normal_n, shear_n;
@@ -26,7 +25,8 @@ static struct felt {
 void act_on(const bt_msg_frame *frame)
 {
     const int32_t *force = frame->force_100un;
-    if (!(frame->flags & BLIND) && bt_valid_i32(force[2])) {
+    const uint32_t restarted = grip.sure ? BT_FRAME_FLAG_TARE_UNSURE : 0; // it takes the grip for rest
+    if (!(frame->flags & (BLIND | restarted)) && bt_valid_i32(force[2])) {
         felt.normal_n += (float)force[2] / 1e4f;
         felt.shear_n = fmaxf(felt.shear_n, hypotf((float)force[0], (float)force[1]) / 1e4f);
         felt.flags |= frame->flags;
@@ -83,6 +83,7 @@ void grip_round(void)
     if (!blind && !grip.holds && !felt.lifted) {
         hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});
         grip.holds = 1;
+        grip.sure = !(felt.flags & BT_FRAME_FLAG_TARE_UNSURE);
         grip.first_n = grip.normal_n;
     }
     if (!blind && grip.holds) {

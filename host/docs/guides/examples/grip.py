@@ -1,16 +1,12 @@
-"""Close two fingers on a thing and hold it no harder than it needs. python grip.py
-
-``Grip`` is the controller; ``main`` tries it on a simulated hand.
-"""
-
-from __future__ import annotations
+"""Close two fingers on a thing, hold it no harder than it needs: ``Grip``, tried on simulated ones by python grip.py"""
 
 import numpy as np
 
+from biotac import EventKind
 from biotac import FrameFlags as F
+from biotac.sim import SimFinger, Touch, world
 
-ROUND_S = 0.01
-CLOSING_MM_S = 10.0
+ROUND_S, CLOSING_MM_S = 0.01, 10.0
 LAG_S = 0.03  # from a command to the motion that the next frame shows: the actuator's, and a round
 RESERVE = 1.3  # press that much harder than friction needs
 FRICTION = 0.6  # until a slip teaches less
@@ -37,17 +33,16 @@ class Grip:
         self.speed_mm_s, self.normal_n, self.shear_n = CLOSING_MM_S, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
         self._round, self._deaf_until, self._reflex_until = 0, -1, 0
-        self._way_mm, self._first_n = 0.0, 0.0
+        self._way_mm, self._first_n, self._blind = 0.0, 0.0, BLIND
 
     def step(self, frames, slipped: bool) -> float:
         """How fast the sides are to close until the next round, in mm/s; negative: open.
 
-        ``frames`` has each finger's ``biotac.Frame`` of this round, or None where none came; ``slipped`` says whether
-        the board has reported a SLIP in it.
+        ``frames`` has each finger's Frame of this round, None where none came; ``slipped``: the board reported a SLIP.
         """
         self._round += 1
         felt = list(zip(frames, self.towards, self.shares, strict=True))
-        felt = [(f, f.force_n / share, to) for f, to, share in felt if f is not None and not f.flags & BLIND]
+        felt = [(f, f.force_n / share, to) for f, to, share in felt if f is not None and not f.flags & self._blind]
         felt = [one for one in felt if np.isfinite(one[1]).all()]
         if not felt:
             self.speed_mm_s = 0.0  # nothing is known: stay where you are
@@ -60,6 +55,7 @@ class Grip:
             if not all(f.flags & F.CONTACT for f, *_ in felt):
                 return self.speed_mm_s
             self.holds, self._first_n = True, self.normal_n
+            self._blind |= F.TARE_UNSURE & ~F(int(flags))  # a board that restarts takes the grip for rest
         self._way_mm += self.speed_mm_s * ROUND_S
         if self._way_mm > 0.3 and self.normal_n - self._first_n > 0.3:
             self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
@@ -89,3 +85,15 @@ class Grip:
             self._deaf_until = self._round + DEAF_ROUNDS
         self.speed_mm_s = rate_n_s / self.stiffness
         return self.speed_mm_s
+
+
+if __name__ == "__main__":
+    grip, closed_mm = Grip(), 0.0
+    with world({"index": SimFinger(11), "thumb": SimFinger(12)}) as hand:
+        hand.rest(7.0)
+        for k in range(300):  # between them a thing of 1 N/mm, whose weight comes in the third second
+            closed_mm += grip.speed_mm_s * ROUND_S
+            press_n, pull_n = max(closed_mm - 2.0, 0.0), max(k - 200, 0) / 200
+            now = hand.step(index=Touch(press_n, (0.0, -pull_n)), thumb=Touch(press_n, (0.0, pull_n)))
+            grip.step([now[name].frame for name in now], any(e.kind == EventKind.SLIP for e in now.events))
+    print(f"holds {2 * pull_n:.1f} N of weight with {press_n:.1f} N, and feels {grip.normal_n:.1f} N")
