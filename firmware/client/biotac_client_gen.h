@@ -738,7 +738,7 @@ typedef struct {
     uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, nor goes below the usual rate
 } bt_msg_set_bus_rate;
 
-// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/reference/live_load.md).
+// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md).
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 47
 typedef struct {

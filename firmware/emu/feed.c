@@ -1,64 +1,47 @@
 #include "feed.h"
 
-// The status says what was not taken.
-static uint8_t put_tape(bt_emu_stream *stream, const uint8_t *payload)
+const bt_msg_hello bt_emu_hello = {
+    .wire_major = BT_WIRE_MAJOR,
+    .wire_minor = BT_WIRE_MINOR,
+    .schema_hash = BT_SCHEMA_HASH,
+    .board = BT_BOARD_PICO_SENSOR,
+    .fingers = BT_MAX_FINGERS,
+    .board_name = "simulated",
+    .board_serial = "simulated",
+    .slot_hz = BT_SLOT_HZ,
+};
+
+static union {
+    bt_msg_hello_request hello;
+    bt_msg_emu_tape tape;
+    bt_msg_emu_set_fault fault;
+    bt_msg_emu_play play;
+} got;
+
+static void send_message(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
 {
-    static bt_msg_emu_tape tape; // it is large for a stack of interrupts and commands
-    bt_msg_emu_tape_unpack(&tape, payload);
-    if (tape.fingers == 0 || tape.fingers > BT_MAX_FINGERS || tape.slots == 0
-        || 2 * tape.slots * tape.fingers > (int)sizeof tape.samples) {
-        return BT_ERROR_OUT_OF_RANGE;
-    }
-    if (tape.first_slot == stream->taken) {
-        (void)bt_emu_stream_put(stream, tape.fingers, tape.samples, tape.slots);
-    }
-    return BT_ERROR_OK;
+    uint8_t frame[BT_ENCODED_MAX_BYTES];
+    feed->send(frame, bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
 }
 
-static uint8_t set_fault(bt_emu_stream *stream, const uint8_t *payload)
+static void send_hello(const bt_emu_feed *feed)
 {
-    bt_msg_emu_set_fault command;
-    bt_msg_emu_set_fault_unpack(&command, payload);
-    if (command.finger >= BT_MAX_FINGERS) {
-        return BT_ERROR_NO_SUCH_FINGER;
-    }
-    if (command.fault != BT_EMU_FAULT_NONE && command.fault < BT_EMU_FAULT_SWAPPED) {
-        return BT_ERROR_OUT_OF_RANGE;
-    }
-    stream->fault[command.finger] = command.fault;
-    return BT_ERROR_OK;
+    uint8_t payload[BT_HELLO_BYTES];
+    bt_msg_hello hello = *feed->hello;
+    hello.req_id = got.hello.req_id;
+    hello.nonce = got.hello.nonce;
+    bt_msg_hello_pack(&hello, payload);
+    send_message(feed, BT_HELLO_ID, payload);
 }
 
-static uint8_t play(bt_emu_stream *stream, const uint8_t *payload)
+static void send_status(const bt_emu_feed *feed, uint8_t req_id)
 {
-    bt_msg_emu_play command;
-    bt_msg_emu_play_unpack(&command, payload);
-    stream->hold = command.hold_slot;
-    stream->by_time = command.by_time;
-    stream->live = command.live;
-    return BT_ERROR_OK;
-}
-
-uint8_t bt_emu_obey(bt_emu_stream *stream, uint8_t id, const uint8_t *payload)
-{
-    switch (id) {
-    case BT_EMU_TAPE_ID:
-        return put_tape(stream, payload);
-    case BT_EMU_SET_FAULT_ID:
-        return set_fault(stream, payload);
-    case BT_EMU_PLAY_ID:
-        return play(stream, payload);
-    case BT_EMU_GET_STATUS_ID:
-        return BT_ERROR_OK;
-    default:
-        return BT_ERROR_UNKNOWN_COMMAND;
-    }
-}
-
-bt_msg_emu_status bt_emu_status_of(const bt_emu_stream *stream)
-{
+    const bt_emu_stream *stream = feed->stream;
     const uint32_t room = bt_emu_stream_room(stream);
-    return (bt_msg_emu_status){
+    uint8_t payload[BT_EMU_STATUS_BYTES];
+    bt_msg_emu_status status = {
+        .req_id = req_id,
+        .fingers = (uint8_t)((1u << stream->fingers) - 1),
         .slots_taken = stream->taken,
         .room_slots = (uint16_t)(room < UINT16_MAX ? room : UINT16_MAX),
         .slots_served = stream->at + (stream->served != 0),
@@ -67,32 +50,73 @@ bt_msg_emu_status bt_emu_status_of(const bt_emu_stream *stream)
         .rounds_late = stream->late,
         .looping = stream->repeats,
     };
-}
-
-// ---- over a byte pipe ----------------------------------------------------------------------------------
-
-static void send_message(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
-{
-    uint8_t frame[BT_ENCODED_MAX_BYTES];
-    feed->send(frame, bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
-}
-
-static void send_status(const bt_emu_feed *feed, uint8_t req_id)
-{
-    uint8_t payload[BT_EMU_STATUS_BYTES];
-    bt_msg_emu_status status = bt_emu_status_of(feed->stream);
-    status.req_id = req_id;
-    status.fingers = (uint8_t)((1u << feed->stream->fingers) - 1);
-    status.link_bytes = feed->link_bytes;
+    if (feed->fill != NULL) {
+        feed->fill(&status);
+    }
     bt_msg_emu_status_pack(&status, payload);
     send_message(feed, BT_EMU_STATUS_ID, payload);
 }
 
-static void answer(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
+// The status says what was not taken.
+static uint8_t put_tape(bt_emu_stream *stream)
+{
+    const bt_msg_emu_tape *tape = &got.tape;
+    if (tape->fingers == 0 || tape->fingers > BT_MAX_FINGERS || tape->slots == 0
+        || 2 * tape->slots * tape->fingers > (int)sizeof tape->samples) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    if (tape->first_slot == stream->taken) {
+        (void)bt_emu_stream_put(stream, tape->fingers, tape->samples, tape->slots);
+    }
+    return BT_ERROR_OK;
+}
+
+static uint8_t set_fault(bt_emu_feed *feed)
+{
+    if (got.fault.finger >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    if (got.fault.fault != BT_EMU_FAULT_NONE && got.fault.fault < BT_EMU_FAULT_SWAPPED) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    feed->stream->fault[got.fault.finger] = got.fault.fault;
+    feed->spoilt = true;
+    return BT_ERROR_OK;
+}
+
+static uint8_t obey(bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
+{
+    bt_emu_stream *stream = feed->stream;
+    switch (id) {
+    case BT_EMU_TAPE_ID:
+        bt_msg_emu_tape_unpack(&got.tape, payload);
+        return put_tape(stream);
+    case BT_EMU_SET_FAULT_ID:
+        bt_msg_emu_set_fault_unpack(&got.fault, payload);
+        return set_fault(feed);
+    case BT_EMU_PLAY_ID:
+        bt_msg_emu_play_unpack(&got.play, payload);
+        stream->hold = got.play.hold_slot;
+        stream->by_time = got.play.by_time;
+        stream->live = got.play.live;
+        return BT_ERROR_OK;
+    case BT_EMU_GET_STATUS_ID:
+        return BT_ERROR_OK;
+    default:
+        return feed->obey != NULL ? feed->obey(id, payload) : BT_ERROR_UNKNOWN_COMMAND;
+    }
+}
+
+static void answer(bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
 {
     const uint8_t req_id = payload[0]; // every command begins with it
-    const uint8_t error = bt_emu_obey(feed->stream, id, payload);
-    if (error == BT_ERROR_OK) {
+    if (id == BT_HELLO_REQUEST_ID) {
+        bt_msg_hello_request_unpack(&got.hello, payload);
+        send_hello(feed);
+        return;
+    }
+    const uint8_t error = obey(feed, id, payload);
+    if (error == BT_ERROR_OK && id >= BT_EMU_PLUG_ID) {
         send_status(feed, req_id);
         return;
     }
@@ -101,10 +125,8 @@ static void answer(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
     send_message(feed, BT_REPLY_ID, reply);
 }
 
-void bt_emu_feed_begin(bt_emu_feed *feed, bt_emu_stream *stream, void (*send)(const uint8_t *, size_t))
+void bt_emu_feed_begin(bt_emu_feed *feed)
 {
-    feed->stream = stream;
-    feed->send = send;
     feed->reported = UINT32_MAX;
     bt_deframer_reset(&feed->deframer);
 }

@@ -34,7 +34,8 @@ static void go_on(bt_emu_stream *stream, uint32_t slots)
     stream->served = 0;
 }
 
-// The round before the bus is still in the ring, as bt_emu_stream_room leaves it there.
+// The round before the bus is still in the ring, as bt_emu_stream_room leaves it there. In the first round
+// the place wraps for the moment until the bus goes on.
 static void go_back(bt_emu_stream *stream)
 {
     stream->at = stream->at - BT_SLOTS;
@@ -82,7 +83,7 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
 static void repeat_if_late(bt_emu_stream *stream, uint32_t ahead)
 {
     bool begins = stream->slot + ahead >= BT_SLOTS;
-    if (stream->live && begins && left(stream) < ahead + BT_SLOTS && stream->at >= BT_SLOTS) {
+    if (stream->live && begins && left(stream) < ahead + BT_SLOTS && stream->started) {
         go_back(stream);
         stream->behind_us += ROUND_US;
         stream->late++;

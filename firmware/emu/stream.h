@@ -1,6 +1,7 @@
-// Counts for the emulated sensors: a ring of slots that one writer fills while the bus reads it, or a tape that
-// is there as a whole. Two readers:
-// - in_order: samples go by the tape's order, not by time: each sample command gets its channel's next sample,
+// Counts for the emulated sensors: a ring of slots that one writer fills while the bus reads it, or a tape
+// that is there as a whole. Two readers:
+// - in_order: samples go by the tape's order, not by time: each sample command gets its channel's next
+// sample,
 //   and all fingers stay in the same slot. With by_time, whole rounds are skipped or repeated to keep to the
 //   clock. For a sensor board, whose clock is not the gateway's.
 // - by_clock: the time since the first sample command says which slot it is. Where time can stand still, it
@@ -65,8 +66,8 @@ void bt_emu_stream_loop(bt_emu_stream *stream, const uint16_t *loop, uint8_t fin
 const char *bt_emu_stream_open(bt_emu_stream *stream, const uint8_t *bytes, size_t size);
 #define BT_EMU_TAPE_HEADER_BYTES 24
 
-// The ring's content as it came, [slots taken][fingers]; NULL if part of it has been overwritten, or it is not
-// whole rounds.
+// The ring's content as it came, [slots taken][fingers]; NULL if part of it has been overwritten, or it is
+// not whole rounds.
 const uint16_t *bt_emu_stream_whole(const bt_emu_stream *stream);
 
 // A finger's sample at a place of the ring or tape.

@@ -197,6 +197,63 @@ TEST(test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice)
     assert_int_equal(play_by_time(101, 25000), 250);
 }
 
+TEST(test_a_live_round_that_is_late_or_not_whole_is_the_one_before_again_and_counted)
+{
+    static uint16_t roomy[4 * FINGERS * BT_SLOTS];
+    bt_emu_stream_init(&stream, roomy, 4 * FINGERS * BT_SLOTS);
+    stream.live = true;
+    (void)put(0, BT_SLOTS);
+    (void)put(BT_SLOTS, 10);
+    for (uint32_t round = 0; round < 3; round++) {
+        for (uint32_t slot = 0; slot < BT_SLOTS; slot++) {
+            assert_int_equal(ask(0, slot), count_at(slot, 0));
+        }
+        assert_int_equal(stream.late, round);
+    }
+    (void)put(BT_SLOTS + 10, BT_SLOTS - 10);
+    for (uint32_t slot = BT_SLOTS; slot < 2 * BT_SLOTS; slot++) {
+        assert_int_equal(ask(0, slot), count_at(slot, 0));
+    }
+    assert_int_equal(stream.late, 2);
+    assert_int_equal(stream.starved, 0);
+}
+
+static uint16_t at_time(uint8_t finger, uint32_t slot)
+{
+    uint8_t command = bt_channel_command[bt_slot_channel[slot % BT_SLOTS]];
+    // As the sampler: in whole us, and a little late.
+    uint64_t t_ns = 7000 + (slot * 1000000ull / BT_SLOT_HZ + 30) * 1000;
+    return bt_emu_stream_by_clock(&stream, finger, (uint8_t)((command & 0x7E) >> 1), t_ns);
+}
+
+TEST(test_by_the_clock_every_sample_is_of_its_own_slot_and_a_missing_round_is_known_before_it_begins)
+{
+    uint32_t put_in = 0;
+    assert_true(bt_emu_stream_lacks(&stream, 0));
+    for (uint32_t slot = 0; slot < ROUNDS * BT_SLOTS; slot++) {
+        put_in += put_in == slot ? put(put_in, BT_SLOTS) : 0;
+        assert_int_equal(put_in, slot / BT_SLOTS * BT_SLOTS + BT_SLOTS);
+        for (uint8_t f = 0; f < FINGERS; f++) {
+            assert_int_equal(at_time(f, slot), count_at(slot, f));
+        }
+        uint64_t next_ns = stream.start_ns + (slot + 1) * 1000000000ull / BT_SLOT_HZ;
+        assert_int_equal(bt_emu_stream_lacks(&stream, next_ns), put_in == slot + 1);
+    }
+    assert_int_equal(bt_emu_stream_lacks_at_ns(&stream), stream.start_ns + ROUNDS * BT_FRAME_MS * 1000000ull);
+    assert_int_equal(bt_emu_stream_room(&stream), BT_SLOTS); // the round that is read stays
+}
+
+TEST(test_by_the_clock_a_board_that_was_reset_goes_on_with_the_round_that_comes_next)
+{
+    (void)put(0, 2 * BT_SLOTS);
+    stream.begins_at = stream.at = 2 * BT_SLOTS;
+    assert_true(bt_emu_stream_lacks(&stream, 0));
+    (void)put(2 * BT_SLOTS, BT_SLOTS);
+    assert_false(bt_emu_stream_lacks(&stream, 0));
+    assert_int_equal(at_time(1, 0), count_at(2 * BT_SLOTS, 1));
+    assert_int_equal(at_time(1, 43), count_at(2 * BT_SLOTS + 43, 1));
+}
+
 int main(void)
 {
     return run_all(NULL, empty);

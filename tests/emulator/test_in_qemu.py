@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kept_board import KeptBoard
+from kept_board import kept_board
 
 import biotac
 from biotac.cli.main import main
@@ -60,7 +60,7 @@ def test_it_computes_what_the_simulated_board_computes(
 def test_what_it_saved_is_there_after_a_restart(board: dict[str, Any], tmp_path: Path) -> None:
     source = load_source("press.toml", seconds=1)
     for expected in (100, 250, 260):
-        with shake_hands(SimLink("qemu", KeptBoard(source, tmp_path / "flash.bin"))) as hand:
+        with shake_hands(SimLink("qemu", kept_board(source, tmp_path / "flash.bin"))) as hand:
             assert hand.board.settings()[biotac.Setting.IDLE_PERIOD_MS] == expected
             hand.board.set_setting(biotac.Setting.IDLE_PERIOD_MS, 250 if expected == 100 else 260)
             hand.board.save_settings()

@@ -17,11 +17,12 @@ import pytest
 import random_courses
 import sensor_faults
 import wrong_by
-from sensor_faults import FAULTS, MODELS, SILENT_ROUNDS, WHEN, outcome
+from sensor_faults import MODELS, SILENT_ROUNDS, WHEN, outcome
 
 from biotac import Finger, FrameFlags
 from biotac.core.geometry import ELECTRODE_MM
 from biotac.sim import sampling
+from biotac.sim.faults import FAULTS, noisy_line
 from biotac.sim.loading import load_source
 from biotac.sim.timeline import Pose
 from biotac.wire import slots
@@ -166,7 +167,7 @@ def test_noise_of_an_electrode_is_said_also_while_the_finger_is_shaken() -> None
 @pytest.mark.parametrize("a_bit", [1e-3, 3e-3, 1e-2])
 def test_a_noisy_line_is_no_other_sensor(a_bit: float) -> None:
     for seed in range(20):
-        words = sensor_faults.noisy_line(a_bit)(PRESSES[0], PRESSES[0].words, 0, np.random.default_rng(seed))
+        words = sensor_faults.spoil(PRESSES[0], noisy_line(a_bit), 0, np.random.default_rng(seed))
         assert not (sensor_faults.run(words, {})["flags"] & FrameFlags.SENSOR_FAULT).any(), f"seed {seed}"
 
 

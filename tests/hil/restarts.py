@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from kept_board import KeptBoard
+from kept_board import kept_board
 from rig import Rig, start
 
 import biotac
@@ -34,7 +34,7 @@ class Restarts:
 
     def _open(self) -> None:
         if self._is_a_process:
-            self.board: Any = KeptBoard(self._source, self._flash)
+            self.board: Any = kept_board(self._source, self._flash)
         else:
             self.board = start(self._rig.facts["board"], self._source, pace=0.0)
         self.link = SimLink(self._rig.name, self.board)

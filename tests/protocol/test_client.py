@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 import biotac
 from biotac.cli.live.sim import prepare
+from biotac.sim import SimFinger, Touch, world
 from biotac.sim.loading import load_source
 from biotac.sim.ports import start_board
 
@@ -21,6 +24,7 @@ COMPILERS = [
     *([compiler, "-std=c++17", "-x", "c++"] for compiler in ("g++", "clang++")),
     [*M4, "-std=c99"], [*M4, "-std=c++17", "-x", "c++"],
 ]  # fmt: skip
+EXAMPLES = CLIENT.parents[1] / "host/docs/guides/examples"
 MOST_BYTES = 4096
 FRAMES = 150
 
@@ -71,6 +75,29 @@ def test_the_example_prints_the_frames_that_python_reads(program: Path) -> None:
         message = wire[finger, t_us]
         assert (message["force_100un"].tolist(), int(message["flags"])) == ([x, y, z], flags)
     assert any(abs(z) < 2**31 - 1 for *_, z, _ in output)
+
+
+def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) -> None:
+    """It presses until it feels 2 N; which load that takes, this computer's own world says."""
+    build = ["cc", "-std=gnu11", *WARNINGS, "-fsanitize=address,undefined"]
+    subprocess.run(
+        [*build, f"-I{CLIENT}", EXAMPLES / "press_loop.c", CLIENT / "biotac_client.c", "-o", tmp_path / "loop"],
+        check=True,
+    )
+    command = [sys.executable, "-m", "biotac", "sim", "--live", "index", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as board:
+        assert board.stdout is not None
+        facts = json.loads(board.stdout.readline())
+        arguments = [tmp_path / "loop", facts["port"], str(facts["loads"])]
+        done = subprocess.run(arguments, capture_output=True, text=True, check=True)
+        board.terminate()
+    rounds = [tuple(map(float, line.split())) for line in done.stdout.splitlines()]
+    assert [seq for seq, *_ in rounds] == list(range(1, 801))
+    assert all(abs(felt_n - 2.0) < 0.2 for *_, felt_n in rounds[-50:])
+    with world({"index": SimFinger(1)}) as w:
+        w.run(5.0)
+        felt = w.run(1.0, index=Touch(rounds[-1][1]))["index"].frame
+        assert felt is not None and abs(felt.force_n[2] - 2.0) < 0.4
 
 
 @pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,21 +11,15 @@ from biotac.sim.process import SimBoard, SimLink
 from biotac.sim.source import Source
 
 
-class KeptBoard(SimBoard):
+def kept_board(source: Source, flash: Path) -> SimBoard:
     """A simulated board whose flash is a file, and outlives it."""
-
-    def __init__(self, source: Source, flash: Path) -> None:
-        self._flash = flash
-        super().__init__(source, pace=0.0, hold=True)
-
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
-        return super()._start([*options, "--flash", str(self._flash)])
+    return SimBoard(source, pace=0.0, hold=True, flash=flash)
 
 
 def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
     """Two fingers, of these serial numbers, on a board with this flash."""
     source = load_source("press.toml", fingers=2, seconds=1)
-    board = KeptBoard(replace(source, serials=serials) if serials else source, flash)
+    board = kept_board(replace(source, serials=serials) if serials else source, flash)
     return biotac.Hand(SimLink("sim:flash", board))
 
 

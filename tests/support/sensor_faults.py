@@ -6,7 +6,6 @@ squeeze, or while it is held. Its error is the force's distance from the same fi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,13 +15,13 @@ from courses import Sensor
 from biotac import Finger, FrameFlags
 from biotac.core.geometry import Floats, normals_at, on_surface, tangents_at
 from biotac.sim import physics, sampling
+from biotac.sim.faults import FAULTS, Fault, Faulty
 from biotac.sim.gains import fit_gains
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots
 
 Words = np.ndarray  # uint16 (n, 44), INVALID_COUNT where no good word came
-Fault = Callable[["Press", Words, int, np.random.Generator], Words]
 
 PROOF_S, REST_S, SQUEEZE_N_PER_S, HOLD_S, FREE_S = 4.0, 10.0, 10.0, 6.0, 3.0
 WHEN = ("rest", "touch", "hold")
@@ -125,142 +124,18 @@ def run(words: Words, settings: dict[wire.Setting, int]) -> np.ndarray:
 # ---- faults ----------------------------------------------------------------------------------------------
 
 
-def _electrodes(change: Callable[[Press, Floats, np.random.Generator], Floats]) -> Fault:
-    """A fault of the electrodes' words (n, 19) from the round on, given and returned as float64."""
-
-    def fault(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-        bad = words.copy()
-        counts = change(of, words[begin:, slots.ELECTRODE_SLOT].astype(float), rng)
-        bad[begin:, slots.ELECTRODE_SLOT] = np.clip(np.rint(counts), 0, 4095)
-        return bad
-
-    return fault
-
-
-def _one(change: Callable[[Floats, Floats, np.random.Generator], Floats]) -> Fault:
-    """The same of the electrode that the press moves most: its words (n,), and the time in s."""
-
-    def electrodes(of: Press, counts: Floats, rng: np.random.Generator) -> Floats:
-        worst = most_pressed(of)
-        counts[:, worst] = change(counts[:, worst].copy(), np.arange(len(counts)) * slots.FRAME_S, rng)
-        return counts
-
-    return _electrodes(electrodes)
-
-
 def most_pressed(of: Press) -> int:
     """The electrode that the press moves most."""
     counts = of.words[:, slots.ELECTRODE_SLOT].astype(float)
     return int(np.abs(counts[of.hold : of.free].mean(axis=0) - counts[: of.squeeze].mean(axis=0)).argmax())
 
 
-def _half_gain(of: Press, counts: Floats, _: np.random.Generator) -> Floats:
-    worst = most_pressed(of)
-    rest = of.words[: of.squeeze, slots.ELECTRODE_SLOT[worst]].mean()
-    counts[:, worst] = rest + (counts[:, worst] - rest) / 2
-    return counts
-
-
-def _exchange(of: Press, counts: Floats, _: np.random.Generator) -> Floats:
-    a = most_pressed(of)
-    b = (a + 7) % counts.shape[1]
-    counts[:, [a, b]] = counts[:, [b, a]]
-    return counts
-
-
-def _freeze(slots_frozen: Iterable[int]) -> Fault:
-    def fault(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-        bad = words.copy()
-        columns = np.array(list(slots_frozen))
-        bad[begin:, columns] = bad[begin, columns]
-        return bad
-
-    return fault
-
-
-def _channel(slot: int, value: Callable[[Floats], Floats | float]) -> Fault:
-    def fault(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-        bad = words.copy()
-        bad[begin:, slot] = np.clip(value(bad[begin:, slot].astype(float)), 0, 4095)
-        return bad
-
-    return fault
-
-
-def _shifted(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-    bad = words.copy()
-    bad[begin:] = np.roll(words.reshape(-1), 1).reshape(words.shape)[begin:]
+def spoil(of: Press, lay: Fault, begin: int, rng: np.random.Generator) -> Words:
+    """The press's words with a fault laid on its most pressed electrode from a round on."""
+    rest, other_rest = (words[: of.squeeze, slots.ELECTRODE_SLOT].mean(axis=0) for words in (of.words, of.other))
+    bad = of.words.copy()
+    bad[begin:] = lay(Faulty(most_pressed(of), rest, other_rest, rng), of.words[begin:], of.other[begin:])
     return bad
-
-
-def _exchanged_fingers(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-    bad = words.copy()
-    bad[begin:] = of.other[begin:]
-    return bad
-
-
-def _cross_talk(share: float) -> Fault:
-    def fault(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-        bad = words.copy()
-        e = slots.ELECTRODE_SLOT
-        signal = of.other[:, e] - of.other[: of.squeeze, e].mean(axis=0)
-        bad[begin:, e] = np.clip(np.rint(words[begin:, e] + share * signal[begin:]), 0, 4095)
-        return bad
-
-    return fault
-
-
-_PARITY = np.array([bin(byte).count("1") & 1 for byte in range(256)], bool)
-
-
-def noisy_line(a_bit: float) -> Fault:
-    """Every bit flips with this chance; what parity does not show is believed."""
-
-    def fault(of: Press, words: Words, begin: int, rng: np.random.Generator) -> Words:
-        bad = words.copy()
-        counts = words[begin:].astype(np.uint16)
-        sent = np.stack([counts >> 5 << 1, (counts & 31) << 3], axis=-1).astype(np.uint8)
-        sent |= ~_PARITY[sent]  # the last bit makes each byte's parity odd
-        flips = np.packbits(rng.random((*sent.shape, 8)) < a_bit, axis=-1)[..., 0]
-        sent ^= flips
-        good = _PARITY[sent].all(axis=-1)
-        read = (sent[..., 0].astype(np.uint16) >> 1 << 5) + (sent[..., 1] >> 3)
-        bad[begin:] = np.where(good, read, wire.INVALID_COUNT)
-        return bad
-
-    return fault
-
-
-FAULTS: dict[str, Fault] = {
-    "electrode open": _one(lambda x, t, rng: np.full_like(x, 4095)),
-    "electrode shorted": _one(lambda x, t, rng: np.zeros_like(x)),
-    "electrode floating: walks 20 counts a round": _one(lambda x, t, rng: x[0] + np.cumsum(rng.normal(0, 20, len(x)))),
-    "electrode floating: uniform noise": _one(lambda x, t, rng: rng.uniform(1, 4089, len(x))),
-    "electrode with noise of 200 counts": _one(lambda x, t, rng: x + rng.normal(0, 200, len(x))),
-    "electrode stuck": _one(lambda x, t, rng: np.full_like(x, x[0])),
-    "electrode at half gain": _electrodes(_half_gain),
-    "electrode drifts 10 counts/s": _one(lambda x, t, rng: x - 10 * t),
-    "electrode drifts 50 counts/s": _one(lambda x, t, rng: x - 50 * t),
-    "electrode drifts 200 counts/s": _one(lambda x, t, rng: x - 200 * t),
-    "all electrodes drift 1 count/s": _electrodes(lambda of, x, rng: x - 1 * np.arange(len(x))[:, None] / 100),
-    "all electrodes drift 5 counts/s": _electrodes(lambda of, x, rng: x - 5 * np.arange(len(x))[:, None] / 100),
-    "all electrodes drift 20 counts/s": _electrodes(lambda of, x, rng: x - 20 * np.arange(len(x))[:, None] / 100),
-    "all electrodes jump by 50": _electrodes(lambda of, x, rng: x - 50),
-    "noise of 30 counts on all electrodes": _electrodes(lambda of, x, rng: x + rng.normal(0, 30, x.shape)),
-    "two electrodes' wires exchanged": _electrodes(_exchange),
-    "the same words for ever": _freeze(range(slots.SLOTS_PER_FRAME)),
-    "electrodes frozen, pressure alive": _freeze(slots.ELECTRODE_SLOT),
-    "channels shifted by a slot": _shifted,
-    "two fingers exchanged": _exchanged_fingers,
-    "cross-talk of 30 % between fingers": _cross_talk(0.3),
-    "cross-talk of 100 % between fingers": _cross_talk(1.0),
-    "noisy line, 1e-3 a bit": noisy_line(1e-3),
-    "noisy line, 3e-3 a bit": noisy_line(3e-3),
-    "TDC jumps by 300 counts": _channel(slots.TDC_SLOT, lambda x: x + 300),
-    "PDC stuck": _channel(slots.PDC_SLOT, lambda x: x[0]),
-    "PDC 0": _channel(slots.PDC_SLOT, lambda x: 0.0),
-    "PDC 4095": _channel(slots.PDC_SLOT, lambda x: 4095.0),
-}
 
 
 @dataclass(frozen=True)
@@ -288,7 +163,7 @@ def longest(mask: np.ndarray) -> int:
 def outcome(of: Press, name: str, when: str, model: str, seed: int = 0) -> Outcome:
     """Run a fault of FAULTS."""
     begin = of.begins(when)
-    bad = FAULTS[name](of, of.words, begin, np.random.default_rng([of.seed, seed, 7]))
+    bad = spoil(of, FAULTS[name], begin, np.random.default_rng([of.seed, seed, 7]))
     good, rows = of.healthy(model)[begin:], run(bad, of.settings(model))[begin:]
     new = rows["flags"] & WARNINGS & ~good["flags"]
     given = (rows["force_100un"] != wire.INVALID_I32).all(axis=1) & (good["force_100un"] != wire.INVALID_I32).all(

@@ -69,7 +69,6 @@ const ports = uartPty === null ? [pty] : [pty, uartPty]
 const tape = options.live === undefined ? read(options.tape) : null
 let sensors = null
 let rig = null // once the gateway has power
-let control = null // where a program feeds the sensors
 
 function read(path) {
   try {
@@ -183,7 +182,7 @@ function turn() {
         console.log('end')
       }
       tellAwaited(true)
-      if (!rig.waiting) control?.report()
+      if (sensors.live && !rig.waiting) sensors.calls.report()
       return sensorsAlone()
     }
   }
@@ -228,8 +227,8 @@ function loop() {
 
 plugIn()
 if (sensors.live) {
-  control = new Control(sensors, () => pty.putBytes, fed)
-  await control.listen()
+  sensors.linkBytes = () => pty.putBytes
+  await new Control(sensors, fed).listen()
 } else if (sensorPty === null) {
   power()
 } else {

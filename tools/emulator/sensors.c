@@ -7,17 +7,26 @@
 #include <string.h>
 
 #define EXPORT(name)  __attribute__((export_name(name)))
+#define IMPORT(name)  __attribute__((import_module("env"), import_name(name)))
 #define PAGE_BYTES    65536u
 #define SERIALS_BYTES 128u
+#define FED_BYTES     4096u
 
 extern unsigned char __heap_base;
 
+IMPORT("link_bytes") uint32_t link_bytes(void);                   // that the board has sent to its host
+IMPORT("answer") void answer(const uint8_t *frame, size_t bytes); // to the program that feeds
+
 static bt_emu_stream stream;
-static bt_emu_feed feed;
 static bt_emu_bus bus;
-static uint8_t answers[4096]; // to the program that feeds
-static uint32_t answer_bytes;
 static char serials[SERIALS_BYTES];
+
+static void fill(bt_msg_emu_status *status)
+{
+    status->link_bytes = link_bytes();
+}
+
+static bt_emu_feed feed = {.stream = &stream, .hello = &bt_emu_hello, .send = answer, .fill = fill};
 static bool sampled_behind_the_end;
 
 // Room for a file of so many bytes, behind everything else; 0 when memory does not reach.
@@ -41,7 +50,8 @@ EXPORT("serials") char *serials_at(void)
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     // The tape's last sample is over when somebody asks for the next one.
-    sampled_behind_the_end = sampled_behind_the_end || (channel != BT_EMU_LINE && bt_emu_stream_lacks(&stream, t_ns));
+    sampled_behind_the_end =
+        sampled_behind_the_end || (channel != BT_EMU_LINE && bt_emu_stream_lacks(&stream, t_ns));
     return bt_emu_stream_by_clock(context, finger, channel, t_ns);
 }
 
@@ -60,14 +70,6 @@ EXPORT("plug_in") const char *plug_in(uint32_t bytes)
     return wrong;
 }
 
-static void keep_answer(const uint8_t *frame, size_t bytes)
-{
-    if (bytes <= sizeof answers - answer_bytes) {
-        memcpy(answers + answer_bytes, frame, bytes);
-        answer_bytes += (uint32_t)bytes;
-    }
-}
-
 // Plug in so many fingers, which a program feeds through a ring at room(), of so many samples.
 EXPORT("plug_in_live") void plug_in_live(uint32_t fingers, uint32_t samples)
 {
@@ -76,41 +78,27 @@ EXPORT("plug_in_live") void plug_in_live(uint32_t fingers, uint32_t samples)
     plug_all_in();
 }
 
+// Another program feeds from here on.
 EXPORT("feed_begin") void feed_begin(void)
 {
-    bt_emu_feed_begin(&feed, &stream, keep_answer);
+    bt_emu_feed_begin(&feed);
 }
 
-// The program sent so many bytes, which lie at fed(); what it is to be answered lies at answers().
+// Where a program's bytes are put, FED_BYTES at the most, and how many came.
 EXPORT("fed") uint8_t *fed(void)
 {
-    static uint8_t bytes[4096];
+    static uint8_t bytes[FED_BYTES];
     return bytes;
 }
 
-EXPORT("feed") void feed_bytes(uint32_t bytes, uint32_t link_bytes)
+EXPORT("feed") void feed_bytes(uint32_t bytes)
 {
-    feed.link_bytes = link_bytes;
     bt_emu_feed_receive(&feed, fed(), bytes);
 }
 
-EXPORT("report") void report(uint32_t link_bytes)
+EXPORT("report") void report(void)
 {
-    feed.link_bytes = link_bytes;
     bt_emu_feed_report(&feed);
-}
-
-EXPORT("answers") uint8_t *answers_at(void)
-{
-    return answers;
-}
-
-// How many bytes of answers there are; they are forgotten then.
-EXPORT("answered") uint32_t answered(void)
-{
-    const uint32_t bytes = answer_bytes;
-    answer_bytes = 0;
-    return bytes;
 }
 
 // When time has to stand still for want of the next round, in ns.

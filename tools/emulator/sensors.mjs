@@ -30,7 +30,10 @@ export class Sensors {
   /** tape: what they play; null: a program feeds as many as there are `liveFingers` (control.mjs). */
   constructor(wasm, tape, serials, liveFingers) {
     const module = new WebAssembly.Module(wasm)
-    this.calls = new WebAssembly.Instance(module).exports
+    this.linkBytes = () => 0 // that the board has sent to its host
+    this.answer = () => {} // the program that feeds
+    const told = (at, bytes) => this.answer(Buffer.from(this.#bytes().slice(at, at + bytes)))
+    this.calls = new WebAssembly.Instance(module, { env: { link_bytes: () => this.linkBytes(), answer: told } }).exports
     this.live = tape === null
     const samples = LIVE_ROUNDS * SLOTS * liveFingers
     const bytes = this.live ? 2 * samples : tape.length
@@ -75,27 +78,10 @@ export class Sensors {
     return this.calls.rounds() > 0
   }
 
-  /** A program begins to feed. */
-  feedBegins() {
-    this.calls.feed_begin()
-  }
-
-  /** Have what a program sent carried out; the answer. */
-  feed(chunk, linkBytes) {
+  /** Have what a program sent carried out; `answer` is called with what it is to be told. */
+  feed(chunk) {
     this.#bytes().set(chunk, this.calls.fed())
-    this.calls.feed(chunk.length, linkBytes)
-    return this.#answers()
-  }
-
-  /** What to say of a standstill, once for each length of what came. */
-  report(linkBytes) {
-    this.calls.report(linkBytes)
-    return this.#answers()
-  }
-
-  #answers() {
-    const at = this.calls.answers()
-    return Buffer.from(this.#bytes().slice(at, at + this.calls.answered()))
+    this.calls.feed(chunk.length)
   }
 
   counters() {

@@ -893,7 +893,7 @@ typedef struct {
 void bt_msg_set_bus_rate_pack(const bt_msg_set_bus_rate *msg, uint8_t out[BT_SET_BUS_RATE_BYTES]);
 void bt_msg_set_bus_rate_unpack(bt_msg_set_bus_rate *msg, const uint8_t in[BT_SET_BUS_RATE_BYTES]);
 
-// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/reference/live_load.md).
+// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md).
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 47
 typedef struct {

@@ -2,6 +2,7 @@
 #include "control.h"
 
 #include "feed.h"
+#include "pty.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
@@ -11,87 +12,78 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-static bt_emu_stream *stream;
-static bt_emu_feed feed;
-static int listening = -1;
-static int program = -1;
+enum { PROGRAM, LISTENING };
+static int fd[2] = {-1, -1};
 
-void control_init(bt_emu_stream *fed)
+// A program that does not read its answers loses them, as on every link.
+static void send_frame(const uint8_t *frame, size_t bytes)
 {
-    stream = fed;
+    (void)send(fd[PROGRAM], frame, bytes, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
-int control_listening_fd(void)
+static void fill(bt_msg_emu_status *status)
 {
-    return listening;
+    status->link_bytes = pty_written();
 }
 
-int control_program_fd(void)
-{
-    return program;
-}
+static bt_emu_feed feed = {.hello = &bt_emu_hello, .send = send_frame, .fill = fill};
 
-unsigned control_open(void)
+unsigned control_open(bt_emu_stream *stream)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     socklen_t bytes = sizeof at;
-    listening = socket(AF_INET, SOCK_STREAM, 0);
-    if (listening < 0 || bind(listening, (struct sockaddr *)&at, sizeof at) != 0 || listen(listening, 1) != 0
-        || getsockname(listening, (struct sockaddr *)&at, &bytes) != 0) {
+    feed.stream = stream;
+    fd[LISTENING] = socket(AF_INET, SOCK_STREAM, 0);
+    if (fd[LISTENING] < 0 || bind(fd[LISTENING], (struct sockaddr *)&at, sizeof at) != 0
+        || listen(fd[LISTENING], 1) != 0 || getsockname(fd[LISTENING], (struct sockaddr *)&at, &bytes) != 0) {
         return 0;
     }
     return ntohs(at.sin_port);
 }
 
-int control_fd(void)
+void control_resume(bt_emu_stream *stream, const int fds[2])
 {
-    return program >= 0 ? program : listening;
+    feed.stream = stream;
+    fd[PROGRAM] = fds[PROGRAM];
+    fd[LISTENING] = fds[LISTENING];
+    bt_emu_feed_begin(&feed);
 }
 
-// A program that does not read its answers loses them, as on every link.
-static void send_frame(const uint8_t *frame, size_t bytes)
+const int *control_fds(void)
 {
-    (void)send(program, frame, bytes, MSG_DONTWAIT | MSG_NOSIGNAL);
-}
-
-void control_resume(int listening_fd, int program_fd)
-{
-    listening = listening_fd;
-    program = program_fd;
-    bt_emu_feed_begin(&feed, stream, send_frame);
+    return fd;
 }
 
 static void accept_program(void)
 {
     int no_delay = 1;
-    program = accept(listening, NULL, NULL);
-    if (program >= 0) {
-        (void)setsockopt(program, IPPROTO_TCP, TCP_NODELAY, &no_delay, sizeof no_delay);
-        (void)fcntl(program, F_SETFL, O_NONBLOCK);
-        bt_emu_feed_begin(&feed, stream, send_frame);
+    fd[PROGRAM] = accept(fd[LISTENING], NULL, NULL);
+    if (fd[PROGRAM] >= 0) {
+        (void)setsockopt(fd[PROGRAM], IPPROTO_TCP, TCP_NODELAY, &no_delay, sizeof no_delay);
+        (void)fcntl(fd[PROGRAM], F_SETFL, O_NONBLOCK);
+        bt_emu_feed_begin(&feed);
     }
 }
 
-void control_poll(uint32_t link_bytes)
+void control_poll(void)
 {
     uint8_t bytes[1024];
-    if (program < 0) {
+    if (fd[PROGRAM] < 0) {
         accept_program();
         return;
     }
-    ssize_t n = recv(program, bytes, sizeof bytes, 0);
-    if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) {
-        (void)close(program);
-        program = -1;
+    const ssize_t n = recv(fd[PROGRAM], bytes, sizeof bytes, 0);
+    if (n > 0) {
+        bt_emu_feed_receive(&feed, bytes, (size_t)n);
+    } else if (n == 0 || (errno != EAGAIN && errno != EINTR)) {
+        (void)close(fd[PROGRAM]);
+        fd[PROGRAM] = -1;
     }
-    feed.link_bytes = link_bytes;
-    bt_emu_feed_receive(&feed, bytes, n > 0 ? (size_t)n : 0);
 }
 
-void control_report_stillness(uint32_t link_bytes)
+void control_report(void)
 {
-    if (program >= 0) {
-        feed.link_bytes = link_bytes;
+    if (fd[PROGRAM] >= 0) {
         bt_emu_feed_report(&feed);
     }
 }

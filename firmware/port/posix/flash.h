@@ -1,5 +1,5 @@
-// The simulated board's flash for settings and maps: a file mapped into memory, without a name or with one. Behaves as NOR flash
-// does: erasing sets whole sectors to 0xFF, programming only clears bits.
+// The simulated board's flash for settings and maps: a file mapped into memory, without a name or with one.
+// Behaves as NOR flash does: erasing sets whole sectors to 0xFF, programming only clears bits.
 #ifndef BIOTAC_POSIX_FLASH_H
 #define BIOTAC_POSIX_FLASH_H
 

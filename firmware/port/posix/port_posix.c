@@ -5,12 +5,13 @@
 //              [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
-// --live: a program feeds the sensors round by round (control.h), and device time stands still until it has sent
+// --live: a program feeds the sensors round by round (control.h), and device time stands still until it has
+// sent
 //   the next round. Writes "control PORT" before "pty PATH".
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
 // --flash: where saved settings and maps are kept; without it they are gone with the process.
-// --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a host's
-// command does. End of stdin ends the process.
+// --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a
+// host's command does. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "only_board.h"
 #include "spi_word_by_word.h"
@@ -88,12 +89,11 @@ static void feed_live(const char *fingers)
     live = true;
     bt_emu_stream_init(&stream, live_ring, LIVE_ROUNDS * BT_SLOTS * (unsigned)count);
     (void)bt_emu_stream_put(&stream, (uint8_t)count, NULL, 0); // so many fingers
-    control_init(&stream);
     if (restarted() != NULL) {
-        control_resume(restarted()->listening, restarted()->program);
+        control_resume(&stream, restarted()->control);
         return;
     }
-    const unsigned port = control_open();
+    const unsigned port = control_open(&stream);
     if (port == 0) {
         die("cannot listen on the loopback interface", strerror(errno));
     }
@@ -119,8 +119,7 @@ static void restart(void)
     restart_process(&(restart_state){
         .pty = pty_fd(),
         .flash = flash_fd(),
-        .listening = control_listening_fd(),
-        .program = control_program_fd(),
+        .control = {control_fds()[0], control_fds()[1]},
         .started = stream.started,
         .start_ns = stream.start_ns - clock_now_ns(), // a board's clock begins at 0
         .taken = stream.taken,
@@ -233,21 +232,22 @@ static void stand_still(void)
     link_due = true;
     pty_flush();
     if (live && !held) {
-        control_report_stillness(pty_written());
+        control_report();
     }
     if (ended && !reported) {
         reported = true;
         printf("end\n");
         (void)fflush(stdout);
     }
-    switch (pty_wait(STDIN_FILENO, control_fd(), -1)) {
+    const int *control = control_fds();
+    switch (pty_wait(STDIN_FILENO, control[0] >= 0 ? control[0] : control[1], -1)) {
     case PTY_WAITED_OTHER:
         read_control();
         break;
     case PTY_WAITED_ANOTHER:
-        control_poll(pty_written());
+        control_poll();
         break;
-    default:
+    case PTY_WAITED:
         break;
     }
 }

@@ -19,8 +19,8 @@ void restart_init(char **argv)
     arguments = argv;
     is_restarted = text != NULL
                    && sscanf(text, "%d,%d,%d,%d,%u,%d,%" SCNu64 ",%" SCNu32, &before.pty, &before.flash,
-                             &before.listening, &before.program, &before.times, &started, &before.start_ns,
-                             &before.taken)
+                             &before.control[0], &before.control[1], &before.times, &started,
+                             &before.start_ns, &before.taken)
                           == 8;
     before.started = started != 0;
 }
@@ -34,7 +34,8 @@ void restart_process(const restart_state *state)
 {
     char text[160];
     (void)snprintf(text, sizeof text, "%d,%d,%d,%d,%u,%d,%" PRIu64 ",%" PRIu32, state->pty, state->flash,
-                   state->listening, state->program, before.times + 1, state->started, state->start_ns, state->taken);
+                   state->control[0], state->control[1], before.times + 1, state->started, state->start_ns,
+                   state->taken);
     (void)setenv(NAME, text, 1);
     (void)execv("/proc/self/exe", arguments);
     (void)execvp(arguments[0], arguments); // where there is no /proc

@@ -16,12 +16,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NoReturn, Protocol, runtime_checkable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from ..errors import DeviceLostError
 from ..link import Link
 from ..link.serial_port import went_away
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch, LinkStats, StreamDecoder
+from ..wire.batches import ROUND_US, Batch, LinkStats, StreamDecoder
 from .gap import Gaps, Reason
 
 # The longest wait for a link before other conditions are checked, such as closing.
@@ -82,6 +85,7 @@ class Reader:
         self.rows = 0  #: how many batches with rows have come
         self.batches_skipped = self.frames_skipped = 0  #: dropped by queues whose consumers are too slow
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
+        self._round0_us: int | None = None  # device time of round 0, of the boot that the board was opened in
         self.silent_s = 0.0  #: for how long it has listened in vain
         self.awaited = 0  #: how many replies are awaited
         self.replies: deque[tuple[Any, float]] = deque()  #: what came meanwhile, and when
@@ -184,6 +188,7 @@ class Reader:
             self._decoder = _decoder(hello)
             self.clock.restart()
             self._arrivals.forget()
+            self._round0_us = None  # a source plays on while its board starts again
         else:
             self._decoder.feed(b"\0")  # ends a packet that was cut off halfway: the rest of it will not come
         self.hello, self.lost = hello, None
@@ -308,6 +313,9 @@ class Reader:
             self._frames += len(batch.wire)
             self._arrivals.note(last_us + LAST_SAMPLE_US, batch.arrived_s)
             batch.taken_s = self.taken_s(last_us, batch.arrived_s)
+            if self.last_t_us is None:
+                idle_us = batch.idle["t_us"] - ROUND_US * batch.idle["seq"].astype(np.int64)
+                self._round0_us = min([*(batch.t_us - ROUND_US * batch.seq).tolist(), *idle_us.tolist()], default=None)
             self.last_t_us = last_us
             batch = self.gaps.through(batch, last_us, self.hello.boot_id, decoder.lost_after)
         elif len(batch.pac):
@@ -315,6 +323,11 @@ class Reader:
         elif not batch.messages:
             return None
         return batch if self.every == 1 else thin(batch, self.every)
+
+    def applied_n(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> NDArray[np.float64] | None:
+        """Force (n, 3) in N on simulated fingers (n,) at rows' times (n,), NaN if unknown; None: real or restarted."""
+        source, round0_us = self.link.source, self._round0_us
+        return None if source is None or round0_us is None else source.applied_n(finger, t_us - round0_us)
 
     # ---- its time ------------------------------------------------------------------------------
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..calibrate.wrench.report import AXIS_COLORS
 from ..core.geometry import ELECTRODE_MM
@@ -19,26 +18,29 @@ from ..errors import InputError
 from ..hand.opening import shake_hands
 from ..picture import check_drawable, picture
 from ..recording.crosscheck import CrossCheck
+from ..recording.felt import Felt
 from ..recording.reader import Recording
 from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
+from ..sim.scenario import FingerSpec
 from ..sim.source import Source
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch, join
 from ..wire.frames import electrode_signals
 from ..wire.slots import FRAME_HZ, PAC_SLOT
-from .answers import Answers, answers_to
+from .answers import LIN, answers_to, own_map
 
 Show = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class DemoRun:
-    """What a demo produced: the source it played, everything received, and the facts of its report."""
+    """What a demo produced: the source it played, all that came, what finger 0 felt by each map, its report's facts."""
 
     source: Source
     batch: Batch
+    felt: dict[str, Felt]
     facts: dict[str, Any]
 
     @property
@@ -88,7 +90,17 @@ def run_demo(
         stats = hand.stats
         status = hand.status()
     joined = join(batches)
-    answers = answers_to(joined, settings, source)
+    own, held_out_n = None, None
+    if source.emulated:
+        show("calibrating finger 0 as `biotac calibrate wrench --live` does, which takes some ten seconds")
+        finger = source.emulated[0]
+        own, held_out_n = own_map(FingerSpec(finger.seed, finger.profile, source.serials[0], finger.scale))
+    at_0 = joined.wire["finger"] == 0
+    frames, sent = joined.frames[at_0], joined.wire[at_0]
+    answers, applied_n = answers_to(sent, settings, own), hand.applied_n(frames["finger"], frames["t_us"])
+    felt = {name: Felt() for name in answers if applied_n is not None}
+    for name, one in felt.items():
+        one.add(applied_n, answers[name])  # type: ignore[arg-type]
     rows, played_fingers = source.samples.shape[:2]
     device_s = rows / FRAME_HZ
     recorded = Recording(recording_path)
@@ -114,36 +126,21 @@ def run_demo(
         "recording_bytes": recording_path.stat().st_size,
         "recording_matches": bool(same),
         "tare_changes": tare_changes(joined.messages),
-        "force_rmse_n": force_error(source, joined),
-        "lin_rmse_n": force_error(source, joined, answers.lin_n),
-        "calibrated_by": answers.calibrated_by,
-        "calibrated_rmse_n": force_error(source, joined, answers.calibrated_n),
+        "calibration_rmse_n": held_out_n,
+        "felt": {name: one.bands for name, one in felt.items()},
         "crosscheck": outcome.as_dict(),
         "recording": str(recording_path),
         "report": str(folder / "report.json"),
         "picture": str(folder / "demo.png"),
     }
-    draw(source, joined, source_rows(source, joined), answers, folder / "demo.png")
+    draw(source, frames, sent, applied_n, answers, folder / "demo.png")
     (folder / "report.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
-    return DemoRun(source, joined, facts)
+    return DemoRun(source, joined, felt, facts)
 
 
 def expected_frames(source: Source) -> int:
     """Frames that the board must send: one for each round of a finger with at least one good word."""
     return int(np.count_nonzero(np.any((source.samples <= 4095), axis=2)))
-
-
-def source_rows(source: Source, batch: Batch) -> NDArray[np.int64]:
-    """The source's row that each frame was sampled from, shape (n,).
-
-    Found by time, because a round in which a finger gave no good word has a row but no seq.
-    """
-    t_us = batch.frames["t_us"]
-    if not len(t_us):
-        return np.empty(0, np.int64)
-    first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
-    rows = first_row + np.rint((t_us - t_us.min()) * FRAME_HZ / 1e6).astype(np.int64)
-    return np.asarray(np.clip(rows, 0, len(source.samples) - 1))
 
 
 def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
@@ -155,34 +152,14 @@ def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
     ]
 
 
-def force_error(source: Source, batch: Batch, force_n: NDArray[np.float64] | None = None) -> list[float] | None:
-    """RMS difference to the source's own force over contact frames, N per axis; None if the source has no force.
-
-    Judges ``force_n`` (n, 3) if given, else what the board sent.
-    """
-    truth = source.known_force_n
-    if truth is None:
-        return None
-    touched = (batch.frames["flags"] & wire.FrameFlags.CONTACT) != 0
-    if not touched.any():
-        return None
-    frames, rows = batch.frames[touched], source_rows(source, batch)[touched]
-    computed_n = frames["force_n"] if force_n is None else force_n[touched]
-    difference = computed_n - truth[rows, frames["finger"]]
-    return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
-
-
-def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], answers: Answers, path: Path) -> None:
-    """Write a PNG of finger 0; ``source_rows`` (n,) gives the source's row of each frame."""
-    at_0 = batch.frames["finger"] == 0
-    frames, messages = batch.frames[at_0], batch.wire[at_0]
+def draw(source: Source, frames: Any, messages: Any, applied_n: Any, answers: dict[str, Any], path: Path) -> None:
+    """Write a PNG of finger 0, with what was applied in its frames (n, 3), if known, and the answers, in N."""
     with picture(path) as figure:
         figure.set_size_inches(13, 5.6)
         axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
         figure.suptitle(f"{source.name}: finger 0 through the simulated board")
         draw_fingertip(figure, axes[0], frames, messages)
-        lin_n, calibrated_n = answers.lin_n[at_0], answers.calibrated_n[at_0]
-        draw_force(axes[1], source, frames, source_rows[at_0], replace(answers, lin_n=lin_n, calibrated_n=calibrated_n))
+        draw_force(axes[1], frames, applied_n, answers)
 
 
 def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
@@ -213,22 +190,20 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     figure.colorbar(dots, ax=axes, shrink=0.7, label="signal [count]: compressed < 0 < bulged")
 
 
-def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64], answers: Answers) -> None:
-    """Both answers' force on the finger over device time, with the source's own force behind them."""
+def draw_force(axes: Any, frames: Any, applied_n: Any, answers: dict[str, Any]) -> None:
+    """The best answer's force on the finger over device time, and Lin's, with what was applied behind them."""
     t_s = frames["t_us"] / 1e6
-    truth_n = source.known_force_n
+    best = next(iter(answers))
     for axis, color in enumerate(AXIS_COLORS):
-        if truth_n is not None:
-            truth = truth_n[rows, 0, axis]
-            axes.plot(t_s, truth, color=color, linewidth=4, alpha=0.25, label=f"{'xyz'[axis]}, truth")
-        axes.plot(t_s, answers.lin_n[:, axis], ":", color=color, linewidth=1, label=f"{'xyz'[axis]}, Lin")
-        axes.plot(t_s, answers.calibrated_n[:, axis], color=color, linewidth=1, label=f"{'xyz'[axis]}, calibrated")
+        name = "xyz"[axis]
+        if applied_n is not None:
+            axes.plot(t_s, applied_n[:, axis], color=color, linewidth=4, alpha=0.25, label=f"{name}, applied")
+        axes.plot(t_s, answers[best][:, axis], color=color, linewidth=1, label=f"{name}, {best}")
+        axes.plot(t_s, answers[LIN][:, axis], ":", color=color, linewidth=1, label=f"{name}, {LIN}")
     contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
-    axes.fill_between(
-        t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06, label="contact"
-    )
-    axes.set(xlabel="device time [s]", ylabel="force on the finger [N]")
-    title = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
-    axes.set_title(f"{title}, truth (thick)" if truth_n is not None else title, fontsize=10)
+    axes.fill_between(t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06)
+    axes.set(xlabel="device time [s]; grey: contact", ylabel="force on the finger [N]")
+    title = f"felt by the {best} (thin) and by {LIN} as shipped (dotted)"
+    axes.set_title(title if applied_n is None else f"force applied (wide), {title}", fontsize=10)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)
+    axes.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

@@ -29,6 +29,9 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
             finger = table.finger or 0
             name = name_of.get(finger, str(finger))
             force.plot(t_s, np.linalg.norm(table.arrays["force_n"], axis=1), _COLOURS[finger], lw=0.8, label=name)
+            if recording.applied_n is not None:
+                applied_n = np.linalg.norm(recording.applied_n[recording.frames["finger"] == finger], axis=1)
+                force.plot(t_s, applied_n, _COLOURS[finger], lw=4, alpha=0.25, label=f"{name}, applied")
             rest = np.nanmedian(table.arrays["pdc_tare"]) if np.isfinite(table.arrays["pdc_tare"]).any() else 0.0
             pdc = np.where(table.arrays["pdc"] == 65535, np.nan, table.arrays["pdc"] - rest)
             pressure.plot(t_s, pdc, _COLOURS[finger], lw=0.8)
@@ -44,6 +47,6 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
                 force.text(at_s, 1.0, label.text, transform=force.get_xaxis_transform(), va="bottom", fontsize=8)
                 free_s = at_s + len(label.text) * (end_us - begin_us) / 1e6 / 150  # as wide as its letters
         force.set_title(recording.path.name, pad=16)
-        force.set(ylabel="force on the finger, N")
+        force.set(ylabel="size of the force on the finger, N")
         force.legend(loc="upper right")
         pressure.set(xlabel="time, s", ylabel="pressure above rest, count")

@@ -56,7 +56,8 @@ class Recorder:
         self._kept = kept
         self._troubles = troubles
         self._known = self._facts()
-        self._writer = Writer(path, self._known, board.link.port, overwrite=overwrite, mid_stream=mid_stream)
+        options: Any = {"overwrite": overwrite, "mid_stream": mid_stream, "applied_n": board.reader.applied_n}
+        self._writer = Writer(path, self._known, board.link.port, **options)
         self._boot_id = board.info.boot_id
         self._waiting: deque[tuple[int, bytes | Gap | Label]] = deque()
         self._put_bytes = self._taken_bytes = 0  # each counted by one thread

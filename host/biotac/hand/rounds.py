@@ -83,7 +83,7 @@ class Rounds:
     # ---- the program ---------------------------------------------------------------------------
 
     def wait(self, after: Round | None, timeout_s: float) -> Round:
-        """The newest complete round after ``after``, or after this call. Raises TimeoutError when none comes in time."""
+        """The newest complete round after ``after``, or after this call. Raises TimeoutError when none comes."""
         after_us = max(self._rows, default=-1) if after is None else after.t_us
         reader = self._reader
 

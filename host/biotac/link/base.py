@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import numpy as np
@@ -10,17 +10,12 @@ from numpy.typing import NDArray
 
 from ..errors import PortError
 
+#: Fingers (n,) and device times (n,) in us to the force (n, 3) in N that was applied: board/reader.py.
+AppliedN = Callable[[NDArray[np.uint8], NDArray[np.int64]], NDArray[np.float64] | None]
+
 
 class Played(Protocol):
     """What a simulated board plays, and what its user would know about it; sim/source.py has the details."""
-
-    @property
-    def name(self) -> str:
-        """Its name, for messages."""
-
-    @property
-    def samples(self) -> NDArray[np.uint16]:
-        """(frames, fingers, 44), 0..4095 where a count came."""
 
     @property
     def settings(self) -> Mapping[str, int]:
@@ -30,9 +25,8 @@ class Played(Protocol):
     def tare_q4(self) -> NDArray[np.uint16] | None:
         """The tare (fingers, 19) to give the board before streaming, in 1/16 count, or None."""
 
-    @property
-    def known_force_n(self) -> NDArray[np.float64] | None:
-        """The applied force (frames, fingers, 3) in N, or None."""
+    def applied_n(self, finger: NDArray[np.uint8], since_us: NDArray[np.int64]) -> NDArray[np.float64] | None:
+        """Force (n, 3) in N on fingers (n,) in rounds ``since_us`` (n,) after round 0; NaN outside, None if unknown."""
 
 
 class Link(Protocol):

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
 from ..wire.dtypes_gen import DTYPES
-from ..wire.fields import WIRE_INVALID
+from ..wire.fields import FORCE_LSB_PER_N, WIRE_INVALID
 from ..wire.frames import StructArray
 from ..wire.framing import encode, open_frame
 from ..wire.native import ffi, lib
 
 KINDS = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)
 FRAME, PAC, IDLE = range(len(KINDS))
+APPLIED = "applied_100un"  #: a column of FRAMEs that no board sends: the force (3) on a simulated finger
 PACKET = 0xFFFF  #: in an order: the next of the packets. Any other code is kind << 8 | finger: that finger's next row.
 _COUNTS = struct.Struct(f"<{len(KINDS)}I")  # rows of each kind, at the beginning of a table
 
@@ -52,7 +53,8 @@ def row_dtype(kind: int) -> np.dtype[Any]:
     sent = DTYPES[KINDS[kind]]
     wide = {"seq": np.dtype("<u4"), "t_us": np.dtype("<i8")}
     names = ["finger", *(name for name in sent.names or () if name != "finger")]
-    return np.dtype([(name, wide.get(name, sent[name])) for name in names])
+    own = [(APPLIED, np.dtype(("<i4", 3)))] if kind == FRAME else []
+    return np.dtype([(name, wide.get(name, sent[name])) for name in names] + own)
 
 
 ROWS = tuple(row_dtype(kind) for kind in range(len(KINDS)))
@@ -122,11 +124,15 @@ class Rest:
         return Rest(**{**vars(self), "order": self.order[~gone]})
 
 
-def take_apart(data: bytes, batch: Batch) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
+def take_apart(
+    data: bytes, batch: Batch, applied_n: NDArray[np.float64] | None
+) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
     """Tables by finger, the order and the packets of ``data``, whole messages whose decoded rows are ``batch``."""
     pieces = data.split(b"\0")[:-1]
     frames = np.empty(len(batch.wire), ROWS[FRAME])
-    for name in ROWS[FRAME].names or ():
+    applied = np.full(3, np.nan) if applied_n is None else np.clip(np.rint(applied_n * FORCE_LSB_PER_N), -2e9, 2e9)
+    frames[APPLIED] = np.nan_to_num(applied, nan=wire.INVALID_I32)
+    for name in DTYPES[wire.Frame.ID].names or ():
         frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
     tables = [frames, batch.pac, batch.idle]
     # COBS's first byte precedes the id. A row is at least as long as here; it is longer from a newer board.

@@ -14,6 +14,7 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
 from ..board.gap import Gap
+from ..link.base import AppliedN
 from ..version import __version__
 from ..wire.batches import StreamDecoder
 from ..wire.counters import nearest
@@ -69,11 +70,13 @@ class RecordingFile:
         """FRAMEs lost on the way, by their sequence numbers."""
         return self._decoder.lost
 
-    def add(self, block: bytes, arrived_ns: int, all_here_ns: int | None = None) -> None:
+    def add(
+        self, block: bytes, arrived_ns: int, all_here_ns: int | None = None, applied_n: AppliedN = lambda *rows: None
+    ) -> None:
         """Append wire bytes; ``arrived_ns`` is when their first byte arrived, in ns on the host's clock (Unix).
 
         ``all_here_ns`` is when all of them had arrived; None if unknown. Bytes after the last delimiter wait for the
-        next block.
+        next block. ``applied_n`` is asked about its FRAMEs.
         """
         data = self._tail + block
         end = data.rfind(b"\0") + 1
@@ -86,7 +89,7 @@ class RecordingFile:
         decoder = self._decoder
         losses, lost_pac, disordered = len(decoder.lost_after), decoder.lost_pac, decoder.disordered
         batch = decoder.feed(data)
-        tables, order, packets = take_apart(data, batch)
+        tables, order, packets = take_apart(data, batch, applied_n(batch.wire["finger"], batch.t_us))
         rest = Rest(
             order,
             packets,

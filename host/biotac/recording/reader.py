@@ -19,12 +19,12 @@ from ..keep.calibration import own_settings
 from ..markdown import html_table
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
-from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire, frames_from_wire
+from ..wire.frames import BANDS_DTYPE, FORCE_LSB_PER_N, StructArray, bands_from_wire, frames_from_wire, to_units
 from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
-from .block import FRAME, Packet, as_sent
+from .block import APPLIED, FRAME, Packet, as_sent
 from .blocks import Block, Blocks, Contents
 from .facts import Facts
 from .labels import Label
@@ -109,6 +109,16 @@ class Recording:
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,), in order of arrival."""
         return frames_from_wire(self._contents.sent, self.seq, self.t_us)
+
+    @cached_property
+    def applied_n(self) -> NDArray[np.float64] | None:
+        """The force (n, 3) in N on simulated fingers in ``frames``, NaN where it is not known; None of real ones."""
+        sent = self._contents.sent[APPLIED]
+        return None if (sent == wire.INVALID_I32).all() else to_units(sent, FORCE_LSB_PER_N)
+
+    def applied_in(self, block: int) -> NDArray[np.float64]:
+        """``applied_n`` of a block's frames, by its number in ``blocks``."""
+        return to_units(self._contents.blocks[block].rows[FRAME][APPLIED], FORCE_LSB_PER_N)
 
     @cached_property
     def wire(self) -> StructArray:

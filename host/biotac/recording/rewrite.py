@@ -35,7 +35,7 @@ def rewrite(
             for gap in recording.gaps_before(k):
                 file.add_gap(gap)
             data = b"".join(map(change, recording.packets(k)))
-            file.add(data, recording.arrived_ns[k], recording.all_here_ns[k])
+            file.add(data, recording.arrived_ns[k], recording.all_here_ns[k], lambda *_, k=k: recording.applied_in(k))
             at_us = head.last_us or at_us
             while labels and (labels[0].t_us or 0) <= at_us:
                 file.add_label(labels.pop(0))

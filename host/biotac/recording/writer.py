@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 from ..board.gap import Gap
 from ..errors import InputError, printable, taken
+from ..link.base import AppliedN
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
@@ -41,6 +42,7 @@ class Writer:
         *,
         overwrite: bool = False,
         mid_stream: bool = False,
+        applied_n: AppliedN = lambda *rows: None,
         clock_s: Callable[[], float] = time.monotonic,
         unix_ns: Callable[[], int] = time.time_ns,
     ) -> None:
@@ -50,6 +52,7 @@ class Writer:
         self._overwrite = overwrite
         self._clock_s = clock_s
         self._unix_ns = unix_ns
+        self._applied_n = applied_n
         self._pending = bytearray()
         self._pending_since = 0.0
         self._arrived_ns = 0
@@ -131,7 +134,7 @@ class Writer:
         if os.fstat(self._file.stream.fileno()).st_nlink == 0:
             self._file.close()  # so that this is reported only once
             raise FileNotFoundError(errno.ENOENT, "was deleted during recording", str(self.path))
-        self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns())
+        self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns(), self._applied_n)
         self._pending.clear()
 
     @property

@@ -12,12 +12,13 @@ from .scenario import FLAT_MM
 from .source import Source, Truth
 from .timeline import Pose, Track
 from .touch import Course, Load, Touch
-from .world import World, world
+from .world import LockStep, World, wired_world, world
 
 SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 
 __all__ = [
-    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PROFILES", "Course", "Finger", "Footprints", "Load", "Pose", "Profile",
-    "Sampler", "SimFinger", "Source", "States", "Touch", "Track", "Truth", "World", "bundled_scenarios", "deform",
-    "fit_gains", "load_source", "plate_recording", "random_loads", "sample", "tdc_counts", "world",
+    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PROFILES", "Course", "Finger", "Footprints", "Load", "LockStep",
+    "Pose", "Profile", "Sampler", "SimFinger", "Source", "States", "Touch", "Track", "Truth", "World",
+    "bundled_scenarios", "deform", "fit_gains", "load_source", "plate_recording", "random_loads", "sample",
+    "tdc_counts", "wired_world", "world",
 ]  # fmt: skip

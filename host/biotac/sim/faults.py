@@ -39,7 +39,7 @@ class Faulty:
     def time_s(self, n: int) -> Floats:
         """The times (n,) of the next rounds since it began; they are counted."""
         self.rounds += n
-        return (self.rounds - n + np.arange(n)) * FRAME_S
+        return np.asarray((self.rounds - n + np.arange(n)) * FRAME_S, np.float64)
 
     def first(self, now: Any) -> Any:
         """``now`` of its first call, for ever."""
@@ -56,7 +56,7 @@ def _electrodes(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
     """A fault of the electrodes' counts (n, 19), given and returned as float64; ``t_s`` (n,) is the time."""
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
-        bad = words.copy()
+        bad: Words = words.copy()
         counts = change(on, words[:, ELECTRODE_SLOT].astype(float), on.time_s(len(words)))
         bad[:, ELECTRODE_SLOT] = np.clip(np.rint(counts), 0, _sensor.FULL_SCALE_COUNT)
         return bad
@@ -90,14 +90,15 @@ def _exchange(on: Faulty, counts: Floats, _: Floats) -> Floats:
 
 def _half_gain(on: Faulty, x: Floats, _: Floats) -> Floats:
     rest = on.rest[on.electrode]
-    return rest + (x - rest) / 2
+    half: Floats = rest + (x - rest) / 2
+    return half
 
 
 def _freeze(slots: Iterable[int]) -> Fault:
     columns = np.array(list(slots))
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
-        bad = words.copy()
+        bad: Words = words.copy()
         bad[:, columns] = on.first(words[0, columns].copy())
         return bad
 
@@ -106,7 +107,7 @@ def _freeze(slots: Iterable[int]) -> Fault:
 
 def _channel(slot: int, value: Callable[[Faulty, Floats], Floats | float]) -> Fault:
     def fault(on: Faulty, words: Words, other: Words) -> Words:
-        bad = words.copy()
+        bad: Words = words.copy()
         bad[:, slot] = np.clip(value(on, words[:, slot].astype(float)), 0, _sensor.FULL_SCALE_COUNT)
         return bad
 
@@ -122,7 +123,7 @@ def _shifted(on: Faulty, words: Words, other: Words) -> Words:
 
 def _cross_talk(share: float) -> Fault:
     def fault(on: Faulty, words: Words, other: Words) -> Words:
-        bad = words.copy()
+        bad: Words = words.copy()
         felt = words[:, ELECTRODE_SLOT] + share * (other[:, ELECTRODE_SLOT] - on.other_rest)
         bad[:, ELECTRODE_SLOT] = np.clip(np.rint(felt), 0, _sensor.FULL_SCALE_COUNT)
         return bad
@@ -190,7 +191,7 @@ BUS_FAULTS = {
     "swapped": EmuFault.SWAPPED,
 }
 EVERY_FAULT = (*FAULTS, *BUS_FAULTS)
-_IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
+IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
 
 
 def fault_named(name: str, channel: str | None = None) -> Fault:
@@ -203,7 +204,7 @@ def fault_named(name: str, channel: str | None = None) -> Fault:
             return FAULTS[known]
     if name not in BUS_FAULTS:
         raise InputError(f"no fault {name!r}, expected one of: {', '.join(EVERY_FAULT)}")
-    code, hit = BUS_FAULTS[name], np.ones(SLOTS_PER_FRAME, bool) if channel is None else _IS_CHANNEL[channel]
+    code, hit = BUS_FAULTS[name], np.ones(SLOTS_PER_FRAME, bool) if channel is None else IS_CHANNEL[channel]
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
         return np.where(hit, np.uint16(code), words)
@@ -211,9 +212,9 @@ def fault_named(name: str, channel: str | None = None) -> Fault:
     return fault
 
 
-def broken_electrode(channel: str | None) -> int:
-    """The index of the electrode that ``channel`` names; without one, E17, the pad's middle."""
-    name = channel or "E17"
+def broken_electrode(kind: str, channel: str | None) -> int:
+    """The index of the electrode that ``channel`` names; without one, and for faults of the bus, E17's, on the pad."""
+    name = "E17" if channel is None or kind in BUS_FAULTS else channel
     if name not in _sensor.ELECTRODE_NAMES:
         raise InputError(f"channel is {name!r}, expected an electrode, E1 to E19")
     return _sensor.ELECTRODE_NAMES.index(name)

@@ -1,4 +1,4 @@
-"""Simulated fingers on a board that waits for them: each round's load becomes words, and the board computes it."""
+"""Simulated fingers that a program loads round by round: each load becomes words, and these go to a board."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from ..link.serial_port import SerialLink
 from ..wire.messages_gen import EmuStatus
 from ..wire.sensor_gen import MAX_SENSORS
 from . import touch
-from .control import Control
 from .emulated import EmulatedBoard
 from .faults import Fault, Faulty, broken_electrode, fault_named, on_the_bus
 from .physics import Finger
@@ -29,16 +28,17 @@ class LiveFingers:
     def __init__(self, fingers: Mapping[str, Finger]) -> None:
         if not 1 <= len(fingers) <= MAX_SENSORS:
             raise InputError(f"{len(fingers)} fingers are given, expected 1 to {MAX_SENSORS}")
-        self.fingers = dict(fingers)
-        self.names = {name: number for number, name in enumerate(self.fingers)}
-        self._samplers = [Sampler(finger) for finger in self.fingers.values()]
-        self._rest = [finger.rest_counts(np.zeros(1))[0] for finger in self.fingers.values()]
+        self.names = {name: number for number, name in enumerate(fingers)}
+        self._fingers = tuple(fingers.values())
+        self._samplers = [Sampler(finger) for finger in self._fingers]
+        self._rest = [finger.rest_counts(np.zeros(1))[0] for finger in self._fingers]
         self._faults: dict[tuple[int, str], tuple[Fault, Faulty]] = {}
 
-    @property
-    def serials(self) -> tuple[str, ...]:
-        """The sensors' serial numbers."""
-        return tuple(default_serial(finger.seed) for finger in self.fingers.values())
+    def at_rest(self, rounds: int = 1) -> Source:
+        """The next rounds, in which nothing touches."""
+        serials = tuple(default_serial(finger.seed) for finger in self._fingers)
+        words = np.stack([self.read({}) for _ in range(rounds)])
+        return Source("live", words, serials=serials, emulated=self._fingers)
 
     def read(self, loads: Mapping[str, Load]) -> Words:
         """The words of the next round, (fingers, 44). A finger that is not named is not touched."""
@@ -46,12 +46,10 @@ class LiveFingers:
             self.number(name)
         states = [touch.states(loads.get(name)) for name in self.names]
         words = np.stack([sampler.step(*state) for sampler, state in zip(self._samplers, states, strict=True)])
-        if not self._faults:
-            return words
-        spoilt = words.copy()
-        for (number, _), (fault, faulty) in self._faults.items():
+        spoilt: Words = words.copy()
+        for (number, _), (lay, faulty) in self._faults.items():
             beside = words[(number + 1) % len(words)]
-            spoilt[number] = on_the_bus(fault(faulty, spoilt[None, number], beside[None]))[0]
+            spoilt[number] = on_the_bus(lay(faulty, spoilt[None, number], beside[None]))[0]
         return spoilt
 
     def number(self, name: str) -> int:
@@ -60,41 +58,27 @@ class LiveFingers:
             raise KeyError(f"no finger {name!r}, expected one of {', '.join(self.names)}")
         return self.names[name]
 
-    def fault(self, name: str, kind: str | None, channel: str | None) -> None:
-        """See World.fault."""
+    def fault(self, name: str, kind: str | None, channel: str | None = None) -> None:
+        """Lay a fault on a finger from the next round on; None ends all of that finger's. See World.fault."""
         number = self.number(name)
         if kind is None:
             self._faults = {key: laid for key, laid in self._faults.items() if key[0] != number}
             return
-        rng = np.random.default_rng([self.fingers[name].seed, 7])
-        lay = fault_named(kind, channel)
-        faulty = Faulty(broken_electrode(channel) if channel and channel[0] == "E" else broken_electrode(None),
-                        self._rest[number], self._rest[(number + 1) % len(self._rest)], rng)  # fmt: skip
-        self._faults[number, f"{kind} {channel}"] = lay, faulty
+        electrode, lay = broken_electrode(kind, channel), fault_named(kind, channel)
+        rng = np.random.default_rng([self._fingers[number].seed, 7])
+        rest, other_rest = self._rest[number], self._rest[(number + 1) % len(self._rest)]
+        self._faults[number, f"{kind} {channel}"] = lay, Faulty(electrode, rest, other_rest, rng)
 
 
-class LiveBoard:
-    """A simulated board whose time stands still until the next round of its fingers has come.
+def live_board(fingers: LiveFingers, board: str, image: str | None = None) -> SimBoard:
+    """Start a board whose time stands still until the next round of its fingers has come to its ``sensors``.
 
     ``board`` is "posix", the firmware as a process, or "pico", its flash image in the emulator. Nothing touches in its
-    first round, which runs when ``release`` is called.
+    first round, which runs when it is released. Raises PortError when it does not start.
     """
-
-    def __init__(self, fingers: LiveFingers, board: str = "posix", image: str | None = None) -> None:
-        rest = fingers.read({})
-        source = Source("live", rest[None], serials=fingers.serials, emulated=tuple(fingers.fingers.values()))
-        self.board: SimBoard = (
-            SimBoard(source, pace=0.0, hold=True, live=True)
-            if board == "posix"
-            else EmulatedBoard(board, source, pace=0.0, hold=True, live=True, image=image)
-        )
-        assert self.board.control is not None
-        self.control: Control = self.board.control
-
-    def compute(self, words: Words) -> EmuStatus:
-        """Have the next round computed; what was made of it has left the board when this returns."""
-        self.control.feed(words)
-        return self.control.wait_still()
+    if board == "posix":
+        return SimBoard(fingers.at_rest(), pace=0.0, hold=True, live=True)
+    return EmulatedBoard(board, fingers.at_rest(), pace=0.0, hold=True, live=True, image=image)
 
 
 class LiveLink(SimLink):

@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.geometry import Floats
+from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
-from .faults import BUS_FAULTS, FAULTS, Faulty, broken_electrode, fault_named, on_the_bus
+from .faults import BUS_FAULTS, FAULTS, IS_CHANNEL, Faulty, broken_electrode, fault_named, on_the_bus
 from .gains import fit_gains
 from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
 
-_IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
 _REPEAT_SEED_STEP = 100  # large enough that repeated fingers do not get the scenario's own seeds
 
 
@@ -49,12 +49,11 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
         for k in range(fault.finger, count, own) if fault.kind in FAULTS else ():
             _lay(fault, samples, emulated, k, period)
     for index in range(min(own, count)):
-        codes = _codes(
-            [fault for fault in scenario.faults if fault.finger == index and fault.kind in BUS_FAULTS], period
-        )
-        for k in range(index, count, own) if codes is not None else ():
-            laid = codes[frame]  # type: ignore[index]
-            np.copyto(samples[:, k], laid, where=laid > 0)
+        codes = _codes([fault for fault in scenario.faults if fault.finger == index], period)
+        if codes is not None:
+            laid = codes[frame]
+            for k in range(index, count, own):
+                np.copyto(samples[:, k], laid, where=laid > 0)
 
     def middles(frames: int) -> list[States]:
         states = [track.states(_seconds(np.arange(frames) + 0.5)) for track in scenario.tracks[:count]]
@@ -91,21 +90,36 @@ def _repeated(spec: FingerSpec, repetition: int) -> FingerSpec:
 
 
 def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
-    """Codes that bus faults put in place of counts, (period, 44): in every slot that begins during a fault; otherwise 0."""
-    if not faults:
+    """Codes that faults of the bus put in place of counts, (period, 44), in each slot that begins in one; else 0."""
+    on_bus = [fault for fault in faults if fault.kind in BUS_FAULTS]
+    if not on_bus:
         return None
     codes = np.zeros((period, slots.SLOTS_PER_FRAME), np.uint16)
-    for fault in faults:
+    for fault in on_bus:
         # in slot numbers: comparing seconds would let rounding decide at the edges
         begin, end = (round(t * _sensor.SLOT_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
         hit = codes.reshape(-1)[begin:end]  # no more than it lasts: there may be many
-        if fault.channel is None:
-            hit[:] = BUS_FAULTS[fault.kind]
-        else:
-            hit[_IS_CHANNEL[fault.channel][np.arange(begin, begin + len(hit)) % slots.SLOTS_PER_FRAME]] = BUS_FAULTS[
-                fault.kind
-            ]
+        slot = np.arange(begin, begin + len(hit)) % slots.SLOTS_PER_FRAME
+        hit[slice(None) if fault.channel is None else IS_CHANNEL[fault.channel][slot]] = BUS_FAULTS[fault.kind]
     return codes
+
+
+def with_fault(source: Source, finger: int, kind: str, channel: str | None = None) -> Source:
+    """``source`` with a fault on one of its fingers from the first round to the last.
+
+    A recording's finger is taken to rest in its first round. Raises InputError for a finger, fault or channel that
+    there is not.
+    """
+    fingers = source.samples.shape[1]
+    if not 0 <= finger < fingers:
+        raise InputError(f"finger {finger}: {source.name} has {fingers}, expected 0 to {fingers - 1}")
+    samples, beside = source.samples.copy(), (finger + 1) % fingers
+    rest, other_rest = (samples[0, k, slots.ELECTRODE_SLOT].astype(np.float64) for k in (finger, beside))
+    electrode = broken_electrode(kind, channel)
+    faulty = Faulty(electrode, rest, other_rest, np.random.default_rng(7))
+    lay = fault_named(kind, channel)
+    samples[:, finger] = on_the_bus(lay(faulty, samples[:, finger], source.samples[:, beside]))
+    return replace(source, samples=samples)
 
 
 def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k: int, period: int) -> None:
@@ -116,7 +130,9 @@ def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k:
     lay = fault_named(fault.kind)
     for first in range(0, len(samples) - begin, period):
         rows = slice(first + begin, first + end)
-        faulty = Faulty(broken_electrode(fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7]))
+        faulty = Faulty(
+            broken_electrode(fault.kind, fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7])
+        )
         samples[rows, k] = on_the_bus(lay(faulty, samples[rows, k], samples[rows, beside]))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import select
 import shlex
+import socket
 import subprocess
 import tempfile
 import threading
@@ -16,9 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DeviceLostError, PortError
+from ..link import Link
 from ..link.serial_port import SerialLink
+from ..link.url_port import UrlLink
 from ..wire.native import BUILT
-from .control import Control
+from .sensor_board import SensorBoard
 from .source import Source
 from .tape import write_tape
 
@@ -29,13 +32,13 @@ class SimBoard:
     def __init__(
         self, source: Source, *, pace: float, hold: bool, live: bool = False, flash: Path | None = None
     ) -> None:
-        """Start it: it plays ``source``; ``live``: that is only the first rounds, and control.feed() has the next.
+        """Start it: it plays ``source``; ``live``: those are only the first rounds, and ``sensors`` is fed.
 
         ``flash`` is the file in which it keeps settings and maps. Raises PortError when it does not start.
         """
         self.source = source
         self.pace = pace
-        self.control: Control | None = None
+        self.sensors: SensorBoard | None = None
         self.over = False  # the tape has been played, and everything handed over
         self._heard = b""
         self._answers: list[str] = []
@@ -57,9 +60,9 @@ class SimBoard:
             raise
         try:
             if live:
-                self.control = Control(int(self._announced("control")))
+                self.sensors = SensorBoard(_loopback(int(self._announced("control"))))
                 for words in source.samples:  # an emulated board samples as it boots
-                    self.control.feed(words)
+                    self.sensors.put(words)
             self.path = self._announced("pty")
         except BaseException:
             self.close()
@@ -113,8 +116,8 @@ class SimBoard:
 
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
-        if self.control is not None:
-            self.control.close()
+        if self.sensors is not None:
+            self.sensors.close()
         with self._process:  # which then closes its pipes and waits
             self._process.kill()
         self._folder.cleanup()  # again, for a board that did not start
@@ -123,6 +126,15 @@ class SimBoard:
         self._process.stdin.close()  # a board that is still there ends
         self._process.wait(timeout=60)
         return " ".join(self._process.stderr.read().decode(errors="replace").split("\n")).strip()
+
+
+def _loopback(port: int) -> Link:
+    """The socket on which a board's sensors are fed."""
+    link = UrlLink(f"socket://127.0.0.1:{port}")
+    with socket.socket(fileno=os.dup(link.fd or 0)) as same:
+        same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    link.patience = SimLink.patience
+    return link
 
 
 class SimLink(SerialLink):

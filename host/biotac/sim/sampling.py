@@ -209,7 +209,8 @@ def _between(boundary: Floats, share: Floats, pieces: int = 1) -> Floats:
     piece = np.floor(share * pieces).astype(np.int64)
     at = piece + np.arange(0, len(boundary) - 1, pieces)[:, None]
     column, rest = np.arange(len(share)), share * pieces - piece
-    return boundary[at, column] * (1.0 - rest) + boundary[at + 1, column] * rest
+    between: Floats = boundary[at, column] * (1.0 - rest) + boundary[at + 1, column] * rest
+    return between
 
 
 def spring_load(states: States) -> Floats:

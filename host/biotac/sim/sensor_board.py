@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..board.board import Board
+from ..board.consumers import Queue
 from ..errors import BiotacError, DeviceLostError, InputError, PortError
 from ..link import Link
 from ..wire import messages_gen as wire
@@ -25,6 +26,7 @@ from .source import Source
 SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
 BURST = 16  # messages sent before the board is asked for its status
+STILL_S = 60.0
 REST_S = 0.05  # wait while the board has no room
 NOT_HELD = 0xFFFFFFFF
 KEEP_S = 20.0  # 39 sectors of flash, each at its longest
@@ -43,12 +45,14 @@ class SensorBoard:
         self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in
         self.held_at = NOT_HELD  #: the slot before which its tape waits
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
+        self._before = 0  # slots of the tape that were sent and are not kept
+        self._reports: Queue | None = None  # of standstills
 
     def plug(self, source: Source) -> None:
         """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
         frames, fingers, slots = source.samples.shape
         self._samples = source.samples.transpose(0, 2, 1).reshape(frames * slots, fingers)
-        self.held_at = NOT_HELD
+        self.held_at, self._before = NOT_HELD, 0
         own = tuple(f"BTEMU{finger + 1:011d}" for finger in range(fingers))
         self.serials = source.serials + own[len(source.serials) :]
         for finger in range(sensor.MAX_SENSORS):
@@ -70,6 +74,7 @@ class SensorBoard:
         Before ``hold_slot``, a round's first, it waits until another play() names a later one or none, and then goes on
         with all fingers in one round. That is for gateways: a reader that never asks its sensors who they are waits for
         good. ``by_time``: the tape keeps to the board's clock, and rounds are left out or played again for that.
+        ``live``: a round that has not come when the gateway begins it is the one before again, and counted.
         """
         self.held_at = NOT_HELD if hold_slot is None else hold_slot
         return self._board.ask(wire.EmuPlay(0, self.held_at, by_time, live), wire.EmuStatus)
@@ -109,7 +114,7 @@ class SensorBoard:
         ``until_full``: return also when the board has no more room.
         """
         ended = ended or threading.Event()
-        slots, fingers = self._samples.shape
+        slots, fingers = self._before + len(self._samples), self._samples.shape[1]
         size = SAMPLES_A_MESSAGE // fingers
         status = self.status()
         while status.slots_taken < slots and not ended.is_set():
@@ -126,6 +131,32 @@ class SensorBoard:
                 self._board.send(self._part(first, count))
             status = self._board.ask(self._part(*parts[-1]), wire.EmuStatus)
         return status
+
+    def put(self, words: npt.NDArray[np.uint16]) -> None:
+        """Send the next round of every finger, uint16 (fingers, 44), without waiting, behind what was sent before."""
+        self._samples, self._before = words.T, self._before + len(self._samples)
+        slots, fingers = self._samples.shape
+        size = SAMPLES_A_MESSAGE // fingers
+        for first in range(0, slots, size):
+            self._board.send(self._part(self._before + first, min(size, slots - first)))
+
+    def wait_still(self) -> wire.EmuStatus:
+        """Wait until a simulated gateway has computed all that was sent, and its time stands still.
+
+        Raises DeviceLostError when it has ended, or takes longer than STILL_S.
+        """
+        reports = self._reports
+        if reports is None:
+            reports = self._reports = Queue(self._board.reader)
+            self._board.reader.add(reports)
+        until_s, sent = time.monotonic() + STILL_S, self._before + len(self._samples)
+        while time.monotonic() < until_s:
+            batch = reports.take(wait=True)
+            self._board.reader.check()
+            for message in batch.messages if batch else ():
+                if isinstance(message, wire.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:
+                    return message
+        raise DeviceLostError(f"the simulated board computed nothing for {STILL_S:g} s; start another world")
 
     @contextmanager
     def feeding(self) -> Iterator[wire.EmuStatus]:
@@ -149,7 +180,7 @@ class SensorBoard:
             thread.join()
 
     def _part(self, first: int, count: int) -> wire.EmuTape:
-        data = self._samples[first : first + count].astype("<u2").tobytes()
+        data = self._samples[first - self._before : first - self._before + count].astype("<u2").tobytes()
         fingers = self._samples.shape[1]
         return wire.EmuTape(0, fingers, count, first, tuple(data.ljust(SAMPLE_BYTES, b"\0")))
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.geometry import Floats
+from ..wire.batches import ROUND_US
 from .physics import Finger
 
 Rows = npt.NDArray[np.int64]
@@ -66,7 +67,12 @@ class Source:
     emulated: tuple[Finger, ...] = ()
     skipped_frames: int = 0
 
-    @property
-    def known_force_n(self) -> npt.NDArray[np.float64] | None:
-        """The force that was applied (frames, fingers, 3), from the scenario or with the recording."""
-        return self.truth_force_n if self.truth is None else self.truth.force_n
+    def applied_n(self, finger: npt.NDArray[np.uint8], since_us: npt.NDArray[np.int64]) -> Floats | None:
+        """See Played.applied_n; the first row with a good word is round 0."""
+        known = self.truth_force_n if self.truth is None else self.truth.force_n
+        if known is None:
+            return None
+        first = next((k for k, row in enumerate(self.samples) if (row <= 4095).any()), 0)
+        rows = first + np.rint(since_us / ROUND_US).astype(np.int64)
+        inside = (rows >= 0) & (rows < len(known))
+        return np.where(inside[:, None], known[np.clip(rows, 0, len(known) - 1), finger], np.nan)

@@ -1,4 +1,4 @@
-"""Physics in the loop: a program gives the simulated fingers their load round by round, and gets what the board made of it.
+"""Physics in the loop: a program gives the simulated fingers their load round by round, and gets the board's answer.
 
     from biotac.sim import SimFinger, Touch, world
 
@@ -7,46 +7,53 @@
         print(now["index"].frame.force_n, now.events)
 
 The firmware runs in lock-step: its time stands still until the next load has come, so the same loads give the same
-bytes, however slow the program is. A controller of another rate steps so many rounds before each of its own.
+bytes, however slow the program is. On boards of silicon time is real (``wired_world``). A controller of another rate
+steps so many rounds before each of its own.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from typing import Any
 
 from ..errors import DeviceLostError, InputError
 from ..hand.hand import Hand
+from ..hand.opening import open as open_hand
 from ..hand.opening import shake_hands
 from ..hand.rounds import FingerRound, Round, Rounds
+from ..link import open_link
 from ..wire.messages_gen import Setting
 from ..wire.slots import FRAME_HZ
-from .live import LiveBoard, LiveFingers, LiveLink
+from .live import LiveFingers, LiveLink, live_board
 from .physics import Finger
+from .process import SimBoard
+from .sensor_board import SensorBoard
 from .touch import Load
 
 PATIENCE_S = 60.0
 BOOT_S = 0.25  # of a board, until it samples again
 WATCHDOG_S = 2.0
 AWAY_S = 0.5  # until a computer has found a port that came back
+AHEAD_ROUNDS = 2
+ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
+STREAMS = ("results", "events")
 
 
 class World:
-    """Simulated fingers on a board of their own, and the hand that reads it. Made by ``world``."""
+    """Simulated fingers and the hand that reads them, while time is real: on a sensor board wired to a gateway.
 
-    def __init__(self, fingers: LiveFingers, board: LiveBoard, link: LiveLink | None, hand: Hand | None) -> None:
-        #: The ordinary Hand, streaming; None when another program has ``port``.
+    A load acts some rounds after its step. Where a program is late the sensors feel the round before once more.
+    """
+
+    def __init__(self, fingers: LiveFingers, sensors: SensorBoard, hand: Hand | None, closes: ExitStack) -> None:
+        #: The ordinary Hand, streaming; None when another program has the board's port.
         self.hand: Hand = hand  # type: ignore[assignment]
-        #: The board's pty, for a C client, ROS or `biotac view` in place of ``hand``.
-        self.port = board.board.path
-        #: Rounds that were stepped since the start.
-        self.rounds = 0
+        self.sensors = sensors
         self._fingers = fingers
-        self._board = board
-        self._link = link
-        self._rounds = Rounds(hand._board.reader, hand._latest) if hand is not None else None
-        self._dead = self._away = self._stalled = 0  # for so many more rounds
+        self._closes = closes
+        self._last: Round | None = None
 
     def __enter__(self) -> World:
         return self
@@ -55,75 +62,89 @@ class World:
         self.close()
 
     def close(self) -> None:
-        """End the board. Safe to call twice."""
-        if self._link is not None:
-            self._link.away = False
-            self.hand.close()
-        self._board.board.close()
+        """End it. Safe to call twice."""
+        self._closes.close()
 
-    # ---- time ----------------------------------------------------------------------------------
+    @property
+    def rounds_late(self) -> int:
+        """Rounds that had not come when the gateway began them; 0 in lock-step. Asks the sensors."""
+        return self.sensors.status().rounds_late
 
     def step(self, **loads: Load) -> Round:
         """Let one round of 10 ms pass, with these loads by finger; whoever is not named is not touched.
 
         A load is what touches at the end of the round: a Touch, several at once, or a Course through the round. It is
-        reached in a straight line from where the round before ended. Returns the frames and events of this round; of
-        a board that is silent or whose cable is out, none. Raises InputError or KeyError for a wrong load, and then no
-        time has passed; DeviceLostError when the board has ended.
+        reached in a straight line from where the round before ended. Returns the frames and events of this round, on
+        real time those of the newest that has come; of a board that is silent or whose cable is out, none. Raises
+        InputError or KeyError for a wrong load, and then no time has passed; DeviceLostError when the board has ended,
+        and TimeoutError when on real time nothing comes.
         """
-        words = self._fingers.read(loads)
-        self.rounds += 1
-        if self._link is not None and self._link.reopened and not self._link.away:
-            self._come_back()  # the program itself restarted the board
+        self.sensors.put(self._fingers.read(loads))
+        self._last = self.hand.next_round(self._last)
+        return self._last
+
+    def run(self, seconds: float, **loads: Load) -> Round:
+        """Step with the same loads for so long, without any they rest; the last round, with the events of all."""
+        events: tuple[Any, ...] = ()
+        for _ in range(_rounds_of(seconds)):
+            now = self.step(**loads)
+            events += now.events
+        return Round(now.seq, now.t_us, now.missed, now.fingers, events)
+
+    def fault(self, finger: str, kind: str | None, channel: str | None = None) -> None:
+        """Lay a fault on a finger from the next round on; None ends all of that finger's.
+
+        ``kind`` is one of biotac.sim.EVERY_FAULT; ``channel`` the electrode that breaks, "E17" by default, or for a
+        fault of the bus the channel that it hits, by default all. Raises InputError for an unknown fault or channel.
+        """
+        self._fingers.fault(finger, kind, channel)
+
+
+class LockStep(World):
+    """Simulated fingers on a simulated board, whose time passes only in ``step``. Made by ``world``."""
+
+    def __init__(self, fingers: LiveFingers, board: SimBoard, hand: Hand | None, closes: ExitStack) -> None:
+        assert board.sensors is not None
+        super().__init__(fingers, board.sensors, hand, closes)
+        #: The board's pty, for a C client, ROS or `biotac view` in place of ``hand``.
+        self.port = board.path
+        self._board = board
+        self._rounds = Rounds(hand._board.reader, hand._latest) if hand is not None else None
+        self._dead = self._away = self._stalled = 0  # for so many more rounds
+
+    @property
+    def _link(self) -> LiveLink | None:
+        link = self.hand.link if self.hand is not None else None
+        return link if isinstance(link, LiveLink) else None
+
+    def step(self, **loads: Load) -> Round:
+        words, link = self._fingers.read(loads), self._link
+        if link is not None and link.reopened and not link.away:
+            self._reconnect()  # the program itself restarted the board
         if self._dead:
             self._dead -= 1
             if self._dead == 0:
                 self._reset()
         else:
-            status = self._board.compute(words)
-            if self._link is not None and not self._link.away:
-                self._wait(lambda s: self._link.wait_passed_on(status, s))  # type: ignore[union-attr]
+            self.sensors.put(words)
+            self._settle()
         if self._away:
             self._away -= 1
             if self._away == 0:
-                self._come_back()
-        if self._stalled:
-            self._stalled -= 1
-            return self._silence()
-        if self._rounds is None or self._link is None or self._link.away:
-            return self._silence()
+                self._reconnect()
+        self._stalled = max(0, self._stalled - 1)
+        if self._stalled or self._rounds is None or link is None or link.away:
+            return Round(-1, -1, 0, {name: FingerRound(None, ()) for name in self._fingers.names}, ())
         return self._rounds.take()
 
-    def rest(self, seconds: float) -> Round:
-        """Step without any touch; returns the last round, with the events of all."""
-        return self.run(seconds)
-
-    def run(self, seconds: float, **loads: Load) -> Round:
-        """Step with the same loads for so long; returns the last round, with the events of all."""
-        events: tuple[Any, ...] = ()
-        now = self._silence()
-        for _ in range(max(1, round(seconds * FRAME_HZ))):
-            now = self.step(**loads)
-            events += now.events
-        return Round(now.seq, now.t_us, now.missed, now.fingers, events)
-
     # ---- what goes wrong -----------------------------------------------------------------------
-
-    def fault(self, finger: str, kind: str | None, channel: str | None = None) -> None:
-        """Lay a fault on a finger from the next round on; None ends all of that finger's.
-
-        ``kind`` is one of biotac.sim.EVERY_FAULT; ``channel`` the electrode that breaks, "E17" by default, or for a fault of
-        the bus the channel that it hits, by default all. Raises InputError for an unknown fault or channel.
-        """
-        self._fingers.fault(finger, kind, channel)
 
     def restart(self, *, boot_s: float = BOOT_S, away_s: float = AWAY_S) -> None:
         """Reset the board now: it boots for ``boot_s``, and its port is away for ``away_s`` in all.
 
         The hand connects again by itself. Settings and maps are restored as on a board, tares are not.
         """
-        self._needs_process("restart")
-        self._pull()
+        self._pull(is_process=True)
         self._dead, self._away = _rounds_of(boot_s), max(_rounds_of(away_s), _rounds_of(boot_s) + 1)
 
     def cut_power(self, seconds: float) -> None:
@@ -132,7 +153,6 @@ class World:
 
     def hang(self, seconds: float = WATCHDOG_S) -> None:
         """The board does nothing for so long, while its port stays; then its watchdog resets it."""
-        self._needs_process("hang")
         self._dead = _rounds_of(seconds)
         self._away = self._dead + _rounds_of(AWAY_S)
 
@@ -143,19 +163,11 @@ class World:
 
     def stall_host(self, seconds: float) -> None:
         """Let the program stand still for so long: steps return nothing, then all events that came meanwhile."""
-        self._stalled = _rounds_of(seconds)
+        self._stalled = _rounds_of(seconds) + 1
 
-    # ------------------------------------------------------------------------------------------
-
-    def _needs_process(self, what: str) -> None:
-        if type(self._board.board).__name__ != "SimBoard" or self._link is None:
-            raise InputError(
-                f"{what} needs the board that is a process, and its hand: leave board and hand as they are"
-            )
-
-    def _pull(self) -> None:
-        if self._link is None:
-            raise InputError("this world has no hand whose cable could be out")
+    def _pull(self, is_process: bool = False) -> None:
+        if self._link is None or (is_process and type(self._board) is not SimBoard):
+            raise InputError("this needs a hand, and a restart the board that is a process; leave both arguments out")
         self._link.away = True
         reader = self.hand._board.reader
         if not reader.wait_for(lambda: reader.parked or reader.failure, PATIENCE_S):
@@ -163,30 +175,34 @@ class World:
 
     def _reset(self) -> None:
         if self._link is not None and not self._link.away:  # it hung until now
-            self._pull()
-        self._board.board.say("restart")
-        self._board.control.status()  # which the new board answers
+            self._pull(is_process=True)
+        self._board.say("restart")
+        self.sensors.status()  # which the new board answers
 
-    def _come_back(self) -> None:
-        assert self._link is not None
-        self._link.away = False
-        wanted, until_s = self.hand._stream.started, time.monotonic() + PATIENCE_S
+    def _reconnect(self) -> None:
+        link, wanted, until_s = self._link, self.hand._stream.started, time.monotonic() + PATIENCE_S
+        assert link is not None
+        link.away = False
         while time.monotonic() < until_s:
             self.hand.check()
             if self.hand.connected and wanted is not None and self.hand.status().streams == wanted.streams:
                 break
             time.sleep(0.001)
-        _count(self._link, self.hand, self._board)
+        self._count()
 
-    def _wait(self, passed_on: Callable[[float], bool]) -> None:
-        until_s = time.monotonic() + PATIENCE_S
-        while not passed_on(0.5):
+    def _count(self) -> None:
+        """Count the link's bytes from here: the reply to a ping is the last that has come."""
+        assert self._link is not None
+        self.hand.ping()
+        self._link.count_from(self.sensors.status())
+
+    def _settle(self) -> None:
+        """Wait until the board's time stands still, and the hand has all that it sent."""
+        status, link, until_s = self.sensors.wait_still(), self._link, time.monotonic() + PATIENCE_S
+        while link is not None and not link.wait_passed_on(status, 0.5):
             self.hand.check()
             if time.monotonic() > until_s:
-                raise DeviceLostError("what the simulated board sent did not arrive; is the machine out of memory?")
-
-    def _silence(self) -> Round:
-        return Round(-1, -1, 0, {name: FingerRound(None, ()) for name in self._fingers.names}, ())
+                raise DeviceLostError("what the simulated board sent did not arrive; start another world")
 
 
 def world(
@@ -194,49 +210,66 @@ def world(
     *,
     maps: Mapping[str, Any] | None = None,
     settings: Mapping[str, int] | None = None,
-    streams: Sequence[str] = ("results", "events"),
+    streams: Sequence[str] = STREAMS,
     board: str = "posix",
     image: str | None = None,
     hand: bool = True,
-) -> World:
+) -> LockStep:
     """Start a board with these simulated fingers, each named, in the order of their chip selects.
 
     ``maps`` are wrench maps by finger (Hand.board.set_map), ``settings`` by their names in link.toml, and ``streams``
     what the hand streams (Hand.stream). ``board`` is "posix", the firmware as a process, or "pico", the Pico's flash
-    image in the emulator. With ``hand=False`` another program opens ``World.port``, and has to: the board waits for its
-    reader. A HOLD does not lapse here, because time waits for the program. Raises PortError when the board does not
+    image in the emulator. With ``hand=False`` another program opens ``LockStep.port``, and has to: the board waits for
+    its reader. A HOLD does not lapse here, because time waits for the program. Raises PortError when the board does not
     start, InputError or CommandRefusedError for a wrong setting or map.
     """
     feed = LiveFingers(fingers)
-    live = LiveBoard(feed, board, image)
-    if not hand:
-        live.board.release()
-        live.control.wait_still()
-        return World(feed, live, None, None)
-    link = LiveLink(live.board)
-    opened = shake_hands(link, fingers=feed.names, reconnect=True)
-    try:
-        opened.board.set_setting(Setting.HOLD_TIMEOUT_MS, 0)
-        for name, value in (settings or {}).items():
-            opened.board.set_setting(Setting[name.upper()], value)
-        for name, board_map in (maps or {}).items():
-            opened.board.set_map(name, board_map, force=True)
-        opened._reading.set_aside()
-        _count(link, opened, live)
-        made = World(feed, live, link, opened)
-        opened.stream(*streams)
-        status = live.control.wait_still()
-        made._wait(lambda timeout_s: link.wait_passed_on(status, timeout_s))
-    except BaseException:
-        opened.close()
-        raise
+    with ExitStack() as closes:
+        live = live_board(feed, board, image)
+        closes.callback(live.close)
+        opened = None
+        if hand:
+            opened = closes.enter_context(shake_hands(LiveLink(live), fingers=feed.names, reconnect=True))
+        made = LockStep(feed, live, opened, closes)
+        if opened is None:
+            live.release()
+        else:
+            opened.board.set_setting(Setting.HOLD_TIMEOUT_MS, 0)
+            for name, value in (settings or {}).items():
+                opened.board.set_setting(Setting[name.upper()], value)
+            for name, board_map in (maps or {}).items():
+                opened.board.set_map(name, board_map, force=True)
+            made._count()
+            opened.stream(*streams)
+        made._settle()
+        made._closes = closes.pop_all()
     return made
 
 
-def _count(link: LiveLink, hand: Hand, board: LiveBoard) -> None:
-    """Count the link's bytes from here: the reply to a ping is the last that has come."""
-    hand.ping()
-    link.count_from(board.control.status())
+def wired_world(
+    fingers: Mapping[str, Finger],
+    *,
+    port: str,
+    sensor_port: str,
+    ahead: int = AHEAD_ROUNDS,
+    streams: Sequence[str] = STREAMS,
+) -> World:
+    """Load simulated fingers through the sensor board at ``sensor_port``, and read them at the gateway's ``port``.
+
+    The program is ``ahead`` rounds ahead of the gateway, 1 to 40. Raises PortError and InputError.
+    """
+    if not 1 <= ahead <= ROOM_ROUNDS:
+        raise InputError(f"ahead is {ahead}, expected 1 to {ROOM_ROUNDS} rounds")
+    feed = LiveFingers(fingers)
+    with ExitStack() as closes:
+        sensors = SensorBoard(open_link(sensor_port))
+        closes.callback(sensors.close)
+        hand = closes.enter_context(open_hand(port, fingers=feed.names))
+        sensors.plug(feed.at_rest(ahead))
+        sensors.play(by_time=True, live=True)
+        sensors.feed()
+        hand.stream(*streams)
+        return World(feed, sensors, hand, closes.pop_all())
 
 
 def _rounds_of(seconds: float) -> int:

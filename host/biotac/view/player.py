@@ -29,6 +29,7 @@ class Player:
 
     def __init__(self, hand: Hand, folder: Path) -> None:
         self._hand = hand
+        self.applied_n = hand.applied_n
         self._folder = folder
         self._replay = hand.link if isinstance(hand.link, ReplayLink) else None
         self._recorder: Recorder | None = None

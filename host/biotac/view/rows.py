@@ -18,18 +18,21 @@ from ..wire.batches import Batch
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray, electrode_signals
 
 #: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing or not used. ``map_um``: the point of
-#: contact on the unrolled skin, across and along, in um; null where it is invalid.
+#: contact on the unrolled skin, across and along, in um; null where it is invalid. ``applied_100un``: Reader.applied_n.
 FRAME_ROW = (
     "finger", "seq", "t_us", "flags", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un", "torque_mnmm",
-    "map_um",
+    "map_um", "applied_100un",
 )  # fmt: skip
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
 SCALES = {"signal_q4": Q4_PER_COUNT, "poc_um": UM_PER_MM, "force_100un": FORCE_LSB_PER_N, "torque_mnmm": MNMM_PER_NMM}
 
 
-def frame_rows(batch: Batch) -> list[str]:
-    """One JSON text per FRAME and per heartbeat, oldest first."""
+def frame_rows(batch: Batch, applied_n: NDArray[np.float64] | None = None) -> list[str]:
+    """One JSON text per FRAME and per heartbeat, oldest first; ``applied_n`` (n, 3) is of the FRAMEs."""
+    applied: list[Any] = [None] * len(batch.wire)
+    if applied_n is not None and np.isfinite(applied_n).all():
+        applied = np.rint(applied_n * FORCE_LSB_PER_N).astype(int).tolist()
     messages, frames = batch.wire, batch.frames
     columns = zip(
         *(frames[name].tolist() for name in ("finger", "seq", "t_us", "flags")),
@@ -38,6 +41,7 @@ def frame_rows(batch: Batch) -> list[str]:
         with_null(messages["poc_um"], wire.INVALID_I16),
         *(with_null(messages[name], wire.INVALID_I32) for name in ("force_100un", "torque_mnmm")),
         map_um(frames),
+        applied,
         strict=True,
     )
     timed = [(row[2], compact(row)) for row in columns]

@@ -124,7 +124,7 @@ class State:
 
     def take(self, batch: Batch, player: Player) -> None:
         """Add a batch."""
-        frames, pac = frame_rows(batch), pac_rows(batch)
+        frames, pac = frame_rows(batch, player.applied_n(batch.wire["finger"], batch.t_us)), pac_rows(batch)
         now_s = time.monotonic()
         with self._news:
             self._frames.extend(frames)

@@ -2240,7 +2240,7 @@ class SetBusRate:
 
 @dataclass(frozen=True, slots=True)
 class EmuStatus:
-    """State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/reference/live_load.md)."""
+    """State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md)."""
 
     req_id: int
     fingers: int

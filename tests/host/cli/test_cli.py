@@ -196,10 +196,6 @@ def test_a_full_disk_exits_2_in_one_line() -> None:
     assert (done.returncode, done.stderr.count("\n")) == (2, 1) and "No space left" in done.stderr
 
 
-def test_demo_takes_the_ports_that_list_prints(capsys, tmp_path: Path) -> None:
-    assert main(["demo", "sim:press.toml", "--seconds", "1", "--out", str(tmp_path), "--json"]) == 0
-
-
 @contextlib.contextmanager
 def simulated(link: Path, *options: str) -> Iterator[str]:
     """A board on a pty that ``link`` leads to; gives what the command prints of it."""

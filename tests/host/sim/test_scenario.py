@@ -13,9 +13,10 @@ from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
+from biotac.sim.faults import BUS_FAULTS, FAULTS
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
-from biotac.sim.scenario import FAULT_CODES, STEP_KEYS, parse_scenario
+from biotac.sim.scenario import STEP_KEYS, parse_scenario
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as _wire
 from biotac.wire import slots
@@ -152,7 +153,7 @@ def test_a_fault_replaces_exactly_the_words_it_covers(tmp_path: Path) -> None:
     fault = '[[fault]]\nat_s = 0.5\nseconds = 0.1\nfinger = 1\nkind = "{}"\n'
     text = 'name = "t"\nfingers = 2\n' + REST
     clean = play(tmp_path, text).samples
-    for kind, code in FAULT_CODES.items():
+    for kind, code in BUS_FAULTS.items():
         words = play(tmp_path, text + fault.format(kind)).samples
         expected = clean.copy()
         expected[50:60, 1, :] = code
@@ -206,8 +207,9 @@ def test_the_page_and_a_new_scenario_have_every_verb_and_fault(tmp_path: Path) -
     assert main(["sim", "--new", str(new)]) == 0
     assert main(["sim", "--new", str(new)]) == 2 and main(["sim", "--new", str(new), "--force"]) == 0
     page, text = (ROOT / "host/docs/guides/simulator.md").read_text(encoding="utf-8"), new.read_text(encoding="utf-8")
-    for word in (*STEP_KEYS, *(key for keys in STEP_KEYS.values() for key in keys), *FAULT_CODES):
+    for word in (*STEP_KEYS, *(key for keys in STEP_KEYS.values() for key in keys), *BUS_FAULTS):
         assert f"`{word}" in page and word in text, word
+    assert all(f"`{name}`" in page for name in FAULTS)
 
 
 @pytest.mark.parametrize("name", bundled_scenarios())

@@ -24,6 +24,7 @@ class ScriptedPlayer:
     """Yields what ``script`` is given: batches, or an error to raise; None ends it. Notes every command."""
 
     paused = False
+    applied_n = staticmethod(lambda *rows: None)
 
     def __init__(self, *, live: bool = True) -> None:
         self.live = live

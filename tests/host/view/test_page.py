@@ -80,6 +80,7 @@ def test_numbers_are_those_of_the_frame_with_that_number(view, open_page) -> Non
         assert seen["finger"] == finger
         assert_shows(seen, truth.frames, signals)
     assert not np.isnan(numbers(seen["force_n"])).any()
+    assert page.is_visible("#applied-key") and page.is_visible("td[data-key=appliedN]")
 
 
 def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
@@ -429,7 +430,7 @@ def test_the_spectrum_is_numpys_and_texts_of_marks_never_overprint(view, open_pa
       const { TimePlot } = await import('./plots.js');
       const { readTheme } = await import('./colours.js');
       const finger = new Finger(), marks = [];
-      for (let k = 0; k < 1000; k++) finger.add({ tUs: 1e4 * k, forceN: [0, 0, 0], pdc: 0, mapMm: null });
+      for (let k = 0; k < 1000; k++) finger.add({ tUs: 1e4 * k, forceN: [0, 0, 0], appliedN: [], pdc: 0, mapMm: null });
       for (const s of [1, 3, 3.1, 3.2, 5, 5.4, 9.5, 9.9]) marks.push({ t_us: 1e6 * s, name: 'a slip' });
       const places = [], fill = CanvasRenderingContext2D.prototype.fillText;
       CanvasRenderingContext2D.prototype.fillText = function (text, x) {

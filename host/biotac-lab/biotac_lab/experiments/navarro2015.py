@@ -40,7 +40,7 @@ from biotac.calibrate.press import (
     with_gain,
 )
 from biotac.recording import CrossCheck
-from biotac.sim import PROFILES, Profile, load_source
+from biotac.sim import PROFILES, Profile
 
 from ..report import Options, Report, Show, Table, check, claim
 
@@ -108,11 +108,12 @@ def calibrate(
     with _played(text, board) as (hand, truth):
         for fitted in fits.values():
             put(hand, fitted.finger, with_gain(hand, fitted, int(time.time())))
-        settings, own = hand.board.settings(), hand.board.finger_settings()
+        settings, own, begin_us = hand.board.settings(), hand.board.finger_settings(), None
         for batch in hand.batches():
             outcome.add(batch.wire, settings, own)
             rows = rows_of(batch.wire, batch.t_us, truth)
-            second.feed(rows[rows["t_us"] - truth.first_us >= verify_s * 1e6])
+            begin_us = batch.first_t_us() if begin_us is None else begin_us
+            second.feed(rows[rows["t_us"] - (begin_us or 0) >= verify_s * 1e6])
     second.finish()
     calibrated = []
     for of_finger, finger in zip(seeds, fingers, strict=True):
@@ -155,7 +156,7 @@ def _played(text: str, board: str) -> Iterator[tuple[biotac.Hand, Truth]]:
         path = Path(folder, "navarro.toml")
         path.write_text(text, encoding="utf-8")
         with biotac.open(f"sim:{path}" if board == "posix" else f"emu:{board}?source={path}") as hand:
-            yield hand, Truth(load_source(str(path)))
+            yield hand, Truth(hand)
 
 
 # ---- what the emulated hand does ----------------------------------------------------------------

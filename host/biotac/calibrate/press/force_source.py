@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from ...core.compiled import ELECTRODES
 from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
-from ...link.base import Played
+from ...hand.hand import Hand
 from ...recording.pressure_check import usable
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
-from ...wire.slots import FRAME_HZ
 from ..reference.csv_file import columns, open_table
 
 LAG_ROWS = 100
@@ -63,33 +62,16 @@ def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: ForceSour
 
 
 class Truth:
-    """The force that a scenario applies, or that a recording of counts holds (Played.known_force_n).
+    """The size of the force that the simulated board of ``hand`` applies. Raises InputError if its source has none."""
 
-    The earliest time in the first call of at() is taken as that of the source's first row with any valid word.
-    """
-
-    def __init__(self, source: Played) -> None:
-        known = source.known_force_n
-        if known is None:
-            raise InputError(f"{source.name} has no force; expected a scenario or a recording with one")
-        self._force_n = np.linalg.norm(known, axis=-1)
-        self._first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
-        self._first_us: int | None = None
-
-    @property
-    def first_us(self) -> int:
-        """Device time of the source's first row with any valid word; 0 before at() was called."""
-        return self._first_us or 0
+    def __init__(self, hand: Hand) -> None:
+        self._hand = hand
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        if not len(t_us):
-            return np.empty(0)
-        if self._first_us is None:
-            self._first_us = int(t_us.min())
-        rows = self._first_row + np.rint((t_us - self._first_us) * FRAME_HZ / 1e6).astype(np.int64)
-        inside = (rows >= 0) & (rows < len(self._force_n))
-        force = self._force_n[np.clip(rows, 0, len(self._force_n) - 1), finger]
-        return np.where(inside, force, np.nan)
+        applied_n = self._hand.applied_n(finger, t_us)
+        if applied_n is None and len(t_us):
+            raise InputError(f"{self._hand.port} has no force; expected a scenario or a recording with one")
+        return np.zeros(0) if applied_n is None else np.sqrt((applied_n**2).sum(axis=1))
 
 
 class Series:

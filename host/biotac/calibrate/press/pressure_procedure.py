@@ -38,7 +38,7 @@ def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: in
         raise InputError(f"no sensor on finger {absent[0] if absent else '0 to 4'} ({there} there); check its cable")
     fingers = fingers or hand.fingers
     serials = {finger: _serial(hand, finger) for finger in fingers}
-    reference = None if hand.link.source is None else Truth(hand.link.source)
+    reference = None if hand.link.source is None else Truth(hand)
     procedure = Procedure(fingers, CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, needs_force=reference is not None)
     held = guide(hand, procedure, reference, face)
     hand.stop()

@@ -187,7 +187,7 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
             return known_force.guided(hand, finger, asked_n, _Guide(press, lambda step: scale.force_n(), "let go"))
     _check_terminal(hand, args.where)
     face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go")
-    reference = None if hand.link.source is None else Truth(hand.link.source)
+    reference = None if hand.link.source is None else Truth(hand)
     return known_force.guided(hand, finger, asked_n, face, reference=reference)
 
 

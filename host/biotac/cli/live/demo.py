@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
+
 from ...demo.run import run_demo
 from .. import values
 from ..outputs import say
@@ -30,6 +32,9 @@ def run(args: argparse.Namespace) -> int:
     )
     progress.done()
     facts, check = demo.facts, demo.facts["crosscheck"]
+    own_n = np.linalg.norm(facts["calibration_rmse_n"] or [])
+    made = f"; own map as by `biotac calibrate wrench --live`, off by {own_n:.2f} N held out" if own_n else ""
+    felt = [f"  {name:14} {one}" for name, one in demo.felt.items() if str(one)]
     skipped = f"{facts['rows_skipped']} incomplete row(s) of the recording skipped"
     lines = [
         f"{facts['source']}: {facts['frames']} frames from {facts['fingers']} finger(s), {facts['frames_lost']} lost, "
@@ -38,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
         f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)",
         f"recording {facts['recording']}, report {facts['report']}",
         *([skipped] if facts["rows_skipped"] else []),
+        *([f"mean force felt along what was applied to finger 0, ± RMS error{made}:"] if felt else []),
+        *felt,
         f"picture {facts['picture']}",
     ]
     say(args, facts, "\n".join(lines))

@@ -9,6 +9,7 @@ from typing import Any
 
 import biotac
 
+from ...recording.felt import Felt
 from .. import values
 from ..outputs import note, say
 from ..progress import Progress
@@ -30,14 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the source ends or Ctrl-C, and keep what has arrived."""
-    progress = Progress()
+    progress, felt = Progress(), Felt()
     recorded_s = 0.0
     with biotac.open(args.port) as hand:
         earlier = latched_faults(hand)
         recorder = hand.record(args.out, overwrite=args.force, note=args.note, **values.facts(args.fact))
         hand.stream("results", "events")
         with suppress(KeyboardInterrupt):  # the usual way to stop a recording
-            for _, recorded_s in batches(hand, args.seconds):
+            for batch, recorded_s in batches(hand, args.seconds):
+                applied_n = hand.applied_n(batch.wire["finger"], batch.t_us)
+                if applied_n is not None:
+                    felt.add(applied_n, batch.frames["force_n"])
                 size_mb = recorder.path.stat().st_size / 1e6
                 lost = hand.stats.frames_lost
                 progress.show(
@@ -55,9 +59,11 @@ def run(args: argparse.Namespace) -> int:
         "crc_errors": stats.crc_errors,
         "faults": faults,
         "device_seconds": recorded_s,
+        "felt": felt.bands,
     }
     held = f"{args.out}: {recorder.frames} frames, {recorder.frames_lost} lost, {stats.gaps} gap(s)"
     lines = [f"{held}; `biotac check {args.out}` verifies them", *(f"fault during the recording: {f}" for f in faults)]
+    lines += [f"felt (mean ± RMS error) along what was applied: {felt}"] if str(felt) else []
     say(args, facts, "\n".join(lines))
     if args.seconds is not None and recorded_s < args.seconds:
         note(f"{recorded_s:.1f} s were recorded, {args.seconds:g} s asked for: it ended before")

@@ -10,14 +10,16 @@ from dataclasses import asdict
 
 from ...errors import InputError
 from ...link import open_link
+from ...sim.faults import BUS_FAULTS, fault_named
 from ...sim.loading import load_source
+from ...sim.play import with_fault
 from ...sim.sensor_board import SensorBoard
 from ...wire import messages_gen as wire
 from ...wire.sensor_gen import SLOT_HZ, SLOTS
 from ..outputs import say
 
 LOOK_S = 0.5
-KINDS = ", ".join(fault.name.lower() for fault in wire.EmuFault)
+NO_FAULT = "none"  # ends the one that the board has
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,29 +37,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="keep SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, over and over",
     )
     kept.add_argument("--forget", action="store_true", help="erase what --keep has stored")
-    group.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="FINGER=KIND",
-        help=f"from now on, whatever the tape says: {KINDS}; may be repeated",
-    )
 
 
 def run(args: argparse.Namespace, length_s: float | None) -> int:
     """Plug the sensors in, feed them until their tape ends or Ctrl-C, and print how the board did."""
     faults = [fault_of(text) for text in args.fault]
+    on_bus = [(finger, kind) for finger, kind, _ in faults if kind in BUS_FAULTS or kind == NO_FAULT]
+    if args.source is None and len(on_bus) < len(faults):
+        known = ", ".join((NO_FAULT, *BUS_FAULTS))
+        raise InputError(f"without a SOURCE, a sensor board's faults are those of the bus: {known}; add one")
     if args.source is None and (args.keep or args.by_time):
         raise InputError(f"{'--keep' if args.keep else '--by-time'} needs a SOURCE, such as press.toml")
     with closing(SensorBoard(open_link(args.sensor_port))) as board:
         if args.source is not None:
             seconds = args.seconds if args.keep else length_s  # a loop repeats on its own
-            board.plug(load_source(args.source.removeprefix("sim:"), fingers=args.fingers, seconds=seconds))
+            source = load_source(args.source.removeprefix("sim:"), fingers=args.fingers, seconds=seconds)
+            for finger, kind, channel in faults:
+                source = source if (finger, kind) in on_bus else with_fault(source, finger, kind, channel)
+            board.plug(source)
             board.play(by_time=args.by_time)
         if args.forget:
             board.forget()
-        for finger, fault in faults:
-            board.fault(finger, fault)
+        for finger, kind in on_bus:
+            board.fault(finger, BUS_FAULTS.get(kind, wire.EmuFault.NONE))
         status = board.keep() if args.keep else board.status() if args.source is None else play(board)
     say(args, asdict(status), summary(status))
     return 0
@@ -76,12 +78,15 @@ def play(board: SensorBoard) -> wire.EmuStatus:
     return status
 
 
-def fault_of(text: str) -> tuple[int, wire.EmuFault]:
-    """Finger and fault of a text such as ``2=stuck_low``."""
+def fault_of(text: str) -> tuple[int, str, str | None]:
+    """Finger, fault and channel of a text such as ``2=stuck_low`` or ``0=electrode stuck@E13``."""
     finger, _, kind = text.partition("=")
-    if not finger.isdigit() or kind.upper() not in wire.EmuFault.__members__:
-        raise InputError(f"--fault {text}: expected FINGER=KIND, as in 2=stuck_low; kinds are {KINDS}")
-    return int(finger), wire.EmuFault[kind.upper()]
+    kind, _, channel = kind.partition("@")
+    if not finger.isdigit() or not kind:
+        raise InputError(f"--fault {text}: expected FINGER=KIND or FINGER=KIND@CHANNEL, as in 1=stuck@E13")
+    if kind != NO_FAULT:
+        fault_named(kind, channel or None)
+    return int(finger), kind, channel or None
 
 
 def summary(status: wire.EmuStatus) -> str:

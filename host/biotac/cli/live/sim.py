@@ -11,7 +11,11 @@ from ...errors import InputError
 from ...hand.opening import shake_hands
 from ...link.serial_port import SerialLink
 from ...recording.replay.playback import Playback
+from ...sim.live import LiveFingers, live_board
+from ...sim.load_server import LoadServer
 from ...sim.loading import bundled_scenario, load_source
+from ...sim.physics import Finger
+from ...sim.play import with_fault
 from ...sim.ports import start_board
 from ...sim.process import SimBoard
 from .. import values
@@ -44,6 +48,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--image", help="flash image for --board pico (default: build/pico/biotac-pico.bin)")
     parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="FINGER=KIND[@CHANNEL]",
+        help="what is broken throughout, as in 0=unplugged or 1=electrode stuck@E13; may be repeated",
+    )
+    parser.add_argument(
+        "--live",
+        metavar="NAMES",
+        help="fingers such as index,thumb, without SOURCE: another program gives their load round by round",
+    )
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
     parser.add_argument("--new", metavar="FILE", type=Path, help="only write a scenario with every verb, and comments")
     parser.add_argument("--force", action="store_true", help="with --new: overwrite FILE")
@@ -51,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the pty's path, then run until Ctrl-C; or play on a sensor board."""
+    """Print the pty's path once the board is ready; run for --seconds or until Ctrl-C. Or play on a sensor board."""
     if args.new is not None:
         write_new(args.new, bundled_scenario("verbs.toml").decode(), overwrite=args.force)
         say(args, {"scenario": str(args.new)}, f"{args.new}: change it, and play it with `biotac view sim:{args.new}`")
@@ -60,7 +76,10 @@ def run(args: argparse.Namespace) -> int:
     if args.sensor_port is not None:
         values.refuse(args, ("board", "image", "pace", "link"), "is for a board on a pty; drop it, or --sensor-port")
         return sensor_board.run(args, seconds)
-    values.refuse(args, ("by_time", "keep", "forget", "fault"), "is for a sensor board; add --sensor-port PORT")
+    values.refuse(args, ("by_time", "keep", "forget"), "is for a sensor board; add --sensor-port PORT")
+    if args.live is not None:
+        values.refuse(args, ("source", "fingers", "seconds", "pace", "fault"), "is for a board with a SOURCE; drop it")
+        return serve_loads(args)
     if args.source is None:
         raise InputError("no SOURCE is given, expected a scenario such as press.toml, or recorded counts")
     if args.pace == 0:
@@ -68,12 +87,14 @@ def run(args: argparse.Namespace) -> int:
             "--pace is 0, expected above 0 for a board on a pty; only biotac.open and biotac demo run unpaced"
         )
     if args.source.endswith(".mcap"):
-        values.refuse(args, ("fingers", "seconds", "board", "image"), "is for a simulated board; drop it")
+        values.refuse(args, ("fingers", "seconds", "board", "image", "fault"), "is for a simulated board; drop it")
         return play_recording(args)
     if args.image is not None and args.board != "pico":
         raise InputError("--image needs a board that has a flash image; add --board pico")
     name = args.source.removeprefix("sim:")
     source = load_source(name, fingers=args.fingers, seconds=seconds)
+    for finger, kind, channel in map(sensor_board.fault_of, args.fault):
+        source = with_fault(source, finger, kind, channel)
     board = start_board(args.board or "posix", source, pace=args.pace or 1.0, image=args.image)
     with until_ctrl_c(board, args.link):
         prepare(board)
@@ -81,8 +102,21 @@ def run(args: argparse.Namespace) -> int:
         tell(board, args, source.name, facts)
         while not board.over:
             board.hear(None)
-        tell_over(source.name)
-        signal.pause()
+        if args.seconds is None:
+            tell_over(source.name)
+            signal.pause()
+    return 0
+
+
+def serve_loads(args: argparse.Namespace) -> int:
+    """Run a board whose fingers another program loads, until Ctrl-C."""
+    names = [name for name in args.live.split(",") if name]
+    fingers = LiveFingers({name: Finger(1 + number) for number, name in enumerate(names)})
+    board = live_board(fingers, args.board or "posix", args.image)
+    with until_ctrl_c(board, args.link):
+        server = LoadServer(fingers, board)
+        tell(board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
+        server.serve()
     return 0
 
 

@@ -42,9 +42,9 @@ export class Model {
 
   inUnits(row) {
     const { column, about } = this;
-    const scaled = (name) => {
+    const scaled = (name, scale = name) => {
       const values = row[column[name]];
-      return values ? values.map((v) => (v === null ? NaN : v / about.scales[name])) : null;
+      return values ? values.map((v) => (v === null ? NaN : v / about.scales[scale])) : null;
     };
     const plain = (name) => row[column[name]] ?? NaN;
     return {
@@ -58,6 +58,7 @@ export class Model {
       tdc: plain("tdc"),
       pocMm: scaled("poc_um") ?? [NaN, NaN, NaN],
       forceN: scaled("force_100un") ?? [NaN, NaN, NaN],
+      appliedN: scaled("applied_100un", "force_100un") ?? [NaN, NaN, NaN],
       torqueNmm: scaled("torque_mnmm") ?? [NaN, NaN, NaN],
       mapMm: row[column.map_um]?.map((um) => um / about.scales.poc_um) ?? null,
     };
@@ -69,7 +70,7 @@ export class Finger {
     this.latest = null;
     this.addedMs = 0; // when the latest came, by the browser's clock
     const ring = () => new Float64Array(HISTORY_ROWS).fill(NaN);
-    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring() };
+    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring(), appliedX: ring(), appliedY: ring(), appliedZ: ring() };
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
     this.pacSamples = 0;
@@ -83,6 +84,7 @@ export class Finger {
     const at = this.rows++ % HISTORY_ROWS;
     this.history.t[at] = frame.tUs / 1e6;
     [this.history.x[at], this.history.y[at], this.history.z[at]] = frame.forceN;
+    [this.history.appliedX[at], this.history.appliedY[at], this.history.appliedZ[at]] = frame.appliedN;
     this.history.pdc[at] = frame.pdc;
     this.trail.push(frame.mapMm);
     if (this.trail.length > TRAIL_POINTS) this.trail.shift();

@@ -59,9 +59,9 @@ class Area {
 }
 
 export class TimePlot {
-  // names: columns of Finger.history; colours: their names in the theme; least: the smallest span shown
-  constructor(canvas, names, colours, { least, digits, zero }) {
-    Object.assign(this, { canvas, names, colours, least, digits, zero });
+  // names: columns of Finger.history; wide: those drawn behind them; colours: of both in the theme; least: the smallest span shown
+  constructor(canvas, names, colours, { least, digits, zero, wide = [] }) {
+    Object.assign(this, { canvas, names, colours, least, digits, zero, wide });
   }
 
   // marks: events of this finger, { t_us, name }
@@ -79,11 +79,13 @@ export class TimePlot {
     area.timeTicks(theme);
     let free = area.right; // the newest comes first; a text that would reach into it is left out
     for (const mark of marks.toReversed()) free = this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / zoom.s, mark.name, free);
-    c.lineWidth = 1.75;
     c.lineJoin = "round";
-    this.names.forEach((name, line) => {
+    [...this.wide, ...this.names].forEach((name, k) => {
+      const line = k % this.names.length;
+      const wide = k < this.wide.length;
       c.strokeStyle = theme[this.colours[line]];
-      c.setLineDash(DASHES[line]);
+      [c.lineWidth, c.globalAlpha] = wide ? [7, 0.3] : [1.75, 1];
+      c.setLineDash(wide ? [] : DASHES[line]);
       c.beginPath();
       let before = -Infinity;
       for (const k of shown) {
@@ -123,7 +125,7 @@ export class TimePlot {
 
   span(finger, shown) {
     let low = Infinity, high = -Infinity;
-    for (const name of this.names) {
+    for (const name of [...this.names, ...this.wide]) {
       for (const k of shown) {
         const v = finger.history[name][k];
         if (v < low) low = v;

@@ -36,6 +36,7 @@ export function make(tag, properties = {}, data = {}) {
 
 const VECTORS = [
   { key: "forceN", name: "Force", unit: "N", digits: 2 },
+  { key: "appliedN", name: "Applied", unit: "N", digits: 2 },
   { key: "torqueNmm", name: "Torque", unit: "N·mm", digits: 1 },
   { key: "pocMm", name: "Contact", unit: "mm", digits: 2 },
 ];
@@ -74,6 +75,7 @@ export class Results {
     panel.dataset.finger = frame.finger;
     panel.dataset.flags = frame.flags;
     VECTORS.forEach(({ key, digits }, row) => frame[key].forEach((v, k) => put(this.cells[row][k], v, digits)));
+    for (const element of [this.cells[1][0].parentNode, byId("applied-key")]) element.hidden = Number.isNaN(frame.appliedN[0]);
     for (const { key } of SCALARS) put(this.scalars[key], frame[key], 0);
     put(this.scalars.seq, frame.seq, 0);
     this.electrodes.forEach((cell, k) => put(cell, frame.signal ? frame.signal[k] : NaN, 0));

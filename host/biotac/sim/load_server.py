@@ -1,0 +1,87 @@
+"""Loads for a live board from a program in any language: a line of JSON a round, over a loopback socket.
+
+host/docs/guides/controller_tests.md describes the lines. One program at a time; the next may connect when it has gone,
+and until then the time of the board stands still.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
+
+from ..errors import BiotacError, DeviceLostError, InputError
+from .live import LiveFingers
+from .process import SimBoard
+from .touch import Course, Load, Touch
+
+LINE_BYTES = 65536
+_KEYS = [field.name for field in fields(Touch)]
+
+
+class LoadServer:
+    """Listens at ``port`` on the loopback interface for loads of a board."""
+
+    def __init__(self, fingers: LiveFingers, board: SimBoard) -> None:
+        assert board.sensors is not None
+        self._fingers = fingers
+        self._sensors = board.sensors
+        board.release()
+        self._sensors.wait_still()
+        self._rounds = 0
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listening.getsockname()[1]
+
+    def serve(self) -> None:
+        """Serve one program after the other until interrupted. Raises DeviceLostError when the board has ended."""
+        with self._listening:
+            while True:
+                program, _ = self._listening.accept()
+                with program, program.makefile("rwb") as lines:
+                    try:
+                        self._serve(lines)
+                    except (BrokenPipeError, ConnectionResetError):
+                        continue  # the program has gone in the middle of a round
+
+    def _serve(self, lines: Any) -> None:
+        while line := lines.readline(LINE_BYTES):
+            lines.write(json.dumps(self._answer(line)).encode() + b"\n")
+            lines.flush()
+
+    def _answer(self, line: bytes) -> dict[str, Any]:
+        try:
+            request = json.loads(line)
+            if not isinstance(request, dict):
+                raise InputError("expected an object with a load for each finger")
+            if "fault" in request:
+                self._fingers.fault(*(request["fault"].get(key) for key in ("finger", "kind", "channel")))
+                return {"round": self._rounds}
+            words = self._fingers.read({name: _load(value) for name, value in request.items()})
+        except DeviceLostError:
+            raise
+        except (BiotacError, KeyError, TypeError, ValueError, AttributeError) as error:
+            return {"error": str(error.args[0] if error.args else error)}
+        self._sensors.put(words)
+        self._sensors.wait_still()
+        self._rounds += 1
+        return {"round": self._rounds}
+
+
+def _load(value: Any) -> Load:
+    """A load from JSON: null, an object, a list of contacts, or {"course": [...]}."""
+    if value is None:
+        return None
+    if isinstance(value, list):
+        return [_touch(one) for one in value]
+    if isinstance(value, dict) and "course" in value:
+        return Course(_load(part) or () for part in value["course"])  # type: ignore[misc]
+    return _touch(value)
+
+
+def _touch(value: Any) -> Touch:
+    if not isinstance(value, dict) or not value.keys() <= set(_KEYS):
+        raise InputError(f"a touch is {json.dumps(value)}, expected an object with some of: {', '.join(_KEYS)}")
+    pairs: Callable[[Any], Any] = lambda one: tuple(one) if isinstance(one, list) else one  # noqa: E731
+    return Touch(**{name: pairs(one) for name, one in value.items()})

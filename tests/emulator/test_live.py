@@ -1,0 +1,70 @@
+"""The same live loads on the emulated Pico as on the process, and on a sensor board wired to a gateway."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from two_picos import TwoPicos
+
+from biotac.sim import SimFinger, Touch, wired_world, world
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "hil"))
+
+from rig import all_rigs, in_ci, prepare
+
+FINGERS = {"index": SimFinger(1), "thumb": SimFinger(2, "worn")}
+SETTINGS = {"force_model": 0}
+
+
+def need(name: str) -> None:
+    why = prepare(all_rigs()[name])
+    if why is not None:
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+
+
+def frames(board: str, rounds: int) -> list[np.ndarray]:
+    """All that the FRAMEs of so many rounds say, but for t_us."""
+    rows = []
+    with world(FINGERS, settings=SETTINGS, board=board) as w:
+        for k in range(rounds):
+            now = w.step(index=Touch(min(max(k - 30, 0) * 0.05, 3.0)), thumb=Touch(1.0 * (k > 40), (0.2, -0.3)))
+            for name in FINGERS:
+                frame = now[name].frame
+                assert frame is not None
+                rest = frame.seq, int(frame.flags), frame.pdc, frame.tac, frame.tdc, frame.pdc_filtered
+                rows.append(np.concatenate([frame.counts, frame.force_n, frame.torque_nmm, frame.poc_mm, rest]))
+    return rows
+
+
+@pytest.mark.parametrize("rounds", [60, pytest.param(1000, marks=pytest.mark.nightly)])
+def test_the_emulated_pico_computes_what_the_process_computes(rounds: int) -> None:
+    need("pico_emulated")
+    np.testing.assert_array_equal(frames("pico", rounds), frames("posix", rounds))
+
+
+@pytest.fixture
+def pair() -> Iterator[TwoPicos]:
+    need("two_picos")
+    with closing(TwoPicos(None, pace=0.0, hold=False)) as board:
+        yield board
+
+
+@pytest.mark.parametrize("rounds", [40, pytest.param(300, marks=pytest.mark.nightly)])
+def test_two_wired_boards_are_loaded_in_time_and_late_rounds_are_counted(pair: TwoPicos, rounds: int) -> None:
+    with wired_world(FINGERS, port=pair.path, sensor_port=pair.sensor_path, ahead=4) as w:
+        for _ in range(5):
+            now = w.step()
+        late = w.rounds_late  # while the hand was opened nobody fed
+        for _ in range(rounds):
+            now = w.step(index=Touch(2.0))
+        assert w.rounds_late == late, "the program kept up"
+        assert now["index"].frame is not None and now["thumb"].frame is not None
+        time.sleep(1.0)
+        w.step(index=Touch(2.0))
+        assert w.rounds_late > late
