@@ -146,14 +146,14 @@ def test_a_fault_in_mid_grasp_is_seen_and_outlived(fault: str) -> None:
     plant, seen = Plant(THING), []
     sense = Board(CASE.seeds, "new", "E17")
     try:
-        for k in range(160):
+        for k in range(200):
             plant.step(10.0 if plant.normal_n < 2 else 0.0, 0.0)
             if k == 60:
                 sense.fault(fault)
             seen.append(sense.feel(plant))
     finally:
         sense.close()
-    healthy, hit, after = seen[59], seen[61], seen[159]
+    healthy, hit, after = seen[59], seen[61], seen[199]
     assert healthy is not None and after is not None and healthy[0][0] is not None and after[0][0] is not None
     if fault == "still program":
         assert seen[60:110] == [None] * 50 and seen[110] is not None

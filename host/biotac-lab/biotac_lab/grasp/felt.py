@@ -10,8 +10,6 @@ from biotac import Calibration, EventKind, Frame, FrameFlags
 from biotac.core import geometry as surface
 from biotac.sim import FAULTS, SimFinger, Touch, world
 
-from .plant import ROUND_S
-
 TOUCHED_N = 0.05
 FINGERS = {2: ("index", "thumb"), 3: ("thumb", "index", "middle")}
 SHARES = {2: (1.0, 1.0), 3: (1.0, 0.5, 0.5)}  # what each bears of its side's force: the first is alone on its side
@@ -67,16 +65,16 @@ class Board(TrueForce):
 
     def __init__(self, seeds: list[int], profile: Any, at: str, maps: Any = None, gains: Any = None) -> None:
         super().__init__(len(seeds))
-        self._names, self._at, self._still = FINGERS[len(seeds)], at, 0
+        self._names, self._at, self._still = FINGERS[len(seeds)], at, False
         fingers = {name: SimFinger(seed, profile) for name, seed in zip(self._names, seeds, strict=True)}
         self._world = world(fingers, maps=maps)
         self._world.hand.stop()
         for name, gain in (gains or {}).items():
             self._world.hand.board.set_calibration(name, Calibration(force_gain_nn=tuple(gain)))
         self._world.hand.stream("force", "events")  # what the law needs
-        self._world.rest(REST_S)
+        self._world.run(REST_S)
         self._world.run(TOUCH_S, **dict.fromkeys(self._names, Touch(normal_n=1.0, at=at)))
-        self._world.rest(TOUCH_S)
+        self._world.run(TOUCH_S)
 
     def feel(self, plant: Any) -> Felt | None:
         """See TrueForce."""
@@ -86,8 +84,8 @@ class Board(TrueForce):
             shear = across, down if k else -down  # the sides face each other
             loads[name] = Touch(normal, shear, self._at, torsion, slip_mm_s=plant.slip_mm_s)
         now = self._world.step(**loads)
+        self._still &= now.seq < 0
         if self._still:
-            self._still -= 1
             return None
         return [now[name].frame for name in self._names], any(event.kind == EventKind.SLIP for event in now.events)
 
@@ -101,7 +99,7 @@ class Board(TrueForce):
             assert SENSOR_FAULTS[name] in FAULTS
             self._world.fault(self._names[0], SENSOR_FAULTS[name])
         elif name == "still program":
-            self._still = round(STILL_S / ROUND_S)
+            self._still = True
             self._world.stall_host(STILL_S)
         else:
             away = {"restart": (), "hang": (), "power cut": (AWAY_S,), "cable": (AWAY_S,)}

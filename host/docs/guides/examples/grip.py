@@ -90,7 +90,7 @@ class Grip:
 if __name__ == "__main__":
     grip, closed_mm = Grip(), 0.0
     with world({"index": SimFinger(11), "thumb": SimFinger(12)}) as hand:
-        hand.rest(7.0)
+        hand.run(7.0)
         for k in range(300):  # between them a thing of 1 N/mm, whose weight comes in the third second
             closed_mm += grip.speed_mm_s * ROUND_S
             press_n, pull_n = max(closed_mm - 2.0, 0.0), max(k - 200, 0) / 200
