@@ -94,7 +94,7 @@ def run_demo(
     if source.emulated:
         show("calibrating finger 0 as `biotac calibrate wrench --live` does, which takes some ten seconds")
         finger = source.emulated[0]
-        own, held_out_n = own_map(FingerSpec(finger.seed, finger.profile, source.serials[0], finger.scale))
+        own, held_out_n = own_map(FingerSpec(finger.seed, finger.profile, source.serials[0]))
     at_0 = joined.wire["finger"] == 0
     frames, sent = joined.frames[at_0], joined.wire[at_0]
     answers, applied_n = answers_to(sent, settings, own), hand.applied_n(frames["finger"], frames["t_us"])

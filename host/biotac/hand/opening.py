@@ -58,8 +58,8 @@ def open(
 def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = None, **options: Any) -> Hand:
     """Make a Hand with these ``options`` from an open link, and give it each finger's calibration.
 
-    A simulated board gets its source's settings (an emulated finger's own gains) and stored tare, as a real one would
-    from its user. Closes the link when any of this fails.
+    A simulated board gets its source's stored tare, as a real one would from its user. Closes the link when any of this
+    fails.
     """
     hand = Hand(link, **options)
     source = link.source
@@ -71,8 +71,6 @@ def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = 
             )
         for finger, calibration in (calibrations or {}).items():
             hand.board.set_calibration(finger, calibration)
-        for name, value in source.settings.items() if source else ():
-            hand.board.set_setting(wire.Setting[name.upper()], value)
         if source and source.tare_q4 is not None:
             for finger, tare_q4 in enumerate(source.tare_q4):
                 hand.set_tare(finger, tare_q4 / Q4_PER_COUNT)

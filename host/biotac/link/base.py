@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -18,9 +18,6 @@ class Played(Protocol):
     """What a simulated board plays, and what its user would know about it; sim/source.py has the details."""
 
     @property
-    def settings(self) -> Mapping[str, int]:
-        """Settings to make before streaming, by their names in link.toml."""
-
     @property
     def tare_q4(self) -> NDArray[np.uint16] | None:
         """The tare (fingers, 19) to give the board before streaming, in 1/16 count, or None."""

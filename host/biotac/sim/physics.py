@@ -1,17 +1,21 @@
-"""Contact to electrode counts: the sensor model of reference/numerics.md, section 3.1.
+"""Contact to electrode counts: a model of skin, fluid and electrodes whose numbers are fitted to real fingers.
 
-A contact squeezes the fluid gap over the electrodes under it; the displaced volume bulges the gap
-elsewhere, tangential force and torsion shift it sideways; each electrode's resistance follows its
-gap, and a divider turns it into counts. The constants are the section's: anchored to the paper's
-rest resistance, about 10 MOhm at 30 N and about 1000 count^2 at 0.5 N; the rest is a free choice,
-so this is a sensor like a BioTac, not a given BioTac. sampling.py adds what time and noise do.
+A contact squeezes the fluid gap over the electrodes under it, less with distance; the displaced volume widens the gap
+elsewhere; shear and torsion drag the skin, which narrows the gap ahead of the core and widens it where skin piles up;
+each electrode's resistance follows its gap, and a divider turns it into counts. ``biotac-lab fit-finger`` fits the
+numbers in skin.json to the counts and forces of two real fingers, and never to a map; the file names its source. What
+these recordings cannot say is a free choice that stands here: a probe smaller than a plate squeezes as deep and less
+wide, up to the paper's 10 MOhm at 30 N; and torsion. sampling.py adds what time and noise do.
 """
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from importlib import resources
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +24,6 @@ from ..core import geometry as surface
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
 
-if TYPE_CHECKING:
-    from ..calibrate.press.few_shot import Scale
-
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")
 
@@ -30,25 +31,62 @@ ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 REST_CELSIUS = 30.0  # the model's reference temperature
 
 GAP_MM = 2.0  # fluid thickness at rest
-FOOTPRINT_GROWTH_MM = 0.35  # per cube root of a newton
-SQUEEZE_AT_REFERENCE = 4.15  # log compression of the gap at 30 N under a 2 mm footprint
-SQUEEZE_FORCE_N = 30.0
-SQUEEZE_EXPONENT = 1.319  # fixed by 1000 count^2 at 0.5 N, mean over pokes on all electrodes
-SQUEEZE_FOOTPRINT_MM = 2.0
-SHEAR_N_PER_MM = np.array([4.0, 3.0, 3.0])
-SHEAR_MAX_MM = 1.6
+PLATE_MM = 3.5  # half width of a contact from which on it is as wide as the plate of the recordings
+PLATE_N, FAINT_N = 4.5, 0.05  # where the footprint is skin.json's, and below which it does not change
+PAD_MM, PAD_REACH_MM = -3.0, 4.0  # x of the pad's middle; towards the tip skin is softer
+SKIN_MM = 2.0  # fluid and skin spread what presses
+SQUEEZE_MAX = 4.2  # log compression: 10 MOhm
+SQUEEZE_MAX_PER_N = 2.0  # of an electrode that faces the contact: E1 of a third finger, 1.5 at about 1 N (trial_15330)
 TORSION_NMM_PER_RAD = 25.0
 TORSION_MAX_RAD = 0.6
-SHEAR_REACH_MM = 7.0
-ANCHOR_SHARE = 0.4  # the nail holds the skin: this much less compliance at z = 0 than at z = -r
-SEAL_MM, SEAL_REACH_MM = -16.5, 3.0  # the proximal seal holds it at the other end
-BULGE_SHARE = 0.8  # of the displaced volume shows up as bulge within the mesh
-BULGE_HOLE = 1.5  # footprints around the contact do not bulge
-FIXED_RESISTANCE_SHARE = 0.35  # path through fluid that no contact moves
 TEMPERATURE_PER_C = -0.02  # of log resistance
 PDC_REST = (1300, 2700)  # counts of static pressure at rest: real sensors' is 1326, 2412, and 2582 to 2695
+MESH_MM = 1.2
+OTHERWISE = 0.04  # of log sensitivity: half of what two halves of one recording differ by; more cannot be known
+SPREAD_REACH_MM = 6.0  # F1 and F2 differ alike in electrodes 5 mm apart, and by chance in those 7 mm apart
+WORN_LEVEL = -0.53  # of log resistance: trial_15330's finger against F1 and F2
 
 _BLOCK = 256  # states at a time: keeps the (states x mesh points) arrays inside the cache
+
+
+@dataclass(frozen=True)
+class Skin:
+    """What fingers have in common, fitted: see deform() for what each number does.
+
+    ``gain`` (4, 19) is each electrode's sensitivity to squeeze, bulge, drag and pile-up, mirror-symmetric, and
+    ``r0_ohm`` (19,) are resistances at rest. Fingers differ from them by logs: one sigma of the one difference that is
+    known, between two fingers, is ``gain_apart`` (19,) and ``r0_apart`` (19,).
+    """
+
+    along_mm: float
+    across_mm: float
+    squeeze: float
+    exponent: float
+    growth: float
+    taper: float
+    fixed_share: float
+    bulge_share: float
+    hole: float
+    drag_along_n_mm: float
+    drag_across_n_mm: float
+    drag_max_mm: float
+    drag_reach_mm: float
+    pile_per_mm2: float
+    gain: Floats
+    r0_ohm: Floats
+    gain_apart: Floats
+    r0_apart: Floats
+
+
+def shipped_skin() -> Skin:
+    """The package's fit, skin.json."""
+    document = json.loads(resources.files(__package__).joinpath("skin.json").read_text(encoding="utf-8"))
+    fields: dict[str, Any] = document["numbers"]
+    fields |= {name: np.array(values, dtype=np.float64) for name, values in document["electrodes"].items()}
+    return Skin(**fields)
+
+
+SKIN = shipped_skin()
 
 
 @dataclass(frozen=True)
@@ -109,74 +147,63 @@ class Footprints:
     along: Floats
 
 
-def compliance(points_mm: Floats) -> Floats:
-    """How freely the skin over core points (n, 3) moves: (n,), 0 to 1."""
-    anchored = 1.0 - ANCHOR_SHARE * (1.0 + points_mm[:, 2] / surface.RADIUS_MM)
-    sealed = 1.0 - np.exp(-(points_mm[:, 0] - SEAL_MM) / SEAL_REACH_MM)
-    return anchored * np.clip(sealed, 0.0, 1.0)
+_MESH_MM, _, _MESH_AREA_MM2 = surface.ventral_mesh(MESH_MM)
+_POINTS_MM = np.concatenate([surface.ELECTRODE_MM, _MESH_MM])  # electrodes first
+_POINTS_MM2 = (_POINTS_MM**2).sum(axis=1)
+_RADIAL = surface.normals_at(_POINTS_MM)  # Table 1's normals at the tip are one flat facet
+_ELECTRODES, _MESH = np.s_[:, :ELECTRODES], np.s_[:, ELECTRODES:]
+_BETWEEN_MM2 = ((surface.ELECTRODE_MM[:, None] - surface.ELECTRODE_MM[None]) ** 2).sum(axis=2)
+_SMOOTH = np.linalg.cholesky(np.exp(_BETWEEN_MM2 / (-2.0 * SPREAD_REACH_MM**2)) + 1e-9 * np.eye(ELECTRODES))
 
 
-_MESH_MM, _MESH_NORMAL, _MESH_AREA_MM2 = surface.ventral_mesh()
-_MESH_COMPLIANCE = compliance(_MESH_MM)
-_ELECTRODE_COMPLIANCE = compliance(surface.ELECTRODE_MM)
-
-
-def _distance2(points_mm: Floats, contact_mm: Floats) -> Floats:
-    """Squared distances (contacts, points) in mm^2."""
-    squared: Floats = (
-        (contact_mm**2).sum(axis=1)[:, None] + (points_mm**2).sum(axis=1)[None, :] - 2.0 * contact_mm @ points_mm.T
-    )
-    return np.maximum(squared, 0.0)
-
-
-def _squeeze_and_bulge(state: Floats) -> tuple[Floats, Floats]:
-    """Log compression and relative bulge (n, 19) for touched states in _pack()'s columns."""
+def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
+    """Log compression and log bulge (n, 19) for touched states in _pack()'s columns."""
     contact, force, shear, torsion = state[:, 0:3], state[:, 3], state[:, 4:7], state[:, 7]
     normal = surface.normals_at(contact)
-    footprint, ellipse = state[:, 8:9], state[:, 9:13]
-    if not ellipse.shape[1]:
-        footprint = footprint + FOOTPRINT_GROWTH_MM * np.cbrt(force)[:, None]
-    # same area as a round footprint, so that the shape alone does not change the force
-    size = footprint if not ellipse.shape[1] else np.sqrt(footprint * ellipse[:, :1])
-    depth = (
-        SQUEEZE_AT_REFERENCE * ((force / SQUEEZE_FORCE_N) ** SQUEEZE_EXPONENT)[:, None] * (SQUEEZE_FOOTPRINT_MM / size)
-    )
+    to_tip, to_side = surface.tangents_at(normal)
+    plate = np.array([skin.along_mm, skin.across_mm])
+    if state.shape[1] == 9:
+        share = _probe(state[:, 8:9]) * plate
+        along = to_tip
+    else:
+        share = _probe(state[:, 9:7:-1]) * math.sqrt(plate.prod())
+        along = state[:, 10:13]
+    firm = np.exp(skin.taper * np.tanh((contact[:, 0] - PAD_MM) / PAD_REACH_MM))
+    strength = (force**skin.exponent * firm)[:, None]
+    long2, short2 = (share * (np.maximum(force, FAINT_N) / PLATE_N)[:, None] ** skin.growth).T[:, :, None] ** 2
 
-    def footprints2(points_mm: Floats, distance2: Floats) -> Floats:
-        """Squared distance (contacts, points) in footprints."""
-        if not ellipse.shape[1]:
-            return distance2 / footprint**2
-        along = ellipse[:, 1:] @ points_mm.T - (ellipse[:, 1:] * contact).sum(axis=1)[:, None]
-        along2 = np.minimum(along**2, distance2)
-        result: Floats = (distance2 - along2) / footprint**2 + along2 / ellipse[:, :1] ** 2
-        return result
+    distance2 = np.maximum((contact**2).sum(axis=1)[:, None] + _POINTS_MM2 - 2.0 * contact @ _POINTS_MM.T, 0.0)
+    part2 = (along @ _POINTS_MM.T - (along * contact).sum(axis=1)[:, None]) ** 2
+    away2 = part2 / long2 + np.maximum(distance2 - part2, 0.0) / short2  # in footprints
+    outside = 1.0 - np.exp(away2 / -skin.hole)
+    under = strength * np.exp(-np.sqrt(away2))
+    facing = skin.squeeze * np.maximum(normal @ _RADIAL.T, 0.0)
 
-    def squeeze(away2: Floats, facing: Floats) -> Floats:
-        return depth * np.exp(-away2 / 2.0) * np.maximum(facing, 0.0)
+    volume_mm3 = (1.0 - np.exp(-under[_MESH] * facing[_MESH])) @ _MESH_AREA_MM2
+    widened = skin.bulge_share * volume_mm3 / (outside[_MESH] @ _MESH_AREA_MM2)
+    limited = SQUEEZE_MAX_PER_N * np.tanh(facing[_ELECTRODES] * (skin.gain[0] / SQUEEZE_MAX_PER_N))
+    compression = under[_ELECTRODES] * limited
+    bulge = widened[:, None] * outside[_ELECTRODES] * skin.gain[1]
 
-    def outside(away2: Floats) -> Floats:
-        return 1.0 - np.exp(-away2 / (2.0 * BULGE_HOLE**2))
+    along_mm = (shear * to_tip).sum(axis=1)[:, None] / skin.drag_along_n_mm
+    across_mm = (shear * to_side).sum(axis=1)[:, None] / skin.drag_across_n_mm
+    length = np.hypot(along_mm, across_mm) + 1e-9
+    limited = skin.drag_max_mm * np.tanh(length / skin.drag_max_mm) / length
+    along_mm, across_mm = limited * along_mm, limited * across_mm
+    radial = _RADIAL[:ELECTRODES]
+    outward = (along_mm * to_tip + across_mm * to_side) @ radial.T
+    if torsion.any():
+        angle = TORSION_MAX_RAD * np.tanh(torsion / (TORSION_NMM_PER_RAD * TORSION_MAX_RAD))
+        arm = surface.ELECTRODE_MM[None, :, :] - contact[:, None, :]
+        outward += np.einsum("nec,ec->ne", np.cross((angle[:, None] * normal)[:, None, :], arm), radial)
+    ahead_mm = to_tip @ surface.ELECTRODE_MM.T - (to_tip * contact).sum(axis=1)[:, None]
+    sideways = outward / GAP_MM * skin.gain[2] + skin.pile_per_mm2 * along_mm * ahead_mm * skin.gain[3]
+    return compression, bulge + sideways * np.exp(distance2[_ELECTRODES] / (-2.0 * skin.drag_reach_mm**2))
 
-    far = footprints2(_MESH_MM, _distance2(_MESH_MM, contact))
-    pressed = squeeze(far, normal @ _MESH_NORMAL.T)
-    volume_mm3 = (GAP_MM * (1.0 - np.exp(-pressed))) @ _MESH_AREA_MM2
-    room_mm3 = (GAP_MM * outside(far)) @ (_MESH_COMPLIANCE * _MESH_AREA_MM2)
 
-    near = _distance2(surface.ELECTRODE_MM, contact)
-    away2 = footprints2(surface.ELECTRODE_MM, near)
-    compression = squeeze(away2, normal @ surface.ELECTRODE_NORMAL.T)
-    bulge = (BULGE_SHARE * volume_mm3 / room_mm3)[:, None] * _ELECTRODE_COMPLIANCE * outside(away2)
-
-    shift = shear / SHEAR_N_PER_MM
-    length = np.linalg.norm(shift, axis=1, keepdims=True)
-    limited = SHEAR_MAX_MM * np.tanh(length / SHEAR_MAX_MM)
-    shift = shift * np.divide(limited, length, out=np.ones_like(length), where=length > 0.0)
-    angle = TORSION_MAX_RAD * np.tanh(torsion / (TORSION_NMM_PER_RAD * TORSION_MAX_RAD))
-    arm = surface.ELECTRODE_MM[None, :, :] - contact[:, None, :]
-    moved = shift[:, None, :] + np.cross((angle[:, None] * normal)[:, None, :], arm)
-    outward = np.einsum("nec,ec->ne", moved, surface.ELECTRODE_NORMAL)
-    sideways = outward / GAP_MM * np.exp(-near / (2.0 * SHEAR_REACH_MM**2)) * _ELECTRODE_COMPLIANCE
-    return compression, bulge + sideways
+def _probe(half_mm: Floats) -> Floats:
+    """How wide a probe presses, as a share of a plate."""
+    return (np.minimum(half_mm, PLATE_MM) + SKIN_MM) / (PLATE_MM + SKIN_MM)
 
 
 def _pack(states: States, footprints: Footprints | None) -> Floats:
@@ -187,8 +214,8 @@ def _pack(states: States, footprints: Footprints | None) -> Floats:
     return np.column_stack([*load, footprints.short_mm, footprints.long_mm, footprints.along])
 
 
-def deform(states: States, footprints: Footprints | None = None) -> tuple[Floats, Floats]:
-    """Log compression and relative bulge of the gap over the electrodes, each (n, 19).
+def deform(states: States, footprints: Footprints | None = None, skin: Skin = SKIN) -> tuple[Floats, Floats]:
+    """Log compression and log bulge of the gap over the electrodes, each (n, 19).
 
     Both are 0 without contact, and those of several contacts add: the logs of what each leaves of the gap, and the
     volumes each displaces. ``footprints`` take the place of ``tip_radius_mm``. Equal states are computed once: a
@@ -198,8 +225,10 @@ def deform(states: States, footprints: Footprints | None = None) -> tuple[Floats
     bulge = np.zeros((len(states), ELECTRODES))
     touched = np.flatnonzero(states.force_n > 0.0)
     if len(touched):
-        unique, inverse = np.unique(_pack(states, footprints)[touched], axis=0, return_inverse=True)
-        parts = [_squeeze_and_bulge(unique[k : k + _BLOCK]) for k in range(0, len(unique), _BLOCK)]
+        unique, inverse = _pack(states, footprints)[touched], np.arange(len(touched))
+        if len(touched) > 1:
+            unique, inverse = np.unique(unique, axis=0, return_inverse=True)
+        parts = [_squeeze_and_bulge(unique[k : k + _BLOCK], skin) for k in range(0, len(unique), _BLOCK)]
         rows = inverse.reshape(-1)  # NumPy 2.0 alone returns it as a column
         compression[touched] = np.concatenate([part[0] for part in parts])[rows]
         bulge[touched] = np.concatenate([part[1] for part in parts])[rows]
@@ -207,23 +236,23 @@ def deform(states: States, footprints: Footprints | None = None) -> tuple[Floats
 
 
 class Finger:
-    """One sensor with its own resistances and skin; the same seed and profile give the same sensor.
+    """One finger of the population; the same seed and profile give the same finger.
 
-    ``profile``: "new" has the paper's rest resistance and a quiet converter, "worn" what the public
-    recordings show (numerics.md 1.1 and 1.4: 1.4 to 3.9 kOhm, sigma 5, 0.5 % glitches).
-    With ``scale`` it is a finger that the population map knows, but for that correction (known_finger.py).
-    ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and 30 C, and gap sensitivity. ``pdc_rest`` is in counts.
+    Resistances and sensitivities are drawn about what two real fingers have in common, as far apart as these are
+    (skin.json). ``profile``: "new" has a quiet converter, "worn" the low resistances of trial_15330's finger with the
+    noise of F1 and F2 and the glitches of btd_biotacsp. ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and
+    30 C, and gap sensitivity. ``pdc_rest`` is in counts.
     """
 
-    def __init__(self, seed: int, profile: Profile = "new", scale: Scale | None = None) -> None:
+    def __init__(self, seed: int, profile: Profile = "new") -> None:
         worn = profile == "worn"
         rng = np.random.default_rng([seed, 0])
-        low_ohm, high_ohm = (1400.0, 3900.0) if worn else (3000.0, 5000.0)
         self.seed = seed
         self.profile: Profile = profile
-        self.scale = scale
-        self.r0_ohm: Floats = rng.uniform(low_ohm, high_ohm, ELECTRODES)
-        self.gap_gain: Floats = rng.normal(1.0, 0.06, ELECTRODES)
+        # along the line through the two fingers that are known, and a little in all directions
+        apart, rest = rng.normal(), OTHERWISE * _SMOOTH @ rng.normal(0.0, 1.0, ELECTRODES)
+        self.r0_ohm: Floats = SKIN.r0_ohm * np.exp(WORN_LEVEL * worn + apart * SKIN.r0_apart)
+        self.gap_gain: Floats = np.exp(apart * SKIN.gain_apart + rest)
         # real drift is one-dimensional: one rate a finger, loadings 0.82 to 1.16 (biotac.md finding 6)
         self.drift_per_min: Floats = rng.uniform(-15.0, 15.0) * rng.uniform(0.82, 1.16, ELECTRODES)
         self.creep_share = float(rng.uniform(0.02, 0.05))
@@ -237,25 +266,18 @@ class Finger:
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
-        counts, touched = self.counts_of(*states.deformation, states.warm_c), states.force_n > 0.0
-        if self.scale is not None and touched.any():
-            from .known_finger import answered  # with all that calibrates, which few fingers need
-
-            at_rest = self.rest_counts(states.warm_c)[touched]
-            load = np.column_stack([counts[touched] - at_rest, states.wrench()[0][touched]])
-            unique, inverse = np.unique(load, axis=0, return_inverse=True)  # a scenario mostly holds still
-            e = answered(unique[:, :ELECTRODES], self.rest_counts(np.zeros(1))[0], unique[:, ELECTRODES:], self.scale)
-            counts[touched] = at_rest + e[inverse.reshape(-1)]
-        return counts
+        return self.counts_of(*states.deformation, states.warm_c)
 
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
         """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""
-        change = bulge * self.gap_gain
-        # a bulge opens the gap in proportion; a negative one must not close it past zero
-        opened = np.where(change >= 0.0, 1.0 + change, np.exp(np.minimum(change, 0.0)))
-        gap = np.exp(-compression * self.gap_gain) * opened
-        share = FIXED_RESISTANCE_SHARE + (1.0 - FIXED_RESISTANCE_SHARE) / gap**2
+        share = resistance_share(compression * self.gap_gain, bulge * self.gap_gain, SKIN.fixed_share)
         return _divider(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
+
+
+def resistance_share(compression: Floats, bulge: Floats, fixed_share: float) -> Floats:
+    """Resistance as a share of that at rest, from the log compression and the log bulge of the gap."""
+    squeezed = SQUEEZE_MAX * np.tanh(compression / SQUEEZE_MAX)
+    return fixed_share + (1.0 - fixed_share) * np.exp(2.0 * (squeezed - bulge))
 
 
 def _divider(resistance_ohm: Floats) -> Floats:

@@ -13,7 +13,6 @@ from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
 from .faults import BUS_FAULTS, FAULTS, IS_CHANNEL, Faulty, broken_electrode, fault_named, on_the_bus
-from .gains import fit_gains
 from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
@@ -40,7 +39,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     boundary = np.append(frame, frame[-1] + 1)
 
     samples = np.empty((frames, count, slots.SLOTS_PER_FRAME), dtype=np.uint16)
-    emulated = tuple(Finger(spec.seed, spec.profile, spec.scale) for spec in specs)
+    emulated = tuple(Finger(spec.seed, spec.profile) for spec in specs)
     for index, track in enumerate(scenario.tracks[:count]):
         states = track.states(_seconds(np.arange(played + 1)))
         for k in range(index, count, own):
@@ -63,7 +62,6 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
         name=scenario.name,
         samples=samples,
         truth=_truth(middles(played), frame),
-        settings=_fit(emulated, middles(period)) if scenario.fit_gains else {},
         serials=tuple(spec.serial for spec in specs),
         emulated=emulated,
     )
@@ -134,13 +132,3 @@ def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k:
             broken_electrode(fault.kind, fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7])
         )
         samples[rows, k] = on_the_bus(lay(faulty, samples[rows, k], samples[rows, beside]))
-
-
-def _fit(emulated: tuple[Finger, ...], middles: list[States]) -> dict[str, int]:
-    """Gains fitted over one whole timeline, even if only part of it is played, and over all fingers together."""
-    signals = [
-        finger.counts(states) - finger.rest_counts(states.warm_c)
-        for finger, states in zip(emulated, middles, strict=True)
-    ]
-    forces, torques = zip(*(states.wrench() for states in middles), strict=True)
-    return fit_gains(np.concatenate(signals), np.concatenate(forces), np.concatenate(torques))

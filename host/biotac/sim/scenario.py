@@ -1,8 +1,7 @@
 """The scenario format: a TOML timeline of what touches the fingers.
 
-Top level: ``name``; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
-``gains = "fit"`` (see gains.py). ``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``, and, for a finger
-that the population map knows, the correction that the map needs on it, ``z_gain`` and ``balance`` (known_finger.py).
+Top level: ``name``; ``about``, a clause; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
+``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``.
 ``[[step]]``, played in order, each with ``seconds`` and optionally ``fingers = [0, ...]`` (others
 hold meanwhile):
 
@@ -28,7 +27,6 @@ the bus (default: all), or the electrode that breaks (default: E17).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from ..core import geometry as surface
 from ..errors import ScenarioError
@@ -39,9 +37,6 @@ from .source import MAX_SECONDS
 from .tables import Table, parse_toml
 from .timeline import Pose, Track
 
-if TYPE_CHECKING:
-    from ..calibrate.press.few_shot import Scale
-
 RELEASE_S = 0.1
 FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
 FORCE_MAX_N = 50.0
@@ -50,7 +45,7 @@ TORSION_MAX_NMM = 100.0
 SLIP_MAX_MM_S = 200.0
 SEED_MAX = 2**31 - 1
 # Repeated for an hour on five fingers, the worst scenario takes about 8 s on a busy processor (half of it for any hour)
-# and 350 MB. With gains = "fit", which computes everything once more, half of each limit is allowed.
+# and 350 MB.
 FINGER_SECONDS_MAX = 900.0  # all fingers together
 MOVING_MAX_S = 160.0  # likewise, with a load that changes: each frame of it costs 0.15 ms
 FAULTS_MAX_S = 10_000.0  # all together; the time to play them grows with it
@@ -74,7 +69,6 @@ class FingerSpec:
     seed: int
     profile: Profile
     serial: str
-    scale: Scale | None = None
 
 
 @dataclass(frozen=True)
@@ -93,11 +87,11 @@ class Scenario:
     """A valid scenario: one track and one sensor per finger, all tracks equally long."""
 
     name: str
-    fit_gains: bool
     fingers: tuple[FingerSpec, ...]
     tracks: tuple[Track, ...]
     faults: tuple[Fault, ...]
     seconds: float
+    about: str = ""
 
 
 def parse_scenario(data: bytes, *, file: str) -> Scenario:
@@ -106,25 +100,21 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     if not values:
         raise ScenarioError(f"{file}:1: the file is empty: expected a name and [[step]] tables; add them")
     top = Table(values, file, "", lines, 0)
-    top.only(("name", "seed", "fingers", "gains", "finger", "step", "fault"))
+    top.only(("name", "about", "seed", "fingers", "finger", "step", "fault"))
     name = top.text("name", r"[^\x00-\x1f]{1,64}", "1 to 64 printable characters")
     seed = top.integer("seed", 0, SEED_MAX) if "seed" in top else 1
-    if "gains" in top:
-        top.choice("gains", ("fit",))
     specs = _fingers(top, seed)
     steps = top.tables("step")
     if not steps:
         raise top.error("step", "is missing", "at least one [[step]] table", "add one")
     tracks = tuple(Track() for _ in specs)
-    share = 0.5 if "gains" in top else 1.0  # of how long it may be
     for step in steps:
-        _add_step(step, tracks, share)
+        _add_step(step, tracks)
     faults = tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault"))
     if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
         raise top.error("fault", "lasts too long", f"at most {FAULTS_MAX_S:g} s in total", "remove some")
-    return Scenario(
-        name=name, fit_gains="gains" in top, fingers=specs, tracks=tracks, faults=faults, seconds=tracks[0].seconds
-    )
+    about = top.text("about", r"[^\x00-\x1f]{1,120}", "1 to 120 printable characters") if "about" in top else ""
+    return Scenario(name, specs, tracks, faults, tracks[0].seconds, about)
 
 
 def default_serial(seed: int) -> str:
@@ -148,27 +138,22 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
         return tuple(FingerSpec(seed + k, "new", default_serial(seed + k)) for k in range(count))
     specs = []
     for index, table in enumerate(tables):
-        table.only(("seed", "profile", "serial", "z_gain", "balance"))
+        table.only(("seed", "profile", "serial"))
         own = table.integer("seed", 0, SEED_MAX) if "seed" in table else seed + index
         word = table.choice("profile", PROFILES) if "profile" in table else "new"
         profile = next(known for known in PROFILES if known == word)  # narrows str to Profile
         serial = default_serial(own)
         if "serial" in table:
             serial = table.text("serial", r"BT[0-9A-Za-z]{14}", "16 letters and digits that begin with BT")
-        scale = None
-        if "z_gain" in table or "balance" in table:
-            from ..calibrate.press.few_shot import Scale  # few scenarios need what calibrates
-
-            scale = Scale(table.number("z_gain", 0.5, 2.0, ""), table.number("balance", -0.5, 0.5, ""))
-        specs.append(FingerSpec(own, profile, serial, scale))
+        specs.append(FingerSpec(own, profile, serial))
     return tuple(specs)
 
 
-def _add_step(step: Table, tracks: tuple[Track, ...], share: float) -> None:
+def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
     do = step.choice("do", tuple(STEP_KEYS))
     step.only(("do", "seconds", "fingers", *STEP_KEYS[do]), f" for {do}")
     seconds = step.number("seconds", 0.01, MAX_SECONDS, "s")
-    most_s = share * FINGER_SECONDS_MAX / len(tracks)
+    most_s = FINGER_SECONDS_MAX / len(tracks)
     if tracks[0].seconds + seconds > most_s:
         expected = f"at most {most_s:g} s in total with {len(tracks)} finger(s)"
         raise step.error("seconds", "makes the scenario too long", expected, "shorten it, and repeat it with ?seconds=")
@@ -187,8 +172,8 @@ def _add_step(step: Table, tracks: tuple[Track, ...], share: float) -> None:
             _press(step, track, seconds)
         else:
             _move(step, do, track, seconds, index)
-    if sum(track.moving_s for track in tracks) > share * MOVING_MAX_S:
-        expected = f"at most {share * MOVING_MAX_S:g} s of changing load, summed over the fingers"
+    if sum(track.moving_s for track in tracks) > MOVING_MAX_S:
+        expected = f"at most {MOVING_MAX_S:g} s of changing load, summed over the fingers"
         raise step.error("seconds", "makes the load change for too long", expected, "shorten it, or hold")
 
 

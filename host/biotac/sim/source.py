@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -50,8 +50,7 @@ class Source:
 
     ``samples`` uint16 (frames, fingers, 44) in SLOTS order, 100 frames/s: counts 0..4095 or the codes
     of tape.py. ``truth`` is None for recorded counts. ``tare_q4`` uint16 (fingers, 19), count * 16: a
-    stored tare the board should be given, or None. ``settings``: board settings to apply before
-    streaming, by their name in link.toml. ``truth_force_n`` float64 (frames, fingers, 3): the force a
+    stored tare the board should be given, or None. ``truth_force_n`` float64 (frames, fingers, 3): the force a
     recording itself carries, in Lin's frame, or None. ``serials``: one of 16 characters a finger.
     ``emulated``: the sensor of each finger; () for a recording.
     ``skipped_frames``: incomplete frames of a recording that were left out.
@@ -61,7 +60,6 @@ class Source:
     samples: npt.NDArray[np.uint16]
     truth: Truth | None = None
     tare_q4: npt.NDArray[np.uint16] | None = None
-    settings: dict[str, int] = field(default_factory=dict)
     truth_force_n: npt.NDArray[np.float64] | None = None
     serials: tuple[str, ...] = ()
     emulated: tuple[Finger, ...] = ()

@@ -83,11 +83,6 @@ def test_list_leaves_out_a_simulated_board_that_a_program_uses_itself(capsys) ->
     assert not any("pytest" in command for command in json.loads(capsys.readouterr().out)["simulated"].values())
 
 
-def test_list_shows_what_can_be_simulated(capsys) -> None:
-    assert main(["list", "--json"]) == 0
-    assert "sim:press.toml" in json.loads(capsys.readouterr().out)["scenarios"]
-
-
 def test_info_tells_board_sensors_and_settings(capsys) -> None:
     assert main(["info", "sim:press.toml?fingers=3", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)

@@ -11,6 +11,7 @@ from matplotlib.image import imread
 import biotac
 from biotac.cli.main import main
 from biotac.recording.felt import Felt
+from biotac.sim.loading import bundled_scenarios, load_source
 
 RAMP = """name = "ramp"\nfingers = 2\nfault = [{at_s = 0.5, seconds = 0.2, finger = 1, kind = "stuck_low"}]
 step = [{do = "rest", seconds = 1.5}, {do = "press", at = "E17", force_n = 4.0, seconds = 0.5, fingers = [1]},
@@ -63,3 +64,10 @@ def test_recordings_keep_it_and_record_and_pictures_show_it(tmp_path: Path, caps
     assert wide[0] > 1000 > 200 > wide[1]
     (felt := Felt()).add(np.ones((1, 3)), np.full((1, 3), np.nan))
     assert str(felt) == "nothing in 1 frames without a force"
+
+
+def test_list_says_what_a_scenario_applies(capsys) -> None:
+    assert main(["list"]) == 0
+    for line, name in zip(capsys.readouterr().out.splitlines()[-12:], bundled_scenarios(), strict=True):
+        most_n = np.linalg.norm(load_source(name).truth.force_n, axis=-1).max()
+        assert line.startswith(f"sim:{name} ") and f" s, up to {most_n:.1f} N, felt by " in line

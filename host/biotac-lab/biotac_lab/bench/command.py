@@ -12,7 +12,7 @@ from biotac import InputError
 
 from ..report import Show, Table
 
-ABOUT = "Measure batch maths, decoding, the live path, recordings, force against cycles."
+ABOUT = "Measure batch maths, decoding, the live path, recordings, force against cycles, physics in the loop."
 EXAMPLE = "biotac-lab bench batch"
 #: Each is a module beside this one with ``measure``, and the arguments that it takes.
 WHAT = {
@@ -20,6 +20,7 @@ WHAT = {
     "decode": ("the link's bytes to arrays, against pymavlink and Python", ("frames",)),
     "live": ("reading thread to callback, against a pyserial thread", ("rounds",)),
     "newtons": ("cycles of a force against its error on real fingers", ("files", "picture")),
+    "world": ("a round of physics in the loop, in hundreds of rounds", ("rounds",)),
     "recording": ("size and load time of a recording", ("source", "fingers", "seconds")),
 }
 DEFAULTS: dict[str, Any] = {"frames": None, "source": "press.toml", "rounds": 5, "files": [], "picture": None,
@@ -39,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--source", default="press.toml", help="recording: what to play (default %(default)s)")
     parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
     parser.add_argument("--seconds", type=float, default=600.0, help="recording: device time (default %(default)g)")
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="live: of each reader (default %(default)s)")
+    parser.add_argument(
+        "--rounds", type=int, default=5, metavar="N", help="live: a reader; world: hundreds (default %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace, show: Show) -> int:

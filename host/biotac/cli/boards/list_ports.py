@@ -7,13 +7,15 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from serial.tools.list_ports_common import ListPortInfo
 
 from ...errors import BiotacError, printable
 from ...hand.hand import Hand
 from ...link import open_link
 from ...link.discovery import is_board, serial_ports
-from ...sim.loading import bundled_scenarios
+from ...sim.loading import bundled_scenario, bundled_scenarios
+from ...sim.scenario import parse_scenario
 from ...wire.identity import board_name, serial_text, version_text
 from ..outputs import say
 
@@ -34,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     ports = [describe(port, ask=is_board(port) or args.all) for port in serial_ports()]
-    scenarios = [f"sim:{name}" for name in bundled_scenarios()]
+    scenarios = {f"sim:{name}": about(name) for name in bundled_scenarios()}
     running = simulated()
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []
     lines = [*map(as_line, ports), *(f"{port}  simulated: {command}" for port, command in running.items())]
@@ -48,9 +50,17 @@ def run(args: argparse.Namespace) -> int:
     say(
         args,
         {"ports": ports, "simulated": running, "scenarios": scenarios, "zenoh": remote},
-        "\n".join([*lines, *scenarios]),
+        "\n".join([*lines, *(f"{port:24}{clause}" for port, clause in scenarios.items())]),
     )
     return 0
+
+
+def about(name: str) -> str:
+    """What a bundled scenario applies, and by what a board without a calibration feels it, in one clause."""
+    played = parse_scenario(bundled_scenario(name), file=name)
+    times_s = np.arange(0.0, played.seconds, 0.05)
+    most_n = max(np.linalg.norm(track.states(times_s).wrench()[0], axis=1).max() for track in played.tracks)
+    return f"{played.seconds:3.0f} s, up to {most_n:.1f} N, felt by the population map: {played.about}"
 
 
 def simulated() -> dict[str, str]:
