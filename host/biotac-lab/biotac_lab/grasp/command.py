@@ -24,8 +24,8 @@ ABOUT = "Grip, lift and let go of things by what the fingers feel, and count wha
 EXAMPLE = "biotac-lab grasp --objects 20 --out gripped"
 NAME = "grasp"
 FAULTS = (*SENSOR_FAULTS, *BOARD_FAULTS)
-HEAD = ("controller", "fingers", "fault", "n", "dropped %", "crushed %", "lost %", "hold / need", "slides",
-        "missed", "SLIPs", "used", "false", "reaction ms", "felt - applied N")  # fmt: skip
+HEAD = ("controller", "fingers", "fault", "n", "dropped %", "crushed %", "lost %", "more lost", "hold / need",
+        "slides", "missed", "SLIPs", "used", "false", "reaction ms", "felt - applied N")  # fmt: skip
 TRUE_PERCENT, WORSE_POINTS, CONSTANT_PERCENT = 10.0, 10.0, 25.0
 
 
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     about = "; ".join(f"{name}: {text}" for name, text in CONTROLLERS.items())
     count: dict[str, Any] = {"metavar": "N", "type": _count}
     parser.add_argument("--objects", **count, default=6, help="things for each pair (default 6)")
-    parser.add_argument("--seed", metavar="N", type=int, default=7, help="of the things (default 7)")
+    parser.add_argument("--seed", **count, default=7, help="of the things (default 7)")
     parser.add_argument("--pairs", **count, default=1, help="pairs of fingers, with things of their own (default 1)")
     parser.add_argument("--jobs", **count, default=1, help="processes (default 1)")
     some: dict[str, Any] = {"metavar": "NAME,...", "type": lambda text: text.split(",")}
@@ -51,38 +51,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(text: str) -> int:
-    if not text.isdigit() or not 1 <= int(text) <= 10_000:
-        raise argparse.ArgumentTypeError(f"seen {text!r}; expected 1 to 10000")
+    if not text.isdigit() or not 1 <= int(text) <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"seen {text!r}; expected 1 to 1000000")
     return int(text)
 
 
 def run(args: argparse.Namespace, show: Show) -> int:
     """Return 0, or 1 if --check finds a limit missed."""
-    faults = list(FAULTS) if args.fault == ["all"] else args.fault
+    args.fault = list(FAULTS) if args.fault == ["all"] else args.fault
     electrodes = [f"E{k}" for k in range(1, 20)]
-    for option, given, known in (
-        ("controllers", args.controllers, CONTROLLERS), ("fault", faults, FAULTS),
-        ("profile", args.profile, PROFILES), ("at", args.at, electrodes),
-    ):  # fmt: skip
-        unknown = sorted(set(given) - set(known))
+    for option, known in (("controllers", CONTROLLERS), ("fault", FAULTS), ("profile", PROFILES), ("at", electrodes)):
+        unknown = sorted(set(getattr(args, option)) - set(known))
         if unknown:
             raise InputError(f"--{option} has {', '.join(unknown)}; expected some of {', '.join(known)}")
     if args.out is not None:
         check_free(args.out, NAME, overwrite=args.force)
         args.out.mkdir(parents=True, exist_ok=True)
-    code = runs.digest(args.law)
-    hands = list(product(args.profile, args.at))
+    hands, code = list(product(args.profile, args.at)), runs.digest(args.law)
     cases = [
         Case(name, fault, pair, args.seed, args.plant, args.fingers, *hand, code)
         for name in args.controllers
         for hand in (hands[:1] if name in TRUE else hands)
-        for fault in ("", *([] if name in TRUE else faults))
+        for fault in ("", *([] if name in TRUE else args.fault))
         for pair in range(args.pairs)
     ]
     kept = None if args.out is None else args.out / "grasps.jsonl"
-    outcomes, made = runs.run(cases, args.objects, args.law, args.jobs, kept, show)
+    outcomes = runs.run(cases, args.objects, args.law, args.jobs, kept, show)
     show("")
-    report = _report(outcomes, partial(picture.draw, outcomes=outcomes, made=made, law_file=args.law))
+    report = _report({case: [outcomes[case, k] for k in range(args.objects)] for case in cases})
+    report = replace(report, draw=partial(picture.draw, cases=cases, outcomes=outcomes, law_file=args.law))
     written = [] if args.out is None else write(report, args.out, NAME, ABOUT, overwrite=args.force)
     if args.json:
         print(json.dumps(report.facts(NAME) | {"written": [str(path) for path in written]}))
@@ -91,41 +88,38 @@ def run(args: argparse.Namespace, show: Show) -> int:
     return 1 if args.check and not all(one["met"] for one in report.checks) else 0
 
 
-def _report(outcomes: dict[Case, list[Facts]], draw: Any) -> Report:
+def _report(outcomes: dict[Case, list[Facts]]) -> Report:
     together: dict[Case, list[Facts]] = {}
     for case, rows in outcomes.items():
         together.setdefault(replace(case, pair=0), []).extend(rows)
-    figures = {case: _figures(rows) for case, rows in together.items()}
-    lines = []
-    for case, row in figures.items():
+    lost = {case: _percent([row["dropped"] or row["crushed"] for row in rows]) for case, rows in together.items()}
+    lines, by_name = [], {case.controller: percent for case, percent in reversed(lost.items()) if not case.fault}
+    for case, rows in together.items():
+        more = (lost[case] - lost[replace(case, fault="")]) * len(rows) / 100
         hand = "-" if case.controller in TRUE else f"{case.profile}, {case.at}"
-        lines.append((CONTROLLERS[case.controller], hand, case.fault or "-", *row))
-    lost = {case.controller: row[3] for case, row in reversed(figures.items()) if not case.fault}
-    checks = [check("true force loses", lost["true"], TRUE_PERCENT, "%")] if "true" in lost else []
+        head = CONTROLLERS[case.controller], hand, case.fault or "-", len(rows)
+        parts = [_percent([row[name] for row in rows]) for name in ("dropped", "crushed")]
+        lines.append((*head, *parts, lost[case], round(more) if case.fault else None, *_figures(rows)))
+    checks = [check("true force loses", by_name["true"], TRUE_PERCENT, "%")] if "true" in by_name else []
     for name, least in (("low", WORSE_POINTS), ("high", WORSE_POINTS), ("constant", CONSTANT_PERCENT)):
-        if "true" in lost and name in lost:
-            least += 0.0 if name == "constant" else lost["true"]
-            text = f"{CONTROLLERS[name]} loses {lost[name]:.1f} %, at least {least:.1f}"
-            checks.append(claim(text, lost[name] >= least))
-    case = next(iter(outcomes))
-    source = f"{len(outcomes[case])} things of seed {case.seed} for each pair of fingers, {case.plant} plant"
-    return Report(source, [Table("Lost", HEAD, lines, digits=2)], checks, [], draw)
+        if {"true", name} <= set(by_name):
+            least += 0.0 if name == "constant" else by_name["true"]
+            text = f"{CONTROLLERS[name]} loses {by_name[name]:.1f} %, at least {least:.1f}"
+            checks.append(claim(text, by_name[name] >= least))
+    case, rows = next(iter(outcomes.items()))
+    source = f"{len(rows)} things of seed {case.seed} for each pair of fingers, {case.plant} plant"
+    return Report(source, [Table("Lost", HEAD, lines, digits=2)], checks, [], lambda figure: None)
+
+
+def _percent(hits: list[bool]) -> float:
+    return 100.0 * float(np.mean(hits))
 
 
 def _figures(rows: list[Facts]) -> list[Any]:
-    def percent(hits: list[bool]) -> float:
-        return 100.0 * float(np.mean(hits))
-
-    def total(name: str) -> int:
-        return sum(row[name] for row in rows)
-
     def middle(values: list[Any]) -> float | None:
         known = [value for value in values if value is not None]
         return float(np.median(known)) if known else None
 
-    dropped, crushed = [row["dropped"] for row in rows], [row["crushed"] for row in rows]
-    return [
-        len(rows), percent(dropped), percent(crushed), percent([a or b for a, b in zip(dropped, crushed, strict=True)]),
-        middle([row["hold_per_need"] for row in rows]), *map(total, ("slides", "missed", "told", "used", "false")),
-        middle([ms for row in rows for ms in row["reaction_ms"]]), middle([row["off_n"] for row in rows]),
-    ]  # fmt: skip
+    counts = [sum(row[name] for row in rows) for name in ("slides", "missed", "told", "used", "false")]
+    reactions = [ms for row in rows for ms in row["reaction_ms"]]
+    return [middle([r["hold_per_need"] for r in rows]), *counts, middle(reactions), middle([r["off_n"] for r in rows])]

@@ -7,7 +7,7 @@ slid by ``DROPPED_MM``, and is crushed where its limit is exceeded.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,11 @@ class Thing:
     knock_n: float
     limit_n: float
 
+    @property
+    def worst_n(self) -> float:
+        """The least that each side has to press with at most, but for the knock."""
+        return (self.mass_kg + self.added_kg) * G / (2 * self.friction)
+
 
 def things(count: int, seed: int) -> list[Thing]:
     """The first ``count`` of a seed's: 50 to 400 g, of which a two-finger grip needs at least .4 and less than 6 N."""
@@ -38,11 +43,10 @@ def things(count: int, seed: int) -> list[Thing]:
     while len(made) < count:
         mass_kg, friction = math.exp(rng.uniform(math.log(0.05), math.log(0.4))), rng.uniform(0.35, 0.9)
         stiffness, added_kg = math.exp(rng.uniform(math.log(0.8), math.log(30))), mass_kg * rng.uniform(0.3, 0.8)
-        weight_n = (mass_kg + added_kg) * G
-        worst_n = weight_n / (2 * friction)
-        knock_n, limit_n = rng.uniform(0.2, 0.5) * weight_n, max(worst_n, 0.8) * rng.uniform(1.6, 4)
-        if 0.4 < worst_n < 6:
-            made.append(Thing(mass_kg, friction, stiffness, added_kg, knock_n, limit_n))
+        thing = Thing(mass_kg, friction, stiffness, added_kg, rng.uniform(0.2, 0.5) * (mass_kg + added_kg) * G, 0.0)
+        thing = replace(thing, limit_n=max(thing.worst_n, 0.8) * rng.uniform(1.6, 4))
+        if 0.4 < thing.worst_n < 6:
+            made.append(thing)
     return made
 
 
