@@ -1,6 +1,6 @@
 // A controller without an operating system that reads a gateway over a UART: what its interrupt does, and its
-// main loop. The four functions that a chip has of its own are declared; firmware/port/stm32f405/uart.c is
-// how one defines them.
+// main loop. The three functions that a chip has of its own are declared; firmware/port/stm32f405/uart.c is
+// how one defines them. The two after them are the controller's: host/docs/guides/examples/grip.c is one.
 #include "biotac_client.h"
 
 // Puts bytes into the UART's transmit ring. Whole commands, or the board refuses what is left of one.
@@ -11,9 +11,9 @@ int uart_next(void);
 
 uint32_t now_ms(void);
 
-// 100 uN on the finger, along x, y and z, never older than the caller allows: it is told nothing when there
-// is nothing.
-void act_on(uint8_t finger, const int32_t force_100un[3]);
+// Each round of each finger, once, as it comes; none when there is none. Its force may be invalid: test it.
+void act_on(const bt_msg_frame *frame);
+void act_on_event(const bt_msg_event *event);
 
 #define KEEPALIVE_MS 500 // the board stops its streams when it has heard nothing for so long
 #define PING_MS      150
@@ -26,7 +26,7 @@ static uint32_t ping_ms;  // when the board last heard from here
 static uint32_t heard_ms; // and when it last told of a finger
 static uint8_t streaming;
 
-static void send(uint8_t id, const void *msg)
+void hand_send(uint8_t id, const void *msg)
 {
     uint8_t out[BT_ENCODED_MAX_BYTES];
     uart_send(out, bt_client_write(id, msg, out));
@@ -39,23 +39,26 @@ static void take(int id)
         heard_ms = now_ms();
     }
     bt_msg_hello hello;
+    bt_msg_event event;
     bt_msg_frame frame;
     bt_msg_idle idle;
     if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello)
         && hello.wire_major == BT_WIRE_MAJOR) {
         bt_msg_start start = {2, BT_STREAM_FLAG_FRAMES, 0, KEEPALIVE_MS};
         start.fingers = (uint8_t)((1u << hello.fingers) - 1u);
+        const bt_msg_subscribe all = {4, start.fingers, BT_QUANTITY_FLAGS};
         board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
-        send(BT_START_ID, &start);
+        hand_send(BT_SUBSCRIBE_ID, &all);
+        hand_send(BT_START_ID, &start);
         heard_ms = now_ms();
         streaming = 1;
     } else if (id == BT_IDLE_ID && bt_client_read(&board, BT_IDLE_ID, &idle) && idle.finger < FINGERS) {
         lost += bt_client_lost(&rounds[idle.finger], idle.seq, idle.frames);
     } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame) && frame.finger < FINGERS) {
         lost += bt_client_lost(&rounds[frame.finger], frame.seq, 1);
-        if (bt_valid_i32(frame.force_100un[2]) && !(frame.flags & BT_FRAME_FLAG_FAULT)) {
-            act_on(frame.finger, frame.force_100un);
-        }
+        act_on(&frame);
+    } else if (id == BT_EVENT_ID && bt_client_read(&board, BT_EVENT_ID, &event)) {
+        act_on_event(&event);
     }
 }
 
@@ -72,7 +75,7 @@ void hand_poll(void)
     if (now_ms() - ping_ms >= PING_MS) {
         const bt_msg_hello_request hello = {1, 7};
         const bt_msg_ping ping = {3};
-        streaming ? send(BT_PING_ID, &ping) : send(BT_HELLO_REQUEST_ID, &hello);
+        streaming ? hand_send(BT_PING_ID, &ping) : hand_send(BT_HELLO_REQUEST_ID, &hello);
     }
 }
 

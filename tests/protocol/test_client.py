@@ -104,8 +104,10 @@ def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) 
 def test_it_compiles_wherever_a_hands_controller_does(tmp_path: Path, compiler: list[str]) -> None:
     if shutil.which(compiler[0]) is None:
         pytest.skip(f"{compiler[0]} is missing")
-    for source in ("biotac_client.c", "example_bare.c"):
-        subprocess.run([*compiler, *WARNINGS, "-c", str(CLIENT / source), "-o", str(tmp_path / "x.o")], check=True)
+    in_c = [] if "c++" in compiler else [CLIENT.parents[1] / "host/docs/guides/examples/grip.c"]
+    for source in (CLIENT / "biotac_client.c", CLIENT / "example_bare.c", *in_c):
+        command = [*compiler, *WARNINGS, f"-I{CLIENT}", "-c", str(source), "-o", str(tmp_path / "x.o")]
+        subprocess.run(command, check=True)
 
 
 def test_a_program_in_cpp_links_it(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 #include "only_board.h"
 #include "stm32f405.h"
 
+#include "biotac_client.h"
 #include "semihosting.h"
 
 #define ENOUGH 100
@@ -12,7 +13,8 @@ uint32_t hand_lost(void);
 void uart_send(const uint8_t *data, size_t bytes);
 int uart_next(void);
 uint32_t now_ms(void);
-void act_on(uint8_t finger, const int32_t force_100un[3]);
+void act_on(const bt_msg_frame *frame);
+void act_on_event(const bt_msg_event *event);
 
 uint32_t flash_erase_us;
 static unsigned acted;
@@ -42,12 +44,20 @@ uint32_t now_ms(void)
     return port_now_us(ONLY_BOARD) / 1000;
 }
 
-void act_on(uint8_t finger, const int32_t force_100un[3])
+void act_on_event(const bt_msg_event *event)
 {
-    semihost_write_hex(finger);
+    (void)event;
+}
+
+void act_on(const bt_msg_frame *frame)
+{
+    if (!bt_valid_i32(frame->force_100un[2]) || (frame->flags & BT_FRAME_FLAG_FAULT)) {
+        return;
+    }
+    semihost_write_hex(frame->finger);
     for (int axis = 0; axis < 3; axis++) {
         semihost_write(" ");
-        semihost_write_hex((uint32_t)force_100un[axis]);
+        semihost_write_hex((uint32_t)frame->force_100un[axis]);
     }
     semihost_write("\n");
     acted++;

@@ -14,6 +14,7 @@ from .calibrate import direction_command as direction
 from .calibrate import finger_command as finger
 from .calibrate import population_command as population
 from .experiments import command as experiments
+from .grasp import command as grasp
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -25,6 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "population": population,
         "direction": direction,
         "finger": finger,
+        "grasp": grasp,
         "bench": bench,
     }
     for name, module in known.items():

@@ -61,6 +61,7 @@ class SimBoard:
         try:
             if live:
                 self.sensors = SensorBoard(_loopback(int(self._announced("control"))))
+                self.sensors.listen()
                 for words in source.samples:  # an emulated board samples as it boots
                     self.sensors.put(words)
             self.path = self._announced("pty")

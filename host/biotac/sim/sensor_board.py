@@ -46,7 +46,7 @@ class SensorBoard:
         self.held_at = NOT_HELD  #: the slot before which its tape waits
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
         self._before = 0  # slots of the tape that were sent and are not kept
-        self._reports: Queue | None = None  # of standstills
+        self._reports = Queue(self._board.reader)  # of standstills, for who listens
 
     def plug(self, source: Source) -> None:
         """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
@@ -140,18 +140,18 @@ class SensorBoard:
         for first in range(0, slots, size):
             self._board.send(self._part(self._before + first, min(size, slots - first)))
 
+    def listen(self) -> None:
+        """Keep reports of standstills for wait_still(): each comes once, the first as soon as time is released."""
+        self._board.reader.add(self._reports)
+
     def wait_still(self) -> wire.EmuStatus:
         """Wait until a simulated gateway has computed all that was sent, and its time stands still.
 
         Raises DeviceLostError when it has ended, or takes longer than STILL_S.
         """
-        reports = self._reports
-        if reports is None:
-            reports = self._reports = Queue(self._board.reader)
-            self._board.reader.add(reports)
         until_s, sent = time.monotonic() + STILL_S, self._before + len(self._samples)
         while time.monotonic() < until_s:
-            batch = reports.take(wait=True)
+            batch = self._reports.take(wait=True)
             self._board.reader.check()
             for message in batch.messages if batch else ():
                 if isinstance(message, wire.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:

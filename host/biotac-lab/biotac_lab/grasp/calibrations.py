@@ -1,0 +1,67 @@
+"""A minute of presses by hand on a force plate, through the board, and what `biotac calibrate wrench` makes of it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biotac import InputError
+from biotac.core import geometry as surface
+from biotac.map import load_fitted
+from biotac.sim import SimFinger, Touch, fit_gains, world
+
+REST_S, MINUTE_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 60.0, 0.9, 0.3, 0.3
+PLATE_N = 1 / 320  # its resolution; its noise is .7 of that
+
+
+def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
+    """What touches in each round of a minute, and the force (n, 3) on the finger in N that the plate measures.
+
+    Each press is somewhere on the pad, tip or sides, of .5 to 8 N, drawn to a side by up to .6 of that, and back.
+    """
+    rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
+    while len(touches) < MINUTE_S * 100:
+        x_mm, y_mm = rng.uniform(-11, 3), rng.uniform(-4, 4)
+        peak_n, pull, turn = 0.5 * 16 ** rng.random(), rng.uniform(-0.6, 0.6, 2), rng.uniform(-1.5, 1.5)
+        normal = surface.normals_at(surface.on_surface(np.array([[x_mm, y_mm]])))
+        tangents = np.concatenate(surface.tangents_at(normal))
+        for t_s in np.arange(0, PRESS_S + PAUSE_S, 0.01):
+            pressed = np.clip(min(t_s, PRESS_S - t_s) / RAMP_S, 0, 1)
+            normal_n = float(peak_n * pressed * (1 + 0.15 * np.sin(9 * t_s)))
+            way = np.sin(np.pi * t_s / PRESS_S) * np.array([np.cos(turn * t_s), np.sin(turn * t_s)])
+            to_tip, to_side = (float(part) for part in normal_n * pull * way)
+            touches.append(Touch(normal_n, (to_tip, to_side), (x_mm, y_mm)))
+            forces.append(np.array([to_tip, to_side]) @ tangents - normal_n * normal[0])
+    measured = np.array(forces) + rng.normal(0, 0.7 * PLATE_N, (len(forces), 3))
+    return touches, np.rint(measured / PLATE_N) * PLATE_N
+
+
+def calibrate(seeds: dict[str, int], profile: Any) -> dict[str, Any]:
+    """By finger ``maps`` as boards keep them, in hex, and ``gains`` for x, y, z in nN a count. Raises InputError."""
+    plays = {name: hand_presses(seed) for name, seed in seeds.items()}
+    rest, counts, found = round(REST_S * 100), dict[str, Any](), {"maps": dict[str, Any](), "gains": dict[str, Any]()}
+    with world({name: SimFinger(seed, profile) for name, seed in seeds.items()}) as hand:
+        loads: list[dict[str, Touch]] = [{}] * rest + [
+            dict(zip(plays, each, strict=True)) for each in zip(*(play[0] for play in plays.values()), strict=True)
+        ]
+        rounds = [hand.step(**load) for load in loads]
+    for name in plays:
+        counts[name] = np.array([now[name].frame.counts for now in rounds])  # type: ignore[union-attr]
+    with tempfile.TemporaryDirectory() as folder:
+        for name, (_, force_n) in plays.items():
+            file, idle, pressed = Path(folder) / f"{name}.npz", counts[name][rest - 500 : rest], counts[name][rest:]
+            plate = np.column_stack([force_n[:, 1], force_n[:, 0], -force_n[:, 2]])  # a recording's axes: wrench.md
+            np.savez(file, E=pressed, F=plate, E_base=idle)
+            command = [sys.executable, "-m", "biotac", "calibrate", "wrench", str(file), "--out", folder]
+            done = subprocess.run(command, capture_output=True, text=True)
+            if done.returncode:
+                raise InputError(f"the simulated {name} was not calibrated: {done.stderr.strip()}")
+            found["maps"][name] = load_fitted(Path(folder) / f"{name}.wrench.json").on_board().blob.hex()
+            gains = fit_gains(pressed - idle.mean(axis=0), force_n, np.zeros_like(force_n))
+            found["gains"][name] = [gains[f"force_gain_{axis}_nn"] for axis in "xyz"]
+    return found

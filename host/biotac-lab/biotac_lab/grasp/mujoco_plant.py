@@ -1,0 +1,110 @@
+"""The same as plant.Plant by MuJoCo: a box between two pads on springs of skin, lifted, loaded, knocked from the side.
+
+A knock turns the box as well, so that its pads feel torsion. Its friction creeps: what is slower than CREEP_MM_S is
+taken for held.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from biotac import InputError
+
+from .plant import LAG_S, MOST_MM_S, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, G, Thing
+
+try:
+    import mujoco
+except ImportError as error:
+    raise InputError("--plant mujoco needs MuJoCo: pip install 'biotac-lab[mujoco]'") from error
+
+STEPS, CREEP_MM_S = 20, 1.0
+CLOSED_MM, HALF_MM, AIR_MM = 2.0, 30.0, 0.05
+SIDE = """<body pos="{x} 0 0"><joint name="close{name}" type="slide" axis="{axis} 0 0"/>
+ <geom size=".002" mass=".05" contype="0" conaffinity="0"/>
+ <body name="pad{name}"><joint name="normal{name}" type="slide" axis="{axis} 0 0" stiffness="{normal}" damping="4"/>
+  <joint type="slide" axis="0 0 1" stiffness="{shear}" damping="4"/>
+  <joint type="slide" axis="0 1 0" stiffness="{shear}" damping="4"/>
+  <geom name="pad{name}" type="box" size=".002 .004 .004" mass=".01" condim="4" priority="1"
+   friction="{friction} .003 .0001"/></body></body>"""
+MODEL = """<mujoco>
+<option timestep="{dt}" cone="elliptic" impratio="20" integrator="implicitfast" noslip_iterations="4"/>
+<default><geom solref=".004 1" solimp=".95 .99 .0005"/></default><worldbody>
+ <geom type="plane" size=".5 .5 .01" friction=".5"/>
+ <body name="thing" pos="0 0 .03"><freejoint/><geom name="thing" type="box" size=".03 .02 .03" mass="{mass}"/></body>
+ <body pos="0 0 .03"><joint name="up" type="slide" axis="0 0 1"/>
+  <geom size=".01" pos="0 0 .1" mass=".5" contype="0" conaffinity="0"/>{sides}</body>
+</worldbody><actuator><position joint="up" kp="20000" dampratio="1"/>
+ <position joint="closeL" kp="20000" dampratio="1"/><position joint="closeR" kp="20000" dampratio="1"/>
+</actuator></mujoco>"""
+
+
+class MujocoPlant:
+    """See plant.Plant."""
+
+    def __init__(self, thing: Thing) -> None:
+        self.thing, self.extra_kg, self.hit_n = thing, 0.0, 0.0
+        self.slip_mm_s, self.slid_mm, self.most_n, self.in_air = 0.0, 0.0, 0.0, False
+        self._spring = 1e3 / (1 / SKIN_N_PER_MM + 1 / (2 * thing.stiffness)), 1e3 * SHEAR_N_PER_MM
+        self._closed_mm = self._speed_mm_s = self._hand_mm = 0.0
+        normal, shear = self._spring
+        off = (HALF_MM + CLOSED_MM + 2.0) / 1e3
+        sides = "".join(
+            SIDE.format(x=-axis * off, name=name, axis=axis, normal=normal, shear=shear, friction=thing.friction)
+            for name, axis in (("L", 1), ("R", -1))
+        )
+        text = MODEL.format(dt=ROUND_S / STEPS, mass=thing.mass_kg, sides=sides)
+        self._model = mujoco.MjModel.from_xml_string(text)
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_forward(self._model, self._data)
+        self._pads = [self._model.geom(f"pad{name}").id for name in "LR"]
+        self._springs = [self._model.joint(f"normal{name}").qposadr[0] for name in "LR"]
+        self._thing = self._model.body("thing").id
+        self._apart = self._relative()
+
+    @property
+    def need_n(self) -> float:
+        """See plant.Plant."""
+        weight_n = (self.thing.mass_kg + self.extra_kg) * G
+        return float(np.hypot(weight_n, self.hit_n)) / (2 * self.thing.friction)
+
+    @property
+    def normal_n(self) -> float:
+        """The mean of both sides."""
+        return -float(self._data.qpos[self._springs].mean()) * self._spring[0]  # pulled apart by no more than inertia
+
+    def touch(self, side: int) -> tuple[float, float, float, float]:
+        """See plant.Plant."""
+        normal, up, across = self._data.qpos[self._springs[side] :][:3]
+        torsion = np.zeros(6)
+        total = 0.0
+        for k, contact in enumerate(self._data.contact):
+            if self._pads[side] in (contact.geom1, contact.geom2):
+                mujoco.mj_contactForce(self._model, self._data, k, torsion)
+                total += torsion[3] * 1e3
+        return max(-normal * self._spring[0], 0.0), -up * self._spring[1], across * self._spring[1], total
+
+    def step(self, close_mm_s: float, up_mm_s: float) -> None:
+        """See plant.Plant."""
+        dt, wanted = ROUND_S / STEPS, min(max(close_mm_s, -MOST_MM_S), MOST_MM_S)
+        for _ in range(STEPS):
+            self._speed_mm_s += (wanted - self._speed_mm_s) * dt / LAG_S
+            self._closed_mm = max(self._closed_mm + self._speed_mm_s * dt, 0.0)
+            if up_mm_s > 0 or self.in_air:
+                self._hand_mm += up_mm_s * dt
+            self._data.ctrl[:] = self._hand_mm / 1e3, self._closed_mm / 1e3, self._closed_mm / 1e3
+            self._data.xfrc_applied[self._thing, 1:3] = self.hit_n, -self.extra_kg * G
+            mujoco.mj_step(self._model, self._data)
+            self.most_n = max(self.most_n, self.normal_n)
+        apart = self._relative()
+        moved_mm = float(np.hypot(*(apart - self._apart)))
+        self._apart, speed = apart, moved_mm / ROUND_S
+        self.slip_mm_s = min(speed, 300.0) if speed > CREEP_MM_S else 0.0
+        self.slid_mm += self.slip_mm_s * ROUND_S
+        self.in_air = self._data.xpos[self._thing][2] * 1e3 - HALF_MM > AIR_MM
+
+    def _relative(self) -> Any:
+        """Where the thing is between the pads, along their faces, mm."""
+        pads = self._data.geom_xpos[self._pads].mean(axis=0)
+        return (self._data.xpos[self._thing] - pads)[1:] * 1e3

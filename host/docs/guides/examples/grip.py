@@ -1,0 +1,99 @@
+"""Close two fingers on a thing, hold it no harder than it needs: ``Grip``, tried on simulated ones by python grip.py"""
+
+import numpy as np
+
+from biotac import EventKind
+from biotac import FrameFlags as F
+from biotac.sim import SimFinger, Touch, world
+
+ROUND_S, CLOSING_MM_S = 0.01, 10.0
+LAG_S = 0.03  # from a command to the motion that the next frame shows: the actuator's, and a round
+RESERVE = 1.3  # press that much harder than friction needs
+FRICTION = 0.6  # until a slip teaches less
+GAIN_PER_S, SQUEEZE_N_PER_S = 6.0, 5.0  # squeeze with so many N/s for each N that is missing, at most
+REFLEX_PER_S, REFLEX_N_PER_S, REFLEX_ROUNDS = 40.0, 20.0, 20  # the same after a slip, and for how long
+RELEASE_N_PER_S = 0.9  # slow enough to hear a slip meanwhile
+DEAF_N_PER_S, DEAF_ROUNDS = 1.0, 10  # a faster squeeze sounds like a slip: SLIP is ignored in it and so long after it
+BLIND = F.UNTARED | F.FAULT | F.SENSOR_FAULT | F.SENSOR_OTHER | F.SENSOR_UNSURE
+WIDE = F.ELECTRODE_OUT | F.ELECTRODE_MISSING | F.RAIL | F.ELECTRODE_ALONE | F.OUTSIDE
+COARSE = F.TEMP | F.BASE_OLD
+
+
+class Grip:
+    """A controller of two sides that close on a thing, by the force that their fingers feel: call ``step`` each round.
+
+    ``towards`` (n, 3) is where the thing presses each finger, in its axes, which a hand knows from where its fingers
+    meet; ``shares`` (n,) what of its side's force each bears. It presses with ``least_n`` to ``most_n``.
+    """
+
+    def __init__(self, towards=((0, 0, 1), (0, 0, 1)), shares=(1.0, 1.0), least_n=0.8, most_n=12.0) -> None:
+        self.towards, self.shares = [np.asarray(to, float) for to in towards], shares
+        self.least_n, self.most_n, self.wanted_n = least_n, most_n, least_n
+        self.friction, self.stiffness = FRICTION, 0.8  # N/mm in front of the fingers, until it is felt
+        self.speed_mm_s, self.normal_n, self.shear_n = CLOSING_MM_S, 0.0, 0.0
+        self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
+        self._round, self._deaf_until, self._reflex_until = 0, -1, 0
+        self._way_mm, self._first_n, self._blind = 0.0, 0.0, BLIND
+
+    def step(self, frames, slipped: bool) -> float:
+        """How fast the sides are to close until the next round, in mm/s; negative: open.
+
+        ``frames`` has each finger's Frame of this round, None where none came; ``slipped``: the board reported a SLIP.
+        """
+        self._round += 1
+        felt = list(zip(frames, self.towards, self.shares, strict=True))
+        felt = [(f, f.force_n / share, to) for f, to, share in felt if f is not None and not f.flags & self._blind]
+        felt = [one for one in felt if np.isfinite(one[1]).all()]
+        if not felt:
+            self.speed_mm_s = 0.0  # nothing is known: stay where you are
+            return 0.0
+        normals = [float(force @ to) for _, force, to in felt]
+        shears = [float(np.linalg.norm(force - n * to)) for n, (_, force, to) in zip(normals, felt, strict=True)]
+        flags = np.bitwise_or.reduce([int(f.flags) for f, *_ in felt])
+        self.normal_n = sum(normals) / len(normals)
+        if not self.holds:
+            if not all(f.flags & F.CONTACT for f, *_ in felt):
+                return self.speed_mm_s
+            self.holds, self._first_n = True, self.normal_n
+            self._blind |= F.TARE_UNSURE & ~F(int(flags))  # a board that restarts takes the grip for rest
+        self._way_mm += self.speed_mm_s * ROUND_S
+        if self._way_mm > 0.3 and self.normal_n - self._first_n > 0.3:
+            self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
+        self.shear_n += 0.5 * (max(shears) - self.shear_n)
+        if slipped and self._round > self._deaf_until:
+            self._learn_from_slip()
+        return self._squeeze(RESERVE * (1.2 if flags & WIDE else 1.0), bool(flags & COARSE))
+
+    def _learn_from_slip(self) -> None:
+        self.slips += 1
+        if self.shear_n > 0.1:
+            self.friction = max(min(self.friction, 0.9 * self.shear_n / max(self.normal_n, 0.05)), 0.15)
+        self.least_n = min(max(self.least_n, RESERVE * self.normal_n), self.most_n)
+        self._reflex_until = self._round + REFLEX_ROUNDS
+
+    def _squeeze(self, reserve: float, coarse: bool) -> float:
+        self.wanted_n = min(max(self.least_n, reserve * self.shear_n / self.friction), self.most_n)
+        coming_n = self.speed_mm_s * self.stiffness * LAG_S
+        missing_n, reflex = self.wanted_n - self.normal_n - coming_n, self._round < self._reflex_until
+        self.settled = self.settled + 1 if abs(missing_n) < 0.15 * self.wanted_n else 0
+        if (coarse and not reflex) or abs(missing_n) <= 0.05 * self.wanted_n:
+            self.speed_mm_s = 0.0
+            return 0.0
+        gain, most = (REFLEX_PER_S, REFLEX_N_PER_S) if reflex else (GAIN_PER_S, SQUEEZE_N_PER_S)
+        rate_n_s = min(max(gain * missing_n, -RELEASE_N_PER_S), most)
+        if rate_n_s > DEAF_N_PER_S:
+            self._deaf_until = self._round + DEAF_ROUNDS
+        self.speed_mm_s = rate_n_s / self.stiffness
+        return self.speed_mm_s
+
+
+if __name__ == "__main__":
+    grip, closed_mm = Grip(), 0.0
+    with world({"index": SimFinger(11), "thumb": SimFinger(12)}) as hand:
+        hand.run(7.0)
+        for k in range(300):  # between them a thing of 1 N/mm, whose weight comes in the third second
+            closed_mm += grip.speed_mm_s * ROUND_S
+            press_n, pull_n = max(closed_mm - 2.0, 0.0), max(k - 200, 0) / 200
+            now = hand.step(index=Touch(press_n, (0.0, -pull_n)), thumb=Touch(press_n, (0.0, pull_n)))
+            grip.step([now[name].frame for name in now], any(e.kind == EventKind.SLIP for e in now.events))
+    print(f"holds {2 * pull_n:.1f} N of weight with {press_n:.1f} N, and feels {grip.normal_n:.1f} N")

@@ -1,0 +1,192 @@
+"""`biotac-lab grasp`: the plant against statics, slides counted by hand, a run that goes on, and that it can tell."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biotac import FrameFlags
+from biotac_lab.cli import main
+from biotac_lab.grasp import law, runs
+from biotac_lab.grasp.felt import Board, TrueForce
+from biotac_lab.grasp.plant import KINETIC, ROUND_S, Plant, Thing, things
+from biotac_lab.grasp.runs import Case
+from biotac_lab.grasp.trial import Slides
+
+THING = Thing(mass_kg=0.2, friction=0.5, stiffness=5.0, added_kg=0.1, knock_n=1.0, limit_n=50.0)
+WEIGHT_N = 0.2 * 9.81
+CASE = Case("true", "", 0, 7, "numpy", 2, "new", "E17", "")
+IN_C = law.EXAMPLE.with_name("grip_in_c.py")
+
+
+def lifted(press_n: float) -> Plant:
+    """THING pressed with so much and lifted by 20 mm."""
+    plant = Plant(THING)
+    while plant.normal_n < press_n:
+        plant.step(2.0, 0.0)
+    for _ in range(10):
+        plant.step(0.0, 0.0)  # the actuators come to rest
+    for _ in range(200):
+        plant.step(0.0, 10.0)
+    return plant
+
+
+def test_a_thing_is_lifted_where_friction_bears_it() -> None:
+    need_n = WEIGHT_N / (2 * 0.5)
+    held = lifted(1.05 * need_n)
+    assert held.in_air and held.slid_mm == 0.0 and held.need_n == pytest.approx(need_n)
+    assert held.touch(0)[1] == pytest.approx(WEIGHT_N / 2)
+    assert not lifted(0.9 * need_n).in_air
+
+
+def test_a_slide_is_that_of_coulombs_friction() -> None:
+    plant = lifted(1.5 * WEIGHT_N)
+    plant.extra_kg = 0.8  # more than friction bears
+    friction_n, mass_kg = 2 * 0.5 * plant.normal_n * KINETIC, 1.0
+    for _ in range(3):
+        plant.step(0.0, 0.0)
+    fallen_mm = 500 * (9.81 - friction_n / mass_kg) * (3 * ROUND_S) ** 2
+    assert plant.slid_mm == pytest.approx(fallen_mm, rel=0.1)  # steps of 1 ms
+
+
+def test_the_things_are_the_same_however_many_and_within_what_is_said() -> None:
+    made = things(50, 7)
+    assert made[:20] == things(20, 7) != things(20, 8)
+    for thing in made:
+        worst_n = (thing.mass_kg + thing.added_kg) * 9.81 / (2 * thing.friction)
+        assert 0.05 <= thing.mass_kg <= 0.4 and 0.35 <= thing.friction <= 0.9 and 0.8 <= thing.stiffness <= 30
+        assert 1.6 <= thing.limit_n / max(worst_n, 0.8) <= 4
+
+
+def test_slides_and_slips_are_counted() -> None:
+    slides = Slides()
+    rows = ["S", "St", "Stu", "", "t", *[""] * 12, "t", *[""] * 12, "S", *[""] * 12, "S", "S", "tu"]
+    for k, row in enumerate(rows):
+        slides.round(k, "S" in row, "t" in row, "u" in row)
+    expected = {"told": 5, "used": 2, "false": 1, "slides": 3, "missed": 1, "reaction_ms": [20, 20]}
+    assert slides.facts() == expected
+
+
+def test_the_law_stays_where_nothing_is_known_and_is_deaf_while_it_squeezes() -> None:
+    grip, plant, sense = law.load(law.EXAMPLE)(), Plant(THING), TrueForce(2)
+    speed = 10.0
+    for _ in range(150):
+        plant.step(speed, 0.0)
+        frames, _ = sense.feel(plant)
+        speed = grip.step(frames, False)
+    assert grip.holds and grip.normal_n == pytest.approx(0.8, rel=0.06)
+    sheared = [replace(frame, force_n=np.add(frame.force_n, [0.0, 0.6, 0.0])) for frame in frames]
+    assert grip.step(sheared, True) > 0 and grip.slips == 1  # heard, and squeezes
+    assert grip.step(sheared, True) > 0 and grip.slips == 1  # its own squeeze
+    blind = [replace(frame, flags=FrameFlags.UNTARED) for frame in frames]
+    for none in ([None, None], blind, [replace(frame, force_n=np.full(3, math.nan)) for frame in frames]):
+        assert grip.step(none, False) == 0.0
+
+
+def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept, case = tmp_path / "grasps.jsonl", replace(CASE, seed=3)
+
+    def run(objects: int) -> Any:
+        return runs.run([case], objects, law.EXAMPLE, 1, kept, lambda text: None)
+
+    first = run(2)
+    kept.write_bytes(kept.read_bytes()[:-9])  # stopped while it wrote
+    assert run(2) == first and set(first) == {(case, 0), (case, 1)}
+    assert json.loads(kept.read_text().splitlines()[-1])["outcome"] == first[case, 1]
+    monkeypatch.setattr(runs, "grasp", None)  # nothing is left to do
+    assert run(2) == first
+    assert runs.digest(law.EXAMPLE) != runs.digest(Path(__file__))
+
+
+def test_more_fingers_on_a_side_share_its_force() -> None:
+    two, three = (runs.one(replace(CASE, fingers=n), 0, law.EXAMPLE) for n in (2, 3))
+    assert two == three
+
+
+def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["grasp", "--controllers", "true,high", "--json", "--out", str(tmp_path)]
+    assert main(command) == 0
+    true, high = json.loads(capsys.readouterr().out)["tables"][0]["rows"]
+    kept = [json.loads(line) for line in (tmp_path / "grasps.jsonl").read_text().splitlines()]
+    crushed = sum(row["outcome"]["crushed"] for row in kept if row["case"]["controller"] == "true")
+    assert true[3:7] == [6, 0, *[pytest.approx(100 * crushed / 6, abs=1e-3)] * 2] and crushed <= 1
+    assert high[4] == 100  # it never presses
+    assert {path.name for path in tmp_path.iterdir()} == {"grasp.md", "grasp.png", "grasp.json", "grasps.jsonl"}
+    assert main([*command[:2], "nobody"]) == 2
+
+
+def test_the_law_in_c_is_the_same() -> None:
+    """Round by round on the same frames, to what a wire message can say."""
+    python, in_c, plant, sense = law.load(law.EXAMPLE)(), law.load(IN_C)(), Plant(THING), TrueForce(2)
+    for k in range(400):
+        plant.step(python.speed_mm_s, 2.0 if k > 200 else 0.0)
+        felt = sense.feel(plant)
+        assert felt is not None
+        felt = ([None, None], False) if k in (150, 250) else felt
+        assert in_c.step(*felt) == pytest.approx(python.step(*felt), abs=2e-2)
+    assert (in_c.holds, in_c.slips, in_c.settled) == (python.holds, python.slips, python.settled) and python.slips > 0
+
+
+def test_a_hand_on_a_board_grasps_and_does_so_again() -> None:
+    case = replace(CASE, controller="default")
+    first = runs.one(case, 1, law.EXAMPLE)
+    assert first == runs.one(case, 1, law.EXAMPLE)  # lock-step: to the last digit
+    assert not first["dropped"] and first["off_n"] is not None and FrameFlags.HELD & FrameFlags(first["flags"])
+
+
+@pytest.mark.parametrize("fault", ["still program", "restart", "cable", "open"])
+def test_a_fault_in_mid_grasp_is_seen_and_outlived(fault: str) -> None:
+    """By the true force of the plant beside it: the board's own frames stop, or say so."""
+    plant, seen = Plant(THING), []
+    sense = Board(CASE.seeds, "new", "E17")
+    try:
+        for k in range(200):
+            plant.step(10.0 if plant.normal_n < 2 else 0.0, 0.0)
+            if k == 60:
+                sense.fault(fault)
+            seen.append(sense.feel(plant))
+    finally:
+        sense.close()
+    healthy, hit, after = seen[59], seen[61], seen[199]
+    assert healthy is not None and after is not None and healthy[0][0] is not None and after[0][0] is not None
+    if fault == "still program":
+        assert seen[60:110] == [None] * 50 and seen[110] is not None
+    elif fault == "open":
+        assert hit is not None and hit[0][0] is not None and hit[0][0].flags & FrameFlags.RAIL
+    else:
+        assert hit is not None and hit[0] == [None, None]
+    if fault == "restart":
+        assert after[0][0].flags & (FrameFlags.UNTARED | FrameFlags.TARE_UNSURE)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [1, 4, 11])
+def test_the_experiment_can_tell(seed: int) -> None:
+    assert main(["grasp", "--objects", "200", "--seed", str(seed), "--jobs", "2", "--check"]) == 0
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("plant", ["numpy", "mujoco"])
+def test_boards_grasp_what_their_calibrations_let_them(plant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    if plant == "mujoco":
+        pytest.importorskip("mujoco", reason="pip install 'biotac-lab[mujoco]'")
+    wide = ["--profile", "new,worn", "--at", "E17,E3", "--fault", "all"] if plant == "numpy" else ["--fingers", "3"]
+    command = ["grasp", "--controllers", "true,own,lin,default", "--jobs", "2", "--plant", plant, "--json", *wide]
+    assert main(command) == 0
+    rows = json.loads(capsys.readouterr().out)["tables"][0]["rows"]
+    assert {row[3] for row in rows} == {6} and len(rows) == (1 + 3 * 4 * 18 if plant == "numpy" else 4)
+
+
+@pytest.mark.nightly
+def test_python_and_c_hold_the_same_things(capsys: pytest.CaptureFixture[str]) -> None:
+    pages = []
+    for path in (law.EXAMPLE, IN_C):
+        assert main(["grasp", "--controllers", "true,default", "--objects", "20", "--law", str(path)]) == 0
+        pages.append(capsys.readouterr().out)
+    assert pages[0] == pages[1]
