@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from paper_finger import PaperFinger
 
 from biotac.core.finger import Finger
 from biotac.core.geometry import Floats
@@ -21,7 +22,7 @@ PAD = Pose(x_mm=-2.8, y_mm=0.0, tip_mm=2.0)  # over E17
 LEAD_S = 10.0  # of rest at the start, in which the tare is taken and the noise measured
 
 
-class Sensor(physics.Finger):
+class Sensor(PaperFinger):
     """The model's finger. It caches its answer to the latest states, because each is asked for twice."""
 
     def counts(self, states: physics.States) -> Floats:
