@@ -15,8 +15,10 @@ import biotac
 from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
 from ...calibrate.press.detector import MAX_N, Phase, Step
-from ...calibrate.press.force_source import Truth, load_csv
+from ...calibrate.press.force_source import Truth
+from ...calibrate.reference.mounting import LIN
 from ...calibrate.reference.scale import UNITS_N, SerialScale
+from ...calibrate.wrench.sources import read_reference
 from ...calibrate.wrench.upload import upload
 from ...documents import write_new
 from ...errors import CommandRefusedError, InputError
@@ -59,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     against.add_argument(
         "--pressure", metavar="FILE", nargs="?", const="",
         help="from pressure to force, one gain per finger: press a plate or scale whose readings are typed in; for a "
-        "recording, a CSV with t_s in the board's time and force_n (or fx_n, fy_n, fz_n)",
+        "recording, a reference as of calibrate wrench, by any clock, or a CSV with t_s and force_n",
     )  # fmt: skip
     parser.add_argument(
         "--finger", metavar="NAME,NAME", type=values.fingers, default=(),
@@ -285,7 +287,7 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
         every = [args.out / f"{stem}finger{finger}.json" for finger in args.finger or range(MAX_SENSORS)]
         outputs.check(args.out, every, overwrite=args.force)
     if recorded:
-        reference = load_csv(Path(args.pressure)) if args.pressure else None
+        reference = read_reference(args.pressure, LIN, size=True) if args.pressure else None
         readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
         calibrated = pressure_procedure.calibrate_recording(
             load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=made_s
