@@ -165,7 +165,7 @@ def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch
     """What is known of others is the force of a whole map, offset and all; torque stays Lin's."""
     run = load_run(finger)
     monkeypatch.setattr(models, "OTHERS_LAMBDAS", (1e12,))
-    others = np.random.default_rng(3).normal(size=(columns.width(with_pdc=False) + 1, 3))
+    others = np.random.default_rng(3).normal(size=(columns.width(columns.blocks(with_pdc=False)) + 1, 3))
     rows = np.arange(500)
     for pdc in (None, np.zeros(500)):
         signals = Signals((run.counts - run.tare)[rows], run.tare, pdc)

@@ -210,25 +210,20 @@ def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[we
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
     """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
     trained = population.load(args.population)
-    felt_n, scale = held.columns @ trained.population.coefficients, None
-    if args.weights:
-        fit, how, forces = few_shot.weighed, "weights on tilted blocks", {"force_n": held.force_n.tolist()}
-        mixing, sigma = few_shot.mixing_of(felt_n, held.force_n)
-        scale = few_shot.Scale(mixing[2, 2], -mixing[2, 0], sigma[2, 2], sigma[2, 0])
-    elif args.plate:
+    way = few_shot.WEIGHTS if args.weights else few_shot.PLATE if args.plate else few_shot.SCALE
+    scale = None
+    if args.plate:
         held = known_force.of_plate(held, trained.population)
-        fit, how, forces = few_shot.plated, "presses of a plate", {"force_n": held.force_n.tolist()}
     else:
-        scale = few_shot.scale_of(felt_n, held.force_n[:, 2])
-        fit, how, forces = few_shot.scaled, "presses on a scale", {"shown_n": held.force_n[:, 2].tolist()}
-    found = known_force.found(trained.population, held, fit)
+        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n, way)
+    found = known_force.found(trained.population, held, way)
     own = found.own.wrench_map(held.tare)
     (finger,), made_s = args.finger, int(time.time())
     facts: dict[str, Any] = {
         "finger": finger,
         "serial": serial,
         "presses": len(held.force_n),
-        **forces,
+        **({"shown_n": held.force_n[:, 2].tolist()} if args.scale is not None else {"force_n": held.force_n.tolist()}),
         **(asdict(scale) if scale else {}),
         "before_n": found.before_n.tolist(),
         "held_out_n": found.held_out_n.tolist(),
@@ -239,10 +234,9 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         "fixed_point": summary(own, held.counts),
     }
     if args.out is not None:
-        reference = f"{len(held.force_n)} {how}; population map from {trained.fingers}"
         software = trained.provenance.get("software", "")
         origin = {"serial": serial, "made_s": made_s, "software": software, "files": [args.where]}
-        origin["reference"] = reference
+        origin["reference"] = f"{len(held.force_n)} {way.name}; population map from {trained.fingers}"
         text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=origin)
         with whole(args.out, overwrite=args.force) as path:
             path.write_text(text, encoding="utf-8")
@@ -253,7 +247,7 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
         if args.save:
             hand.board.save_settings()
-    outputs.say(args, facts, "\n".join(_map_lines(facts, how)))
+    outputs.say(args, facts, "\n".join(_map_lines(facts, way.name)))
     return int(facts["refused"])
 
 
