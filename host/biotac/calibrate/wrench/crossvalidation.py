@@ -267,7 +267,7 @@ class _Trainer:
         """Coefficients of the ``chosen`` models pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
         found = models.pulled(sums, chosen)
         if self._others is not None:
-            found += models.pulled_to_others(sums, POOL, self._others)
+            found += models.pulled(sums, POOL, self._others)
         return found
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:

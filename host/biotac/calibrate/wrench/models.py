@@ -108,21 +108,17 @@ def solve(sums: Sums, lam: float) -> Floats:
     return np.concatenate([found, (sums.cross[-1] / rows - mean @ found)[None]])
 
 
-def pulled(sums: Sums, chosen: Sequence[Model]) -> list[Floats]:
-    """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales."""
-    return _pulled_to(lin(sums), sums, chosen, LAMBDAS)
+def pulled(sums: Sums, chosen: Sequence[Model], others: Floats | None = None) -> list[Floats]:
+    """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales.
 
-
-def pulled_to_others(sums: Sums, chosen: Sequence[Model], others: Floats) -> list[Floats]:
-    """As pulled(), with OTHERS_LAMBDAS and the force pulled to ``others`` (q + 1, 3), which have no columns of PDC."""
-    known = lin(sums)
-    known[:, : others.shape[1]] = 0.0
-    known[: len(others) - 1, : others.shape[1]] = others[:-1]
-    known[-1, : others.shape[1]] = others[-1]
-    return _pulled_to(known, sums, chosen, OTHERS_LAMBDAS)
-
-
-def _pulled_to(known: Floats, sums: Sums, chosen: Sequence[Model], lambdas: Sequence[float]) -> list[Floats]:
+    The force is pulled to ``others`` (q + 1, 3), if given, with OTHERS_LAMBDAS; they have no columns of PDC.
+    """
+    known, lambdas = lin(sums), LAMBDAS
+    if others is not None:
+        lambdas = OTHERS_LAMBDAS
+        known[:, : others.shape[1]] = 0.0
+        known[: len(others) - 1, : others.shape[1]] = others[:-1]
+        known[-1, : others.shape[1]] = others[-1]
     left = sums.left_by(known)
     result = []
     for model in chosen:
