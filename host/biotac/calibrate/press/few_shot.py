@@ -1,7 +1,7 @@
 """The population map improved with a little data of a new finger: presses on a scale, weights, a minute on a plate.
 
-Each is the likeliest fit: coefficients have a prior, the map of other fingers or the normals of the electrodes, and a
-spread about it; measured are z, all axes, or the force along a plate's normal.
+All are one regression: coefficients have a prior, the map of other fingers or the normals of the electrodes, and a
+spread about it. z is measured, or all axes, or the force along a plate's normal.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ PULL = 1000.0  # weight of the population map against the finger's own data, in 
 
 @dataclass(frozen=True)
 class Way:
-    """A ``name`` for how a finger was pressed, and what that tells.
+    """How a finger was pressed, by ``name``, and what is fitted to that.
 
-    First how the map's axes (rows) mix into the finger's (columns), each number within ``spread`` (3, 3); if None, the
-    gain of the electrodes' normals instead. Then, with ``columns``, what is left changes every column's coefficients.
+    First it is how the map's axes (rows) mix into the finger's (columns), each number within ``spread`` (3, 3); where
+    that is None, the gain of the electrodes' normals. With ``columns``, the coefficients of all columns follow.
     """
 
     name: str
