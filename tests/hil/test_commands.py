@@ -105,7 +105,7 @@ def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
     for kind, values, error in REFUSED:
         if hand.info.map_bytes == 0 and kind in FOR_MAPS and error != wire.Error.NO_SUCH_FINGER:
             error = wire.Error.NOT_HERE
-        (answer,) = replies_to(hand, kind.ID, kind(7, *values).pack())
+        (answer,) = replies_to(hand, kind.ID, kind(249, *values).pack())  # no command of the hand has come so far
         assert (type(answer), answer.command, answer.error) == (wire.Reply, kind.ID, error), (kind, values)
 
 

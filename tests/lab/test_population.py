@@ -13,7 +13,7 @@ import wrench_run
 from biotac.calibrate import population as population_map
 from biotac.calibrate.population import Population, Trained
 from biotac.calibrate.press import known_force
-from biotac.calibrate.press.few_shot import Scale, plated, pulled, scale_of
+from biotac.calibrate.press.few_shot import PLATE, Scale, scale_of, shrink_to
 from biotac.calibrate.press.known_force import Held, angles_deg, of_plate
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.cli.main import main as gateway
@@ -95,11 +95,11 @@ def test_the_map_is_one_for_a_board(prior: Population, runs: list[Run]) -> None:
 def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
     felt_n = np.column_stack([np.zeros(20), np.zeros(20), np.full(20, 40.0)])
     felt_n[:, 0] = 0.1 * felt_n[:, 2]
-    found = scale_of(felt_n, 1.2 * felt_n[:, 2])
+    found = scale_of(felt_n, felt_n * [0.0, 0.0, 1.2])
     assert found.gain == pytest.approx(1.2, abs=0.001)
     assert found.balance == pytest.approx(0.1, abs=0.001)
     # light ones say less than what is known of fingers
-    light = scale_of(0.01 * felt_n, 0.012 * felt_n[:, 2])
+    light = scale_of(0.01 * felt_n, felt_n * [0.0, 0.0, 0.012])
     assert 1.0 < light.gain < 1.02
     assert 0.0 < light.balance < 0.05
     assert np.allclose(
@@ -111,15 +111,15 @@ def test_five_presses_find_a_finger_that_is_softer_and_tilted() -> None:
 def test_presses_that_say_nothing_are_refused(said_z: list[float], shown: list[float]) -> None:
     felt_n = np.column_stack([np.zeros(len(said_z)), np.zeros(len(said_z)), said_z])
     with pytest.raises(InputError, match="presses"):
-        scale_of(felt_n, np.array(shown, dtype=np.float64))
+        scale_of(felt_n, np.multiply.outer(shown, [0.0, 0.0, 1.0]))
 
 
 def test_a_minute_moves_the_map_and_no_time_does_not(prior: Population, runs: list[Run]) -> None:
     new = runs[2]
     sums = training.sums(new)
-    assert np.array_equal(pulled(prior, sums, 0.0).coefficients, prior.coefficients)
+    assert np.array_equal(shrink_to(prior, sums, 0.0).coefficients, prior.coefficients)
     rmse = [
-        float(((pulled(prior, sums, seconds).force(new.counts, new.tare) - new.truth) ** 2).sum())
+        float(((shrink_to(prior, sums, seconds).force(new.counts, new.tare) - new.truth) ** 2).sum())
         for seconds in (0.0, 60.0, 6000.0)
     ]
     assert rmse[0] > rmse[1] > rmse[2]
@@ -219,7 +219,7 @@ def test_a_plate_pressed_by_hand_corrects_the_sides_of_a_finger_of_another_rig()
     press = np.arange(half) // 50
     held = Held(counts[:half].astype(np.float64), tare, press, np.zeros((press[-1] + 1, 3)))
     trained = population_map.load(None)
-    found = known_force.found(trained.population, of_plate(held, trained.population), plated)
+    found = known_force.found(trained.population, of_plate(held, trained.population), PLATE)
     own = found.own.wrench_map(tare).on_board()
     new = counts[half:]
     tare_q4 = np.tile((16 * tare).astype(np.uint16), (len(new), 1))

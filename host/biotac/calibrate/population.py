@@ -11,7 +11,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,11 @@ import numpy as np
 from ..core.geometry import ELECTRODE_MM, Floats, normals_at
 from ..documents import parse_document, read_document, sealed
 from ..map import columns as map_columns
-from ..map.columns import ELECTRODES, SIGNAL_COUNTS, Signals, split
+from ..map.columns import ELECTRODES, GATED, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
 from ..map.population import SHIPPED, Likeness, board_map, likeness, shipped
 from ..version import __version__
 from ..wire.frames import FORCE_LSB_PER_N
-from .wrench.models import GATED
 
 __all__ = [
     "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps", "load",
@@ -41,11 +40,8 @@ MODEL = "population"
 AXES = map_columns.AXES[:3]
 ROWS_AT_ONCE = 4096
 
-ALL_COLUMNS = map_columns.width(with_pdc=False)
-INDEX = GATED.index(ALL_COLUMNS)
-COLUMNS = len(INDEX)
-_BLOCKS = [block for block in map_columns.blocks(with_pdc=False) if block in GATED.blocks]
-_BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in _BLOCKS]
+COLUMNS = map_columns.width(GATED)
+_BLOCK_NAMES = [[kind.name, gate.name] for kind, gate in GATED]
 
 
 @dataclass(frozen=True)
@@ -78,18 +74,19 @@ class Population:
 
     def force(self, counts: Floats, tare: Floats) -> Floats:
         """Force (n, 3) in N on the finger, from counts (n, 19) and their ``tare`` (19,)."""
-        return by_columns(counts, tare, lambda z: z @ self.coefficients)
+        e, starts = counts - tare, range(0, len(counts), ROWS_AT_ONCE)  # chunks that fit the cache
+        return np.concatenate([columns(e[at : at + ROWS_AT_ONCE], tare) @ self.coefficients for at in starts])
 
     def wrench_map(self, tare: Floats) -> WrenchMap:
         """The same map in the form of a calibrated finger's, for ``tare`` (19,), with an offset of 0."""
-        every = np.zeros((ALL_COLUMNS + 1, len(AXES)))
-        every[INDEX] = self.coefficients
+        every = np.zeros((map_columns.width(map_columns.blocks(with_pdc=False)) + 1, len(AXES)))
+        every[map_columns.index(GATED, len(every) - 1)] = self.coefficients
         return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every)
 
 
 def columns(e: Floats, tare: Floats) -> Floats:
     """The columns (n, 114) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
-    return map_columns.columns(Signals(e, tare))[:, INDEX]
+    return map_columns.columns(Signals(e, tare), GATED)
 
 
 def normals() -> Floats:
@@ -97,12 +94,6 @@ def normals() -> Floats:
     result = np.zeros((COLUMNS, len(AXES)))
     result[:ELECTRODES] = 1e-3 * SIGNAL_COUNTS * normals_at(ELECTRODE_MM)  # COMPRESSION comes first
     return result
-
-
-def by_columns(counts: Floats, tare: Floats, function: Callable[[Floats], Floats]) -> Floats:
-    """``function`` applied to the columns (n, 114) of counts (n, 19), in chunks of rows that fit the cache."""
-    rows = range(0, len(counts), ROWS_AT_ONCE)
-    return np.concatenate([function(columns(counts[at : at + ROWS_AT_ONCE] - tare, tare)) for at in rows])
 
 
 # ---- its file ----------------------------------------------------------------------------------
@@ -152,7 +143,7 @@ def dumps(trained: Trained) -> str:
     """The map as JSON, one line for each column."""
     rounded = np.array([_short(row) for row in trained.population.coefficients])
     # the board's map is made from the rounded coefficients, so that a reader of the file gets the same one
-    on_board = board_map(split(_BLOCKS, rounded))
+    on_board = board_map(split(GATED, rounded))
     rows = np.column_stack([rounded, trained.population.variance])
     document = sealed(
         {

@@ -7,7 +7,7 @@ because a fitted map has to mean the same on the next run.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,7 @@ def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Si
     return Signals(np.where(missing, 0.0, counts - tare), tare)
 
 
-def summed(blocks: Iterable[tuple[tuple[Kind, Gate], Floats]], signals: Signals) -> Floats:
+def summed(blocks: Iterable[tuple[Block, Floats]], signals: Signals) -> Floats:
     """The sum of blocks (n, axes), each with coefficients (columns, axes)."""
     found, gate = kinds(signals), gates(signals.e)
     total: Floats = np.zeros(())
@@ -62,30 +62,39 @@ def summed(blocks: Iterable[tuple[tuple[Kind, Gate], Floats]], signals: Signals)
 
 # ---- the columns of a fitted map, block by block ------------------------------------------------
 
+Block = tuple[Kind, Gate]
 STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
 SPLIT = (Kind.COMPRESSION, Kind.BULGE)  # different physics: a squeezed path and one that is wider than at rest
+GATED: tuple[Block, ...] = tuple((kind, gate) for gate in STRAIGHT for kind in SPLIT)  # all that a population map has
+PRESSURES: tuple[Block, ...] = tuple((Kind.PRESSURE, gate) for gate in STRAIGHT)
 #: Each block's kind and gate. PRESSURE is last: without PDC there are just the columns before it.
-BLOCKS: tuple[tuple[Kind, Gate], ...] = (
+BLOCKS: tuple[Block, ...] = (
     (Kind.SIGNAL, Gate.ONE),
     (Kind.SIGNAL_PAIRS, Gate.ONE),
     (Kind.CONDUCTANCE, Gate.ONE),
     (Kind.CONDUCTANCE_PAIRS, Gate.ONE),
-    *((kind, gate) for gate in STRAIGHT for kind in SPLIT),
-    *((Kind.PRESSURE, gate) for gate in STRAIGHT),
+    *GATED,
+    *PRESSURES,
 )
 
 
-def blocks(*, with_pdc: bool) -> tuple[tuple[Kind, Gate], ...]:
-    """The blocks of columns(), in order."""
-    return BLOCKS if with_pdc else BLOCKS[: -len(STRAIGHT)]
+def blocks(*, with_pdc: bool) -> tuple[Block, ...]:
+    """The blocks of all columns, in order."""
+    return BLOCKS if with_pdc else BLOCKS[: -len(PRESSURES)]
 
 
-def width(*, with_pdc: bool) -> int:
-    """Number of columns of columns()."""
-    return sum(_map.KINDS[kind].columns for kind, _ in blocks(with_pdc=with_pdc))
+def width(chosen: Iterable[Block]) -> int:
+    """Number of columns of the ``chosen`` blocks."""
+    return sum(_map.KINDS[kind].columns for kind, _ in chosen)
 
 
-def split(named: Iterable[tuple[Kind, Gate]], coefficients: Floats) -> dict[tuple[Kind, Gate], Floats]:
+def index(chosen: Sequence[Block], count: int) -> npt.NDArray[np.intp]:
+    """Indices of the ``chosen`` blocks' columns among the first ``count`` of BLOCKS: 532 without PDC, 535 with it."""
+    own = np.repeat([block in chosen for block in BLOCKS], [width([block]) for block in BLOCKS])
+    return np.flatnonzero(own[:count])
+
+
+def split(named: Iterable[Block], coefficients: Floats) -> dict[Block, Floats]:
     """The coefficients of each block, from those of all of them (columns, axes)."""
     parts, at = {}, 0
     for kind, gate in named:
@@ -94,11 +103,11 @@ def split(named: Iterable[tuple[Kind, Gate]], coefficients: Floats) -> dict[tupl
     return parts
 
 
-def columns(signals: Signals) -> Floats:
-    """All columns (n, 532), or (n, 535) with PDC, in the order of blocks()."""
+def columns(signals: Signals, chosen: Iterable[Block] | None = None) -> Floats:
+    """The columns (n, width) of the ``chosen`` blocks; of all that the signals have, (n, 532) or (n, 535), if None."""
     found, gate = kinds(signals), gates(signals.e)
     parts = []
-    for kind, which in blocks(with_pdc=signals.pdc is not None):
+    for kind, which in blocks(with_pdc=signals.pdc is not None) if chosen is None else chosen:
         parts.append(found[kind] if which == Gate.ONE else found[kind] * gate[which])
     return np.concatenate(parts, axis=1)
 

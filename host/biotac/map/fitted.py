@@ -37,7 +37,7 @@ class WrenchMap:
     @property
     def with_pdc(self) -> bool:
         """Whether the map was trained with PDC, and so needs it."""
-        return len(self.coefficients) - 1 == columns.width(with_pdc=True)
+        return len(self.coefficients) - 1 == columns.width(columns.BLOCKS)
 
     def predict(self, counts: Floats, pdc: Floats | None = None) -> Floats:
         """Wrench (n, axes) in N and N mm for each of ``counts`` (n, 19); NaN where a count is NaN.
@@ -91,7 +91,7 @@ class WrenchMap:
             tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
         )
-        shapes = [(columns.width(with_pdc=pdc) + 1, len(fitted.axes)) for pdc in (False, True)]
+        shapes = [(columns.width(columns.blocks(with_pdc=pdc)) + 1, len(fitted.axes)) for pdc in (False, True)]
         if fitted.coefficients.shape not in shapes or fitted.tare.shape != (ELECTRODES,):
             raise ValueError(f"its coefficients have shape {fitted.coefficients.shape}, its tare {fitted.tare.shape}")
         if len(fitted.lag_rows) != len(fitted.axes):

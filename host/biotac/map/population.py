@@ -25,7 +25,7 @@ from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
-from .columns import SIGNAL_COUNTS, split, summed, tared
+from .columns import GATED, SIGNAL_COUNTS, split, summed, tared
 from .fitted import quantise
 from .float64 import derived_torque_x
 
@@ -41,7 +41,6 @@ _LEAST_Q4 = 64 * 16
 _LIGHT_Q4 = 1500 * 16
 _FAR_8, _OUTSIDE = 11, 2
 _CHUNK_ROWS = 4096
-_COMPILED = [(kind, gate) for gate in (Gate.ONE, Gate.X, Gate.Y) for kind in (Kind.COMPRESSION, Kind.BULGE)]
 
 
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:
@@ -148,7 +147,7 @@ def replace_force(
 @cache
 def compiled_coefficients() -> Any:
     """The coefficients as host/binding/population_float64.h wants them; they live as long as the process."""
-    if list(blocks()) != _COMPILED:
+    if tuple(blocks()) != GATED:
         raise ValueError(
             f"{SHIPPED} has different blocks from host/binding/population_float64.c; retrain it with this version"
         )

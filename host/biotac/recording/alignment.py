@@ -67,6 +67,13 @@ class Alignment:
         by_peak = self.width_s / 2.355 * float(np.sqrt(max(1.0 / self.peak**2 - 1.0, 0.0) / values))
         return max(by_peak, self.scatter_s / float(np.sqrt(max(self.pieces, 1))))
 
+    def __str__(self) -> str:
+        return (
+            f"clocks: offset {self.offset_s:+.4f} s, {self.drift_ppm:+.0f} ppm; correlation {self.peak:.2f}, next best "
+            f"{self.runner_up:.2f}, {self.width_s * 1e3:.0f} ms wide at half height; {self.pieces} pieces scatter by "
+            f"{self.scatter_s * 1e3:.1f} ms"
+        )
+
     def to_reference_s(self, t_board_s: Floats) -> Floats:
         """The reference's times (n,) at the board's times (n,), both in s."""
         return t_board_s + self.offset_s + 1e-6 * self.drift_ppm * (t_board_s - self.middle_s)

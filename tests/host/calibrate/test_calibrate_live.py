@@ -14,7 +14,7 @@ from biotac.calibrate.wrench import upload
 from biotac.calibrate.wrench.sources import load
 from biotac.cli.main import main
 from biotac.errors import PortError
-from biotac.map.board_map import from_blob
+from biotac.map.board_map import BoardMap, from_blob
 from biotac.map.file import load_fitted
 
 pytestmark = pytest.mark.nightly  # a minute and a half of procedure and fits
@@ -71,22 +71,20 @@ def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.Captu
 
 
 def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A board that keeps another map than it was given, by one coefficient."""
+    """A board that runs another map than it was given, by one coefficient."""
     from biotac.calibrate.reference.csv_file import read_csv
 
     reference = calibrated / f"{SERIAL}.csv"
     loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))
     fitted = load_fitted(calibrated / f"{SERIAL}.wrench.json")
     with biotac.open("sim:calibrate.toml") as hand:
-        real = hand.board.get_map
+        real = hand.board.set_map
 
-        def spoilt(finger: int) -> bytes | None:
-            blob = real(finger)
-            assert blob is not None
-            held = from_blob(blob)
+        def spoilt(finger: int, given: BoardMap, *, force: bool) -> None:
+            held = from_blob(given.blob)
             held.blocks[0].coefficients[0, 2] += np.int64(1)
-            return type(held)(held.axes, held.blocks, held.serial, held.made_s).blob
+            real(finger, held, force=force)
 
-        monkeypatch.setattr(hand.board, "get_map", spoilt)
-        with pytest.raises(PortError, match=r"the board accepted the map of \d+ bytes, but has another of \d+ bytes"):
+        monkeypatch.setattr(hand.board, "set_map", spoilt)
+        with pytest.raises(PortError, match=r"the board has the map, but \d+ of \d+ frames do not match it"):
             upload.upload(hand, 0, fitted, loaded.run.counts, loaded.run.pdc, serial=SERIAL, made_s=1)

@@ -14,7 +14,7 @@ import pytest
 from biotac import InputError
 from biotac.calibrate.press import pressure
 from biotac.calibrate.press.detector import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
-from biotac.calibrate.press.force_source import ROW_DTYPE, Series, check_alignment
+from biotac.calibrate.press.force_source import ROW_DTYPE
 from biotac.calibrate.press.guide import ask_forces
 from biotac.calibrate.press.pressure import Fit, fit, verify, with_board_force
 
@@ -284,34 +284,3 @@ def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:
     seen = verify(fitted, with_board_force(Press(0, 4, rows), fitted.gain_nn))
     assert 0 < seen.apart_n <= 0.5e-4 + 1e-9
     assert abs(seen.board_error - seen.float_error) < 1e-4
-
-
-# ---- reference -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("t_s", "force_n", "message"),
-    [
-        ([0.0], [1.0], "has 1 rows; expected at least two"),
-        ([0.0, 1.0], [1.0, np.nan], "1 of 2 rows with NaN"),
-        ([0.0, 2.0, 1.0], [1.0, 1.0, 1.0], "time does not increase in row 3"),
-        ([0.0, 1.0], [1.0, 3500.0], "forces up to 3500, expected newtons, at most 200"),
-    ],
-)
-def test_a_series_that_is_none_is_refused(t_s: list[float], force_n: list[float], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Series("plate.csv", np.array(t_s), np.array(force_n))
-
-
-def test_a_series_is_straight_between_and_unknown_outside() -> None:
-    got = Series("plate.csv", np.array([1.0, 2.0]), np.array([0.0, 4.0])).at(
-        np.zeros(4, np.uint8), np.array([990_000, 1_000_000, 1_250_000, 2_010_000])
-    )
-    assert np.isnan(got[[0, 3]]).all() and got[1:3].tolist() == [0.0, 1.0]
-
-
-@pytest.mark.parametrize("lag", [-12, 20])
-def test_the_lag_is_found(lag: int) -> None:
-    force = np.array(presses(2, 3.5, 5))
-    above = np.roll(force, lag) / K
-    assert check_alignment("it", above, force) == lag

@@ -12,7 +12,6 @@ import pytest
 
 import biotac
 from biotac.calibrate.press.detector import Step
-from biotac.calibrate.press.force_source import load_csv
 from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
 from biotac.calibrate.press.pressure_procedure import calibrate
 from biotac.cli.main import main
@@ -190,7 +189,7 @@ def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None
     for facts in (zero, one):
         assert -K_LOW <= facts["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
         assert facts["verification"]["board_error"] <= 0.059
-        assert abs(facts["lag_rows"]) <= 1
+        assert abs(facts["alignment"]["offset_s"]) <= 0.02 and facts["alignment"]["peak"] > 0.9
     assert file.load(tmp_path / "two-finger1.json").serial == "BTSIM00000000012"
 
 
@@ -204,6 +203,22 @@ def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
     assert len(table) == 3 and "BTSIM00000000011" in table[1]
 
 
+@pytest.mark.parametrize("head", ["t_s,force_n", "time [s],Fx [N],Fy [N],Fz [N],Tx [Nm],Ty [Nm],Tz [Nm]"])
+def test_a_plate_by_another_clock_gives_the_same_k(pressed: Path, tmp_path: Path, capsys, head: str) -> None:
+    """Or its size alone, or the file of a wrench calibration."""
+    values = np.loadtxt(pressed / "plate.csv", delimiter=",", skiprows=1)
+    late, size = values[:, :1] + 1e4, np.linalg.norm(values[:, 1:], axis=1)
+    columns = [late, size] if "force" in head else [late, values[:, 1:], np.ones((len(late), 3))]
+    np.savetxt(tmp_path / "late.csv", np.column_stack(columns), delimiter=",", header=head, comments="")
+    found = []
+    for path in (pressed / "plate.csv", tmp_path / "late.csv"):
+        assert run(pressed, str(path), "--json") == 0
+        found.append(json.loads(capsys.readouterr().out)["fingers"])
+    for own, other in zip(*found, strict=True):
+        assert other["gain_n"] == pytest.approx(own["gain_n"], rel=1e-6)
+        assert other["alignment"]["offset_s"] - own["alignment"]["offset_s"] == pytest.approx(1e4, abs=1e-3)
+
+
 def noisy(values: np.ndarray) -> np.ndarray:
     force = np.random.default_rng(1).normal(0, 1, values[:, 1:].shape)
     return np.column_stack([values[:, 0], force])
@@ -213,11 +228,10 @@ def noisy(values: np.ndarray) -> np.ndarray:
     ("change", "message"),
     [
         (lambda v: v * [1, 20, 20, 20], "N/count, expected 0.0009 to 0.1; is the reference in newtons, and"),
-        (lambda v: np.add(v, [0.6, 0, 0, 0]), "they agree best with pressure -59 rows after the force"),
-        (lambda v: np.add(v, [1e4, 0, 0, 0]), "covers none of"),
-        (noisy, "correlation 0."),
-        (lambda v: v[:900], "has no reference: it gave no force in "),
-        (None, "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
+        (noisy, "their changes correlate with 0."),
+        (lambda v: v[:900], "9.0 s of force or counts: expected at least 10 s to align them"),
+        (lambda v: v[:1500], "has no reference: it gave no force in "),
+        (None, "'t_ms' is in 'ms': expected t in s"),
     ],
 )
 def test_a_reference_that_is_none_is_refused_with_its_number(
@@ -247,11 +261,3 @@ def test_the_gain_of_a_file_recomputes_a_recording(pressed: Path, tmp_path: Path
     np.testing.assert_array_equal(kept.frames["pressure_force_n"], ran.frames["pressure_force_n"])
     np.testing.assert_array_equal(kept.frames["pdc_filtered"], ran.frames["pdc_filtered"])
     assert main(["check", str(tmp_path / "run.mcap")]) == 0
-
-
-def test_the_csv_of_a_wrench_calibration_is_a_reference_for_pressure_too(tmp_path: Path) -> None:
-    path = tmp_path / "plate.csv"
-    head = "time [s],Fx [N],Fy [N],Fz [N],Tx [Nm],Ty [Nm],Tz [Nm]"
-    path.write_text(f"# sensor: Nano17\n{head}\n0,3,0,4,1,2,3\n1,0,0,2,1,2,3\n2,0,0,1,1,2,3\n")
-    at = load_csv(path).at(np.zeros(3, np.uint8), np.array([0, 500_000, 1_000_000]))
-    np.testing.assert_allclose(at, [5.0, 3.5, 2.0])

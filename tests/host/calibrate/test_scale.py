@@ -12,7 +12,7 @@ import pytest
 from biotac.calibrate import population as population_map
 from biotac.calibrate.population import Population
 from biotac.calibrate.press import few_shot
-from biotac.calibrate.press.few_shot import scaled
+from biotac.calibrate.press.few_shot import SCALE
 from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
 from biotac.core.geometry import RADIUS_MM
@@ -46,7 +46,7 @@ def firm() -> Population:
 
 def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
     presses, tilted = held(firm, 1.3, 0.08)
-    judged = found(tilted, presses, scaled)
+    judged = found(tilted, presses, SCALE)
     x, _, z = judged.own.coefficients[:38].T
     assert z == pytest.approx(np.full(38, 1.3 * -5.0), rel=0.02)
     assert x == pytest.approx(np.zeros(38), abs=0.005 * 5.0)
@@ -55,10 +55,17 @@ def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
     assert "unlike those of the population map" in judged.why_not(np.full(3, 1e-3))
 
 
+def test_one_press_says_as_much_as_a_mean_with_its_prior() -> None:
+    """By hand: a press of 5 N weighs 25 against (error / spread)^2, 76.5625 for the gain and 20.25 for the balance."""
+    scale = few_shot.scale_of(np.array([[0.5, 0.3, 5.0]]), np.array([[0.0, 0.0, 6.0]]))
+    assert (scale.gain, scale.gain_sigma) == pytest.approx((1.0 + 5.0 / 101.5625, 0.35 / 101.5625**0.5))
+    assert (scale.balance, scale.balance_sigma) == pytest.approx((2.5 / 45.25, 0.45 / 45.25**0.5))
+
+
 def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
     presses, tilted = held(firm, 1.0, 0.0)
     presses.force_n[2] *= 5.0
-    assert "no better than" in found(tilted, presses, scaled).why_not(np.full(3, 100.0))
+    assert "no better than" in found(tilted, presses, SCALE).why_not(np.full(3, 100.0))
 
 
 @pytest.mark.parametrize(

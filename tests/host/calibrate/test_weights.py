@@ -100,5 +100,5 @@ def test_axes_that_are_mixed_are_told_apart() -> None:
     tare = np.full(19, 2800.0)
     mixing = np.array([[0.9, 0.1, -0.1], [0.05, 1.2, 0.1], [0.1, -0.1, 1.1]])
     held = Held(counts, tare, np.arange(12), firm.force(counts, tare) @ mixing)
-    result = found(firm, held, few_shot.weighed)
+    result = found(firm, held, few_shot.WEIGHTS)
     assert (result.held_out_n < 0.2 * result.before_n).all()

@@ -131,7 +131,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "check the path", "calibrate press +no.mcap --pressure"),
     (2, "expected a reference file", "calibrate press @rec.mcap --pressure"),
     (2, "expected a CSV file of a force/torque sensor", "calibrate press @rec.mcap --pressure +no.csv"),
-    (2, "t_s and force_n, or", "calibrate press @rec.mcap --pressure @list.json"),
+    (2, "expected .csv, .tsv, .txt, or .mcap", "calibrate press @rec.mcap --pressure @list.json"),
     (2, "press harder", "calibrate press @rec.mcap --pressure --readings 2,3,4,3"),
     (2, "expected 4 or more", "calibrate press @rec.mcap --pressure --readings 2,3,4"),
     (2, "expected --finger NAME", "calibrate press sim:fingers.toml --scale"),

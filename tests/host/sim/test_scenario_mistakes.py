@@ -91,7 +91,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
     ("six tables", 'name = "t"\n' + "[[finger]]\n" * 6 + REST, 2, "", "key 'finger' has 6 tables"),
     ("profile", 'name = "t"\n[[finger]]\n[[finger]]\nprofile = "old"\n' + REST, 4, "finger 2", "'profile' is 'old'"),
     ("serial", 'name = "t"\n[[finger]]\nserial = "BT1"\n' + REST, 3, "finger 1", "'serial' is 'BT1'"),
-    ("fault kind", fault(0, kind="odd"), 9, "fault 1", "'kind' is 'odd': expected one of bad_parity"),
+    ("fault kind", fault(0, kind="odd"), 9, "fault 1", "'kind' is 'odd': expected one of electrode open"),
     ("fault finger", fault(0, finger=1), 8, "fault 1", "'finger' is 1"),
     ("fault too long", fault(0.5), 7, "fault 1", "'seconds' is 1: expected a number 0.001 to 0.5 s"),
     ("fault channel", fault(0, more='channel = "E20"\n'), 10, "fault 1", "'channel' is 'E20'"),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from biotac.calibrate.population import Population
-from biotac.calibrate.press import Scale, pulled, scale_of
+from biotac.calibrate.press import Scale, scale_of, shrink_to
 from biotac.calibrate.wrench import Run, rmse
 
 from .training import FingerSums, Floats, mirrored, sums, train
@@ -112,7 +112,7 @@ def _scaled(felt_n: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | 
             if all(abs(int(at) - other) >= APART_ROWS for other in chosen):
                 chosen.append(int(at))
             if len(chosen) == PRESSES:
-                result.append(scale_of(mean[chosen, :3], mean[chosen, 5]))
+                result.append(scale_of(mean[chosen, :3], mean[chosen, 3:] * [0.0, 0.0, 1.0]))
                 break
         else:
             return (), None  # the run has no five presses
@@ -129,7 +129,7 @@ def _minute(population: Population, run: Run) -> Floats | None:
     for start in np.linspace(0, n - rows, MINUTES).astype(int):
         minute = slice(start, start + rows)
         part = replace(run, counts=run.counts[minute], truth=run.truth[minute])
-        moved = pulled(population, sums(part), MINUTE_S)
+        moved = shrink_to(population, sums(part), MINUTE_S)
         rest = np.r_[: max(start - ROWS_PER_S, 0), min(start + rows + ROWS_PER_S, n) : n]
         found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest]) ** 2).mean(axis=0))
     result: Floats = np.sqrt(np.mean(found, axis=0))

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from .detector import Press, Procedure
-from .few_shot import Scale, pulled, scale_of
+from .few_shot import Scale, scale_of, shrink_to
 from .force_source import Truth, rows_of
 from .guide import guide
 from .pressure import (
@@ -27,6 +27,6 @@ from .pressure_procedure import put, with_gain
 
 __all__ = [
     "CALIBRATION_FORCES_N", "PAPER_ERROR", "VERIFICATION_FORCES_N", "Fit", "Press", "Procedure", "Scale", "Truth",
-    "Verification", "fit", "guide", "pulled", "put", "relative_error", "rows_of", "scale_of", "verify",
+    "Verification", "fit", "guide", "put", "relative_error", "rows_of", "scale_of", "shrink_to", "verify",
     "with_board_force", "with_gain",
 ]  # fmt: skip

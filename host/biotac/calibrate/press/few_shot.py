@@ -1,10 +1,15 @@
-"""The population map improved with a little data of a new finger: presses on a scale, weights, a minute on a plate."""
+"""The population map improved with a little data of a new finger: presses on a scale, weights, a minute on a plate.
+
+All are one regression: coefficients have a prior, the map of other fingers or the normals of the electrodes, and a
+spread about it. z is measured, or all axes, or the force along a plate's normal.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core.geometry import Floats
 from ...errors import InputError
@@ -14,11 +19,26 @@ from ..population import Population, Sums, normals
 GAIN_SPREAD = 0.04
 BALANCE_SPREAD = 0.1
 PRESS_ERROR_N = (0.45, 0.35, 0.35)  # x, y, z
-
-# Weights give the whole force vector: how far axes may mix into each other, and how many seconds a weight counts as.
-MIXING_SPREAD = 0.1
-WEIGHT_S = 3.0
+WEIGHT_S = 3.0  # how many seconds of recording a press of known force counts as
 PULL = 1000.0  # weight of the population map against the finger's own data, in seconds of recording: from F1 and F2
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a finger was pressed, by ``name``, and what is fitted to that.
+
+    First it is how the map's axes (rows) mix into the finger's (columns), each number within ``spread`` (3, 3); where
+    that is None, the gain of the electrodes' normals. With ``columns``, the coefficients of all columns follow.
+    """
+
+    name: str
+    spread: Floats | None
+    columns: bool
+
+
+SCALE = Way("presses on a scale", np.array([[0, 0, 0], [0, 0, 0], [BALANCE_SPREAD, 0, GAIN_SPREAD]]), columns=False)
+WEIGHTS = Way("weights on tilted blocks", np.full((3, 3), 0.1), columns=True)
+PLATE = Way("presses of a plate", None, columns=True)
 
 
 @dataclass(frozen=True)
@@ -38,74 +58,59 @@ class Scale:
         x = force[:, 0] - self.balance * force[:, 2]
         return np.column_stack([x, force[:, 1], self.gain * force[:, 2]])
 
-    def on(self, population: Population) -> Population:
-        """The map with the correction in its coefficients."""
-        return replace(population, coefficients=self.applied(population.coefficients))
 
-
-def scale_of(felt_n: Floats, shown_n: Floats) -> Scale:
-    """The correction from presses straight down, by the map's force ``felt_n`` (k, 3) and the scale's (k,), both in N.
+def scale_of(felt_n: Floats, force_n: Floats, way: Way = SCALE) -> Scale:
+    """The correction from presses, by the map's force ``felt_n`` (k, 3) and the true one (k, 3), both in N.
 
     Both numbers are pulled towards their defaults, the more the larger the map's error in one press is against their
-    spread over fingers. Raises InputError for a force that is not above 0.
+    spread over fingers. Raises InputError for a force on a scale that is not above 0.
     """
-    z = felt_n[:, 2]
-    if not np.isfinite(z).all() or (shown_n <= 0.0).any() or (z <= 0.0).any():
-        felt, read = (np.array2string(values, precision=1) for values in (z, shown_n))
+    mixing, sigma = _mixing(felt_n, force_n, way)
+    return Scale(*map(float, (mixing[2, 2], -mixing[2, 0], sigma[2, 2], sigma[2, 0])))
+
+
+def fit(population: Population, columns: Floats, force_n: Floats, way: Way) -> Population:
+    """The map fitted to presses: mean ``columns`` (k, 114) of each, and its force (k, 3) in N. Raises as scale_of."""
+    known = population.coefficients
+    if way.spread is None:
+        felt_n = columns @ normals()  # the population's own leaning is left out: it is that of a rig
+        known = (felt_n * force_n).sum() / (felt_n**2).sum() * normals()
+    else:
+        known = known @ _mixing(columns @ known, force_n, way)[0]
+    mixed = replace(population, coefficients=known)
+    if not way.columns:
+        return mixed
+    return shrink_to(mixed, Sums(columns.T @ columns, columns.T @ force_n, columns.sum(axis=0)), WEIGHT_S)
+
+
+def shrink_to(population: Population, new: Sums, seconds: float) -> Population:
+    """The map fitted to a finger's own ``new`` sums, each worth ``seconds`` of recording, and pulled to what it was."""
+    spread = np.tile(1.0 / np.sqrt(PULL * population.variance), (new.cross.shape[1], 1)).T
+    found, _ = _regress(population.coefficients, spread, 1.0, seconds * new.gram, seconds * new.cross)
+    return replace(population, coefficients=found)
+
+
+def _mixing(felt_n: Floats, force_n: Floats, way: Way) -> tuple[Floats, Floats]:
+    assert way.spread is not None
+    pressed = np.column_stack([felt_n[:, 2], force_n[:, 2]])
+    if way is SCALE and not (np.isfinite(pressed) & (pressed > 0.0)).all():
+        felt, read = (np.array2string(values, precision=1) for values in pressed.T)
         raise InputError(
-            f"presses of {felt} N by the map, {read} N on the scale: expected all above 0; tare the finger, and press "
-            "its pad straight down"
+            f"presses of {felt} N by the map, {read} N on the scale: expected all above 0; tare the finger, and "
+            "press its pad straight down"
         )
-    size = float(z @ z)
-    for_gain = size + (PRESS_ERROR_N[2] / GAIN_SPREAD) ** 2
-    for_balance = size + (PRESS_ERROR_N[0] / BALANCE_SPREAD) ** 2
-    gain, balance = 1.0 + float(z @ (shown_n - z)) / for_gain, float(z @ felt_n[:, 0]) / for_balance
-    return Scale(gain, balance, PRESS_ERROR_N[2] / for_gain**0.5, PRESS_ERROR_N[0] / for_balance**0.5)
+    return _regress(np.eye(3), way.spread, PRESS_ERROR_N, felt_n.T @ felt_n, felt_n.T @ force_n)
 
 
-def scaled(population: Population, columns: Floats, force_n: Floats) -> Population:
-    """The map corrected by scale_of() presses: mean ``columns`` (k, 114) of each and its force (k, 3) in N, along z."""
-    return scale_of(columns @ population.coefficients, force_n[:, 2]).on(population)
+def _regress(prior: Floats, spread: Floats, error: npt.ArrayLike, gram: Floats, cross: Floats) -> tuple[Floats, Floats]:
+    """The likeliest coefficients (q, axes), and one sigma of each; one whose ``spread`` is 0 stays at its ``prior``.
 
-
-def mixing_of(felt_n: Floats, force_n: Floats) -> tuple[Floats, Floats]:
-    """The mixing (3, 3) of the map's axes, felt to true, from forces (k, 3) in N, and one sigma of each number."""
-    mixing, sigma = np.eye(len(PRESS_ERROR_N)), np.empty((len(PRESS_ERROR_N),) * 2)
-    for axis, error_n in enumerate(PRESS_ERROR_N):
-        unsure = np.linalg.inv(felt_n.T @ felt_n + (error_n / MIXING_SPREAD) ** 2 * np.eye(len(mixing)))
-        mixing[:, axis] += unsure @ felt_n.T @ (force_n - felt_n)[:, axis]
-        sigma[:, axis] = error_n * np.sqrt(np.diag(unsure))
-    return mixing, sigma
-
-
-def weighed(population: Population, columns: Floats, force_n: Floats) -> Population:
-    """The map fitted to weights: mean ``columns`` (k, 114) while each lay still, and its force (k, 3) in N.
-
-    A mixing of the axes, nine numbers, is fitted first; what it leaves then changes the columns' coefficients.
+    ``gram`` (q, q) and ``cross`` (q, axes) are sums over rows, each known to ``error``, one number or (axes,).
     """
-    mixing, _ = mixing_of(columns @ population.coefficients, force_n)
-    return _pulled_by_presses(replace(population, coefficients=population.coefficients @ mixing), columns, force_n)
-
-
-def plated(population: Population, columns: Floats, force_n: Floats) -> Population:
-    """A map of the compressed electrodes' normals, fitted to presses of a flat plate from all sides.
-
-    ``columns`` (k, 114) are means of each press, ``force_n`` (k, 3) is against the skin's normal there, in N. The
-    population's own leaning is left out: it is that of a rig.
-    """
-    felt_n = columns @ normals()
-    gain = (felt_n * force_n).sum() / (felt_n**2).sum()
-    return _pulled_by_presses(replace(population, coefficients=gain * normals()), columns, force_n)
-
-
-def _pulled_by_presses(population: Population, columns: Floats, force_n: Floats) -> Population:
-    k = len(columns)
-    mean = Sums(columns.T @ columns / k, columns.T @ force_n / k, columns.mean(axis=0))
-    return pulled(population, mean, WEIGHT_S * k)
-
-
-def pulled(population: Population, new: Sums, seconds: float) -> Population:
-    """The map pulled towards a finger's own ``new`` sums, weighted as ``seconds`` of recording on a force plate."""
-    pull = PULL * np.diag(population.variance)
-    change = np.linalg.solve(seconds * new.gram + pull, seconds * (new.cross - new.gram @ population.coefficients))
-    return replace(population, coefficients=population.coefficients + change)
+    mean, sigma, left = prior.copy(), np.zeros_like(prior), cross - gram @ prior
+    for axis, row_error in enumerate(np.broadcast_to(np.asarray(error), prior.shape[1])):
+        free = np.flatnonzero(spread[:, axis])
+        weight = gram[np.ix_(free, free)] + np.diag((row_error / spread[free, axis]) ** 2)
+        mean[free, axis] += np.linalg.solve(weight, left[free, axis])
+        sigma[free, axis] = row_error * np.sqrt(np.diag(np.linalg.inv(weight)))
+    return mean, sigma

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,9 +15,10 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
-from ..population import Population, by_columns
+from ..population import Population, columns
 from ..wrench.figures import angles_deg, rmse
 from .detector import Press, Procedure
+from .few_shot import Way, fit
 from .force_source import ForceSource, rows_of
 from .guide import Face, guide
 
@@ -26,9 +27,6 @@ FAR_SIGMAS = 3.0
 STRAIGHT_DOWN = (0.0, 0.0, 1.0)
 ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # on a scale: light and firm in turn; starts again after the last
 SIDE = 0.3  # component of a plate's normal, on each side
-
-#: From a map, and columns (k, 114) and force (k, 3) in N of presses, to the map fitted to them; see few_shot.
-Fitter = Callable[[Population, Floats, Floats], Population]
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Held:
     @cached_property
     def columns(self) -> Floats:
         """The map's columns (k, 114), a mean over each press."""
-        every = by_columns(self.counts, self.tare, lambda z: z)
+        every = columns(self.counts - self.tare, self.tare)
         return np.array([every[self.press == k].mean(axis=0) for k in range(len(self.force_n))])
 
 
@@ -82,12 +80,12 @@ class Found:
         return ""
 
 
-def found(population: Population, held: Held, fit: Fitter) -> Found:
-    """The finger's own map by ``fit``, and its errors. Raises InputError for presses that ``fit`` cannot use."""
+def found(population: Population, held: Held, way: Way) -> Found:
+    """The finger's own map, and its errors. Raises InputError for presses that cannot be used."""
     columns, force_n = held.columns, held.force_n
-    own = fit(population, columns, force_n)
+    own = fit(population, columns, force_n, way)
     every = np.arange(len(force_n))
-    out = [columns[k] @ fit(population, columns[every != k], force_n[every != k]).coefficients for k in every]
+    out = [columns[k] @ fit(population, columns[every != k], force_n[every != k], way).coefficients for k in every]
     before, held_out = columns @ population.coefficients, np.array(out)
     deg = [float(np.median(angles_deg(felt_n, force_n))) for felt_n in (before, held_out)]
     return Found(own, rmse(before, force_n), rmse(held_out, force_n), *deg)

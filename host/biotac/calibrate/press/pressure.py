@@ -7,7 +7,7 @@ K = pinv(P - P0) |F|    Eq 6, over the held rows of all presses
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from ...core.geometry import Floats
 from ...documents import Provenance
 from ...errors import InputError
 from ...keep import Calibration
+from ...recording.alignment import Alignment
 from ...version import __version__
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, to_units
@@ -161,14 +162,14 @@ def _check(where: str, press: Press) -> None:
 class Calibrated:
     """One finger's K, its error on the verification press, the calibration with it, and where the presses are from.
 
-    ``lag_rows`` is how many rows pressure lags a reference that has its own times, None for a force without.
+    ``alignment`` is that of a reference with times of its own, None for a force without.
     """
 
     fit: Fit
     verified: Verification
     calibration: Calibration
     source: Provenance
-    lag_rows: int | None = None
+    alignment: Alignment | None = None
 
     @property
     def provenance(self) -> Provenance:
@@ -207,7 +208,7 @@ def facts(fingers: Sequence[Calibrated]) -> list[dict[str, Any]]:
             "notes": list(one.fit.notes),
             "verification": {key: round(getattr(one.verified, key), n) for key, n in digits.items()},
         }
-        | ({} if one.lag_rows is None else {"lag_rows": one.lag_rows})
+        | ({} if one.alignment is None else {"alignment": asdict(one.alignment)})
         for one in fingers
     ]
 
@@ -229,6 +230,5 @@ def lines(fingers: Sequence[Calibrated]) -> list[str]:
                 f"finger {fitted.finger}: {seen.board_error:.1%} off on the verification press (the paper's: "
                 f"{PAPER_ERROR:.2%}): was it at another place, or pressed in another way?"
             )
-        if one.lag_rows:
-            notes.append(f"finger {fitted.finger}: pressure lags the force by {one.lag_rows} rows")
+    notes += dict.fromkeys(str(one.alignment) for one in fingers if one.alignment)
     return [*out, *(f"  {note}" for note in notes)]

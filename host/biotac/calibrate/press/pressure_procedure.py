@@ -15,15 +15,16 @@ import numpy as np
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import Calibration
+from ...recording.alignment import PDC_S, Alignment, align, means
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
+from ...wire.frames import StructArray
 from ...wire.identity import ascii_text, serial_text
+from ..reference.samples import Reference
 from .detector import Procedure
-from .force_source import Series, Truth, check_alignment, rows_of
+from .force_source import Truth, rows_of
 from .guide import Face, guide
 from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, Fit, fit_and_verify
-
-AROUND_ROWS = 50  # before and after a touch, in which the plate's force is taken as this finger's
 
 
 def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int) -> list[Calibrated]:
@@ -85,7 +86,7 @@ def put(hand: Hand, finger: int, calibration: Calibration) -> None:
 
 def calibrate_recording(
     recording: Recording,
-    reference: Series | None,
+    reference: Reference | None,
     *,
     fingers: Sequence[int] = (),
     forces_n: Sequence[float] = (),
@@ -93,9 +94,9 @@ def calibrate_recording(
 ) -> list[Calibrated]:
     """K of each of ``fingers`` (none: all in the recording), from all of its presses but the last, which verifies it.
 
-    ``reference`` has the force over the board's time; without it ``forces_n`` are what a scale showed at each press,
-    including the last. The board's force at the last press is computed by the board's own code. Raises InputError for
-    data that does not give K.
+    ``reference`` is that of all fingers, in any sensor's axes; without it ``forces_n`` are what a scale showed at each
+    press, including the last. The board's force at the last press is computed by the board's own code. Raises
+    InputError for data that does not give K.
     """
     if reference is None and not forces_n:
         raise InputError(
@@ -106,13 +107,7 @@ def calibrate_recording(
         raise InputError(
             f"{len(asked)} forces given, expected {MIN_PRESSES + 1} or more: one per press, the last for verification"
         )
-    t_us = recording.frames["t_us"]
-    rows = rows_of(recording.wire, t_us, reference)
-    if reference is not None and len(rows) and np.isnan(rows["force_n"]).all():
-        raise InputError(
-            f"{reference.name} covers none of {len(rows)} frames, which span {t_us.min() / 1e6:.2f} to "
-            f"{t_us.max() / 1e6:.2f} s of the board's time; expected t_s within it (t_us / 1e6)"
-        )
+    rows = rows_of(recording.wire, recording.frames["t_us"])
     there = np.unique(rows["finger"]).tolist()
     absent = sorted(set(fingers) - set(there))
     if absent or not there:
@@ -126,19 +121,24 @@ def calibrate_recording(
         "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
         "reference": reference.name if reference is not None else "typed",
     }
+    alignment = None if reference is None else _add_force(str(recording.path), rows, reference)
     calibrated = []
     for finger in fingers or there:
-        own_rows, lag_rows = rows[rows["finger"] == finger], None
-        if reference is not None:
-            # All fingers share one plate: its force is this finger's only around its own touches.
-            near = np.convolve(own_rows["touched"], np.ones(2 * AROUND_ROWS + 1), "same") > 0
-            above = np.where(near, own_rows["pressure"] - own_rows["rest"], np.nan)
-            lag_rows = check_alignment(f"{recording.path}, finger {finger}", above, own_rows["force_n"])
+        own_rows = rows[rows["finger"] == finger]
         # A procedure for each finger: a recording may have them in any order.
         procedure = Procedure([finger], asked, needs_force=reference is not None)
         presses = procedure.find(own_rows, forces_n if reference is None else ())[finger]
         fitted, verified = fit_and_verify(procedure.rests[finger], presses)
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
         own = replace(own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s)
-        calibrated.append(Calibrated(fitted, verified, own, source, lag_rows))
+        calibrated.append(Calibrated(fitted, verified, own, source, alignment))
     return calibrated
+
+
+def _add_force(where: str, rows: StructArray, reference: Reference) -> Alignment:
+    """Put the reference's force into ``rows``. All fingers share one plate, and so one alignment of their pressures."""
+    t_s, at_s = reference.samples.t_s, rows["t_us"] / 1e6 + PDC_S
+    size_n = np.linalg.norm(reference.samples.wrench[:, :3], axis=1)
+    alignment = align(where, at_s, rows["pressure"] - rows["rest"], t_s, size_n)
+    rows["force_n"] = means(t_s, size_n[:, None], alignment.to_reference_s(at_s))[:, 0]
+    return alignment

@@ -4,7 +4,8 @@
     # mounting: {"rotation": ..., "offset_mm": ..., "reads": "force on finger"}
     t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm
 
-Units may also be in brackets: ``Fx [N]``, ``Tx (N m)``. Columns with other names are ignored. A column without a unit
+Units may also be in brackets: ``Fx [N]``, ``Tx (N m)``. Where the size of the force is enough, ``force_n`` may stand
+in place of its axes. Columns with other names are ignored. A column without a unit
 is refused: a calibration would not notice a factor such as millimetres for metres.
 """
 
@@ -28,17 +29,18 @@ from .samples import Reference, Samples, check
 COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
 # in the order of the result; torque may be named M or T
 _NAMES = ("t", "fx", "fy", "fz", "mx", "my", "mz")
+_SIZE = ("t", "force")
 _UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0, "n": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
-_COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]([^\])]*)[\])]|_(.+))?$", re.IGNORECASE)
+_COLUMN = re.compile(r"^(t|time|force|[FMT][xyz])(?:\s*[\[(]([^\])]*)[\])]|_(.+))?$", re.IGNORECASE)
 SILENCE_S = 5.0  # programs write in pieces
 _WANTED = "t in s, forces in N, torques in N mm or N m"
 
 
-def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
-    """The reference in ``path``; ``mounting`` replaces the file's own."""
+def read_csv(path: Path, mounting: Mounting | None = None, *, size: bool = False) -> Reference:
+    """The reference in ``path``; ``mounting`` replaces the file's own. With ``size`` it may be of one axis: |F|."""
     own, head, read = open_table(path)
     chosen = mounting or _mounting_in(path, own)
-    use, scale = columns(path, head)
+    use, scale = _columns(path, head, size=size)
     table = read(use)
     samples = Samples(table[:, 0], table[:, 1:] * scale)
     check(str(path), samples)
@@ -92,8 +94,8 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[..., Flo
     return own, [name.strip().strip('"') for name in head.split(separator)], read
 
 
-def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[int], Floats]:
-    """Indices of the columns t, F and, with ``torque`` and if there are any, M; and the factors for F and M.
+def _columns(path: Path, names: list[str], *, size: bool = False) -> tuple[list[int], Floats]:
+    """Indices of the columns t, F and, if there are any, M, or with ``size`` t and force; and the factors for F and M.
 
     The factors convert to N and N mm. Raises RecordingError for a column that is missing, doubled or without a known
     unit.
@@ -104,7 +106,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
         if match is None:
             continue
         word = match[1].lower()
-        name = "t" if word in ("t", "time") else word.replace("t", "m", 1)
+        name = {"time": "t", "t": "t", "force": "force"}.get(word) or word.replace("t", "m", 1)
         unit = (match[2] or match[3] or "").strip()
         if not unit:
             raise RecordingError(f"{path}: column {cell!r} has no unit: expected {_WANTED}, as in {COLUMNS[4]}")
@@ -114,12 +116,13 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
         if name in found:
             raise RecordingError(f"{path}: column {cell!r} is there twice: expected once; remove one")
         found[name] = (index, factor)
-    torques = torque and [name for name in _NAMES[4:] if name in found]
-    wanted = _NAMES if torques else _NAMES[:4]
+    torques = [name for name in _NAMES[4:] if name in found]
+    wanted = _SIZE if size and "force" in found else _NAMES if torques else _NAMES[:4]
     missing = [COLUMNS[_NAMES.index(name)] for name in wanted if name not in found]
     if missing:
+        either = " or t_s,force_n" if size else ""
         raise RecordingError(
-            f"{path}: no column {missing[0]}: expected {','.join(COLUMNS)}, or the same without torque"
+            f"{path}: no column {missing[0]}: expected {','.join(COLUMNS)}, or the same without torque{either}"
         )
     return [found[name][0] for name in wanted], np.array([found[name][1] for name in wanted[1:]])
 
@@ -137,7 +140,7 @@ class GrowingCsv:
         self.mounting = mounting or _mounting_in(path, own)
         self.sensor = own.get("sensor", path.name)
         self._path, self._steady_s = path, steady_s
-        self._use, self._scale = columns(path, head)
+        self._use, self._scale = _columns(path, head)
         self._file = path.open("rb")
         self._begun = self._file.read().rpartition(b"\n")[2]  # a row that is being written
         self._grew_s = steady_s()

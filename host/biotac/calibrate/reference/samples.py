@@ -21,7 +21,8 @@ class Samples:
     """n readings in the sensor's own axes and by its own clock.
 
     ``t_s`` (n,) is increasing. ``wrench`` (n, 6) is force in N and torque in N mm about the sensor's origin, or (n, 3)
-    for a sensor with three axes. A reading that the sensor itself marks as bad is NaN.
+    for a sensor with three axes, or (n, 1), the force's size. A reading that the sensor itself marks as
+    bad is NaN.
     """
 
     t_s: Floats

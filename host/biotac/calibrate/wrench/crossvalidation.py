@@ -17,11 +17,11 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from ...core.geometry import Floats
-from ...map.columns import Signals, columns, with_one
+from ...map.columns import GATED, PRESSURES, Signals, columns, index, with_one
 from ...map.fitted import WrenchMap
 from . import models
 from .lag import Lags
-from .models import GATED, LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
+from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums
 from .run import Run
 from .splits import BLOCKS, Blocks
@@ -267,13 +267,13 @@ class _Trainer:
         """Coefficients of the ``chosen`` models pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
         found = models.pulled(sums, chosen)
         if self._others is not None:
-            found += models.pulled_to_others(sums, POOL, self._others)
+            found += models.pulled(sums, POOL, self._others)
         return found
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:
         """The weight of the free-air frames, chosen with a cheap model that bends as the pool does."""
-        index = GATED.index(len(air.gram) - 1)
-        air = air.part(index)
+        own = index((*GATED, *PRESSURES), len(air.gram) - 1)
+        air = air.part(own)
 
         def error(share: float) -> Floats:
             fits = [models.solve(one.plus(air, share), AIR_LAMBDA) for one in small]
@@ -281,7 +281,7 @@ class _Trainer:
             forces: Floats = np.sum(errors, axis=0)[:3]
             return forces
 
-        small, outs = [one.part(index) for one in kept], [one.part(index) for one in tested]
+        small, outs = [one.part(own) for one in kept], [one.part(own) for one in tested]
         without = error(0.0)
         return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), AIR_SHARES[-1])
 

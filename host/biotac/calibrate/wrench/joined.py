@@ -125,10 +125,7 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
         f"tare: the board's own, which moved by up to {moved:.0f} counts",
         f"reference: {reference.name}" + (f", {reference.sensor}" if reference.sensor else ""),
         f"reference's zero: {zero_text}, from {int(board.quiet.sum())} rows in which the board saw no contact",
-        f"clocks: offset {alignment.offset_s:+.4f} s, {alignment.drift_ppm:+.0f} ppm; "
-        f"correlation {alignment.peak:.2f}, next best {alignment.runner_up:.2f}, "
-        f"{alignment.width_s * 1e3:.0f} ms wide at half height; "
-        f"{alignment.pieces} pieces scatter by {alignment.scatter_s * 1e3:.1f} ms",
+        str(alignment),
         f"{int((~there).sum())} of {len(there)} frames left out, as the reference does not cover them",
         *about_torque[:1],
         drift_note,

@@ -10,12 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
-from ...map.columns import BLOCKS, ELECTRODES, SIGNAL_COUNTS, SPLIT, STRAIGHT
-from ...wire import map_gen as _map
+from ...map.columns import ELECTRODES, GATED, PRESSURES, SIGNAL_COUNTS, Block, index
 from ...wire.map_gen import Gate, Kind
 from .moments import Sums
 
@@ -38,28 +36,19 @@ class Model:
     """A ridge regression on blocks of columns, in the order of BLOCKS; PRESSURE only where it was recorded."""
 
     name: str
-    blocks: tuple[tuple[Kind, Gate], ...]
+    blocks: tuple[Block, ...]
     text: str
 
-    def index(self, columns: int) -> npt.NDArray[np.intp]:
-        """Indices of the model's columns; ``columns`` is the number of all columns of a run, with or without PDC."""
-        every = np.repeat(np.arange(len(BLOCKS)), [_map.KINDS[kind].columns for kind, _ in BLOCKS])
-        own = [k for k, block in enumerate(BLOCKS) if block in self.blocks]
-        return np.flatnonzero(np.isin(every, own)[:columns])
 
-
-_PRESSURE = tuple((Kind.PRESSURE, gate) for gate in STRAIGHT)
 _CONDUCTANCES = ((Kind.CONDUCTANCE, Gate.ONE), (Kind.CONDUCTANCE_PAIRS, Gate.ONE))
-_GATED = tuple((kind, gate) for gate in STRAIGHT for kind in (*SPLIT, Kind.PRESSURE))
 _SIGNALS = ((Kind.SIGNAL, Gate.ONE), (Kind.SIGNAL_PAIRS, Gate.ONE))
 
 AFFINE = Model("affine", _SIGNALS[:1], "every electrode to every axis")
-GATED = Model("gated", _GATED, "gains by sign that follow the contact")  # not on its own, but in others
-QUADRATIC = Model("quadratic", (*_SIGNALS, *_PRESSURE), "all products of two electrodes, PDC where recorded")
+QUADRATIC = Model("quadratic", (*_SIGNALS, *PRESSURES), "all products of two electrodes, PDC where recorded")
 CONDUCTANCE = Model(
-    "conductance-quadratic", (*_CONDUCTANCES, *_PRESSURE), "all products of two conductances, PDC where recorded"
+    "conductance-quadratic", (*_CONDUCTANCES, *PRESSURES), "all products of two conductances, PDC where recorded"
 )
-JOINED = Model("joined", (*_GATED, *_CONDUCTANCES), "the same, plus gains by sign that follow the contact")
+JOINED = Model("joined", (*_CONDUCTANCES, *GATED, *PRESSURES), "the same, plus gains by sign that follow the contact")
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
 LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
@@ -89,8 +78,8 @@ def lin_directions(axes: int) -> Floats:
 def lin(sums: Sums, *, offset: bool = True) -> Floats:
     """Lin's scales, least squares per axis, as coefficients (p + 1, axes) of all columns."""
     axes = sums.cross.shape[1]
-    index = AFFINE.index(len(sums.gram) - 1)
-    small = sums.part(index)
+    own = index(AFFINE.blocks, len(sums.gram) - 1)
+    small = sums.part(own)
     result = np.zeros(sums.cross.shape)
     for axis, direction in enumerate(lin_directions(axes).T):
         basis = np.zeros((ELECTRODES + 1, 1 + offset))
@@ -100,7 +89,7 @@ def lin(sums: Sums, *, offset: bool = True) -> Floats:
         gram = basis.T @ small.gram @ basis
         # M_x is the difference of two electrodes: if nothing reaches them, it would be 0 / 0
         gram[0, 0] += 1e-9 * max(float(gram.max()), 1.0)
-        result[np.append(index, -1), axis] = basis @ np.linalg.solve(gram, basis.T @ small.cross[:, axis])
+        result[np.append(own, -1), axis] = basis @ np.linalg.solve(gram, basis.T @ small.cross[:, axis])
     return result
 
 
@@ -119,29 +108,25 @@ def solve(sums: Sums, lam: float) -> Floats:
     return np.concatenate([found, (sums.cross[-1] / rows - mean @ found)[None]])
 
 
-def pulled(sums: Sums, chosen: Sequence[Model]) -> list[Floats]:
-    """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales."""
-    return _pulled_to(lin(sums), sums, chosen, LAMBDAS)
+def pulled(sums: Sums, chosen: Sequence[Model], others: Floats | None = None) -> list[Floats]:
+    """For each model, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales.
 
-
-def pulled_to_others(sums: Sums, chosen: Sequence[Model], others: Floats) -> list[Floats]:
-    """As pulled(), with OTHERS_LAMBDAS and the force pulled to ``others`` (q + 1, 3), which have no columns of PDC."""
-    known = lin(sums)
-    known[:, : others.shape[1]] = 0.0
-    known[: len(others) - 1, : others.shape[1]] = others[:-1]
-    known[-1, : others.shape[1]] = others[-1]
-    return _pulled_to(known, sums, chosen, OTHERS_LAMBDAS)
-
-
-def _pulled_to(known: Floats, sums: Sums, chosen: Sequence[Model], lambdas: Sequence[float]) -> list[Floats]:
+    The force is pulled to ``others`` (q + 1, 3), if given, with OTHERS_LAMBDAS; they have no columns of PDC.
+    """
+    known, lambdas = lin(sums), LAMBDAS
+    if others is not None:
+        lambdas = OTHERS_LAMBDAS
+        known[:, : others.shape[1]] = 0.0
+        known[: len(others) - 1, : others.shape[1]] = others[:-1]
+        known[-1, : others.shape[1]] = others[-1]
     left = sums.left_by(known)
     result = []
     for model in chosen:
-        index = model.index(len(known) - 1)
-        own = left.part(index)
+        columns = index(model.blocks, len(known) - 1)
+        own = left.part(columns)
         found = np.repeat(known[None], len(lambdas), axis=0)
         for k, lam in enumerate(lambdas):
-            found[k, np.append(index, -1)] += solve(own, lam)
+            found[k, np.append(columns, -1)] += solve(own, lam)
         result.append(found)
     return result
 

@@ -26,10 +26,11 @@ from .joined import Joined, board_of, choose_finger, join
 from .run import Run, load_run
 
 
-def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
+def read_reference(text: str, mounting: Mounting | None = None, *, size: bool = False) -> Reference:
     """The reference in ``FILE.csv``, in ``FILE.mcap`` with one wrench topic, or in ``FILE.mcap:TOPIC``.
 
-    ``mounting`` replaces the one in the file. Raises InputError (RecordingError for the content).
+    ``mounting`` replaces the one in the file; with ``size``, a CSV may have the size of the force alone. Raises
+    InputError (RecordingError for the content).
     """
     name, colon, topic = text.rpartition(":")
     if colon and name.lower().endswith(".mcap"):
@@ -39,7 +40,7 @@ def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
     if suffix == ".mcap":
         return read_mcap(path, mounting)
     if suffix in (".csv", ".tsv", ".txt"):
-        return read_csv(path, mounting)
+        return read_csv(path, mounting, size=size)
     raise InputError(f"{text}: unknown file type: expected .csv, .tsv, .txt, or .mcap with geometry_msgs WrenchStamped")
 
 

@@ -1,8 +1,8 @@
 """Uploads a fitted map to the board, and proves that the board computes what was fitted.
 
-Three checks, each of which can fail on its own: the bytes read back are those that were sent; the board's own code with
-these bytes agrees with the float model on recorded counts, within the proven bound on rounding; and the frames that the
-board then sends are, bit for bit, what that code computes from their counts.
+Three checks, each of which can fail on its own: the bytes read back are those that were sent (set_map); the board's own
+code with these bytes agrees with the float model on recorded counts, within the proven bound on rounding; and the
+frames that the board then sends are, bit for bit, what that code computes from their counts.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ import numpy as np
 from ...core.geometry import Floats
 from ...errors import PortError
 from ...hand.hand import Hand
-from ...map.board_map import from_blob, pdc_above_rest_q4
+from ...map.board_map import pdc_above_rest_q4
 from ...map.bound import compare
 from ...map.fitted import WrenchMap
 from ...wire import messages_gen as wire
 from ...wire.dtypes_gen import DTYPES
 from ...wire.frames import StructArray
-from ...wire.map_gen import HEADER_BYTES
 
 STREAM_S = 0.5
 TRIES = 60  # a simulated board that runs ahead has some seconds of unread frames
@@ -46,16 +45,8 @@ def upload(
     InputError for a map that no board takes, CommandRefusedError for another sensor, PortError when the board does not
     compute what was fitted.
     """
-    sent = fitted.on_board(serial=serial, made_s=made_s).blob
-    hand.board.set_map(finger, sent, force=force)
-    blob = hand.board.get_map(finger)
-    # only the header may differ: a forced map has no serial number in it
-    if blob is None or blob[HEADER_BYTES:] != sent[HEADER_BYTES:]:
-        seen = "none" if blob is None else f"another of {len(blob)} bytes"
-        raise PortError(
-            f"the board accepted the map of {len(sent)} bytes, but has {seen}: expected the same; upload it again"
-        )
-    on_board = from_blob(blob)
+    on_board = fitted.on_board(serial=serial, made_s=made_s)
+    hand.board.set_map(finger, on_board, force=force)
     comparison = compare(fitted, on_board, np.rint(counts), pdc if fitted.with_pdc else None)
     if comparison.outside:
         raise PortError(

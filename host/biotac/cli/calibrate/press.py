@@ -15,8 +15,10 @@ import biotac
 from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
 from ...calibrate.press.detector import MAX_N, Phase, Step
-from ...calibrate.press.force_source import Truth, load_csv
+from ...calibrate.press.force_source import Truth
+from ...calibrate.reference.mounting import LIN
 from ...calibrate.reference.scale import UNITS_N, SerialScale
+from ...calibrate.wrench.sources import read_reference
 from ...calibrate.wrench.upload import upload
 from ...documents import write_new
 from ...errors import CommandRefusedError, InputError
@@ -59,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     against.add_argument(
         "--pressure", metavar="FILE", nargs="?", const="",
         help="from pressure to force, one gain per finger: press a plate or scale whose readings are typed in; for a "
-        "recording, a CSV with t_s in the board's time and force_n (or fx_n, fy_n, fz_n)",
+        "recording, a reference as of calibrate wrench, by any clock, or a CSV with t_s and force_n",
     )  # fmt: skip
     parser.add_argument(
         "--finger", metavar="NAME,NAME", type=values.fingers, default=(),
@@ -208,25 +210,20 @@ def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[we
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
     """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
     trained = population.load(args.population)
-    felt_n, scale = held.columns @ trained.population.coefficients, None
-    if args.weights:
-        fit, how, forces = few_shot.weighed, "weights on tilted blocks", {"force_n": held.force_n.tolist()}
-        mixing, sigma = few_shot.mixing_of(felt_n, held.force_n)
-        scale = few_shot.Scale(mixing[2, 2], -mixing[2, 0], sigma[2, 2], sigma[2, 0])
-    elif args.plate:
+    way = few_shot.WEIGHTS if args.weights else few_shot.PLATE if args.plate else few_shot.SCALE
+    scale = None
+    if args.plate:
         held = known_force.of_plate(held, trained.population)
-        fit, how, forces = few_shot.plated, "presses of a plate", {"force_n": held.force_n.tolist()}
     else:
-        scale = few_shot.scale_of(felt_n, held.force_n[:, 2])
-        fit, how, forces = few_shot.scaled, "presses on a scale", {"shown_n": held.force_n[:, 2].tolist()}
-    found = known_force.found(trained.population, held, fit)
+        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n, way)
+    found = known_force.found(trained.population, held, way)
     own = found.own.wrench_map(held.tare)
     (finger,), made_s = args.finger, int(time.time())
     facts: dict[str, Any] = {
         "finger": finger,
         "serial": serial,
         "presses": len(held.force_n),
-        **forces,
+        **({"shown_n": held.force_n[:, 2].tolist()} if args.scale is not None else {"force_n": held.force_n.tolist()}),
         **(asdict(scale) if scale else {}),
         "before_n": found.before_n.tolist(),
         "held_out_n": found.held_out_n.tolist(),
@@ -237,10 +234,9 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         "fixed_point": summary(own, held.counts),
     }
     if args.out is not None:
-        reference = f"{len(held.force_n)} {how}; population map from {trained.fingers}"
         software = trained.provenance.get("software", "")
         origin = {"serial": serial, "made_s": made_s, "software": software, "files": [args.where]}
-        origin["reference"] = reference
+        origin["reference"] = f"{len(held.force_n)} {way.name}; population map from {trained.fingers}"
         text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=origin)
         with whole(args.out, overwrite=args.force) as path:
             path.write_text(text, encoding="utf-8")
@@ -251,7 +247,7 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
         if args.save:
             hand.board.save_settings()
-    outputs.say(args, facts, "\n".join(_map_lines(facts, how)))
+    outputs.say(args, facts, "\n".join(_map_lines(facts, way.name)))
     return int(facts["refused"])
 
 
@@ -285,7 +281,7 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
         every = [args.out / f"{stem}finger{finger}.json" for finger in args.finger or range(MAX_SENSORS)]
         outputs.check(args.out, every, overwrite=args.force)
     if recorded:
-        reference = load_csv(Path(args.pressure)) if args.pressure else None
+        reference = read_reference(args.pressure, LIN, size=True) if args.pressure else None
         readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
         calibrated = pressure_procedure.calibrate_recording(
             load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=made_s
