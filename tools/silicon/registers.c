@@ -176,3 +176,9 @@ void __tsan_atomic32_store(uint32_t *at, uint32_t value, int order)
     (void)order;
     *at = value;
 }
+
+void __tsan_atomic_signal_fence(int order);
+void __tsan_atomic_signal_fence(int order)
+{
+    (void)order;
+}

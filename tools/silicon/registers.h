@@ -2,8 +2,8 @@
 // each of its volatile accesses calls in here (GCC's thread sanitizer instruments them, and its functions are
 // ours), at the chip's own addresses, which are mapped. A model answers reads, and names what the chip's
 // documents forbid.
-#ifndef BIOTAC_TEST_REGISTERS_H
-#define BIOTAC_TEST_REGISTERS_H
+#ifndef BIOTAC_SILICON_REGISTERS_H
+#define BIOTAC_SILICON_REGISTERS_H
 
 #include <setjmp.h>
 #include <stdbool.h>

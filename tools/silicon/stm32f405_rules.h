@@ -1,5 +1,5 @@
-#ifndef BIOTAC_TEST_STM32F405_RULES_H
-#define BIOTAC_TEST_STM32F405_RULES_H
+#ifndef BIOTAC_SILICON_STM32F405_RULES_H
+#define BIOTAC_SILICON_STM32F405_RULES_H
 
 #include <stdbool.h>
 #include <stdint.h>
