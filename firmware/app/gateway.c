@@ -226,8 +226,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.faults |= board.started_by;
+    bt_serial_query query[BT_MAX_FINGERS] = {0};
     for (uint8_t f = 0; f < can.fingers; f++) {
-        bt_properties_read(port, f, &gateway->session.info[f]);
+        bt_properties_read(port, f, &query[f], &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
         if (!gateway->session.info[f].present) {
             bt_sensors_doubt(&gateway->session, f);
@@ -246,6 +247,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;
     bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us,
                      bt_settings_get(&gateway->session.settings, BT_SETTING_SLOTS_BY_CORE) != 0);
+    memcpy(gateway->sampler.query, query, sizeof query); // how each of them answers
     port_alarm_at(port, start_us);
 }
 
@@ -303,12 +305,18 @@ static void close_round(bt_gateway *gateway)
         bt_kept_tares_note(gateway->kept, session);
     }
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
-        if (session->asked >> f & 1) {
+        if (gateway->queried >> f & 1) {
             bool answered = bt_serial_query_answer(&gateway->sampler.query[f], serial);
             bt_sensors_answer(session, f, answered ? serial : NULL);
         }
     }
     uint8_t ask = bt_sensors_to_ask(session);
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_serial_query *query = &gateway->sampler.query[f];
+        if (query->form == BT_FORM_HELD && !session->finger[f].present) {
+            query->form = BT_FORM_WORDS; // nobody is there for whom the others should wait
+        }
+    }
     if (ask != 0) {
         (void)bt_sampler_ask(&gateway->sampler, ask, gateway->round + ASK_AHEAD_ROUNDS);
     }
@@ -328,6 +336,7 @@ static void take_slot(bt_gateway *gateway, const bt_slot *slot)
         gateway->round = slot->round;
         gateway->round_open = true;
         session->asked = slot->asked;
+        gateway->queried = slot->queried;
     }
     uint16_t count[BT_MAX_FINGERS];
     for (int f = 0; f < BT_MAX_FINGERS; f++) {

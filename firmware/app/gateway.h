@@ -15,6 +15,7 @@ typedef struct {
     bt_map_flash map_flash;
     uint32_t round;    // being assembled
     uint32_t dma_late; // of the sampler, as last seen
+    uint8_t queried;   // bit mask of the fingers asked for their serial number in it
     bool round_open;
     atomic_bool in_use;              // as the latest round ended; for the interrupt
     uint32_t link_turns[PORT_LINKS]; // as of the last poll

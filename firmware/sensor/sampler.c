@@ -61,14 +61,15 @@ bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round)
 static void begin_round(bt_sampler *sampler)
 {
     uint8_t ask = atomic_load_explicit(&sampler->ask, memory_order_acquire);
-    sampler->current.asked = 0;
+    sampler->current.asked = sampler->current.queried = 0;
     if (ask == 0 || (int32_t)(sampler->current.round - sampler->ask_round) < 0) {
         return;
     }
-    sampler->current.asked = ask;
+    sampler->current.asked = sampler->current.queried = ask;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (ask >> f & 1) {
             bt_serial_query_begin(&sampler->query[f]);
+            sampler->current.asked |= sampler->query[f].form == BT_FORM_HELD ? sampler->fingers : 0;
         }
     }
     atomic_store_explicit(&sampler->ask, 0, memory_order_release);
@@ -97,6 +98,10 @@ static uint32_t command(bt_sampler *sampler)
     uint8_t mask = (uint8_t)(sampler->fingers & ~sampler->current.asked);
     sampler->commanded = true;
     sampler->current.t_us = port_now_us(sampler->port);
+    if (mask == 0) { // the bus is that of the finger that is asked
+        sampler->by_itself = false;
+        return sampler->current.t_us + SETTLE_TICKS_US;
+    }
     uint32_t busy_us = sampler->by_core ? 0 : port_spi_slot_begin(sampler->port, (uint16_t)(code << 8), mask);
     sampler->by_itself = busy_us != 0;
     if (sampler->by_itself) {
@@ -128,15 +133,15 @@ static bool read_sensors(bt_sampler *sampler)
         sampler->by_core = sampler->late_in_a_row == BT_SLOTS;
     }
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bool asked = sampler->current.asked >> f & 1;
-        if (sampler->by_itself && !asked) {
+        const bool queried = sampler->current.queried >> f & 1;
+        if (sampler->by_itself && !queried) {
             continue;
         }
         sampler->current.word[f] = 0;
-        if (!(sampler->fingers >> f & 1)) {
+        if (!(sampler->fingers >> f & 1) || (sampler->current.asked >> f & 1 && !queried)) {
             continue;
         }
-        if (asked) {
+        if (queried) {
             bt_serial_query_step(&sampler->query[f], sampler->port, f); // waits for its byte, but only rarely
         } else {
             sampler->current.word[f] = read_one(sampler, f);

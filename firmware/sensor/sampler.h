@@ -22,7 +22,8 @@ typedef struct {
     uint32_t round; // its number since start
     uint32_t t_us;  // when the sample command was sent
     uint8_t slot;
-    uint8_t asked; // bit mask of fingers asked for their serial number in this round, not sampled
+    uint8_t asked;   // bit mask of fingers not sampled in this round: one is asked for its serial number
+    uint8_t queried; // the one
     uint16_t word[BT_MAX_FINGERS];
 } bt_slot;
 
@@ -54,8 +55,9 @@ void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint3
 uint32_t bt_sampler_alarm(bt_sampler *sampler);
 
 // Main loop: ask these fingers for their serial numbers instead of sampling them, for one whole round: the
-// given one or the first after it. Their answers are in query once that round's slots have come. Returns
-// false if an earlier request is still pending.
+// given one or the first after it. Their answers are in query once that round's slots have come. Where one is
+// asked with its select held low, the bus is its own, and no finger is sampled in that round. Returns false
+// if an earlier request is still pending.
 bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round);
 
 // Main loop: take the oldest slot. False when there is none.

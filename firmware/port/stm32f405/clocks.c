@@ -24,8 +24,8 @@ AT_BOOT static void jump_to_loader(void)
     __asm volatile("msr msp, %0\n bx %1" ::"r"(SYSTEM_MEMORY[0]), "r"(SYSTEM_MEMORY[1]) : "memory");
 }
 
-// From whatever the ROM's loader leaves at Go: the PLL on and under the system clock, where PLLCFGR cannot be
-// written, and an interrupt let go that nobody here takes (AN2606; stm32duino #1653).
+// The ROM's loader leaves the PLL on at Go, where PLLCFGR cannot be written, and interrupts let go that
+// nobody here takes (AN2606; stm32duino #1653).
 AT_BOOT static bool clocks_as_after_reset(void)
 {
     for (uint32_t number = 0; number < INTERRUPTS_OF_CHIP; number += 32) {

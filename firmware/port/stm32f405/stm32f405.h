@@ -52,7 +52,7 @@ void spi_start(void);
 uint32_t spi_khz(void);
 
 // ---- uart.c
-bool uart_heard(void); // a byte, so far
+extern volatile bool uart_heard; // a byte, so far
 void uart_watch(void);
 bool uart_all_sent(void);
 

@@ -12,7 +12,7 @@
 RING(tx, 4096); // 40 ms of five fingers' frames
 RING(rx, 512);  // some commands
 static bool started;
-static volatile bool heard;
+volatile bool uart_heard;
 
 // In the interrupt, or with it held off. On silicon a byte at a time; QEMU's UART is always ready, but never
 // interrupts for it.
@@ -38,15 +38,10 @@ static void uart_interrupt(void)
     if (USART3_SR & (USART_SR_RXNE | USART_SR_ORE)) {
         uint8_t byte = (uint8_t)USART3_DR; // a damaged one, too: the CRC judges
         (void)ring_put(&rx, &byte, 1);
-        heard = true;
+        uart_heard = true;
         wake();
     }
     send();
-}
-
-bool uart_heard(void)
-{
-    return heard;
 }
 
 void uart_watch(void)

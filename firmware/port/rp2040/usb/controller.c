@@ -145,8 +145,7 @@ void usb_start(const char *serial)
 {
     usb_control_start(serial);
 #ifdef PIN_VBUS_SENSE
-    // Pulled up, so that a board whose pin is open has a host; a Pico's divider (5.6 and 10 kOhm) is
-    // stronger.
+    // An open pin is a host; a Pico's divider (5.6 and 10 kOhm) is stronger than the pull.
     PADS_BANK0_GPIO(PIN_VBUS_SENSE) = PADS_IE | PADS_SCHMITT | PADS_PUE;
 #endif
     usb_watch();
