@@ -168,12 +168,27 @@ static void load_settings(bt_gateway *gateway)
 
 // A slower UART is not used: one FRAME would take longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
+#define DOUBTFUL_BYTES        64 // more than the frame with which a host begins
 
 static void start_uart(const bt_gateway *gateway)
 {
     const bt_settings *settings = &gateway->session.settings;
     int32_t bits_per_s = bt_settings_get(settings, BT_SETTING_UART_BITS_PER_S);
-    port_link_uart(gateway->port, bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s);
+    const bool none = bits_per_s < UART_LEAST_BITS_PER_S || gateway->uart_by_default;
+    port_link_uart(gateway->port, none ? 0 : (uint32_t)bits_per_s);
+}
+
+// A rate may have been saved by mistake, on a board that has no other link. So it is believed after a good
+// frame; until one has come, what is no frame of a host's has the other rate tried: the port's default, or
+// this one again.
+static void doubt_uart(bt_gateway *gateway, size_t bytes)
+{
+    gateway->doubtful_bytes += (uint32_t)bytes;
+    if (gateway->session.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
+        gateway->doubtful_bytes = 0;
+        gateway->uart_by_default = !gateway->uart_by_default;
+        start_uart(gateway);
+    }
 }
 
 void bt_gateway_init(bt_gateway *gateway, bt_port *port)
@@ -226,9 +241,8 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.faults |= board.started_by;
-    bt_serial_query query[BT_MAX_FINGERS] = {0};
     for (uint8_t f = 0; f < can.fingers; f++) {
-        bt_properties_read(port, f, &query[f], &gateway->session.info[f]);
+        bt_properties_read(port, f, &gateway->sampler.query[f], &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
         if (!gateway->session.info[f].present) {
             bt_sensors_doubt(&gateway->session, f);
@@ -247,7 +261,6 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;
     bt_sampler_start(&gateway->sampler, port, (uint8_t)((1u << can.fingers) - 1), start_us,
                      bt_settings_get(&gateway->session.settings, BT_SETTING_SLOTS_BY_CORE) != 0);
-    memcpy(gateway->sampler.query, query, sizeof query); // how each of them answers
     port_alarm_at(port, start_us);
 }
 
@@ -308,15 +321,13 @@ static void close_round(bt_gateway *gateway)
         if (gateway->queried >> f & 1) {
             bool answered = bt_serial_query_answer(&gateway->sampler.query[f], serial);
             bt_sensors_answer(session, f, answered ? serial : NULL);
+            if (!session->finger[f].present) {
+                gateway->sampler.query[f].form =
+                    BT_FORM_WORDS; // nobody for whom the others should give a round up
+            }
         }
     }
     uint8_t ask = bt_sensors_to_ask(session);
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_serial_query *query = &gateway->sampler.query[f];
-        if (query->form == BT_FORM_HELD && !session->finger[f].present) {
-            query->form = BT_FORM_WORDS; // nobody is there for whom the others should wait
-        }
-    }
     if (ask != 0) {
         (void)bt_sampler_ask(&gateway->sampler, ask, gateway->round + ASK_AHEAD_ROUNDS);
     }
@@ -372,6 +383,7 @@ static void read_link(bt_gateway *gateway, unsigned link)
     const size_t n = port_link_read(gateway->port, link, bytes, sizeof bytes);
     if (n > 0) {
         bt_session_receive(&gateway->session, link, bytes, n, port_now_us(gateway->port));
+        doubt_uart(gateway, n);
     }
 }
 

@@ -19,6 +19,8 @@ typedef struct {
     bool round_open;
     atomic_bool in_use;              // as the latest round ended; for the interrupt
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
+    uint32_t doubtful_bytes;         // that came before a good frame, since the UART's rate is what it is
+    bool uart_by_default;            // its rate is the port's, not the saved one
     bt_kept_tares *kept;             // NULL: the board has no memory for them
 } bt_gateway;
 

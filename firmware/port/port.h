@@ -64,8 +64,8 @@ size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 // is started). One that was closed and opened between two calls shows by this.
 uint32_t port_link_turns(bt_port *port, unsigned link);
 
-// Call once: start the UART, in bits per second. 0 is none or, on a board without another link, its own
-// default: such a board is never mute. Does nothing on a board without a UART.
+// Start the UART, or go on at another rate, in bits per second. 0 is none or, on a board without another
+// link, its own default: such a board is never mute. Does nothing on a board without a UART.
 void port_link_uart(bt_port *port, uint32_t bits_per_s);
 
 // True once after a host set link 0 to 1200 baud and closed it, the customary way to ask for the bootloader.

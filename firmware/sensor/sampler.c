@@ -1,5 +1,6 @@
 #include "sampler.h"
 
+#include <stddef.h>
 #include <string.h>
 
 // port_now_us() truncates, so a minimum time needs one us more.
@@ -10,7 +11,7 @@ _Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
 
 void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us, bool by_core)
 {
-    memset(sampler, 0, sizeof *sampler);
+    memset(sampler, 0, offsetof(bt_sampler, query));
     sampler->port = port;
     sampler->fingers = fingers;
     sampler->slot_start_us = start_us;

@@ -39,15 +39,16 @@ typedef struct {
     uint32_t fraction;  // of slot_start_us, in 1/BT_SLOT_HZ us
     atomic_uchar ask;   // fingers to ask; set by the main loop when 0, taken by the interrupt
     uint32_t ask_round; // from this round on; written before ask
-    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole once their round is
     bt_slot ring[BT_SLOT_RING];
-    atomic_uchar head;         // written by the interrupt only
-    atomic_uchar tail;         // written by the main loop only
-    _Atomic uint32_t late;     // slots lost
-    _Atomic uint32_t dma_late; // slots lost because hardware was late with a word
+    atomic_uchar head;                     // written by the interrupt only
+    atomic_uchar tail;                     // written by the main loop only
+    _Atomic uint32_t late;                 // slots lost
+    _Atomic uint32_t dma_late;             // slots lost because hardware was late with a word
+    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole once their round is
 } bt_sampler;
 
-// The first slot begins at start_us. The caller arms the alarm for start_us. by_core: word by word.
+// The first slot begins at start_us; what query knows of the sensors stays. The caller arms the alarm for
+// start_us. by_core: word by word.
 void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us, bool by_core);
 
 // Interrupt context: do what is due. Returns when to be called next; `commanded` is false when a slot is

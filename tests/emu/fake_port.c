@@ -156,6 +156,7 @@ bool port_link_touched(bt_port *port)
 
 void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
+    fake.bits_per_s = bits_per_s;
 }
 
 bool port_flash_erase(bt_port *port, uint32_t sector_offset)

@@ -35,6 +35,7 @@ typedef struct {
 
     uint32_t link_turns; // odd: open
     bool touched;        // at 1200 baud
+    uint32_t bits_per_s; // of the UART; 0: the port's default
 
     _Alignas(4) uint8_t kept[BT_KEPT_BYTES];
     failing_flash flash; // of what is kept

@@ -77,6 +77,33 @@ static uint8_t calibrate(uint8_t finger, int32_t gain_nn, bool forced)
     return gateway.session.calibration_state[finger];
 }
 
+static void host_at_another_rate(int bytes)
+{
+    for (int k = 0; k < bytes; k++) {
+        fake_host_sends((const uint8_t[]){(uint8_t)(k * 37)}, 1);
+        bt_gateway_poll(&gateway);
+    }
+}
+
+// Where the UART is the only link, a host at the default rate would never get in again.
+TEST(a_saved_uart_rate_is_believed_after_a_good_frame)
+{
+    boot(START_NS);
+    (void)plain(BT_STOP_ID);
+    set(BT_SETTING_UART_BITS_PER_S, 9600);
+    (void)plain(BT_SAVE_SETTINGS_ID);
+    power_cycle();
+    assert_int_equal(fake.bits_per_s, 9600);
+    host_at_another_rate(64);
+    assert_int_equal(fake.bits_per_s, 0);
+    host_at_another_rate(64);
+    assert_int_equal(fake.bits_per_s, 9600);
+    (void)ask(BT_STOP_ID, NULL, 0); // ends the damaged one
+    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    host_at_another_rate(1000);
+    assert_int_equal(fake.bits_per_s, 9600);
+}
+
 TEST(saved_calibrations_hold_for_their_own_sensors_alone)
 {
     const bt_session *session = &gateway.session;
