@@ -178,19 +178,6 @@ static void start_uart(const bt_gateway *gateway)
     port_link_uart(gateway->port, none ? 0 : (uint32_t)bits_per_s);
 }
 
-// A rate may have been saved by mistake, on a board that has no other link. So it is believed after a good
-// frame; until one has come, what is no frame of a host's has the other rate tried: the port's default, or
-// this one again.
-static void doubt_uart(bt_gateway *gateway, size_t bytes)
-{
-    gateway->doubtful_bytes += (uint32_t)bytes;
-    if (gateway->session.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
-        gateway->doubtful_bytes = 0;
-        gateway->uart_by_default = !gateway->uart_by_default;
-        start_uart(gateway);
-    }
-}
-
 void bt_gateway_init(bt_gateway *gateway, bt_port *port)
 {
     const port_abilities can = port_describe(port);
@@ -383,7 +370,14 @@ static void read_link(bt_gateway *gateway, unsigned link)
     const size_t n = port_link_read(gateway->port, link, bytes, sizeof bytes);
     if (n > 0) {
         bt_session_receive(&gateway->session, link, bytes, n, port_now_us(gateway->port));
-        doubt_uart(gateway, n);
+        // A rate may have been saved by mistake, on a board that has no other link: until a good frame has
+        // come, what is none has the port's default tried, and this one again.
+        gateway->doubtful_bytes += (uint32_t)n;
+        if (gateway->session.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
+            gateway->doubtful_bytes = 0;
+            gateway->uart_by_default = !gateway->uart_by_default;
+            start_uart(gateway);
+        }
     }
 }
 

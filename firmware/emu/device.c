@@ -45,11 +45,7 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
         memset(device->serial, 0, sizeof device->serial);
         memcpy(device->serial, serial, bytes < sizeof device->serial ? bytes : sizeof device->serial - 1);
     }
-    const char kind = serial[bytes] == '\0' ? '\0' : serial[bytes + 1];
-    device->kind = kind == 'w'   ? BT_EMU_WORDS
-                   : kind == 'h' ? BT_EMU_HELD
-                   : kind == 'b' ? BT_EMU_BYTES
-                                 : BT_EMU_ANY;
+    device->kind = (uint8_t)(serial[bytes] == '\0' ? BT_EMU_ANY : serial[bytes + 1]);
 }
 
 // Unplugged and so without power: what was asked for is forgotten.

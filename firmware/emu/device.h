@@ -39,13 +39,12 @@
 // bt_emu_fault.
 typedef uint16_t (*bt_emu_source)(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
-// How a property's bytes come, of which nobody has seen a real sensor do one and not the others
-// (properties.h). A suffix of the serial number chooses: "BT.../words".
+// How a property's bytes come (properties.h), by the first letter of a suffix: "BT.../words".
 enum bt_emu_kind {
-    BT_EMU_ANY,   // from select to select, one or several in each
-    BT_EMU_WORDS, // a property ends when the chip select rises within a word
-    BT_EMU_HELD,  // it ends when the chip select rises
-    BT_EMU_BYTES, // one a select; what follows is zeros
+    BT_EMU_ANY,         // from select to select, one or several in each
+    BT_EMU_WORDS = 'w', // a property ends when the chip select rises within a word
+    BT_EMU_HELD = 'h',  // it ends when the chip select rises
+    BT_EMU_BYTES = 'b', // one a select; what follows is zeros
 };
 
 #define BT_EMU_PROPERTY_BYTES (2 * BT_SLOTS) // the list of channels

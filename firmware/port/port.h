@@ -101,8 +101,8 @@ typedef struct {
     ((port_facts){.usb_frame = UINT16_MAX, .die_centi_c = PORT_NOT_MEASURED, .bus_khz = 4400})
 port_facts port_measure(bt_port *port);
 
-// From the next slot on, clock SPI at the fastest rate there is up to this one, but not below the usual; 0:
-// the usual one. Does nothing where the rate is fixed.
+// From the next slot on, clock SPI at the fastest rate there is up to this one, or the slowest, some 1 MHz;
+// 0: the usual one. Does nothing where the rate is fixed.
 void port_spi_rate(bt_port *port, uint32_t khz);
 
 // ---- identity -------------------------------------------------------------------------------

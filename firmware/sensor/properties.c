@@ -13,7 +13,9 @@ _Static_assert(4 + VERSION_BYTES / 2 + 3 * BT_SERIAL_CHARS / 2 <= BT_SLOTS
                    && 3 + VERSION_BYTES + 2 * BT_SERIAL_CHARS <= BT_SLOTS,
                "one round must suffice to ask in each form");
 
-bool bt_property_step(bt_property *property, bt_port *port, uint8_t finger)
+// Sends the command, or reads what is next: a word, a byte or, with the select held, two. True once all are
+// there.
+static bool step(bt_property *property, bt_port *port, uint8_t finger)
 {
     port_spi_select(port, (uint8_t)(1u << finger));
     if (!property->asked) {
@@ -54,7 +56,7 @@ void bt_serial_query_begin(bt_serial_query *query)
 
 void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger)
 {
-    if (query->whole < READS_IN(query->form) && bt_property_step(&query->read[query->whole], port, finger)) {
+    if (query->whole < READS_IN(query->form) && step(&query->read[query->whole], port, finger)) {
         query->whole++;
     }
 }
@@ -81,26 +83,21 @@ static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
            && (uint8_t)(serial[7] - '0') < 10;
 }
 
-static void take_readings(bt_serial_query *query)
-{
-    query->driven = (uint8_t)(query->read[1].got[0] + 1) > 1; // neither 0x00 nor 0xFF
-    for (int k = 1; k < query->whole; k++) {
-        uint8_t *got = query->read[k].got;
-        if (trim_serial(got)) {
-            bool same = memcmp(query->serial, got, BT_SERIAL_CHARS) == 0;
-            memcpy(query->serial, got, BT_SERIAL_CHARS);
-            query->readings = (uint8_t)(same ? query->readings + 1 : 1);
-            query->forms = (uint8_t)((same ? query->forms : 0) | 1u << query->form);
-        }
-    }
-}
-
 #define PATIENCE    2 // rounds that a form may fail in which the sensor has answered
 #define HELD_ROUNDS 6 // with the select held low a round costs the other fingers theirs
 
 bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
 {
-    take_readings(query);
+    query->driven = (uint8_t)(query->read[1].got[0] + 1) > 1; // neither 0x00 nor 0xFF
+    for (int k = 1; k < query->whole; k++) {
+        uint8_t *got = query->read[k].got;
+        if (trim_serial(got)) {
+            const bool same = memcmp(query->serial, got, BT_SERIAL_CHARS) == 0;
+            memcpy(query->serial, got, BT_SERIAL_CHARS);
+            query->readings = (uint8_t)(same ? query->readings + 1 : 1);
+            query->forms = (uint8_t)((same ? query->forms : 0) | 1u << query->form);
+        }
+    }
     const bool sure = query->readings >= 3 || query->forms & (query->forms - 1);
     if (sure) {
         query->readings = query->forms = query->held = 0;
@@ -136,7 +133,7 @@ static bool read_alike(bt_port *port, uint8_t finger, uint8_t form, uint8_t sele
         for (int n = 0; n < 2; n++) {
             read[n] = begin(selector, bytes, form);
             for (bool whole = false; !whole; pause(port, &read[n])) {
-                whole = bt_property_step(&read[n], port, finger);
+                whole = step(&read[n], port, finger);
             }
         }
         const uint8_t *got = read[0].got;

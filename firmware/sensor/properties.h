@@ -29,12 +29,6 @@ typedef struct {
     uint8_t got[BT_SERIAL_CHARS]; // no property that we read is longer
 } bt_property;
 
-// Sends the command, or reads what is next: a word, a byte or, with the select held, two. Returns true once
-// all bytes are there. Wait BT_SETTLE_US before the first and BT_PROPERTY_GAP_US before each other one.
-// BT_FORM_HELD leaves the chip select low from the first byte to the last: nothing else may be on the bus
-// meanwhile.
-bool bt_property_step(bt_property *property, bt_port *port, uint8_t finger);
-
 // Asks for the serial number in at most as many steps as a round has slots, which the sampler's interrupt
 // takes instead of samples: three times, single bytes twice. What is known of the sensor stays from
 // round to round; all zeros: nothing.

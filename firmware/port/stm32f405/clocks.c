@@ -24,32 +24,25 @@ AT_BOOT static void jump_to_loader(void)
     __asm volatile("msr msp, %0\n bx %1" ::"r"(SYSTEM_MEMORY[0]), "r"(SYSTEM_MEMORY[1]) : "memory");
 }
 
-// The ROM's loader leaves the PLL on at Go, where PLLCFGR cannot be written, and interrupts let go that
-// nobody here takes (AN2606; stm32duino #1653).
-AT_BOOT static bool clocks_as_after_reset(void)
-{
-    for (uint32_t number = 0; number < INTERRUPTS_OF_CHIP; number += 32) {
-        NVIC_ICER(number) = UINT32_MAX;
-    }
-    RCC_CR |= RCC_CR_HSION;
-    if (!wait_for(&RCC_CR, RCC_CR_HSIRDY, RCC_CR_HSIRDY, WAIT_CLOCKS_TURNS)) {
-        return false;
-    }
-    RCC_CFGR = 0;
-    if (!wait_for(&RCC_CFGR, RCC_CFGR_SWS, 0, WAIT_CLOCKS_TURNS)) {
-        return false;
-    }
-    RCC_CR &= ~RCC_CR_PLLON;
-    return wait_for(&RCC_CR, RCC_CR_PLLRDY, 0, WAIT_CLOCKS_TURNS);
-}
-
 AT_BOOT bool clocks_start(void)
 {
     if (asked_for == THE_LOADER) {
         jump_to_loader();
     }
-    if (!clocks_as_after_reset()) {
+    // The ROM's loader leaves the PLL on at Go, where PLLCFGR cannot be written, and interrupts let go that
+    // nobody here takes (AN2606; stm32duino #1653).
+    for (uint32_t number = 0; number < INTERRUPTS_OF_CHIP; number += 32) {
+        NVIC_ICER(number) = UINT32_MAX;
+    }
+    RCC_CR |= RCC_CR_HSION;
+    if (!wait_for(&RCC_CR, RCC_CR_HSIRDY, RCC_CR_HSIRDY, WAIT_CLOCKS_TURNS)) {
         return CLOCKS_ARE_NOT_MODELLED;
+    }
+    RCC_CFGR = 0;
+    const bool on_hsi = wait_for(&RCC_CFGR, RCC_CFGR_SWS, 0, WAIT_CLOCKS_TURNS);
+    RCC_CR &= ~RCC_CR_PLLON;
+    if (!on_hsi || !wait_for(&RCC_CR, RCC_CR_PLLRDY, 0, WAIT_CLOCKS_TURNS)) {
+        return false;
     }
     clock_on(&RCC_APB1ENR, RCC_APB1ENR_PWR);
     PWR_CR |= PWR_CR_VOS;

@@ -23,8 +23,7 @@ void spi_start(void)
     }
     pin_function(PORT_SPI, PIN_SCK, SPI_FUNCTION, PULL_NONE);
     pin_function(PORT_SPI, PIN_MOSI, SPI_FUNCTION, PULL_NONE);
-    // The receiver samples by SCK as its pad has it: on a slow pad the last bit of a word is the one of the
-    // word before (ES0182, corrupted last bit, in master mode with delayed SCK feedback).
+    // The receiver samples by SCK as its pad has it: on a slow one a word's last bit is old (ES0182 2.5.2).
     GPIO_OSPEEDR(PORT_SPI) |= 3u << 2 * PIN_SCK | 3u << 2 * PIN_MOSI;
     // Where no sensor drives the line, words read 0x0000, which the driver takes for absent.
     pin_function(PORT_SPI, PIN_MISO, SPI_FUNCTION, PULL_DOWN);

@@ -8,8 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// A block hears some cycles after its clock is on (ES0182, delay after an RCC peripheral clock enabling),
-// which the read takes.
+// A block hears some cycles after its clock is on (ES0182), which the read takes.
 static inline void clock_on(volatile uint32_t *enable, uint32_t blocks)
 {
     *enable |= blocks;
