@@ -76,6 +76,12 @@ TEST(it_starts_from_what_the_loader_left)
     }
 }
 
+TEST(tares_outlive_a_hang_of_it)
+{
+    start(false);
+    assert_non_null(port_identify(ONLY_BOARD).kept);
+}
+
 TEST(it_leaves_for_the_loader_as_out_of_reset)
 {
     start(false);
