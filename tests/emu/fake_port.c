@@ -121,7 +121,6 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     uint8_t miso = bt_emu_bus_transfer8(&fake.bus, mosi, fake.now_ns);
     fake.now_ns += TRANSFER_NS / 2;
-    fake.bytes++;
     return miso;
 }
 

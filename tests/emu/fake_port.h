@@ -30,7 +30,6 @@ typedef struct {
     // What the bus saw.
     void (*on_command)(const sent_command *command); // may be NULL
     uint64_t shortest_gap_ns;                        // between a chip select's rise and the next one's fall
-    uint32_t bytes;                                  // that came one by one
     uint32_t selected_reads;                         // reads with other than one chip select low
 
     uint32_t link_turns; // odd: open

@@ -41,15 +41,20 @@ static void assert_all_are_known(const bt_msg_sensor_info *info)
     assert_int_equal(info->sampling_hz, 4400);
 }
 
+// In whatever way they come. Plugged in later: tests/hil/test_serials.py.
 TEST(all_are_read_with_gaps_between_the_bytes)
 {
-    bt_msg_sensor_info info;
-    read_all(0, &info);
-    assert_int_equal(info.present, 1);
-    assert_all_are_known(&info);
-    assert_int_equal(fake.bytes, 0); // by words
-    assert_true(fake.shortest_gap_ns >= 10000);
-    assert_int_equal(fake.bus.sensor[0].early_reads, 0);
+    static const enum bt_emu_kind kinds[] = {BT_EMU_ANY, BT_EMU_WORDS, BT_EMU_HELD, BT_EMU_BYTES};
+    for (unsigned k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+        bt_msg_sensor_info info;
+        (void)new_bus(NULL);
+        fake.bus.sensor[0].kind = kinds[k];
+        read_all(0, &info);
+        assert_int_equal(info.present, 1);
+        assert_all_are_known(&info);
+        assert_true(fake.shortest_gap_ns >= 10000);
+        assert_int_equal(fake.bus.sensor[0].early_reads, 0);
+    }
 }
 
 static uint64_t flipped;
@@ -95,60 +100,6 @@ TEST(a_line_that_is_stuck_is_nobody)
     static const uint8_t none[16];
     assert_int_equal(info.present, 0);
     assert_memory_equal(info.serial, none, 16);
-}
-
-static const enum bt_emu_kind kinds[] = {BT_EMU_ANY, BT_EMU_WORDS, BT_EMU_HELD, BT_EMU_BYTES};
-
-// Whatever way its properties come out, at start or plugged in later.
-TEST(a_sensor_of_each_kind_is_read)
-{
-    for (unsigned k = 0; k < 4; k++) {
-        bt_msg_sensor_info info;
-        (void)new_bus(NULL);
-        fake.bus.sensor[0].kind = kinds[k];
-        read_all(0, &info);
-        assert_int_equal(info.present, 1);
-        assert_all_are_known(&info);
-        assert_int_equal(fake.bus.sensor[0].early_reads, 0);
-    }
-}
-
-static void plug_all(bool in, enum bt_emu_kind kind)
-{
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        fake.bus.sensor[f].present = in;
-        fake.bus.sensor[f].kind = kind;
-        fake.bus.sensor[f].serial[15] = 'X'; // another one
-    }
-}
-
-// Within 3 s, and each has lost no more rounds than it may until then; afterwards a finger that is asked
-// again loses none for its form.
-TEST(five_sensors_of_each_kind_are_told_while_others_are_sampled)
-{
-    static const int may_lose[] = {1, 1, 10, 10};
-    for (unsigned k = 0; k < 4; k++) {
-        boot(START_NS);
-        run_rounds(30);
-        plug_all(false, BT_EMU_ANY);
-        run_rounds(30);
-        int before[BT_MAX_FINGERS], rounds = 0;
-        plug_all(true, kinds[k]);
-        for (int f = 0; f < BT_MAX_FINGERS; f++) {
-            before[f] = host.frames[f];
-        }
-        for (; gateway.session.unsure != 0 && rounds < 300; rounds++) {
-            run_rounds(1);
-        }
-        run_rounds(5);
-        for (int f = 0; f < BT_MAX_FINGERS; f++) {
-            const int lost = rounds + 5 - (host.frames[f] - before[f]);
-            assert_in_range(lost, 0, may_lose[k]);
-            assert_int_equal(gateway.session.info[f].serial[15], 'X');
-        }
-        assert_int_equal(gateway.session.unsure, 0);
-        assert_int_equal(gateway.session.slots_late, 0);
-    }
 }
 
 // A BioTac SP has 24 electrodes, elsewhere: its counts come, and no force of them is ever sure.

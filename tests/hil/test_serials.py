@@ -12,8 +12,7 @@ from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 
 FINGERS, BEGIN, END = 5, 30, 40
-#: Rounds that a finger may lose until its form is known, beside those in which nobody is there. Of the first two kinds
-#: those that it is asked in and that its connector's bounce costs.
+#: Rounds that a finger may lose until it is known: one that it is asked in, and one in which it came.
 MAY_LOSE = {"": 2, "/words": 2, "/held": 10, "/bytes": 10}
 
 

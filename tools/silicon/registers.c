@@ -78,6 +78,17 @@ void asm_seen(const char *text)
     on_asm(text);
 }
 
+bool broke(const char *words)
+{
+    registers_settle();
+    const bool as_said = strstr(broken, words) != NULL && (words[0] != '\0' || broken[0] == '\0');
+    if (!as_said) {
+        (void)fprintf(stderr, "expected \"%s\" to be broken, seen \"%s\"\n", words, broken);
+    }
+    broken[0] = '\0';
+    return as_said;
+}
+
 // ---- what the instrumented code calls before each access ------------------------------------------------
 
 void __tsan_init(void);

@@ -25,6 +25,8 @@ extern char broken[2048];           // the rules that were broken, with their so
 extern jmp_buf registers_left;      // where a reset or a jump out of the image leads
 extern uint32_t registers_reset_at; // the register that resets the chip when written
 void break_rule(const char *rule);
+// Whether a rule with these words was broken, or, with none, no rule; says what was, and forgets it.
+bool broke(const char *words);
 
 // What an assembler statement of the port says; -include asm_seen.h makes each of them this call.
 void asm_seen(const char *text);
