@@ -6,89 +6,75 @@
 #include <stdint.h>
 
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
-#define BT_WIRE_MAJOR      1
-#define BT_WIRE_MINOR      0
-#define BT_SCHEMA_HASH     0xB3FEBD21u
+#define BT_WIRE_MAJOR 1
+#define BT_WIRE_MINOR 0
+#define BT_SCHEMA_HASH 0xB3FEBD21u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
-#define BT_INVALID_COUNT   0xFFFF
-#define BT_INVALID_I16     INT16_MIN
-#define BT_INVALID_I32     INT32_MIN
+#define BT_INVALID_COUNT 0xFFFF
+#define BT_INVALID_I16 INT16_MIN
+#define BT_INVALID_I32 INT32_MIN
 
 // Why a command was refused.
 enum bt_error {
-    BT_ERROR_OK = 0,              // success
+    BT_ERROR_OK = 0, // success
     BT_ERROR_UNKNOWN_COMMAND = 1, // this firmware does not know the command; update it
-    BT_ERROR_BAD_LENGTH = 2,      // the payload has the wrong length for this command
+    BT_ERROR_BAD_LENGTH = 2, // the payload has the wrong length for this command
     BT_ERROR_UNKNOWN_SETTING = 3, // no setting has this id
-    BT_ERROR_OUT_OF_RANGE = 4,    // a value is outside the range given in MESSAGES.md
-    BT_ERROR_NO_SUCH_FINGER = 5,  // the finger index is not 0 to 4, or no sensor answers there
-    BT_ERROR_BUSY = 6,            // not possible while streaming: send STOP first
-    BT_ERROR_NOT_STILL = 7,       // the signals are moving too much to tare: release the finger and try again
-    BT_ERROR_RAILED = 8,          // more than two electrodes are railed or missing: check the sensor
-    BT_ERROR_NOT_HERE = 9,        // this kind of board cannot do that
-    BT_ERROR_NOT_STORED = 10,     // not written to flash; what was stored before is intact
-    BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send
-                                // no serial number to force it
-    BT_ERROR_NOT_BEGUN = 12,    // no upload of this finger's map is in progress: send BEGIN_MAP; another
-                                // BEGIN_MAP, STOP or a closed port ends an upload
-    BT_ERROR_NOT_WHOLE = 13,    // data are missing or do not match the CRC-32: upload them again
-    BT_ERROR_LINK_BUSY = 14,    // the host at the board's other port streams with a keep-alive, or holds a
-                                // finger: end it there, wait until it is silent, or take the link over:
-                                // --take-link of biotac flash and doctor, hand.take_link()
+    BT_ERROR_OUT_OF_RANGE = 4, // a value is outside the range given in MESSAGES.md
+    BT_ERROR_NO_SUCH_FINGER = 5, // the finger index is not 0 to 4, or no sensor answers there
+    BT_ERROR_BUSY = 6, // not possible while streaming: send STOP first
+    BT_ERROR_NOT_STILL = 7, // the signals are moving too much to tare: release the finger and try again
+    BT_ERROR_RAILED = 8, // more than two electrodes are railed or missing: check the sensor
+    BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
+    BT_ERROR_NOT_STORED = 10, // not written to flash; what was stored before is intact
+    BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
+    BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
+    BT_ERROR_NOT_WHOLE = 13, // data are missing or do not match the CRC-32: upload them again
+    BT_ERROR_LINK_BUSY = 14, // the host at the board's other port streams with a keep-alive, or holds a finger: end it there, wait until it is silent, or take the link over: --take-link of biotac flash and doctor, hand.take_link()
 };
 
 // State of a finger's tare machine (SPEC.md, Tare).
 enum bt_tare_state {
     BT_TARE_STATE_INIT = 0, // no tare yet: waiting for still signals
     BT_TARE_STATE_REST = 1, // tared and untouched; the tare follows slow drift
-    BT_TARE_STATE_CONTACT =
-        2, // touched; the tare follows only temperature and drift common to all electrodes
-    BT_TARE_STATE_FAULT =
-        3, // more than two electrodes railed or missing; the tare is frozen, and no new one is taken
-    BT_TARE_STATE_DOUBT = 4, // still, and either held lightly or with residue of a press in the skin; the
-                             // tare stays, and a new contact is detected
+    BT_TARE_STATE_CONTACT = 2, // touched; the tare follows only temperature and drift common to all electrodes
+    BT_TARE_STATE_FAULT = 3, // more than two electrodes railed or missing; the tare is frozen, and no new one is taken
+    BT_TARE_STATE_DOUBT = 4, // still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
 };
 
 // What shows that an electrode, or a whole sensor, is broken.
 enum bt_sensor_fault {
-    BT_SENSOR_FAULT_NONE = 0,    // nothing
-    BT_SENSOR_FAULT_RAILED = 1,  // it reads 0 or at least 4090: shorted or open
+    BT_SENSOR_FAULT_NONE = 0, // nothing
+    BT_SENSOR_FAULT_RAILED = 1, // it reads 0 or at least 4090: shorted or open
     BT_SENSOR_FAULT_MISSING = 2, // no good word comes from it
-    BT_SENSOR_FAULT_ALONE = 3,   // it moved while the rest of the skin did not: it floats, drifts or is loose
-    BT_SENSOR_FAULT_STUCK = 4,   // it repeats one count while the skin moves
-    BT_SENSOR_FAULT_FROZEN =
-        5, // every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
-    BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure:
-                                  // supply or reference; the tare is wrong until the next one
-    BT_SENSOR_FAULT_NOISY =
-        7, // it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
-    BT_SENSOR_FAULT_EXCHANGED = 8, // its words leapt as no touch and no warmth moves them: another channel's,
-                                   // or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
+    BT_SENSOR_FAULT_ALONE = 3, // it moved while the rest of the skin did not: it floats, drifts or is loose
+    BT_SENSOR_FAULT_STUCK = 4, // it repeats one count while the skin moves
+    BT_SENSOR_FAULT_FROZEN = 5, // every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
+    BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
+    BT_SENSOR_FAULT_NOISY = 7, // it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
+    BT_SENSOR_FAULT_EXCHANGED = 8, // its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
 };
 
 // The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE.
 enum bt_tare_reason {
-    BT_TARE_REASON_NONE = 0,      // never tared
-    BT_TARE_REASON_START = 1,     // first still frames after power-up or plug-in
-    BT_TARE_REASON_RELEASE = 2,   // contact ended: the signals returned to the tare
-    BT_TARE_REASON_RESIDUE = 3,   // contact ended; the residue that it left in the skin is tared out
+    BT_TARE_REASON_NONE = 0, // never tared
+    BT_TARE_REASON_START = 1, // first still frames after power-up or plug-in
+    BT_TARE_REASON_RELEASE = 2, // contact ended: the signals returned to the tare
+    BT_TARE_REASON_RESIDUE = 3, // contact ended; the residue that it left in the skin is tared out
     BT_TARE_REASON_ROLL_BACK = 4, // contact began: back to a tare from at least 1.2 s before, plus drift
-    BT_TARE_REASON_HOST_NOW = 5,  // TARE_NOW command
-    BT_TARE_REASON_HOST_SET = 6,  // TARE_SET command
-    BT_TARE_REASON_SHIFT =
-        7, // not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
-    BT_TARE_REASON_INVERTED =
-        9, // pressure far below showed that the tare was taken of a hold: untared until still
-    BT_TARE_REASON_HOST_HOLD = 10,    // HOLD command: the tare is unchanged, and kept
+    BT_TARE_REASON_HOST_NOW = 5, // TARE_NOW command
+    BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
+    BT_TARE_REASON_SHIFT = 7, // not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
+    BT_TARE_REASON_INVERTED = 9, // pressure far below showed that the tare was taken of a hold: untared until still
+    BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is unchanged, and kept
     BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is unchanged until the signals are still
-    BT_TARE_REASON_HOLD_LAPSED =
-        12, // HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
+    BT_TARE_REASON_HOLD_LAPSED = 12, // HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
     BT_TARE_REASON_RESTORED = 13, // the tare from before a reset of the board, with HELD as it was
 };
 
 // Weight of an electrode's signal e in the point of contact (Lin Eq 1).
 enum bt_poc_weights {
-    BT_POC_WEIGHTS_ABS_N2 = 0,      // e^2, as in the paper
+    BT_POC_WEIGHTS_ABS_N2 = 0, // e^2, as in the paper
     BT_POC_WEIGHTS_COMPRESS_N1 = 1, // max(-e, 0)
     BT_POC_WEIGHTS_COMPRESS_N2 = 2, // min(e, 0)^2
 };
@@ -96,499 +82,413 @@ enum bt_poc_weights {
 // Where the force of a finger without a wrench map comes from.
 enum bt_force_model {
     BT_FORCE_MODEL_LIN = 0, // Lin's three gains, force_gain_*_nn
-    BT_FORCE_MODEL_POPULATION =
-        1, // the population map, trained on other fingers (host/docs/guides/population.md), if all three
-           // force gains are defaults; otherwise LIN
+    BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/guides/population.md), if all three force gains are defaults; otherwise LIN
 };
 
 // What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody.
 enum bt_board {
-    BT_BOARD_POSIX_SIM = 1,   // a process on a pty with emulated sensors
-    BT_BOARD_PICO = 2,        // Raspberry Pi Pico (RP2040)
-    BT_BOARD_LINUX_SBC = 3,   // a Linux computer with the sensors on its own SPI bus (spidev)
-    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board):
-                              // it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
-    BT_BOARD_STM32F405 = 5,   // STM32F405 with a UART to the host (firmware/boards/f405)
-    BT_BOARD_PICO_W = 6,      // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
+    BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
+    BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
+    BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
+    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
+    BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     BT_BOARD_PRIVATE = 32768, // the first of the private ids
 };
 
 // Faults of an emulated sensor. On a tape, these codes stand in place of counts.
 enum bt_emu_fault {
-    BT_EMU_FAULT_NONE = 0,           // no fault
-    BT_EMU_FAULT_SWAPPED = 65529,    // unplugged; the sensor plugged in afterwards has another serial number
-    BT_EMU_FAULT_UNPLUGGED = 65530,  // no sensor or no power: MISO is not driven; afterwards the sensor sends
-                                     // zeros until a property is read
-    BT_EMU_FAULT_TOO_EARLY = 65531,  // it answers as if read before its 50 us had passed
+    BT_EMU_FAULT_NONE = 0, // no fault
+    BT_EMU_FAULT_SWAPPED = 65529, // unplugged; the sensor plugged in afterwards has another serial number
+    BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
+    BT_EMU_FAULT_TOO_EARLY = 65531, // it answers as if read before its 50 us had passed
     BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO is always high
-    BT_EMU_FAULT_STUCK_LOW = 65533,  // MISO is always low
+    BT_EMU_FAULT_STUCK_LOW = 65533, // MISO is always low
     BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word is flipped
     BT_EMU_FAULT_NO_CHANNEL = 65535, // the sensor has no such channel
 };
 
 // Whether a finger's calibration or wrench map is used.
 enum bt_calibration_state {
-    BT_CALIBRATION_STATE_NONE =
-        0, // there is none: the board's settings are used, or for a map force_model and the gains
-    BT_CALIBRATION_STATE_IN_FORCE = 1,     // it is used
+    BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings are used, or for a map force_model and the gains
+    BT_CALIBRATION_STATE_IN_FORCE = 1, // it is used
     BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept but not used: it is for a sensor with another serial number
 };
 
 // What an EVENT reports (SPEC.md, Events).
 enum bt_event_kind {
     BT_EVENT_KIND_TOUCH = 1, // something touches a resting finger
-    BT_EVENT_KIND_LIFT = 2,  // the finger is no longer touched; one for each TOUCH
-    BT_EVENT_KIND_JOLT = 3,  // a jolt of dynamic pressure: a tap on the finger or the held object, a quick
-                             // squeeze, or the beginning of a slip
-    BT_EVENT_KIND_SLIP = 4,  // the held object slips: dynamic pressure vibrates in both directions
+    BT_EVENT_KIND_LIFT = 2, // the finger is no longer touched; one for each TOUCH
+    BT_EVENT_KIND_JOLT = 3, // a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip
+    BT_EVENT_KIND_SLIP = 4, // the held object slips: dynamic pressure vibrates in both directions
     BT_EVENT_KIND_STUCK = 5, // the slip has ended; one for each SLIP
 };
 
 // State of a frame's counts and results.
 #define BT_FRAME_FLAG_CONTACT (1u << 0) // the finger is touched (tare state CONTACT)
-#define BT_FRAME_FLAG_UNTARED                                                                                \
-    (1u << 1) // no tare: point of contact (PoC), force, torque and torsion are invalid
-#define BT_FRAME_FLAG_POC_INVALID                                                                            \
-    (1u << 2) // all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
-#define BT_FRAME_FLAG_POC_LOW                                                                                \
-    (1u << 3) // the signal energy is below four times the contact threshold: the PoC is noisy
+#define BT_FRAME_FLAG_UNTARED (1u << 1) // no tare: point of contact (PoC), force, torque and torsion are invalid
+#define BT_FRAME_FLAG_POC_INVALID (1u << 2) // all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
+#define BT_FRAME_FLAG_POC_LOW (1u << 3) // the signal energy is below four times the contact threshold: the PoC is noisy
 #define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame
-#define BT_FRAME_FLAG_RAIL              (1u << 5) // an electrode reads 0 or at least 4090
-#define BT_FRAME_FLAG_PDC_MISSING                                                                            \
-    (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
+#define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090
+#define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
-#define BT_FRAME_FLAG_MX_DERIVED                                                                             \
-    (1u << 9) // (always) torque x is derived from PoC and force unless a wrench map gives it: electrodes
-              // hardly sense it
+#define BT_FRAME_FLAG_MX_DERIVED (1u << 9) // (always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it
 #define BT_FRAME_FLAG_FX_WEAK (1u << 10) // (always) force x has two to three times the noise of y and z
-#define BT_FRAME_FLAG_TORSION_OK                                                                             \
-    (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes
-               // active, none railed or missing
-#define BT_FRAME_FLAG_SHEAR_MIX                                                                              \
-    (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
-#define BT_FRAME_FLAG_BASE_OLD                                                                               \
-    (1u << 13) // in contact for over 60 s: the tare has followed only temperature and drift common to all
-               // electrodes
-#define BT_FRAME_FLAG_TARE_CHANGED                                                                           \
-    (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
-#define BT_FRAME_FLAG_FAULT                                                                                  \
-    (1u << 15) // more than two electrodes are railed or missing: do not trust the results
-#define BT_FRAME_FLAG_TEMP                                                                                   \
-    (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by
-               // 0.12 N with the finger's gains, or by a degree: the tare is uncertain
-#define BT_FRAME_FLAG_NOT_ASKED                                                                              \
-    (1u << 17) // some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
-#define BT_FRAME_FLAG_MAPPED                                                                                 \
-    (1u << 18) // force, and torque and torsion if the map has them, come from the finger's wrench map
-#define BT_FRAME_FLAG_DOUBT                                                                                  \
-    (1u << 19) // tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare
-               // stays
+#define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
+#define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
+#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
+#define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
+#define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are railed or missing: do not trust the results
+#define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
+#define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
+#define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion if the map has them, come from the finger's wrench map
+#define BT_FRAME_FLAG_DOUBT (1u << 19) // tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
 #define BT_FRAME_FLAG_HELD (1u << 20) // the host sent HOLD: no new tare is taken
-#define BT_FRAME_FLAG_REPEATED                                                                               \
-    (1u << 21) // the board was short of time: force, torque and torsion repeat the map's results of
-               // wrench_age_ms before
-#define BT_FRAME_FLAG_SHED                                                                                   \
-    (1u << 22) // the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were
-               // not sent
-#define BT_FRAME_FLAG_SENSOR_UNSURE                                                                          \
-    (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may
-               // belong to another
-#define BT_FRAME_FLAG_SENSOR_OTHER                                                                           \
-    (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration
-               // or map
-#define BT_FRAME_FLAG_POPULATION                                                                             \
-    (1u << 25) // force comes from the population map, or along the skin's normals where the touch is unlike
-               // its training
-#define BT_FRAME_FLAG_OUTSIDE                                                                                \
-    (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on
-               // that its force has no sigma
-#define BT_FRAME_FLAG_TARE_UNSURE                                                                            \
-    (1u << 27) // the tare was taken when the board started, and nothing has confirmed since that the finger
-               // held nothing then
-#define BT_FRAME_FLAG_PDC_FLAT                                                                               \
-    (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
-#define BT_FRAME_FLAG_ELECTRODE_OUT                                                                          \
-    (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its
-               // signal is estimated from the others'
-#define BT_FRAME_FLAG_SENSOR_FAULT                                                                           \
-    (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust
-               // the results
-#define BT_FRAME_FLAG_ELECTRODE_ALONE                                                                        \
-    (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow
-               // as an electrode, or a fault
+#define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
+#define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
+#define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
+#define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
+#define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map, or along the skin's normals where the touch is unlike its training
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
+#define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
+#define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
+#define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
+#define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
+#define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
 #define BT_FRAME_FLAGS 0xFFFFFFFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
-#define BT_FAULT_FLAG_HUNG    (1u << 1) // the firmware hung for two seconds, and the watchdog restarted it
+#define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware hung for two seconds, and the watchdog restarted it
 #define BT_FAULT_FLAG_CRASHED (1u << 2) // the firmware restarted itself after an exception
-#define BT_FAULT_FLAG_STORAGE                                                                                \
-    (1u << 3) // stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or
-              // the defaults
+#define BT_FAULT_FLAG_STORAGE (1u << 3) // stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults
 #define BT_FAULT_FLAG_SLOTS_LATE (1u << 4) // the main loop fell behind and slots were lost
-#define BT_FAULT_FLAG_DROPPED    (1u << 5) // messages were dropped for lack of room: the host read too slowly
+#define BT_FAULT_FLAG_DROPPED (1u << 5) // messages were dropped for lack of room: the host read too slowly
 #define BT_FAULT_FLAG_LINK_DAMAGED (1u << 6) // frames from the host were damaged or had a wrong length
-#define BT_FAULT_FLAG_HOST_SILENT  (1u << 7) // a stream ended because the host sent nothing for keepalive_ms
-#define BT_FAULT_FLAG_HOLD_LAPSED  (1u << 8) // a HOLD ended because the host sent nothing for hold_timeout_ms
-#define BT_FAULT_FLAG_LINK_TAKEN                                                                             \
-    (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its
-              // streams
-#define BT_FAULT_FLAG_TARE_RESTORED                                                                          \
-    (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
-#define BT_FAULT_FLAG_EARLY_FAULT                                                                            \
-    (1u << 11) // one or more starts before this one failed before the firmware ran: its image was read
-               // wrongly, or an exception came
-#define BT_FAULT_FLAG_SLOT_DMA_LATE                                                                          \
-    (1u << 12) // slots were lost because the DMA was late with a word; after 44 of them in a row the core
-               // does its work until the next start
+#define BT_FAULT_FLAG_HOST_SILENT (1u << 7) // a stream ended because the host sent nothing for keepalive_ms
+#define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host sent nothing for hold_timeout_ms
+#define BT_FAULT_FLAG_LINK_TAKEN (1u << 9) // the host at one of the board's ports took over from the one at the other, and ended its streams
+#define BT_FAULT_FLAG_TARE_RESTORED (1u << 10) // after a hang or a crash, a finger has the tare and HOLD of before
+#define BT_FAULT_FLAG_EARLY_FAULT (1u << 11) // one or more starts before this one failed before the firmware ran: its image was read wrongly, or an exception came
+#define BT_FAULT_FLAG_SLOT_DMA_LATE (1u << 12) // slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
 #define BT_FAULT_FLAGS 0x1FFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
-#define BT_STREAM_FLAG_PAC    (1u << 1) // PAC messages
+#define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS every status_period_ms
-#define BT_STREAM_FLAG_BANDS  (1u << 3) // BANDS messages
-#define BT_STREAM_FLAGS       0xFu      // all there are
+#define BT_STREAM_FLAG_BANDS (1u << 3) // BANDS messages
+#define BT_STREAM_FLAGS 0xFu // all there are
 
 // What a host can SUBSCRIBE to. The board does not compute the rest.
-#define BT_QUANTITY_FLAG_POC    (1u << 0) // point of contact; TORSION_OK needs it
-#define BT_QUANTITY_FLAG_FORCE  (1u << 1) // force
+#define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; TORSION_OK needs it
+#define BT_QUANTITY_FLAG_FORCE (1u << 1) // force
 #define BT_QUANTITY_FLAG_TORQUE (1u << 2) // torque and torsion
-#define BT_QUANTITY_FLAG_SIGMA  (1u << 3) // standard deviations of point of contact and force
-#define BT_QUANTITY_FLAG_REST_FRAMES                                                                         \
-    (1u << 4) // a FRAME in every round; without it, an untouched finger sends IDLE heartbeats
-#define BT_QUANTITY_FLAG_TOUCH    (1u << 5) // TOUCH messages
+#define BT_QUANTITY_FLAG_SIGMA (1u << 3) // standard deviations of point of contact and force
+#define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it, an untouched finger sends IDLE heartbeats
+#define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
 #define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure and, if calibrated, the force from it
-#define BT_QUANTITY_FLAG_EVENTS   (1u << 7) // EVENT messages; sent while FRAMES or PAC is on
-#define BT_QUANTITY_FLAGS         0xFFu     // all there are
+#define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages; sent while FRAMES or PAC is on
+#define BT_QUANTITY_FLAGS 0xFFu // all there are
 
 enum bt_setting {
-    BT_SETTING_POC_WEIGHTS = 1,            // [enum poc_weights]
-    BT_SETTING_FORCE_GAIN_X_NN = 2,        // [nN/count]
-    BT_SETTING_FORCE_GAIN_Y_NN = 3,        // [nN/count]
-    BT_SETTING_FORCE_GAIN_Z_NN = 4,        // [nN/count]
-    BT_SETTING_TORQUE_GAIN_Y_NN = 5,       // [nN/count]
-    BT_SETTING_TORQUE_GAIN_Z_NN = 6,       // [nN/count]
-    BT_SETTING_CONTACT_ENERGY_COUNT2 = 7,  // [count^2]
-    BT_SETTING_STATUS_PERIOD_MS = 8,       // [ms]
-    BT_SETTING_IDLE_PERIOD_MS = 9,         // [ms]
-    BT_SETTING_THERMAL_GAIN_MILLI = 10,    // [count/1000 per TDC count]
-    BT_SETTING_PRESSURE_GAIN_NN = 11,      // [nN/count]
+    BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]
+    BT_SETTING_FORCE_GAIN_X_NN = 2, // [nN/count]
+    BT_SETTING_FORCE_GAIN_Y_NN = 3, // [nN/count]
+    BT_SETTING_FORCE_GAIN_Z_NN = 4, // [nN/count]
+    BT_SETTING_TORQUE_GAIN_Y_NN = 5, // [nN/count]
+    BT_SETTING_TORQUE_GAIN_Z_NN = 6, // [nN/count]
+    BT_SETTING_CONTACT_ENERGY_COUNT2 = 7, // [count^2]
+    BT_SETTING_STATUS_PERIOD_MS = 8, // [ms]
+    BT_SETTING_IDLE_PERIOD_MS = 9, // [ms]
+    BT_SETTING_THERMAL_GAIN_MILLI = 10, // [count/1000 per TDC count]
+    BT_SETTING_PRESSURE_GAIN_NN = 11, // [nN/count]
     BT_SETTING_PRESSURE_FILTER_MILLI = 12, // [1/1000]
-    BT_SETTING_HOLD_TIMEOUT_MS = 13,       // [ms]
-    BT_SETTING_FORCE_MODEL = 14,           // [enum force_model]
-    BT_SETTING_UART_BITS_PER_S = 15,       // [bit/s]
-    BT_SETTING_LOADER_BY_TOUCH = 17,       // [bool]
-    BT_SETTING_SLOTS_BY_CORE = 19,         // [bool]
+    BT_SETTING_HOLD_TIMEOUT_MS = 13, // [ms]
+    BT_SETTING_FORCE_MODEL = 14, // [enum force_model]
+    BT_SETTING_UART_BITS_PER_S = 15, // [bit/s]
+    BT_SETTING_LOADER_BY_TOUCH = 17, // [bool]
+    BT_SETTING_SLOTS_BY_CORE = 19, // [bool]
 };
 #define BT_SETTINGS 17
 
 // Identifies the board. Reply to HELLO_REQUEST.
-#define BT_HELLO_ID    0x01
+#define BT_HELLO_ID 0x01
 #define BT_HELLO_BYTES 58
 typedef struct {
     uint8_t req_id; // [1] as in the command
     uint32_t nonce; // [1] copied from the request, so that an old HELLO in a buffer is not taken for this one
-    uint8_t wire_major;       // [1] a host and a board with different majors do not talk
-    uint8_t wire_minor;       // [1] raised by appended messages, fields and settings
-    uint32_t schema_hash;     // [1] CRC-32 of the contract without its texts (SPEC.md, Versions)
-    uint8_t firmware_major;   // [1] firmware version, major
-    uint8_t firmware_minor;   // [1] firmware version, minor
-    uint8_t firmware_patch;   // [1] firmware version, patch
-    uint16_t board;           // [enum board] what the firmware runs on
+    uint8_t wire_major; // [1] a host and a board with different majors do not talk
+    uint8_t wire_minor; // [1] raised by appended messages, fields and settings
+    uint32_t schema_hash; // [1] CRC-32 of the contract without its texts (SPEC.md, Versions)
+    uint8_t firmware_major; // [1] firmware version, major
+    uint8_t firmware_minor; // [1] firmware version, minor
+    uint8_t firmware_patch; // [1] firmware version, patch
+    uint16_t board; // [enum board] what the firmware runs on
     uint8_t board_serial[12]; // [1] unique id of the microcontroller
-    uint32_t boot_id;         // [1] random at each boot: if it changes, the board has restarted
-    uint16_t slot_hz;         // [Hz] slots per second; each slot samples one channel of every sensor
-    uint8_t fingers_present;  // [bit mask] bit f is set if finger f's sensor answers
-    uint32_t image_crc32;     // [1] CRC-32 of the running flash image, computed at boot
-                              // (firmware/app/image_note.h); 0xFFFFFFFF: unknown
-    uint8_t fingers;          // [1] how many sensors the board has chip selects for
-    uint16_t map_bytes; // [byte] the largest wrench map that it has room for; 0: it keeps none, and answers
-                        // what is about maps with NOT_HERE
+    uint32_t boot_id; // [1] random at each boot: if it changes, the board has restarted
+    uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor
+    uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
+    uint32_t image_crc32; // [1] CRC-32 of the running flash image, computed at boot (firmware/app/image_note.h); 0xFFFFFFFF: unknown
+    uint8_t fingers; // [1] how many sensors the board has chip selects for
+    uint16_t map_bytes; // [byte] the largest wrench map that it has room for; 0: it keeps none, and answers what is about maps with NOT_HERE
     uint8_t board_name[16]; // [ASCII] what people call the board, padded with zeros
 } bt_msg_hello;
 
 // Result of a command that has no reply message of its own, or refusal of any command.
-#define BT_REPLY_ID    0x02
+#define BT_REPLY_ID 0x02
 #define BT_REPLY_BYTES 3
 typedef struct {
-    uint8_t req_id;  // [1] as in the command; 0 if its length was wrong
+    uint8_t req_id; // [1] as in the command; 0 if its length was wrong
     uint8_t command; // [message id] message id of the command
-    uint8_t error;   // [enum error] OK, or why it was refused
+    uint8_t error; // [enum error] OK, or why it was refused
 } bt_msg_reply;
 
 // Value of one setting. Reply to GET_SETTING and SET_SETTING.
-#define BT_SETTING_ID    0x03
+#define BT_SETTING_ID 0x03
 #define BT_SETTING_BYTES 6
 typedef struct {
-    uint8_t req_id;  // [1] as in the command
+    uint8_t req_id; // [1] as in the command
     uint8_t setting; // [setting id] id of the setting
-    int32_t value;   // [the setting's] current value
+    int32_t value; // [the setting's] current value
 } bt_msg_setting;
 
-// What a sensor reports about itself, read when the board starts. After an absence only the serial number is
-// read again; for a new sensor, the rest is then 0. A value is 0 unless two reads agreed. Reply to
-// GET_SENSOR_INFO.
-#define BT_SENSOR_INFO_ID    0x04
+// What a sensor reports about itself, read when the board starts. After an absence only the serial number is read again; for a new sensor, the rest is then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO.
+#define BT_SENSOR_INFO_ID 0x04
 #define BT_SENSOR_INFO_BYTES 29
 typedef struct {
-    uint8_t req_id;  // [1] as in the command
-    uint8_t finger;  // [1] chip select index
-    uint8_t present; // [bool] 1: its serial number began with BT (but not BTSP or BTTB), and it is not
-                     // unplugged; else 0
-    uint8_t flex_version[2];     // [ASCII] digits: MN means M.N
+    uint8_t req_id; // [1] as in the command
+    uint8_t finger; // [1] chip select index
+    uint8_t present; // [bool] 1: its serial number began with BT (but not BTSP or BTTB), and it is not unplugged; else 0
+    uint8_t flex_version[2]; // [ASCII] digits: MN means M.N
     uint8_t software_version[4]; // [ASCII] digits: MMNN means MM.NN
-    uint8_t serial[16];          // [ASCII] serial number, padded with zeros
-    uint16_t cpu_khz;            // [kHz] CPU speed
-    uint16_t sampling_hz;        // [Hz] internal sampling frequency
+    uint8_t serial[16]; // [ASCII] serial number, padded with zeros
+    uint16_t cpu_khz; // [kHz] CPU speed
+    uint16_t sampling_hz; // [Hz] internal sampling frequency
 } bt_msg_sensor_info;
 
 // Where a finger is touched now, within a round, from the latest word of every electrode. Reply to GET_POINT.
-#define BT_POINT_ID    0x05
+#define BT_POINT_ID 0x05
 #define BT_POINT_BYTES 12
 typedef struct {
-    uint8_t req_id;     // [1] as in the command
-    uint8_t finger;     // [1] chip select index
-    uint16_t seq;       // [1] seq of the current round
-    uint8_t slot;       // [1] how many of its slots have been read
+    uint8_t req_id; // [1] as in the command
+    uint8_t finger; // [1] chip select index
+    uint16_t seq; // [1] seq of the current round
+    uint8_t slot; // [1] how many of its slots have been read
     uint8_t tare_state; // [enum tare_state] state after the previous round
-    int16_t
-        poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: no weight or no tare
+    int16_t poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: no weight or no tare
 } bt_msg_point;
 
 // Calibration of one finger. Reply to GET_CALIBRATION and SET_CALIBRATION.
-#define BT_CALIBRATION_ID    0x06
+#define BT_CALIBRATION_ID 0x06
 #define BT_CALIBRATION_BYTES 55
 typedef struct {
-    uint8_t req_id;     // [1] as in the command
-    uint8_t finger;     // [1] chip select index
-    uint8_t state;      // [enum calibration_state] whether it is used; never changes while streaming
+    uint8_t req_id; // [1] as in the command
+    uint8_t finger; // [1] chip select index
+    uint8_t state; // [enum calibration_state] whether it is used; never changes while streaming
     uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; all zero: any sensor, or state NONE
-    uint32_t made_s;    // [s] creation time, seconds since 1970 UTC; 0: unknown
-    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id; with NONE the
-                      // board's settings
+    uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
+    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id; with NONE the board's settings
 } bt_msg_calibration;
 
 // The wrench map of one finger. Reply to GET_MAP and END_MAP.
-#define BT_MAP_INFO_ID    0x07
+#define BT_MAP_INFO_ID 0x07
 #define BT_MAP_INFO_BYTES 29
 typedef struct {
-    uint8_t req_id;      // [1] as in the command
-    uint8_t finger;      // [1] chip select index
-    uint8_t state;       // [enum calibration_state] whether it is used; never changes while streaming
-    uint8_t serial[16];  // [ASCII] serial number of the sensor it is for; all zero: any sensor, or state NONE
-    uint32_t made_s;     // [s] creation time, seconds since 1970 UTC; 0: unknown
+    uint8_t req_id; // [1] as in the command
+    uint8_t finger; // [1] chip select index
+    uint8_t state; // [enum calibration_state] whether it is used; never changes while streaming
+    uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; all zero: any sensor, or state NONE
+    uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
     uint16_t size_bytes; // [byte] size of the map; 0 with NONE
-    uint32_t crc32;      // [1] CRC-32 of the map, as zlib's; 0 with NONE
+    uint32_t crc32; // [1] CRC-32 of the map, as zlib's; 0 with NONE
 } bt_msg_map_info;
 
 // Part of a finger's wrench map. Reply to READ_MAP.
-#define BT_MAP_DATA_ID    0x08
+#define BT_MAP_DATA_ID 0x08
 #define BT_MAP_DATA_BYTES 132
 typedef struct {
-    uint8_t req_id;    // [1] as in the command
-    uint8_t finger;    // [1] chip select index
-    uint16_t offset;   // [byte] position of the first byte in the map
+    uint8_t req_id; // [1] as in the command
+    uint8_t finger; // [1] chip select index
+    uint16_t offset; // [byte] position of the first byte in the map
     uint8_t data[128]; // [1] bytes of the map; 0xFF after its end
 } bt_msg_map_data;
 
 // One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md).
-#define BT_FRAME_ID    0x10
+#define BT_FRAME_ID 0x10
 #define BT_FRAME_BYTES 150
 typedef struct {
-    uint16_t seq;           // [1] counts this finger's rounds with a good word, sent or not; wraps
-    uint32_t t_us;          // [us] device time at which slot 0 was sampled; slot k is k/4400 s later; wraps
-    uint8_t finger;         // [1] chip select index
-    uint8_t tare_state;     // [enum tare_state] state after this round
-    uint32_t flags;         // [flags frame] validity and quality of the results
-    uint16_t counts[19];    // [count] E1 to E19; 0xFFFF: no good word
-    uint16_t pdc;           // [count] static pressure; 0xFFFF: no good word
-    uint16_t tac;           // [count] thermal flux; 0xFFFF: no good word
-    uint16_t tdc;           // [count] temperature; 0xFFFF: no good word
-    int16_t poc_um[3];      // [um] x, y, z of the point of contact on the core's surface; -32768: invalid
+    uint16_t seq; // [1] counts this finger's rounds with a good word, sent or not; wraps
+    uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later; wraps
+    uint8_t finger; // [1] chip select index
+    uint8_t tare_state; // [enum tare_state] state after this round
+    uint32_t flags; // [flags frame] validity and quality of the results
+    uint16_t counts[19]; // [count] E1 to E19; 0xFFFF: no good word
+    uint16_t pdc; // [count] static pressure; 0xFFFF: no good word
+    uint16_t tac; // [count] thermal flux; 0xFFFF: no good word
+    uint16_t tdc; // [count] temperature; 0xFFFF: no good word
+    int16_t poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: invalid
     int32_t force_100un[3]; // [100 uN] x, y, z of the force on the finger; -2147483648: invalid
-    int32_t torque_mnmm[3]; // [mN*mm] x, y, z of the torque on the finger about the origin; -2147483648:
-                            // invalid; for x see MX_DERIVED
-    uint16_t
-        tare_q4[19]; // [count q4] tare subtracted from counts, in 1/16 count; 0xFFFF: electrode never read
-    uint16_t pdc_tare_q4;          // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: never read
-    uint16_t poc_sigma_um;         // [um] standard deviation of the PoC due to noise, saturating; 0xFFFF: not
-                                   // computed, or noise not measured yet
-    uint16_t force_sigma_100un[3]; // [100 uN] standard deviation of the force, likewise; 0xFFFF also if
-                                   // MAPPED or OUTSIDE
-    uint16_t pdc_filtered_q4; // [count q4] static pressure filtered by pressure_filter_milli, in 1/16 count;
-                              // 0xFFFF: no good word, or not subscribed to
-    int32_t pressure_force_100un; // [100 uN] force magnitude from pdc_filtered_q4 - pdc_tare_q4, negative
-                                  // below rest; -2147483648: either is invalid, or pressure_gain_nn is 0
-    int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench
-                          // map gives it; else -2147483648
-    uint16_t
-        wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
-    uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its
-                             // signal
+    int32_t torque_mnmm[3]; // [mN*mm] x, y, z of the torque on the finger about the origin; -2147483648: invalid; for x see MX_DERIVED
+    uint16_t tare_q4[19]; // [count q4] tare subtracted from counts, in 1/16 count; 0xFFFF: electrode never read
+    uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: never read
+    uint16_t poc_sigma_um; // [um] standard deviation of the PoC due to noise, saturating; 0xFFFF: not computed, or noise not measured yet
+    uint16_t force_sigma_100un[3]; // [100 uN] standard deviation of the force, likewise; 0xFFFF also if MAPPED or OUTSIDE
+    uint16_t pdc_filtered_q4; // [count q4] static pressure filtered by pressure_filter_milli, in 1/16 count; 0xFFFF: no good word, or not subscribed to
+    int32_t pressure_force_100un; // [100 uN] force magnitude from pdc_filtered_q4 - pdc_tare_q4, negative below rest; -2147483648: either is invalid, or pressure_gain_nn is 0
+    int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench map gives it; else -2147483648
+    uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
+    uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its signal
 } bt_msg_frame;
 
 // The 22 dynamic pressure samples of one finger in one round.
-#define BT_PAC_ID    0x11
+#define BT_PAC_ID 0x11
 #define BT_PAC_BYTES 51
 typedef struct {
-    uint16_t seq;     // [1] seq of the same round's FRAME
-    uint32_t t_us;    // [us] device time of the first sample; sample k is k/2200 s later
-    uint8_t finger;   // [1] chip select index
+    uint16_t seq; // [1] seq of the same round's FRAME
+    uint32_t t_us; // [us] device time of the first sample; sample k is k/2200 s later
+    uint8_t finger; // [1] chip select index
     uint16_t pac[22]; // [count] dynamic pressure; 0xFFFF: no good word
 } bt_msg_pac;
 
 // The tare changed by more than drift tracking, or the host sent HOLD or RELEASE. Sent with FRAMES.
-#define BT_TARE_ID    0x12
+#define BT_TARE_ID 0x12
 #define BT_TARE_BYTES 93
 typedef struct {
-    uint16_t seq;          // [1] as in the first FRAME that uses this tare
-    uint32_t t_us;         // [us] as in the first FRAME that uses this tare
-    uint8_t finger;        // [1] chip select index
-    uint8_t tare_state;    // [enum tare_state] state after the change
-    uint8_t reason;        // [enum tare_reason] why it was sent
+    uint16_t seq; // [1] as in the first FRAME that uses this tare
+    uint32_t t_us; // [us] as in the first FRAME that uses this tare
+    uint8_t finger; // [1] chip select index
+    uint8_t tare_state; // [enum tare_state] state after the change
+    uint8_t reason; // [enum tare_reason] why it was sent
     uint32_t noise_count2; // [count^2] noise energy at rest, summed over 19 electrodes; 0: not measured yet
     uint32_t tare_q16[19]; // [count q16] new tare, in 1/65536 count; 0xFFFFFFFF: electrode never read
-    uint32_t
-        pdc_tare_q16; // [count q16] new static pressure at rest, in 1/65536 count; 0xFFFFFFFF: never read
+    uint32_t pdc_tare_q16; // [count q16] new static pressure at rest, in 1/65536 count; 0xFFFFFFFF: never read
 } bt_msg_tare;
 
 // Health of the board and the link. Sent periodically, and as reply to GET_STATUS. Counters start at boot.
-#define BT_STATUS_ID    0x13
+#define BT_STATUS_ID 0x13
 #define BT_STATUS_BYTES 87
 typedef struct {
-    uint16_t seq;              // [1] counts STATUS messages
-    uint32_t t_us;             // [us] device time at which the message was made
-    uint8_t req_id;            // [1] req_id of GET_STATUS; 0: periodic
-    uint32_t uptime_s;         // [s] time since boot
-    uint8_t fingers_present;   // [bit mask] bit f is set if finger f's sensor answers
-    uint8_t streams;           // [flags stream] streams that are on
-    uint32_t messages_sent;    // [1] messages passed to the link
+    uint16_t seq; // [1] counts STATUS messages
+    uint32_t t_us; // [us] device time at which the message was made
+    uint8_t req_id; // [1] req_id of GET_STATUS; 0: periodic
+    uint32_t uptime_s; // [s] time since boot
+    uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
+    uint8_t streams; // [flags stream] streams that are on
+    uint32_t messages_sent; // [1] messages passed to the link
     uint32_t messages_dropped; // [1] messages dropped because the link had no room
-    uint32_t slots_late;       // [1] slots lost because the main loop fell behind
-    uint32_t rx_frames;        // [1] good frames from the host
-    uint32_t rx_errors;        // [1] bad frames from the host: too long, bad COBS, bad CRC or bad length
-    uint32_t frames_idle;      // [1] rounds of streamed fingers covered by an IDLE instead of a FRAME
-    uint32_t
-        poc_skipped; // [1] rounds of streamed fingers in which no PoC was computed because it was not needed
-    uint32_t force_skipped;  // [1] the same for force
+    uint32_t slots_late; // [1] slots lost because the main loop fell behind
+    uint32_t rx_frames; // [1] good frames from the host
+    uint32_t rx_errors; // [1] bad frames from the host: too long, bad COBS, bad CRC or bad length
+    uint32_t frames_idle; // [1] rounds of streamed fingers covered by an IDLE instead of a FRAME
+    uint32_t poc_skipped; // [1] rounds of streamed fingers in which no PoC was computed because it was not needed
+    uint32_t force_skipped; // [1] the same for force
     uint32_t torque_skipped; // [1] the same for torque
-    uint32_t sigma_skipped;  // [1] the same for standard deviations
-    uint32_t sigma_shed;     // [1] FRAMEs without subscribed standard deviations, for lack of time; these are
-                             // shed first
-    uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed
-                              // second
-    uint32_t frames_shed;     // [1] FRAMEs not sent, for lack of time; shed last
-    uint16_t faults;          // [flags fault] what went wrong since boot or the last CLEAR_FAULTS
-    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that
-                               // make its values doubtful; not DOUBT or OUTSIDE, which occur in any touch;
-                               // UNTARED only if a tare was lost
+    uint32_t sigma_skipped; // [1] the same for standard deviations
+    uint32_t sigma_shed; // [1] FRAMEs without subscribed standard deviations, for lack of time; these are shed first
+    uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed second
+    uint32_t frames_shed; // [1] FRAMEs not sent, for lack of time; shed last
+    uint16_t faults; // [flags fault] what went wrong since boot or the last CLEAR_FAULTS
+    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that make its values doubtful; not DOUBT or OUTSIDE, which occur in any touch; UNTARED only if a tare was lost
 } bt_msg_status;
 
-// Health of one sensor. Sent periodically for each present sensor, and as reply to GET_SENSOR_STATUS.
-// Counters start at boot.
-#define BT_SENSOR_STATUS_ID    0x14
+// Health of one sensor. Sent periodically for each present sensor, and as reply to GET_SENSOR_STATUS. Counters start at boot.
+#define BT_SENSOR_STATUS_ID 0x14
 #define BT_SENSOR_STATUS_BYTES 43
 typedef struct {
-    uint16_t seq;          // [1] counts SENSOR_STATUS messages
-    uint32_t t_us;         // [us] device time at which the message was made
-    uint8_t req_id;        // [1] req_id of GET_SENSOR_STATUS; 0: periodic
-    uint8_t finger;        // [1] chip select index
-    uint8_t present;       // [bool] 1: a good word came in the last round; else 0
-    uint8_t tare_state;    // [enum tare_state] current state
-    uint8_t tare_reason;   // [enum tare_reason] reason of the last change
-    uint32_t tare_age_ms;  // [ms] time since the last change
+    uint16_t seq; // [1] counts SENSOR_STATUS messages
+    uint32_t t_us; // [us] device time at which the message was made
+    uint8_t req_id; // [1] req_id of GET_SENSOR_STATUS; 0: periodic
+    uint8_t finger; // [1] chip select index
+    uint8_t present; // [bool] 1: a good word came in the last round; else 0
+    uint8_t tare_state; // [enum tare_state] current state
+    uint8_t tare_reason; // [enum tare_reason] reason of the last change
+    uint32_t tare_age_ms; // [ms] time since the last change
     uint32_t noise_count2; // [count^2] noise energy at rest, summed over 19 electrodes; 0: not measured yet
-    uint32_t words_good;   // [1] words with good parity
-    uint32_t words_stuck;  // [1] words 0x0000 or 0xFFFF: sensor absent, unpowered or not connected
-    uint32_t words_error;  // [1] error words from the sensor
+    uint32_t words_good; // [1] words with good parity
+    uint32_t words_stuck; // [1] words 0x0000 or 0xFFFF: sensor absent, unpowered or not connected
+    uint32_t words_error; // [1] error words from the sensor
     uint32_t words_parity; // [1] other words with bad parity
     uint16_t last_error_word; // [1] last error word; 0: none
-    uint32_t electrodes_out;  // [bit mask] bit i is set if results do without electrode i + 1
-    uint8_t electrode_fault;  // [enum sensor_fault] why, of the electrode that went out last; 0: none is out
-    uint8_t sensor_fault;     // [enum sensor_fault] what is wrong with the whole sensor
+    uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1
+    uint8_t electrode_fault; // [enum sensor_fault] why, of the electrode that went out last; 0: none is out
+    uint8_t sensor_fault; // [enum sensor_fault] what is wrong with the whole sensor
 } bt_msg_sensor_status;
 
 // Heartbeat of an untouched finger, in place of the FRAMEs that were not sent.
-#define BT_IDLE_ID    0x15
+#define BT_IDLE_ID 0x15
 #define BT_IDLE_BYTES 22
 typedef struct {
-    uint16_t seq;   // [1] seq of the latest round that it covers
-    uint32_t t_us;  // [us] t_us of the round that the other fields describe: that of seq, or the one after it
-                    // if a FRAME follows at once
+    uint16_t seq; // [1] seq of the latest round that it covers
+    uint32_t t_us; // [us] t_us of the round that the other fields describe: that of seq, or the one after it if a FRAME follows at once
     uint8_t finger; // [1] chip select index
-    uint8_t tare_state;     // [enum tare_state] state after that round
-    uint32_t flags;         // [flags frame] of that round; results were not computed
-    uint16_t frames;        // [1] number of rounds covered: all since this finger's last FRAME or IDLE
+    uint8_t tare_state; // [enum tare_state] state after that round
+    uint32_t flags; // [flags frame] of that round; results were not computed
+    uint16_t frames; // [1] number of rounds covered: all since this finger's last FRAME or IDLE
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals
-    uint16_t pdc;           // [count] static pressure; 0xFFFF: no good word
-    uint16_t tdc;           // [count] temperature; 0xFFFF: no good word
+    uint16_t pdc; // [count] static pressure; 0xFFFF: no good word
+    uint16_t tdc; // [count] temperature; 0xFFFF: no good word
 } bt_msg_idle;
 
-// A resting finger's trigger fired in this slot. An early hint: CONTACT follows if it fires in three rounds
-// in a row.
-#define BT_TOUCH_ID    0x16
+// A resting finger's trigger fired in this slot. An early hint: CONTACT follows if it fires in three rounds in a row.
+#define BT_TOUCH_ID 0x16
 #define BT_TOUCH_BYTES 12
 typedef struct {
-    uint16_t seq;           // [1] seq of the current round
-    uint32_t t_us;          // [us] device time at which the slot was sampled
-    uint8_t finger;         // [1] chip select index
-    uint8_t slot;           // [1] slot within the round
+    uint16_t seq; // [1] seq of the current round
+    uint32_t t_us; // [us] device time at which the slot was sampled
+    uint8_t finger; // [1] chip select index
+    uint8_t slot; // [1] slot within the round
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals in the round so far
 } bt_msg_touch;
 
-// Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS,
-// while FRAMES or PAC is on.
-#define BT_EVENT_ID    0x17
+// Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on.
+#define BT_EVENT_ID 0x17
 #define BT_EVENT_BYTES 20
 typedef struct {
-    uint16_t seq;       // [1] seq of the current round
-    uint32_t t_us;      // [us] device time at which the slot was sampled
-    uint8_t finger;     // [1] chip select index
-    uint8_t slot;       // [1] slot within the round
-    uint8_t kind;       // [enum event_kind] what happened; ignore a kind that you do not know
+    uint16_t seq; // [1] seq of the current round
+    uint32_t t_us; // [us] device time at which the slot was sampled
+    uint8_t finger; // [1] chip select index
+    uint8_t slot; // [1] slot within the round
+    uint8_t kind; // [enum event_kind] what happened; ignore a kind that you do not know
     uint8_t tare_state; // [enum tare_state] state after the previous round
-    uint32_t onset_us;  // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when
-                        // dynamic pressure left its noise; else t_us
-    uint32_t energy_count2; // [count^2] TOUCH, LIFT: sum of squares of the filtered signals, from the latest
-                            // word of every electrode; else 0xFFFFFFFF
-    uint16_t peak_count;    // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it
-                            // began; else 0xFFFF
+    uint32_t onset_us; // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when dynamic pressure left its noise; else t_us
+    uint32_t energy_count2; // [count^2] TOUCH, LIFT: sum of squares of the filtered signals, from the latest word of every electrode; else 0xFFFFFFFF
+    uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began; else 0xFFFF
 } bt_msg_event;
 
 // How strongly dynamic pressure vibrated in one round, in six octave bands (SPEC.md, Bands).
-#define BT_BANDS_ID    0x18
+#define BT_BANDS_ID 0x18
 #define BT_BANDS_BYTES 32
 typedef struct {
-    uint16_t seq;          // [1] seq of the same round's FRAME
-    uint32_t t_us;         // [us] t_us of the same round's PAC
-    uint8_t finger;        // [1] chip select index
-    uint8_t good;          // [1] number of samples with a good word; the others repeat the last good one
-    uint32_t energy_q4[6]; // [count^2 q4] energy of each band over the round, in 1/16 count^2, lowest band
-                           // first; 0xFFFFFFFF: no good word
+    uint16_t seq; // [1] seq of the same round's FRAME
+    uint32_t t_us; // [us] t_us of the same round's PAC
+    uint8_t finger; // [1] chip select index
+    uint8_t good; // [1] number of samples with a good word; the others repeat the last good one
+    uint32_t energy_q4[6]; // [count^2 q4] energy of each band over the round, in 1/16 count^2, lowest band first; 0xFFFFFFFF: no good word
 } bt_msg_bands;
 
 // What a board measures of itself. Reply to GET_BOARD_FACTS.
-#define BT_BOARD_FACTS_ID    0x19
+#define BT_BOARD_FACTS_ID 0x19
 #define BT_BOARD_FACTS_BYTES 34
 typedef struct {
-    uint8_t req_id;      // [1] as in the command
-    uint32_t t_us;       // [us] device time at which usb_frame and usb_starts were read
-    uint16_t usb_frame;  // [1] number of USB's latest frame, one a ms by the host's clock; 0xFFFF: no USB
+    uint8_t req_id; // [1] as in the command
+    uint32_t t_us; // [us] device time at which usb_frame and usb_starts were read
+    uint16_t usb_frame; // [1] number of USB's latest frame, one a ms by the host's clock; 0xFFFF: no USB
     uint32_t usb_starts; // [1] starts of frame received since boot; wraps
-    uint32_t chip_id;    // [1] the microcontroller's own id of its kind and revision; 0: unknown
+    uint32_t chip_id; // [1] the microcontroller's own id of its kind and revision; 0: unknown
     uint8_t flash_id[3]; // [1] JEDEC id of the flash chip: maker, kind, log2 of its bytes; 0: unknown
-    uint32_t erase_us;   // [us] longest erase of a flash sector since boot; 0: none
-    uint16_t supply_mv;  // [mV] the board's supply, before its regulator; 0: not measured
+    uint32_t erase_us; // [us] longest erase of a flash sector since boot; 0: none
+    uint16_t supply_mv; // [mV] the board's supply, before its regulator; 0: not measured
     int16_t die_centi_c; // [1/100 degree Celsius] temperature of the microcontroller; -32768: not measured
-    uint16_t bus_khz;    // [kHz] clock rate of the sensors' bus
+    uint16_t bus_khz; // [kHz] clock rate of the sensors' bus
     uint32_t slots_dma_late; // [1] slots lost since boot because the DMA was late with a word
-    uint16_t early_faults;   // [1] starts before this one that failed before the firmware ran
+    uint16_t early_faults; // [1] starts before this one that failed before the firmware ran
 } bt_msg_board_facts;
 
 // First command of a host. Allowed at any time.
-#define BT_HELLO_REQUEST_ID    0x80
+#define BT_HELLO_REQUEST_ID 0x80
 #define BT_HELLO_REQUEST_BYTES 5
 typedef struct {
     uint8_t req_id; // [1] 1 to 255; repeated in the reply
@@ -596,53 +496,48 @@ typedef struct {
 } bt_msg_hello_request;
 
 // Start streaming. Sequence numbers continue.
-#define BT_START_ID    0x81
+#define BT_START_ID 0x81
 #define BT_START_BYTES 5
 typedef struct {
-    uint8_t req_id;        // [1] 1 to 255
-    uint8_t streams;       // [flags stream] what to send
-    uint8_t fingers;       // [bit mask] bit f: stream finger f
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t streams; // [flags stream] what to send
+    uint8_t fingers; // [bit mask] bit f: stream finger f
     uint16_t keepalive_ms; // [ms] stop streaming when the host has sent nothing for this long; 0: never
 } bt_msg_start;
 
 // Stop streaming.
-#define BT_STOP_ID    0x82
+#define BT_STOP_ID 0x82
 #define BT_STOP_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_stop;
 
 // Keep-alive and barrier: its reply comes after everything sent before.
-#define BT_PING_ID    0x83
+#define BT_PING_ID 0x83
 #define BT_PING_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_ping;
 
-// Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, as
-// after a reboot, whenever another host begins: a port is opened, its host sends HELLO_REQUEST while nothing
-// streams, or the other port's host takes over.
-#define BT_SUBSCRIBE_ID    0x8B
+// Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES, as after a reboot, whenever another host begins: a port is opened, its host sends HELLO_REQUEST while nothing streams, or the other port's host takes over.
+#define BT_SUBSCRIBE_ID 0x8B
 #define BT_SUBSCRIBE_BYTES 3
 typedef struct {
-    uint8_t req_id;     // [1] 1 to 255
-    uint8_t fingers;    // [bit mask] bit f: finger f; others keep theirs
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t fingers; // [bit mask] bit f: finger f; others keep theirs
     uint8_t quantities; // [flags quantity] what to compute and send
 } bt_msg_subscribe;
 
-// Take the board over from the host at its other port: its streams and uploads end, holds stay. It is refused
-// (LINK_BUSY) until this host sends STOP, closes its port or has sent nothing for keepalive_ms. Both are sent
-// a STATUS with LINK_TAKEN.
-#define BT_TAKE_LINK_ID    0xAF
+// Take the board over from the host at its other port: its streams and uploads end, holds stay. It is refused (LINK_BUSY) until this host sends STOP, closes its port or has sent nothing for keepalive_ms. Both are sent a STATUS with LINK_TAKEN.
+#define BT_TAKE_LINK_ID 0xAF
 #define BT_TAKE_LINK_BYTES 3
 typedef struct {
-    uint8_t req_id;        // [1] 1 to 255
+    uint8_t req_id; // [1] 1 to 255
     uint16_t keepalive_ms; // [ms] how long this host may be silent
 } bt_msg_take_link;
 
-// Ask for POINT, without waiting for the round to end. Refused (OTHER_SENSOR) if SENSOR_OTHER leaves no
-// results.
-#define BT_GET_POINT_ID    0x8C
+// Ask for POINT, without waiting for the round to end. Refused (OTHER_SENSOR) if SENSOR_OTHER leaves no results.
+#define BT_GET_POINT_ID 0x8C
 #define BT_GET_POINT_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -650,7 +545,7 @@ typedef struct {
 } bt_msg_get_point;
 
 // Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL).
-#define BT_TARE_NOW_ID    0x84
+#define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -658,24 +553,24 @@ typedef struct {
 } bt_msg_tare_now;
 
 // Use this tare from the next FRAME on, such as one stored for a finger that is already loaded.
-#define BT_TARE_SET_ID    0x85
+#define BT_TARE_SET_ID 0x85
 #define BT_TARE_SET_BYTES 42
 typedef struct {
-    uint8_t req_id;       // [1] 1 to 255
-    uint8_t finger;       // [1] chip select index
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
     uint16_t tare_q4[19]; // [count q4] tare of E1 to E19, in 1/16 count
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: unknown
 } bt_msg_tare_set;
 
 // Ask for STATUS.
-#define BT_GET_STATUS_ID    0x86
+#define BT_GET_STATUS_ID 0x86
 #define BT_GET_STATUS_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_get_status;
 
 // Ask for SENSOR_STATUS.
-#define BT_GET_SENSOR_STATUS_ID    0x87
+#define BT_GET_SENSOR_STATUS_ID 0x87
 #define BT_GET_SENSOR_STATUS_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -683,7 +578,7 @@ typedef struct {
 } bt_msg_get_sensor_status;
 
 // Ask for SENSOR_INFO.
-#define BT_GET_SENSOR_INFO_ID    0x88
+#define BT_GET_SENSOR_INFO_ID 0x88
 #define BT_GET_SENSOR_INFO_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -691,67 +586,58 @@ typedef struct {
 } bt_msg_get_sensor_info;
 
 // Ask for SETTING.
-#define BT_GET_SETTING_ID    0x89
+#define BT_GET_SETTING_ID 0x89
 #define BT_GET_SETTING_BYTES 2
 typedef struct {
-    uint8_t req_id;  // [1] 1 to 255
+    uint8_t req_id; // [1] 1 to 255
     uint8_t setting; // [setting id] id of the setting
 } bt_msg_get_setting;
 
-// Change a setting until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming, so that
-// a recording has one set of settings.
-#define BT_SET_SETTING_ID    0x8A
+// Change a setting until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming, so that a recording has one set of settings.
+#define BT_SET_SETTING_ID 0x8A
 #define BT_SET_SETTING_BYTES 6
 typedef struct {
-    uint8_t req_id;  // [1] 1 to 255
+    uint8_t req_id; // [1] 1 to 255
     uint8_t setting; // [setting id] id of the setting
-    int32_t value;   // [the setting's] new value
+    int32_t value; // [the setting's] new value
 } bt_msg_set_setting;
 
-// Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or
-// as itself. Allowed at any time.
-#define BT_REBOOT_BOOTLOADER_ID    0x8D
+// Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed at any time.
+#define BT_REBOOT_BOOTLOADER_ID 0x8D
 #define BT_REBOOT_BOOTLOADER_BYTES 5
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint32_t magic; // [1] 0xB0071DE5: into its boot loader; 0x2E57A27A: into its firmware again; anything
-                    // else is refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
+    uint32_t magic; // [1] 0xB0071DE5: into its boot loader; 0x2E57A27A: into its firmware again; anything else is refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
 } bt_msg_reboot_bootloader;
 
-// Store settings, calibrations and maps permanently. Refused while streaming, as slots are lost while flash
-// is written. If power fails, the settings and each finger's calibration and map are each either old or new,
-// never mixed.
-#define BT_SAVE_SETTINGS_ID    0x8E
+// Store settings, calibrations and maps permanently. Refused while streaming, as slots are lost while flash is written. If power fails, the settings and each finger's calibration and map are each either old or new, never mixed.
+#define BT_SAVE_SETTINGS_ID 0x8E
 #define BT_SAVE_SETTINGS_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_save_settings;
 
 // Ask for CALIBRATION.
-#define BT_GET_CALIBRATION_ID    0x8F
+#define BT_GET_CALIBRATION_ID 0x8F
 #define BT_GET_CALIBRATION_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
     uint8_t finger; // [1] chip select index
 } bt_msg_get_calibration;
 
-// Give a finger its own values for the per-finger settings, until the next reboot, or permanently with
-// SAVE_SETTINGS. Refused while streaming.
-#define BT_SET_CALIBRATION_ID    0x90
+// Give a finger its own values for the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
+#define BT_SET_CALIBRATION_ID 0x90
 #define BT_SET_CALIBRATION_BYTES 54
 typedef struct {
-    uint8_t req_id;     // [1] 1 to 255
-    uint8_t finger;     // [1] chip select index
-    uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; if not this finger's, refused
-                        // (OTHER_SENSOR); all zero: any sensor
-    uint32_t made_s;    // [s] creation time, seconds since 1970 UTC; 0: unknown
-    int32_t
-        value[8]; // [the per-finger settings'] one per per-finger setting, in order of id, within its range
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; if not this finger's, refused (OTHER_SENSOR); all zero: any sensor
+    uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
+    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id, within its range
 } bt_msg_set_calibration;
 
-// Use the board's settings for a finger again, until the next reboot, or permanently with SAVE_SETTINGS.
-// Refused while streaming.
-#define BT_CLEAR_CALIBRATION_ID    0x91
+// Use the board's settings for a finger again, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
+#define BT_CLEAR_CALIBRATION_ID 0x91
 #define BT_CLEAR_CALIBRATION_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -759,7 +645,7 @@ typedef struct {
 } bt_msg_clear_calibration;
 
 // Ask for MAP_INFO.
-#define BT_GET_MAP_ID    0x92
+#define BT_GET_MAP_ID 0x92
 #define BT_GET_MAP_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -767,40 +653,36 @@ typedef struct {
 } bt_msg_get_map;
 
 // Ask for a part of the map that MAP_INFO describes, whether it is used or not.
-#define BT_READ_MAP_ID    0x93
+#define BT_READ_MAP_ID 0x93
 #define BT_READ_MAP_BYTES 4
 typedef struct {
-    uint8_t req_id;  // [1] 1 to 255
-    uint8_t finger;  // [1] chip select index
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
     uint16_t offset; // [byte] position of the first byte, below the map's size
 } bt_msg_read_map;
 
-// Begin to upload a wrench map. The finger keeps its present map until END_MAP. One upload at a time: a new
-// one ends the one before. Refused while streaming.
-#define BT_BEGIN_MAP_ID    0x94
+// Begin to upload a wrench map. The finger keeps its present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming.
+#define BT_BEGIN_MAP_ID 0x94
 #define BT_BEGIN_MAP_BYTES 8
 typedef struct {
-    uint8_t req_id;      // [1] 1 to 255
-    uint8_t finger;      // [1] chip select index
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
     uint16_t size_bytes; // [byte] size of the map
-    uint32_t crc32;      // [1] CRC-32 of the map, as zlib's
+    uint32_t crc32; // [1] CRC-32 of the map, as zlib's
 } bt_msg_begin_map;
 
-// Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused
-// (NOT_STORED). Takes up to 0.4 s if a flash sector must be erased. Refused while streaming.
-#define BT_WRITE_MAP_ID    0x95
+// Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Takes up to 0.4 s if a flash sector must be erased. Refused while streaming.
+#define BT_WRITE_MAP_ID 0x95
 #define BT_WRITE_MAP_BYTES 132
 typedef struct {
-    uint8_t req_id;    // [1] 1 to 255
-    uint8_t finger;    // [1] chip select index
-    uint16_t offset;   // [byte] position of the first byte: a multiple of 128, below the map's size
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint16_t offset; // [byte] position of the first byte: a multiple of 128, below the map's size
     uint8_t data[128]; // [1] bytes of the map; those after its end are ignored
 } bt_msg_write_map;
 
-// Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and
-// match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and its serial
-// number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming.
-#define BT_END_MAP_ID    0x96
+// Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and its serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming.
+#define BT_END_MAP_ID 0x96
 #define BT_END_MAP_BYTES 6
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -808,111 +690,96 @@ typedef struct {
     uint32_t crc32; // [1] as in BEGIN_MAP; the command also succeeds if the finger's map already has it
 } bt_msg_end_map;
 
-// Remove a finger's wrench map, until the next reboot, or permanently with SAVE_SETTINGS. Refused while
-// streaming.
-#define BT_CLEAR_MAP_ID    0x97
+// Remove a finger's wrench map, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
+#define BT_CLEAR_MAP_ID 0x97
 #define BT_CLEAR_MAP_BYTES 2
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
     uint8_t finger; // [1] chip select index
 } bt_msg_clear_map;
 
-// These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for
-// hold_timeout_ms. Repeating it is harmless.
-#define BT_HOLD_ID    0x98
+// These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless.
+#define BT_HOLD_ID 0x98
 #define BT_HOLD_BYTES 2
 typedef struct {
-    uint8_t req_id;  // [1] 1 to 255
+    uint8_t req_id; // [1] 1 to 255
     uint8_t fingers; // [bit mask] bit f: finger f; others stay as they are
 } bt_msg_hold;
 
-// These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT)
-// is tared as residue.
-#define BT_RELEASE_ID    0x99
+// These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT) is tared as residue.
+#define BT_RELEASE_ID 0x99
 #define BT_RELEASE_BYTES 2
 typedef struct {
-    uint8_t req_id;  // [1] 1 to 255
+    uint8_t req_id; // [1] 1 to 255
     uint8_t fingers; // [bit mask] bit f: finger f; others stay as they are
 } bt_msg_release;
 
-// Clear faults that STATUS reported. Only these bits are cleared, so that new faults stay. A fault that
-// persists is set again in the next round.
-#define BT_CLEAR_FAULTS_ID    0x9A
+// Clear faults that STATUS reported. Only these bits are cleared, so that new faults stay. A fault that persists is set again in the next round.
+#define BT_CLEAR_FAULTS_ID 0x9A
 #define BT_CLEAR_FAULTS_BYTES 23
 typedef struct {
-    uint8_t req_id;            // [1] 1 to 255
-    uint16_t faults;           // [flags fault] STATUS.faults as it was read
+    uint8_t req_id; // [1] 1 to 255
+    uint16_t faults; // [flags fault] STATUS.faults as it was read
     uint32_t finger_faults[5]; // [flags frame] STATUS.finger_faults as it was read
 } bt_msg_clear_faults;
 
 // Ask for BOARD_FACTS.
-#define BT_GET_BOARD_FACTS_ID    0x9B
+#define BT_GET_BOARD_FACTS_ID 0x9B
 #define BT_GET_BOARD_FACTS_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_get_board_facts;
 
-// Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a
-// closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and
-// long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming.
-#define BT_SET_BUS_RATE_ID    0x9C
+// Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming.
+#define BT_SET_BUS_RATE_ID 0x9C
 #define BT_SET_BUS_RATE_BYTES 3
 typedef struct {
-    uint8_t req_id;   // [1] 1 to 255
-    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, and goes down to some 1 MHz,
-                      // where five fingers by core fill a slot
+    uint8_t req_id; // [1] 1 to 255
+    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, and goes down to some 1 MHz, where five fingers by core fill a slot
 } bt_msg_set_bus_rate;
 
 // State of an emulated sensor board. Reply to every EMU command. Counters start at EMU_PLUG of finger 0.
-#define BT_EMU_STATUS_ID    0x40
+#define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 39
 typedef struct {
-    uint8_t req_id;        // [1] as in the command
-    uint8_t fingers;       // [bit mask] bit f is set if finger f's sensor is plugged in
-    uint32_t slots_taken;  // [1] slots of the tape received; the next EMU_TAPE begins here
-    uint16_t room_slots;   // [1] further slots that fit now
+    uint8_t req_id; // [1] as in the command
+    uint8_t fingers; // [bit mask] bit f is set if finger f's sensor is plugged in
+    uint32_t slots_taken; // [1] slots of the tape received; the next EMU_TAPE begins here
+    uint16_t room_slots; // [1] further slots that fit now
     uint32_t slots_served; // [1] slots of the tape that the bus has reached
-    uint32_t
-        elapsed_us; // [us] time from the first sample command to the latest, by this board's clock; wraps
+    uint32_t elapsed_us; // [us] time from the first sample command to the latest, by this board's clock; wraps
     uint32_t words; // [1] words that the bus has read
-    uint32_t
-        words_late; // [1] words not ready in time: MISO was not driven, or the answer was for another time
-    uint32_t samples_starved; // [1] samples requested beyond what has come of the tape, or during a hold;
-                              // they read 0x0000
-    uint16_t slowest_us;  // [us] longest time from the select's rise until the next answer was ready; the bus
-                          // allows 50 us
-    int32_t rounds_moved; // [1] with by_time: rounds skipped less rounds replayed; each makes up 10 ms
-                          // between this board's clock and the bus's
-    uint32_t loop_slots;  // [1] slots of the tape in flash; 0: none
-    uint8_t looping;      // [bool] 1: the tape in flash is being played
+    uint32_t words_late; // [1] words not ready in time: MISO was not driven, or the answer was for another time
+    uint32_t samples_starved; // [1] samples requested beyond what has come of the tape, or during a hold; they read 0x0000
+    uint16_t slowest_us; // [us] longest time from the select's rise until the next answer was ready; the bus allows 50 us
+    int32_t rounds_moved; // [1] with by_time: rounds skipped less rounds replayed; each makes up 10 ms between this board's clock and the bus's
+    uint32_t loop_slots; // [1] slots of the tape in flash; 0: none
+    uint8_t looping; // [bool] 1: the tape in flash is being played
 } bt_msg_emu_status;
 
-// Plug a sensor in or out. For finger 0 this also clears the tape, the faults and the counters, so plug it
-// first.
-#define BT_EMU_PLUG_ID    0xC0
+// Plug a sensor in or out. For finger 0 this also clears the tape, the faults and the counters, so plug it first.
+#define BT_EMU_PLUG_ID 0xC0
 #define BT_EMU_PLUG_BYTES 19
 typedef struct {
-    uint8_t req_id;     // [1] 1 to 255
-    uint8_t finger;     // [1] chip select index
-    uint8_t present;    // [bool] 1: plugged in; 0: not
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint8_t present; // [bool] 1: plugged in; 0: not
     uint8_t serial[16]; // [ASCII] serial number; all zero: a made-up one
 } bt_msg_emu_plug;
 
-// The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS
-// tells where to go on. The bus gets samples in the tape's order, as it asks for them.
-#define BT_EMU_TAPE_ID    0xC1
+// The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them.
+#define BT_EMU_TAPE_ID 0xC1
 #define BT_EMU_TAPE_BYTES 227
 typedef struct {
-    uint8_t req_id;       // [1] 1 to 255
-    uint8_t fingers;      // [1] fingers on the tape; the same for the whole tape
-    uint8_t slots;        // [1] slots in this message; slots * fingers is at most 110
-    uint32_t first_slot;  // [1] position of the first slot on the tape
-    uint8_t samples[220]; // [1] slots * fingers samples (u16, little-endian), slot by slot: a count or an
-                          // emu_fault; the rest is ignored
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t fingers; // [1] fingers on the tape; the same for the whole tape
+    uint8_t slots; // [1] slots in this message; slots * fingers is at most 110
+    uint32_t first_slot; // [1] position of the first slot on the tape
+    uint8_t samples[220]; // [1] slots * fingers samples (u16, little-endian), slot by slot: a count or an emu_fault; the rest is ignored
 } bt_msg_emu_tape;
 
 // Give a sensor a fault from now on, whatever the tape says.
-#define BT_EMU_SET_FAULT_ID    0xC2
+#define BT_EMU_SET_FAULT_ID 0xC2
 #define BT_EMU_SET_FAULT_BYTES 4
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -921,31 +788,23 @@ typedef struct {
 } bt_msg_emu_set_fault;
 
 // Ask for EMU_STATUS.
-#define BT_EMU_GET_STATUS_ID    0xC3
+#define BT_EMU_GET_STATUS_ID 0xC3
 #define BT_EMU_GET_STATUS_BYTES 1
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_emu_get_status;
 
 // How to serve the tape. EMU_PLUG of finger 0 restores the defaults: no hold, in the tape's order.
-#define BT_EMU_PLAY_ID    0xC4
+#define BT_EMU_PLAY_ID 0xC4
 #define BT_EMU_PLAY_BYTES 6
 typedef struct {
-    uint8_t req_id;     // [1] 1 to 255
-    uint32_t hold_slot; // [1] first slot of a round at which the tape stops until another EMU_PLAY names a
-                        // later slot; samples requested meanwhile count as samples_starved. It resumes with a
-                        // round before which every finger on the tape was asked for a property, as a gateway
-                        // asks sensors that give no samples, so that all fingers begin in the same round.
-                        // 0xFFFFFFFF: no hold
-    uint8_t by_time;    // [bool] 1: follow this board's clock: skip a round when the bus is a round behind,
-                        // replay one when it is a round ahead
+    uint8_t req_id; // [1] 1 to 255
+    uint32_t hold_slot; // [1] first slot of a round at which the tape stops until another EMU_PLAY names a later slot; samples requested meanwhile count as samples_starved. It resumes with a round before which every finger on the tape was asked for a property, as a gateway asks sensors that give no samples, so that all fingers begin in the same round. 0xFFFFFFFF: no hold
+    uint8_t by_time; // [bool] 1: follow this board's clock: skip a round when the bus is a round behind, replay one when it is a round ahead
 } bt_msg_emu_play;
 
-// Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole
-// rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written
-// in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0
-// until it is done.
-#define BT_EMU_KEEP_ID    0xC5
+// Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done.
+#define BT_EMU_KEEP_ID 0xC5
 #define BT_EMU_KEEP_BYTES 9
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
@@ -957,284 +816,62 @@ typedef struct {
 #ifdef BT_CLIENT_LAYOUT
 // Of each message: id, how many runs, and the runs; a run is the size's logarithm (2 bits) and a count (6).
 static const uint8_t bt_client_layout[] = {
-    BT_HELLO_ID,
-    14,
-    0x01,
-    0x81,
-    0x02,
-    0x81,
-    0x03,
-    0x41,
-    0x0C,
-    0x81,
-    0x41,
-    0x01,
-    0x81,
-    0x01,
-    0x41,
-    0x10,
-    BT_REPLY_ID,
-    1,
-    0x03,
-    BT_SETTING_ID,
-    2,
-    0x02,
-    0x81,
-    BT_SENSOR_INFO_ID,
-    2,
-    0x19,
-    0x42,
-    BT_POINT_ID,
-    4,
-    0x02,
-    0x41,
-    0x02,
-    0x43,
-    BT_CALIBRATION_ID,
-    2,
-    0x13,
-    0x89,
-    BT_MAP_INFO_ID,
-    4,
-    0x13,
-    0x81,
-    0x41,
-    0x81,
-    BT_MAP_DATA_ID,
-    5,
-    0x02,
-    0x41,
-    0x3F,
-    0x3F,
-    0x02,
-    BT_FRAME_ID,
-    10,
-    0x41,
-    0x81,
-    0x02,
-    0x81,
-    0x59,
-    0x86,
-    0x59,
-    0x82,
-    0x41,
-    0x81,
-    BT_PAC_ID,
-    4,
-    0x41,
-    0x81,
-    0x01,
-    0x56,
-    BT_TARE_ID,
-    4,
-    0x41,
-    0x81,
-    0x03,
-    0x95,
-    BT_STATUS_ID,
-    8,
-    0x41,
-    0x81,
-    0x01,
-    0x81,
-    0x02,
-    0x8D,
-    0x41,
-    0x85,
-    BT_SENSOR_STATUS_ID,
-    7,
-    0x41,
-    0x81,
-    0x05,
-    0x86,
-    0x41,
-    0x81,
-    0x02,
-    BT_IDLE_ID,
-    7,
-    0x41,
-    0x81,
-    0x02,
-    0x81,
-    0x41,
-    0x81,
-    0x42,
-    BT_TOUCH_ID,
-    4,
-    0x41,
-    0x81,
-    0x02,
-    0x81,
-    BT_EVENT_ID,
-    5,
-    0x41,
-    0x81,
-    0x04,
-    0x82,
-    0x41,
-    BT_BANDS_ID,
-    4,
-    0x41,
-    0x81,
-    0x02,
-    0x86,
-    BT_BOARD_FACTS_ID,
-    9,
-    0x01,
-    0x81,
-    0x41,
-    0x82,
-    0x03,
-    0x81,
-    0x43,
-    0x81,
-    0x41,
-    BT_HELLO_REQUEST_ID,
-    2,
-    0x01,
-    0x81,
-    BT_START_ID,
-    2,
-    0x03,
-    0x41,
-    BT_STOP_ID,
-    1,
-    0x01,
-    BT_PING_ID,
-    1,
-    0x01,
-    BT_SUBSCRIBE_ID,
-    1,
-    0x03,
-    BT_TAKE_LINK_ID,
-    2,
-    0x01,
-    0x41,
-    BT_GET_POINT_ID,
-    1,
-    0x02,
-    BT_TARE_NOW_ID,
-    1,
-    0x02,
-    BT_TARE_SET_ID,
-    2,
-    0x02,
-    0x54,
-    BT_GET_STATUS_ID,
-    1,
-    0x01,
-    BT_GET_SENSOR_STATUS_ID,
-    1,
-    0x02,
-    BT_GET_SENSOR_INFO_ID,
-    1,
-    0x02,
-    BT_GET_SETTING_ID,
-    1,
-    0x02,
-    BT_SET_SETTING_ID,
-    2,
-    0x02,
-    0x81,
-    BT_REBOOT_BOOTLOADER_ID,
-    2,
-    0x01,
-    0x81,
-    BT_SAVE_SETTINGS_ID,
-    1,
-    0x01,
-    BT_GET_CALIBRATION_ID,
-    1,
-    0x02,
-    BT_SET_CALIBRATION_ID,
-    2,
-    0x12,
-    0x89,
-    BT_CLEAR_CALIBRATION_ID,
-    1,
-    0x02,
-    BT_GET_MAP_ID,
-    1,
-    0x02,
-    BT_READ_MAP_ID,
-    2,
-    0x02,
-    0x41,
-    BT_BEGIN_MAP_ID,
-    3,
-    0x02,
-    0x41,
-    0x81,
-    BT_WRITE_MAP_ID,
-    5,
-    0x02,
-    0x41,
-    0x3F,
-    0x3F,
-    0x02,
-    BT_END_MAP_ID,
-    2,
-    0x02,
-    0x81,
-    BT_CLEAR_MAP_ID,
-    1,
-    0x02,
-    BT_HOLD_ID,
-    1,
-    0x02,
-    BT_RELEASE_ID,
-    1,
-    0x02,
-    BT_CLEAR_FAULTS_ID,
-    3,
-    0x01,
-    0x41,
-    0x85,
-    BT_GET_BOARD_FACTS_ID,
-    1,
-    0x01,
-    BT_SET_BUS_RATE_ID,
-    2,
-    0x01,
-    0x41,
-    BT_EMU_STATUS_ID,
-    7,
-    0x02,
-    0x81,
-    0x41,
-    0x85,
-    0x41,
-    0x82,
-    0x01,
-    BT_EMU_PLUG_ID,
-    1,
-    0x13,
-    BT_EMU_TAPE_ID,
-    6,
-    0x03,
-    0x81,
-    0x3F,
-    0x3F,
-    0x3F,
-    0x1F,
-    BT_EMU_SET_FAULT_ID,
-    2,
-    0x02,
-    0x41,
-    BT_EMU_GET_STATUS_ID,
-    1,
-    0x01,
-    BT_EMU_PLAY_ID,
-    3,
-    0x01,
-    0x81,
-    0x01,
-    BT_EMU_KEEP_ID,
-    2,
-    0x01,
-    0x82,
-    0,
-    0,
+    BT_HELLO_ID, 14, 0x01, 0x81, 0x02, 0x81, 0x03, 0x41, 0x0C, 0x81, 0x41, 0x01, 0x81, 0x01, 0x41, 0x10,
+    BT_REPLY_ID, 1, 0x03,
+    BT_SETTING_ID, 2, 0x02, 0x81,
+    BT_SENSOR_INFO_ID, 2, 0x19, 0x42,
+    BT_POINT_ID, 4, 0x02, 0x41, 0x02, 0x43,
+    BT_CALIBRATION_ID, 2, 0x13, 0x89,
+    BT_MAP_INFO_ID, 4, 0x13, 0x81, 0x41, 0x81,
+    BT_MAP_DATA_ID, 5, 0x02, 0x41, 0x3F, 0x3F, 0x02,
+    BT_FRAME_ID, 10, 0x41, 0x81, 0x02, 0x81, 0x59, 0x86, 0x59, 0x82, 0x41, 0x81,
+    BT_PAC_ID, 4, 0x41, 0x81, 0x01, 0x56,
+    BT_TARE_ID, 4, 0x41, 0x81, 0x03, 0x95,
+    BT_STATUS_ID, 8, 0x41, 0x81, 0x01, 0x81, 0x02, 0x8D, 0x41, 0x85,
+    BT_SENSOR_STATUS_ID, 7, 0x41, 0x81, 0x05, 0x86, 0x41, 0x81, 0x02,
+    BT_IDLE_ID, 7, 0x41, 0x81, 0x02, 0x81, 0x41, 0x81, 0x42,
+    BT_TOUCH_ID, 4, 0x41, 0x81, 0x02, 0x81,
+    BT_EVENT_ID, 5, 0x41, 0x81, 0x04, 0x82, 0x41,
+    BT_BANDS_ID, 4, 0x41, 0x81, 0x02, 0x86,
+    BT_BOARD_FACTS_ID, 9, 0x01, 0x81, 0x41, 0x82, 0x03, 0x81, 0x43, 0x81, 0x41,
+    BT_HELLO_REQUEST_ID, 2, 0x01, 0x81,
+    BT_START_ID, 2, 0x03, 0x41,
+    BT_STOP_ID, 1, 0x01,
+    BT_PING_ID, 1, 0x01,
+    BT_SUBSCRIBE_ID, 1, 0x03,
+    BT_TAKE_LINK_ID, 2, 0x01, 0x41,
+    BT_GET_POINT_ID, 1, 0x02,
+    BT_TARE_NOW_ID, 1, 0x02,
+    BT_TARE_SET_ID, 2, 0x02, 0x54,
+    BT_GET_STATUS_ID, 1, 0x01,
+    BT_GET_SENSOR_STATUS_ID, 1, 0x02,
+    BT_GET_SENSOR_INFO_ID, 1, 0x02,
+    BT_GET_SETTING_ID, 1, 0x02,
+    BT_SET_SETTING_ID, 2, 0x02, 0x81,
+    BT_REBOOT_BOOTLOADER_ID, 2, 0x01, 0x81,
+    BT_SAVE_SETTINGS_ID, 1, 0x01,
+    BT_GET_CALIBRATION_ID, 1, 0x02,
+    BT_SET_CALIBRATION_ID, 2, 0x12, 0x89,
+    BT_CLEAR_CALIBRATION_ID, 1, 0x02,
+    BT_GET_MAP_ID, 1, 0x02,
+    BT_READ_MAP_ID, 2, 0x02, 0x41,
+    BT_BEGIN_MAP_ID, 3, 0x02, 0x41, 0x81,
+    BT_WRITE_MAP_ID, 5, 0x02, 0x41, 0x3F, 0x3F, 0x02,
+    BT_END_MAP_ID, 2, 0x02, 0x81,
+    BT_CLEAR_MAP_ID, 1, 0x02,
+    BT_HOLD_ID, 1, 0x02,
+    BT_RELEASE_ID, 1, 0x02,
+    BT_CLEAR_FAULTS_ID, 3, 0x01, 0x41, 0x85,
+    BT_GET_BOARD_FACTS_ID, 1, 0x01,
+    BT_SET_BUS_RATE_ID, 2, 0x01, 0x41,
+    BT_EMU_STATUS_ID, 7, 0x02, 0x81, 0x41, 0x85, 0x41, 0x82, 0x01,
+    BT_EMU_PLUG_ID, 1, 0x13,
+    BT_EMU_TAPE_ID, 6, 0x03, 0x81, 0x3F, 0x3F, 0x3F, 0x1F,
+    BT_EMU_SET_FAULT_ID, 2, 0x02, 0x41,
+    BT_EMU_GET_STATUS_ID, 1, 0x01,
+    BT_EMU_PLAY_ID, 3, 0x01, 0x81, 0x01,
+    BT_EMU_KEEP_ID, 2, 0x01, 0x82,
+    0, 0,
 };
 // Numbers lie at multiples of their size.
 typedef char bt_msg_hello_lies_so[sizeof(bt_msg_hello) == 68 ? 1 : -1];
@@ -1295,142 +932,62 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #endif
 
 #ifdef BT_CLIENT_FIELDS // for tests: X(name, type, count) for every field
-#define BT_HELLO_FIELDS(X)                                                                                   \
-    X(req_id, u8, 1)                                                                                         \
-    X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1)                        \
-        X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1)          \
-            X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1)          \
-                X(image_crc32, u32, 1) X(fingers, u8, 1) X(map_bytes, u16, 1) X(board_name, u8, 16)
-#define BT_REPLY_FIELDS(X)   X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
+#define BT_HELLO_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1) X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1) X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1) X(image_crc32, u32, 1) X(fingers, u8, 1) X(map_bytes, u16, 1) X(board_name, u8, 16)
+#define BT_REPLY_FIELDS(X) X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
-#define BT_SENSOR_INFO_FIELDS(X)                                                                             \
-    X(req_id, u8, 1)                                                                                         \
-    X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16)   \
-        X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
-#define BT_POINT_FIELDS(X)                                                                                   \
-    X(req_id, u8, 1) X(finger, u8, 1) X(seq, u16, 1) X(slot, u8, 1) X(tare_state, u8, 1) X(poc_um, i16, 3)
-#define BT_CALIBRATION_FIELDS(X)                                                                             \
-    X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
-#define BT_MAP_INFO_FIELDS(X)                                                                                \
-    X(req_id, u8, 1)                                                                                         \
-    X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1)               \
-        X(crc32, u32, 1)
+#define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
+#define BT_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(seq, u16, 1) X(slot, u8, 1) X(tare_state, u8, 1) X(poc_um, i16, 3)
+#define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
+#define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
 #define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_FRAME_FIELDS(X)                                                                                   \
-    X(seq, u16, 1)                                                                                           \
-    X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) \
-        X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3)        \
-            X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3)  \
-                X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1)           \
-                    X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
-#define BT_TARE_FIELDS(X)                                                                                    \
-    X(seq, u16, 1)                                                                                           \
-    X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1)           \
-        X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
-#define BT_STATUS_FIELDS(X)                                                                                  \
-    X(seq, u16, 1)                                                                                           \
-    X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1)         \
-        X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1)      \
-            X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1)      \
-                X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1)                     \
-                    X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1)                      \
-                        X(finger_faults, u32, 5)
-#define BT_SENSOR_STATUS_FIELDS(X)                                                                           \
-    X(seq, u16, 1)                                                                                           \
-    X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1)                 \
-        X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1)           \
-            X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1) \
-                X(electrodes_out, u32, 1) X(electrode_fault, u8, 1) X(sensor_fault, u8, 1)
-#define BT_IDLE_FIELDS(X)                                                                                    \
-    X(seq, u16, 1)                                                                                           \
-    X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1)                 \
-        X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
-#define BT_TOUCH_FIELDS(X)                                                                                   \
-    X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
-#define BT_EVENT_FIELDS(X)                                                                                   \
-    X(seq, u16, 1)                                                                                           \
-    X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1)  \
-        X(energy_count2, u32, 1) X(peak_count, u16, 1)
+#define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
+#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
+#define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1) X(electrodes_out, u32, 1) X(electrode_fault, u8, 1) X(sensor_fault, u8, 1)
+#define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
+#define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
+#define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
-#define BT_BOARD_FACTS_FIELDS(X)                                                                             \
-    X(req_id, u8, 1)                                                                                         \
-    X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3)         \
-        X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1)                   \
-            X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
+#define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
-#define BT_START_FIELDS(X)      X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
-#define BT_STOP_FIELDS(X)       X(req_id, u8, 1)
-#define BT_PING_FIELDS(X)       X(req_id, u8, 1)
-#define BT_SUBSCRIBE_FIELDS(X)  X(req_id, u8, 1) X(fingers, u8, 1) X(quantities, u8, 1)
-#define BT_TAKE_LINK_FIELDS(X)  X(req_id, u8, 1) X(keepalive_ms, u16, 1)
-#define BT_GET_POINT_FIELDS(X)  X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_TARE_NOW_FIELDS(X)   X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_TARE_SET_FIELDS(X)   X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
+#define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
+#define BT_STOP_FIELDS(X) X(req_id, u8, 1)
+#define BT_PING_FIELDS(X) X(req_id, u8, 1)
+#define BT_SUBSCRIBE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(quantities, u8, 1)
+#define BT_TAKE_LINK_FIELDS(X) X(req_id, u8, 1) X(keepalive_ms, u16, 1)
+#define BT_GET_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_TARE_NOW_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_TARE_SET_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
 #define BT_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_GET_SENSOR_STATUS_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_GET_SENSOR_INFO_FIELDS(X)   X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_GET_SETTING_FIELDS(X)       X(req_id, u8, 1) X(setting, u8, 1)
-#define BT_SET_SETTING_FIELDS(X)       X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
+#define BT_GET_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_GET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1)
+#define BT_SET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_REBOOT_BOOTLOADER_FIELDS(X) X(req_id, u8, 1) X(magic, u32, 1)
-#define BT_SAVE_SETTINGS_FIELDS(X)     X(req_id, u8, 1)
-#define BT_GET_CALIBRATION_FIELDS(X)   X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_SET_CALIBRATION_FIELDS(X)                                                                         \
-    X(req_id, u8, 1) X(finger, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
+#define BT_SAVE_SETTINGS_FIELDS(X) X(req_id, u8, 1)
+#define BT_GET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_SET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_CLEAR_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_GET_MAP_FIELDS(X)           X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_READ_MAP_FIELDS(X)          X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1)
-#define BT_BEGIN_MAP_FIELDS(X)       X(req_id, u8, 1) X(finger, u8, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
-#define BT_WRITE_MAP_FIELDS(X)       X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_END_MAP_FIELDS(X)         X(req_id, u8, 1) X(finger, u8, 1) X(crc32, u32, 1)
-#define BT_CLEAR_MAP_FIELDS(X)       X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_HOLD_FIELDS(X)            X(req_id, u8, 1) X(fingers, u8, 1)
-#define BT_RELEASE_FIELDS(X)         X(req_id, u8, 1) X(fingers, u8, 1)
-#define BT_CLEAR_FAULTS_FIELDS(X)    X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
+#define BT_GET_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_READ_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1)
+#define BT_BEGIN_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
+#define BT_WRITE_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
+#define BT_END_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(crc32, u32, 1)
+#define BT_CLEAR_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
+#define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
+#define BT_CLEAR_FAULTS_FIELDS(X) X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
 #define BT_GET_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1)
-#define BT_SET_BUS_RATE_FIELDS(X)    X(req_id, u8, 1) X(bus_khz, u16, 1)
-#define BT_EMU_STATUS_FIELDS(X)                                                                              \
-    X(req_id, u8, 1)                                                                                         \
-    X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1)                   \
-        X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1)              \
-            X(slowest_us, u16, 1) X(rounds_moved, i32, 1) X(loop_slots, u32, 1) X(looping, u8, 1)
+#define BT_SET_BUS_RATE_FIELDS(X) X(req_id, u8, 1) X(bus_khz, u16, 1)
+#define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1) X(rounds_moved, i32, 1) X(loop_slots, u32, 1) X(looping, u8, 1)
 #define BT_EMU_PLUG_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(serial, u8, 16)
-#define BT_EMU_TAPE_FIELDS(X)                                                                                \
-    X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
-#define BT_EMU_SET_FAULT_FIELDS(X)  X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
+#define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
+#define BT_EMU_SET_FAULT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
-#define BT_EMU_PLAY_FIELDS(X)       X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1)
-#define BT_EMU_KEEP_FIELDS(X)       X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X)                                                                                  \
-    X(HELLO, bt_msg_hello)                                                                                   \
-    X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(                  \
-        POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info)                 \
-        X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(       \
-            STATUS, bt_msg_status) X(SENSOR_STATUS,                                                          \
-                                     bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch)       \
-            X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(              \
-                HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop)             \
-                X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(        \
-                    GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set)   \
-                    X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(       \
-                        GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting)          \
-                        X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X( \
-                            SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration)  \
-                            X(SET_CALIBRATION, bt_msg_set_calibration)                                       \
-                                X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map)    \
-                                    X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map)              \
-                                        X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(         \
-                                            CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold)                \
-                                            X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults)  \
-                                                X(GET_BOARD_FACTS, bt_msg_get_board_facts)                   \
-                                                    X(SET_BUS_RATE, bt_msg_set_bus_rate)                     \
-                                                        X(EMU_STATUS, bt_msg_emu_status)                     \
-                                                            X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE,         \
-                                                                                           bt_msg_emu_tape)  \
-                                                                X(EMU_SET_FAULT, bt_msg_emu_set_fault)       \
-                                                                    X(EMU_GET_STATUS, bt_msg_emu_get_status) \
-                                                                        X(EMU_PLAY, bt_msg_emu_play)         \
-                                                                            X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1)
+#define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif
