@@ -38,7 +38,7 @@ void port_spi_select(bt_port *port, uint8_t mask);
 // Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi);
 
-// The same with 8 bits: a property's bytes come one by one.
+// The same with 8 bits, for sensors whose properties come byte by byte.
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi);
 
 // Begin a whole slot, if the board's hardware can do it: the command to the sensors of mask at once,

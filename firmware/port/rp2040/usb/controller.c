@@ -124,6 +124,7 @@ static bool has_host(uint32_t now_us)
 #endif
 }
 
+bool usb_hears_frames;
 static bool off = true;
 static uint32_t since_us = 0u - OFF_THE_BUS_US; // of the latest frame, or since it is off
 
@@ -133,12 +134,8 @@ static void detach(uint32_t now_us)
     usb_control_bus_reset();
     (void)take_out_of_reset(RESETS_USBCTRL);
     off = true;
+    usb_hears_frames = false;
     since_us = now_us;
-}
-
-bool usb_hears_frames(void)
-{
-    return !off && port_now_us(ONLY_BOARD) - since_us < SUSPENDED_US;
 }
 
 void usb_start(const char *serial)
@@ -171,6 +168,7 @@ void usb_watch(void)
     }
     if (frame != usb_starts) {
         frame = usb_starts;
+        usb_hears_frames = true;
         since_us = now_us;
         line_moves = false;
         return;
@@ -178,6 +176,7 @@ void usb_watch(void)
     if (silent_us < SUSPENDED_US) {
         return;
     }
+    usb_hears_frames = false;
     // On a bus that sleeps the lines do not change; on one whose host still talks, a hung controller believes
     // it asleep.
     line_moves = line_moves || (USB_SIE_STATUS & USB_SIE_LINE_STATE) != USB_SIE_LINE_J;
