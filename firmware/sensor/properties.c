@@ -105,11 +105,9 @@ bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHA
     } else if (query->driven && query->patience != 0) {
         query->patience--;
     } else if (query->driven && !(query->forms >> query->form & 1)) {
-        query->form = (uint8_t)(query->form == BT_FORM_BYTES ? BT_FORM_WORDS : query->form + 1);
-        if (query->form == BT_FORM_HELD && query->held++ == HELD_ROUNDS) {
-            query->held = HELD_ROUNDS;
-            query->form = BT_FORM_BYTES;
-        }
+        const bool hold = query->form == BT_FORM_WORDS && query->held < HELD_ROUNDS;
+        query->held = (uint8_t)(query->held + hold);
+        query->form = hold ? BT_FORM_HELD : query->form == BT_FORM_BYTES ? BT_FORM_WORDS : BT_FORM_BYTES;
     }
     memcpy(serial, query->serial, BT_SERIAL_CHARS);
     // Sensors with 24 electrodes (BioTac SP: BTSP; BTTB) answer the same commands, but have other electrodes

@@ -1,11 +1,10 @@
 // Reads what a sensor says about itself.
 //
-// Three ways for a property's bytes to come are documented, and none has been seen to work: 16-bit words, one
-// a select (SPM 8.2; CLIB's CPU speed), bytes with the select held low (CLIB), and bytes with a select each.
-// They have no parity and no length, so an error word (0xA5xx) is never taken for a value, each property is
-// read twice and compared, and a serial number has the shape of one, and is alike in two forms or three times
-// in one. SynTouch's library discards the first read after power-up, and so do we: some sensors send only
-// zeros until they are asked.
+// Three ways for a property's bytes to come are documented, none seen to work: 16-bit words, one a select
+// (SPM 8.2; CLIB's CPU speed), bytes with the select held (CLIB), bytes with a select each. They have no
+// parity and no length: an error word (0xA5xx) is no value, each property is read twice alike, a serial
+// number in two forms or three times in one. The first read is thrown away, as CLIB does: some send zeros
+// until they are asked.
 #ifndef BIOTAC_PROPERTIES_H
 #define BIOTAC_PROPERTIES_H
 
@@ -21,9 +20,8 @@ enum bt_form { BT_FORM_WORDS, BT_FORM_HELD, BT_FORM_BYTES };
 
 // A property being read. Zeroed except for selector, bytes and form.
 typedef struct {
-    uint8_t selector; // enum bt_property
-    uint8_t bytes;    // an even number
-    uint8_t form;     // enum bt_form
+    uint8_t selector;    // enum bt_property
+    uint8_t bytes, form; // an even number; enum bt_form
     uint8_t at;
     bool asked;
     uint8_t got[BT_SERIAL_CHARS]; // no property that we read is longer

@@ -56,9 +56,8 @@ void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint3
 uint32_t bt_sampler_alarm(bt_sampler *sampler);
 
 // Main loop: ask these fingers for their serial numbers instead of sampling them, for one whole round: the
-// given one or the first after it. Their answers are in query once that round's slots have come. Where one is
-// asked with its select held low, the bus is its own, and no finger is sampled in that round. Returns false
-// if an earlier request is still pending.
+// given one or the first after it; none is sampled if one is asked with its select held. Their answers are in
+// query once that round's slots have come. Returns false if an earlier request is still pending.
 bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round);
 
 // Main loop: take the oldest slot. False when there is none.
