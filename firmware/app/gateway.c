@@ -168,12 +168,14 @@ static void load_settings(bt_gateway *gateway)
 
 // A slower UART is not used: one FRAME would take longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
+#define DOUBTFUL_BYTES        64 // more than the frame with which a host begins
 
 static void start_uart(const bt_gateway *gateway)
 {
     const bt_settings *settings = &gateway->session.settings;
     int32_t bits_per_s = bt_settings_get(settings, BT_SETTING_UART_BITS_PER_S);
-    port_link_uart(gateway->port, bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s);
+    const bool none = bits_per_s < UART_LEAST_BITS_PER_S || gateway->uart_by_default;
+    port_link_uart(gateway->port, none ? 0 : (uint32_t)bits_per_s);
 }
 
 void bt_gateway_init(bt_gateway *gateway, bt_port *port)
@@ -227,7 +229,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.faults |= board.started_by;
     for (uint8_t f = 0; f < can.fingers; f++) {
-        bt_properties_read(port, f, &gateway->session.info[f]);
+        bt_properties_read(port, f, &gateway->sampler.query[f], &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
         if (!gateway->session.info[f].present) {
             bt_sensors_doubt(&gateway->session, f);
@@ -303,9 +305,13 @@ static void close_round(bt_gateway *gateway)
         bt_kept_tares_note(gateway->kept, session);
     }
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
-        if (session->asked >> f & 1) {
+        if (gateway->queried >> f & 1) {
             bool answered = bt_serial_query_answer(&gateway->sampler.query[f], serial);
             bt_sensors_answer(session, f, answered ? serial : NULL);
+            if (!session->finger[f].present) {
+                gateway->sampler.query[f].form =
+                    BT_FORM_WORDS; // nobody for whom the others should give a round up
+            }
         }
     }
     uint8_t ask = bt_sensors_to_ask(session);
@@ -328,6 +334,7 @@ static void take_slot(bt_gateway *gateway, const bt_slot *slot)
         gateway->round = slot->round;
         gateway->round_open = true;
         session->asked = slot->asked;
+        gateway->queried = slot->queried;
     }
     uint16_t count[BT_MAX_FINGERS];
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -363,6 +370,14 @@ static void read_link(bt_gateway *gateway, unsigned link)
     const size_t n = port_link_read(gateway->port, link, bytes, sizeof bytes);
     if (n > 0) {
         bt_session_receive(&gateway->session, link, bytes, n, port_now_us(gateway->port));
+        // A rate may have been saved by mistake, on a board that has no other link: until a good frame has
+        // come, what is none has the port's default tried, and this one again.
+        gateway->doubtful_bytes += (uint32_t)n;
+        if (gateway->session.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
+            gateway->doubtful_bytes = 0;
+            gateway->uart_by_default = !gateway->uart_by_default;
+            start_uart(gateway);
+        }
     }
 }
 

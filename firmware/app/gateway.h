@@ -15,9 +15,12 @@ typedef struct {
     bt_map_flash map_flash;
     uint32_t round;    // being assembled
     uint32_t dma_late; // of the sampler, as last seen
+    uint8_t queried;   // bit mask of the fingers asked for their serial number in it
     bool round_open;
     atomic_bool in_use;              // as the latest round ended; for the interrupt
     uint32_t link_turns[PORT_LINKS]; // as of the last poll
+    uint32_t doubtful_bytes;         // that came before a good frame, since the UART's rate is what it is
+    bool uart_by_default;            // its rate is the port's, not the saved one
     bt_kept_tares *kept;             // NULL: the board has no memory for them
 } bt_gateway;
 

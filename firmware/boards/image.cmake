@@ -2,7 +2,7 @@
 #   gateway_image(NAME PORT CPU LINKER [SOURCES...])   the gateway on that port
 #   board_image(NAME PORT CPU LINKER SOURCES...)       another program on it
 # PORT is a folder of firmware/port, CPU the compiler's options for the core, LINKER a script in the port's folder. Makes
-# NAME.elf and NAME.bin (what is stored from its first byte on), with whatever PORT/image.cmake adds, and holds it to
+# NAME.elf, NAME.bin (what is stored from its first byte on) and NAME.hex (all, with addresses), with whatever PORT/image.cmake adds, and holds it to
 # limits.json of the board's folder.
 #   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for its bus and flash
 if(NOT CMAKE_TOOLCHAIN_FILE)
@@ -16,6 +16,7 @@ set(tools ${fw}/../tools)
 
 find_package(Python3 3.10 REQUIRED COMPONENTS Interpreter)
 include(${boards}/compile_options.cmake)
+option(BIOTAC_NO_LIMITS "an image of a first hack, whose flash, RAM, stack, floats and waits nobody checks" OFF)
 
 macro(leave_out_systick sources) # where the port's timer.c is the alarm
   if(EXISTS ${port}/timer.c)
@@ -34,6 +35,13 @@ function(board_image name port_name cpu linker)
     include(${port}/image.cmake)
   endif()
   leave_out_systick(ARGN)
+  if(EXISTS ${CMAKE_CURRENT_LIST_DIR}/flash.json) # for `biotac flash`, beside the image
+    set(flash_json COMMAND ${CMAKE_COMMAND} -E copy ${CMAKE_CURRENT_LIST_DIR}/flash.json ${name}.flash.json)
+  endif()
+  if(NOT BIOTAC_NO_LIMITS)
+    set(check COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${port_name}
+      --limits ${CMAKE_CURRENT_LIST_DIR}/limits.json --objdump ${CMAKE_OBJDUMP})
+  endif()
   add_executable(${name} ${ARGN} ${port_objects})
   set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
   target_include_directories(${name} PRIVATE
@@ -44,9 +52,8 @@ function(board_image name port_name cpu linker)
   add_custom_command(TARGET ${name} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary -R .boot_vectors ${name}.elf ${name}.bin
     COMMAND ${Python3_EXECUTABLE} ${tools}/image/note.py ${name}.bin ${name}.elf --objcopy ${CMAKE_OBJCOPY}
-    ${port_after}
-    COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${port_name}
-      --limits ${CMAKE_CURRENT_LIST_DIR}/limits.json --objdump ${CMAKE_OBJDUMP})
+    COMMAND ${CMAKE_OBJCOPY} -O ihex ${name}.elf ${name}.hex
+    ${port_after} ${flash_json} ${check})
 endfunction()
 
 function(gateway_image name port_name cpu linker)

@@ -730,12 +730,12 @@ typedef struct {
     uint8_t req_id; // [1] 1 to 255
 } bt_msg_get_board_facts;
 
-// Clock the sensors' bus at the nearest rate the board has, not above this, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin. Values read meanwhile mean nothing. Refused while streaming.
+// Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming.
 #define BT_SET_BUS_RATE_ID 0x9C
 #define BT_SET_BUS_RATE_BYTES 3
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, nor goes below the usual rate
+    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, and goes down to some 1 MHz, where five fingers by core fill a slot
 } bt_msg_set_bus_rate;
 
 // State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md).

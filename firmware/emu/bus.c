@@ -7,7 +7,7 @@ void bt_emu_bus_init(bt_emu_bus *bus, uint32_t fingers, const char *serials, bt_
 {
     bus->selected = 0;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        char serial[sizeof bus->sensor[f].serial] = "";
+        char serial[BT_EMU_SERIAL_CHARS] = "";
         size_t given = strcspn(serials, ",");
         if (given < sizeof serial) {
             memcpy(serial, serials, given);

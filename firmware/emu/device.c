@@ -40,9 +40,12 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
     device->context = context;
     memcpy(device->serial, "BTEMU00000000001", sizeof device->serial);
     device->serial[sizeof device->serial - 2] = (char)('1' + finger);
-    if (serial[0] != '\0') {
-        strncpy(device->serial, serial, sizeof device->serial - 1);
+    const size_t bytes = strcspn(serial, "/");
+    if (bytes != 0) {
+        memset(device->serial, 0, sizeof device->serial);
+        memcpy(device->serial, serial, bytes < sizeof device->serial ? bytes : sizeof device->serial - 1);
     }
+    device->kind = (uint8_t)(serial[bytes] == '\0' ? BT_EMU_ANY : serial[bytes + 1]);
 }
 
 // Unplugged and so without power: what was asked for is forgotten.
@@ -225,6 +228,9 @@ static uint8_t shift_out(bt_emu_device *device, uint64_t t_ns)
 {
     bool low = device->position & 1;
     if (device->pending == PROPERTY && device->settled) {
+        if (device->kind == BT_EMU_BYTES && device->position != 0) {
+            return 0x00;
+        }
         uint8_t byte = property_byte(device, device->property_at);
         device->property_at = (uint8_t)(device->property_at + (device->property_at < device->property_bytes));
         return on_the_line(byte, line_now(device, t_ns), low);
@@ -279,6 +285,11 @@ void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns)
 {
     if (device->selected && !low) {
         device->released_ns = t_ns;
+        const bool ends =
+            device->kind == BT_EMU_HELD || (device->kind == BT_EMU_WORDS && device->position & 1);
+        if (ends && device->pending == PROPERTY && device->property_at != 0) {
+            device->pending = NOTHING;
+        }
     }
     if (low && !device->selected) {
         device->position = 0;

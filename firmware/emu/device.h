@@ -39,12 +39,21 @@
 // bt_emu_fault.
 typedef uint16_t (*bt_emu_source)(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
+// How a property's bytes come (properties.h), by the first letter of a suffix: "BT.../words".
+enum bt_emu_kind {
+    BT_EMU_ANY,         // from select to select, one or several in each
+    BT_EMU_WORDS = 'w', // a property ends when the chip select rises within a word
+    BT_EMU_HELD = 'h',  // it ends when the chip select rises
+    BT_EMU_BYTES = 'b', // one a select; what follows is zeros
+};
+
 #define BT_EMU_PROPERTY_BYTES (2 * BT_SLOTS) // the list of channels
 
 typedef struct {
     bool present;
     bool mute; // sends only zeros until it is asked for a property
     uint8_t finger;
+    uint8_t kind; // enum bt_emu_kind
     char serial[17];
     bt_emu_source source;
     void *context;
@@ -66,7 +75,8 @@ typedef struct {
     uint32_t early_reads; // reads that broke the 50 us rule
 } bt_emu_device;
 
-// serial: up to 16 characters; empty: one made up.
+// serial: up to 16 characters, and a kind's suffix; empty: one made up.
+#define BT_EMU_SERIAL_CHARS 24
 void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char *serial,
                  bt_emu_source source, void *context);
 

@@ -38,7 +38,7 @@ void port_spi_select(bt_port *port, uint8_t mask);
 // Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi);
 
-// The same with 8 bits: a property's bytes come one by one.
+// The same with 8 bits, for sensors whose properties come byte by byte.
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi);
 
 // Begin a whole slot, if the board's hardware can do it: the command to the sensors of mask at once,
@@ -64,8 +64,8 @@ size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 // is started). One that was closed and opened between two calls shows by this.
 uint32_t port_link_turns(bt_port *port, unsigned link);
 
-// Call once: start the UART, in bits per second. 0 is none or, on a board without another link, its own
-// default: such a board is never mute. Does nothing on a board without a UART.
+// Start the UART, or go on at another rate, in bits per second. 0 is none or, on a board without another
+// link, its own default: such a board is never mute. Does nothing on a board without a UART.
 void port_link_uart(bt_port *port, uint32_t bits_per_s);
 
 // True once after a host set link 0 to 1200 baud and closed it, the customary way to ask for the bootloader.
@@ -101,8 +101,8 @@ typedef struct {
     ((port_facts){.usb_frame = UINT16_MAX, .die_centi_c = PORT_NOT_MEASURED, .bus_khz = 4400})
 port_facts port_measure(bt_port *port);
 
-// From the next slot on, clock SPI at the fastest rate there is up to this one, but not below the usual; 0:
-// the usual one. Does nothing where the rate is fixed.
+// From the next slot on, clock SPI at the fastest rate there is up to this one, or the slowest, some 1 MHz;
+// 0: the usual one. Does nothing where the rate is fixed.
 void port_spi_rate(bt_port *port, uint32_t khz);
 
 // ---- identity -------------------------------------------------------------------------------

@@ -4,47 +4,59 @@
 
 #include <string.h>
 
-#define TRIES         3
-#define ERROR_HIGH    (BT_ERROR_WORD_UNKNOWN_COMMAND >> 8)
-#define VERSION_BYTES 4
-#define QUERY_READS   3
-#define QUERY_STEPS   (1 + VERSION_BYTES + 2 * (1 + BT_SERIAL_CHARS))
-_Static_assert(QUERY_STEPS <= BT_SLOTS, "one round must suffice to ask");
+#define TRIES          3
+#define ASKS           6 // at start, in all forms
+#define ERROR_HIGH     (BT_ERROR_WORD_UNKNOWN_COMMAND >> 8)
+#define VERSION_BYTES  4
+#define READS_IN(form) ((form) == BT_FORM_BYTES ? 3 : 4)
+_Static_assert(4 + VERSION_BYTES / 2 + 3 * BT_SERIAL_CHARS / 2 <= BT_SLOTS
+                   && 3 + VERSION_BYTES + 2 * BT_SERIAL_CHARS <= BT_SLOTS,
+               "one round must suffice to ask in each form");
 
-bool bt_property_step(bt_property *property, bt_port *port, uint8_t finger)
+// Sends the command, or reads what is next: a word, a byte or, with the select held, two. True once all are
+// there.
+static bool step(bt_property *property, bt_port *port, uint8_t finger)
 {
     port_spi_select(port, (uint8_t)(1u << finger));
     if (!property->asked) {
         property->asked = true;
         (void)port_spi_transfer16(port, (uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | property->selector));
+    } else if (property->form == BT_FORM_WORDS) {
+        const uint16_t word = port_spi_transfer16(port, BT_LISTEN_WORD);
+        property->got[property->at++] = (uint8_t)(word >> 8);
+        property->got[property->at++] = (uint8_t)word;
     } else {
         property->got[property->at++] = port_spi_transfer8(port, BT_LISTEN_WORD >> 8);
+        if (property->form == BT_FORM_HELD) {
+            port_delay_us(port, BT_PROPERTY_GAP_US);
+            property->got[property->at++] = port_spi_transfer8(port, BT_LISTEN_WORD >> 8);
+        }
     }
-    port_spi_select(port, 0);
-    return property->at == property->bytes;
+    const bool whole = property->at == property->bytes;
+    if (property->form != BT_FORM_HELD || property->at == 0 || whole) {
+        port_spi_select(port, 0);
+    }
+    return whole;
 }
 
 // ---- who is there -----------------------------------------------------------------------------------
 
-static void begin(bt_property *property, uint8_t selector, uint8_t bytes)
+static bt_property begin(uint8_t selector, size_t bytes, uint8_t form)
 {
-    property->selector = selector;
-    property->bytes = bytes;
-    property->at = 0;
-    property->asked = false;
+    return (bt_property){.selector = selector, .bytes = (uint8_t)bytes, .form = form};
 }
 
 void bt_serial_query_begin(bt_serial_query *query)
 {
     query->whole = 0;
-    begin(&query->read[0], BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
-    begin(&query->read[1], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
-    begin(&query->read[2], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
+    query->read[0] = begin(BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES, query->form);
+    query->read[1] = begin(BT_PROPERTY_SERIAL, BT_SERIAL_CHARS, query->form);
+    query->read[2] = query->read[3] = query->read[1];
 }
 
 void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger)
 {
-    if (query->whole < QUERY_READS && bt_property_step(&query->read[query->whole], port, finger)) {
+    if (query->whole < READS_IN(query->form) && step(&query->read[query->whole], port, finger)) {
         query->whole++;
     }
 }
@@ -63,40 +75,68 @@ static bool trim_text(uint8_t *text, unsigned bytes)
     return ends && end > 0;
 }
 
-// Sensors with 24 electrodes (BioTac SP: BTSP; BTTB) answer the same commands, but have other electrodes in
-// other places.
+// BT2P0220B11E0004 and BTSP050400018017 are known; both have digits here.
 static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
 {
     return trim_text(serial, BT_SERIAL_CHARS) && memcmp(serial, "BT", 2) == 0
-           && memcmp(serial + 2, "SP", 2) != 0 && memcmp(serial + 2, "TB", 2) != 0;
+           && (uint8_t)(serial[5] - '0') < 10 && (uint8_t)(serial[6] - '0') < 10
+           && (uint8_t)(serial[7] - '0') < 10;
 }
 
-bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
+#define PATIENCE    2 // rounds that a form may fail in which the sensor has answered
+#define HELD_ROUNDS 6 // with the select held low a round costs the other fingers theirs
+
+bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
 {
-    memcpy(serial, query->read[1].got, BT_SERIAL_CHARS);
-    return query->whole == QUERY_READS && memcmp(serial, query->read[2].got, BT_SERIAL_CHARS) == 0
-           && trim_serial(serial);
+    query->driven = (uint8_t)(query->read[1].got[0] + 1) > 1; // neither 0x00 nor 0xFF
+    for (int k = 1; k < query->whole; k++) {
+        uint8_t *got = query->read[k].got;
+        if (trim_serial(got)) {
+            const bool same = memcmp(query->serial, got, BT_SERIAL_CHARS) == 0;
+            memcpy(query->serial, got, BT_SERIAL_CHARS);
+            query->readings = (uint8_t)(same ? query->readings + 1 : 1);
+            query->forms = (uint8_t)((same ? query->forms : 0) | 1u << query->form);
+        }
+    }
+    const bool sure = query->readings >= 3 || query->forms & (query->forms - 1);
+    if (sure) {
+        query->readings = query->forms = query->held = 0;
+        query->patience = PATIENCE;
+    } else if (query->driven && query->patience != 0) {
+        query->patience--;
+    } else if (query->driven && !(query->forms >> query->form & 1)) {
+        const bool hold = query->form == BT_FORM_WORDS && query->held < HELD_ROUNDS;
+        query->held = (uint8_t)(query->held + hold);
+        query->form = hold ? BT_FORM_HELD : query->form == BT_FORM_BYTES ? BT_FORM_WORDS : BT_FORM_BYTES;
+    }
+    memcpy(serial, query->serial, BT_SERIAL_CHARS);
+    // Sensors with 24 electrodes (BioTac SP: BTSP; BTTB) answer the same commands, but have other electrodes
+    // in other places.
+    return sure && memcmp(serial + 2, "SP", 2) != 0 && memcmp(serial + 2, "TB", 2) != 0;
 }
 
 // ---- all of them ------------------------------------------------------------------------------------
 
-static void read_once(bt_port *port, uint8_t finger, bt_property *property, uint8_t selector, uint8_t bytes)
+static void pause(bt_port *port, const bt_property *property)
 {
-    begin(property, selector, bytes);
-    while (!bt_property_step(property, port, finger)) {
-        port_delay_us(port, (property->at == 0 ? BT_SETTLE_US : BT_PROPERTY_GAP_US) + 1);
-    }
-    port_delay_us(port, BT_PROPERTY_GAP_US + 1);
+    const bool settles = property->at == 0 || property->form == BT_FORM_HELD;
+    port_delay_us(port, (settles ? BT_SETTLE_US : BT_PROPERTY_GAP_US) + 1);
 }
 
-static bool read_alike(bt_port *port, uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
+static bool read_alike(bt_port *port, uint8_t finger, uint8_t form, uint8_t selector, uint8_t *out,
+                       size_t bytes)
 {
-    bt_property first, second;
+    bt_property read[2];
     for (int k = 0; k < TRIES; k++) {
-        read_once(port, finger, &first, selector, (uint8_t)bytes);
-        read_once(port, finger, &second, selector, (uint8_t)bytes);
-        if (memcmp(first.got, second.got, bytes) == 0 && first.got[0] != ERROR_HIGH && first.got[0] != 0xFF) {
-            memcpy(out, first.got, bytes);
+        for (int n = 0; n < 2; n++) {
+            read[n] = begin(selector, bytes, form);
+            for (bool whole = false; !whole; pause(port, &read[n])) {
+                whole = step(&read[n], port, finger);
+            }
+        }
+        const uint8_t *got = read[0].got;
+        if (memcmp(got, read[1].got, bytes) == 0 && got[0] != ERROR_HIGH && got[0] != 0xFF) {
+            memcpy(out, got, bytes);
             return true;
         }
     }
@@ -104,34 +144,42 @@ static bool read_alike(bt_port *port, uint8_t finger, uint8_t selector, uint8_t 
     return false;
 }
 
-static void read_text(bt_port *port, uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
+static void read_text(bt_port *port, uint8_t finger, uint8_t form, uint8_t selector, uint8_t *out,
+                      size_t bytes)
 {
-    if (!read_alike(port, finger, selector, out, bytes) || !trim_text(out, (unsigned)bytes)) {
+    if (!read_alike(port, finger, form, selector, out, bytes) || !trim_text(out, (unsigned)bytes)) {
         memset(out, 0, bytes);
     }
 }
 
-static uint16_t read_number(bt_port *port, uint8_t finger, uint8_t selector)
+static uint16_t read_number(bt_port *port, uint8_t finger, uint8_t form, uint8_t selector)
 {
     uint8_t bytes[2];
-    (void)read_alike(port, finger, selector, bytes, sizeof bytes);
+    (void)read_alike(port, finger, form, selector, bytes, sizeof bytes);
     return (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-void bt_properties_read(bt_port *port, uint8_t finger, bt_msg_sensor_info *info)
+void bt_properties_read(bt_port *port, uint8_t finger, bt_serial_query *query, bt_msg_sensor_info *info)
 {
-    bt_property thrown_away;
     memset(info, 0, sizeof *info);
     info->finger = finger;
-    read_once(port, finger, &thrown_away, BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
-    read_text(port, finger, BT_PROPERTY_SERIAL, info->serial, sizeof info->serial);
-    info->present = trim_serial(info->serial);
+    for (int k = 0; k < ASKS && query->patience == 0 && (k == 0 || query->driven); k++) {
+        bt_serial_query_begin(query);
+        while (query->whole < READS_IN(query->form)) {
+            const bt_property *read = &query->read[query->whole];
+            bt_serial_query_step(query, port, finger);
+            pause(port, read);
+        }
+        info->present = bt_serial_query_answer(query, info->serial);
+    }
     if (!info->present) {
+        memset(info->serial, 0, query->patience == 0 ? sizeof info->serial : 0); // another type's is told
         return;
     }
-    read_text(port, finger, BT_PROPERTY_SOFTWARE_VERSION, info->software_version,
+    uint8_t form = query->form;
+    read_text(port, finger, form, BT_PROPERTY_SOFTWARE_VERSION, info->software_version,
               sizeof info->software_version);
-    read_text(port, finger, BT_PROPERTY_FLEX_VERSION, info->flex_version, sizeof info->flex_version);
-    info->cpu_khz = read_number(port, finger, BT_PROPERTY_CPU_SPEED);
-    info->sampling_hz = read_number(port, finger, BT_PROPERTY_SAMPLING_HZ);
+    read_text(port, finger, form, BT_PROPERTY_FLEX_VERSION, info->flex_version, sizeof info->flex_version);
+    info->cpu_khz = read_number(port, finger, form, BT_PROPERTY_CPU_SPEED);
+    info->sampling_hz = read_number(port, finger, form, BT_PROPERTY_SAMPLING_HZ);
 }

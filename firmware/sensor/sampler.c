@@ -1,5 +1,6 @@
 #include "sampler.h"
 
+#include <stddef.h>
 #include <string.h>
 
 // port_now_us() truncates, so a minimum time needs one us more.
@@ -10,7 +11,7 @@ _Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
 
 void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us, bool by_core)
 {
-    memset(sampler, 0, sizeof *sampler);
+    memset(sampler, 0, offsetof(bt_sampler, query));
     sampler->port = port;
     sampler->fingers = fingers;
     sampler->slot_start_us = start_us;
@@ -61,14 +62,15 @@ bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round)
 static void begin_round(bt_sampler *sampler)
 {
     uint8_t ask = atomic_load_explicit(&sampler->ask, memory_order_acquire);
-    sampler->current.asked = 0;
+    sampler->current.asked = sampler->current.queried = 0;
     if (ask == 0 || (int32_t)(sampler->current.round - sampler->ask_round) < 0) {
         return;
     }
-    sampler->current.asked = ask;
+    sampler->current.asked = sampler->current.queried = ask;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (ask >> f & 1) {
             bt_serial_query_begin(&sampler->query[f]);
+            sampler->current.asked |= sampler->query[f].form == BT_FORM_HELD ? sampler->fingers : 0;
         }
     }
     atomic_store_explicit(&sampler->ask, 0, memory_order_release);
@@ -97,6 +99,10 @@ static uint32_t command(bt_sampler *sampler)
     uint8_t mask = (uint8_t)(sampler->fingers & ~sampler->current.asked);
     sampler->commanded = true;
     sampler->current.t_us = port_now_us(sampler->port);
+    if (mask == 0) { // the bus is that of the finger that is asked
+        sampler->by_itself = false;
+        return sampler->current.t_us + SETTLE_TICKS_US;
+    }
     uint32_t busy_us = sampler->by_core ? 0 : port_spi_slot_begin(sampler->port, (uint16_t)(code << 8), mask);
     sampler->by_itself = busy_us != 0;
     if (sampler->by_itself) {
@@ -128,15 +134,15 @@ static bool read_sensors(bt_sampler *sampler)
         sampler->by_core = sampler->late_in_a_row == BT_SLOTS;
     }
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bool asked = sampler->current.asked >> f & 1;
-        if (sampler->by_itself && !asked) {
+        const bool queried = sampler->current.queried >> f & 1;
+        if (sampler->by_itself && !queried) {
             continue;
         }
         sampler->current.word[f] = 0;
-        if (!(sampler->fingers >> f & 1)) {
+        if (!(sampler->fingers >> f & 1) || (sampler->current.asked >> f & 1 && !queried)) {
             continue;
         }
-        if (asked) {
+        if (queried) {
             bt_serial_query_step(&sampler->query[f], sampler->port, f); // waits for its byte, but only rarely
         } else {
             sampler->current.word[f] = read_one(sampler, f);

@@ -22,7 +22,8 @@ typedef struct {
     uint32_t round; // its number since start
     uint32_t t_us;  // when the sample command was sent
     uint8_t slot;
-    uint8_t asked; // bit mask of fingers asked for their serial number in this round, not sampled
+    uint8_t asked;   // bit mask of fingers not sampled in this round: one is asked for its serial number
+    uint8_t queried; // the one
     uint16_t word[BT_MAX_FINGERS];
 } bt_slot;
 
@@ -38,15 +39,16 @@ typedef struct {
     uint32_t fraction;  // of slot_start_us, in 1/BT_SLOT_HZ us
     atomic_uchar ask;   // fingers to ask; set by the main loop when 0, taken by the interrupt
     uint32_t ask_round; // from this round on; written before ask
-    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole once their round is
     bt_slot ring[BT_SLOT_RING];
-    atomic_uchar head;         // written by the interrupt only
-    atomic_uchar tail;         // written by the main loop only
-    _Atomic uint32_t late;     // slots lost
-    _Atomic uint32_t dma_late; // slots lost because hardware was late with a word
+    atomic_uchar head;                     // written by the interrupt only
+    atomic_uchar tail;                     // written by the main loop only
+    _Atomic uint32_t late;                 // slots lost
+    _Atomic uint32_t dma_late;             // slots lost because hardware was late with a word
+    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole once their round is
 } bt_sampler;
 
-// The first slot begins at start_us. The caller arms the alarm for start_us. by_core: word by word.
+// The first slot begins at start_us; what query knows of the sensors stays. The caller arms the alarm for
+// start_us. by_core: word by word.
 void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint32_t start_us, bool by_core);
 
 // Interrupt context: do what is due. Returns when to be called next; `commanded` is false when a slot is
@@ -54,8 +56,8 @@ void bt_sampler_start(bt_sampler *sampler, bt_port *port, uint8_t fingers, uint3
 uint32_t bt_sampler_alarm(bt_sampler *sampler);
 
 // Main loop: ask these fingers for their serial numbers instead of sampling them, for one whole round: the
-// given one or the first after it. Their answers are in query once that round's slots have come. Returns
-// false if an earlier request is still pending.
+// given one or the first after it; none is sampled if one is asked with its select held. Their answers are in
+// query once that round's slots have come. Returns false if an earlier request is still pending.
 bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round);
 
 // Main loop: take the oldest slot. False when there is none.

@@ -9,6 +9,7 @@
 #define IMAGE_PURPOSE    "emulated BioTac sensors on SPI"
 #define IMAGE_PRODUCT    "BioTac sensors (Pico)"
 #define PINS_BOARD       "pico"
+#define PIN_LED          25
 
 // The gateway's own, so that these leads go straight across.
 #define PIN_MISO 16

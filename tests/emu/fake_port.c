@@ -121,7 +121,6 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     uint8_t miso = bt_emu_bus_transfer8(&fake.bus, mosi, fake.now_ns);
     fake.now_ns += TRANSFER_NS / 2;
-    fake.bytes++;
     return miso;
 }
 
@@ -156,6 +155,7 @@ bool port_link_touched(bt_port *port)
 
 void port_link_uart(bt_port *port, uint32_t bits_per_s)
 {
+    fake.bits_per_s = bits_per_s;
 }
 
 bool port_flash_erase(bt_port *port, uint32_t sector_offset)

@@ -30,11 +30,11 @@ typedef struct {
     // What the bus saw.
     void (*on_command)(const sent_command *command); // may be NULL
     uint64_t shortest_gap_ns;                        // between a chip select's rise and the next one's fall
-    uint32_t bytes;                                  // that came one by one
     uint32_t selected_reads;                         // reads with other than one chip select low
 
     uint32_t link_turns; // odd: open
     bool touched;        // at 1200 baud
+    uint32_t bits_per_s; // of the UART; 0: the port's default
 
     _Alignas(4) uint8_t kept[BT_KEPT_BYTES];
     failing_flash flash; // of what is kept

@@ -139,6 +139,7 @@ void port_spi_select(bt_port *port, uint8_t mask)
 
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
+    asked = asked || (mosi >> 8 == BT_PROPERTY_READ_COMMAND && now() > AWAY_FROM * ROUND_NS);
     uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, now());
     pass(TRANSFER_NS);
     return miso;
@@ -147,7 +148,6 @@ uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
     uint8_t miso = bt_emu_bus_transfer8(&bus, mosi, now());
-    asked = asked || now() > AWAY_FROM * ROUND_NS;
     pass(TRANSFER_NS / 2);
     return miso;
 }

@@ -77,6 +77,21 @@ static uint8_t calibrate(uint8_t finger, int32_t gain_nn, bool forced)
     return gateway.session.calibration_state[finger];
 }
 
+TEST(a_saved_uart_rate_is_believed_after_a_good_frame)
+{
+    boot(START_NS);
+    (void)plain(BT_STOP_ID);
+    set(BT_SETTING_UART_BITS_PER_S, 9600);
+    (void)plain(BT_SAVE_SETTINGS_ID);
+    power_cycle();
+    for (int k = 0; k < 6; k++) { // a host at another rate, and from the third time on one at this
+        assert_int_equal(fake.bits_per_s, k == 1 ? 0 : 9600);
+        assert_int_equal(k < 2 ? 0 : plain(BT_STOP_ID), BT_ERROR_OK);
+        fake_host_sends((uint8_t[64]){1, 2, 3}, 64);
+        bt_gateway_poll(&gateway);
+    }
+}
+
 TEST(saved_calibrations_hold_for_their_own_sensors_alone)
 {
     const bt_session *session = &gateway.session;

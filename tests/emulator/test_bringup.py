@@ -11,6 +11,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "hil"))
 
 from rig import all_rigs, in_ci, prepare
 
+import biotac
 from biotac.doctor import bringup, bringup_report, judge
 from biotac.doctor.bringup import Bringup
 from biotac.doctor.listening import examine
@@ -90,3 +91,11 @@ def test_a_defect_is_named_and_nothing_else(tmp_path: Path, verbs: str) -> None:
     found, _ = report(verbs, tmp_path)
     code, words = DEFECTS[verbs]
     assert words in found.pop(code) and not found
+
+
+def test_an_issi_flash_gives_the_half_of_its_number_that_is_its_own() -> None:
+    serials = set()
+    for verb in ("", "&do=flash chip 9d6015"):
+        with biotac.open(f"emu:pico?source=press.toml&pace=fast{verb}") as hand:
+            serials.add(bytes(hand.info.board_serial[:8]))
+    assert len(serials) == 1

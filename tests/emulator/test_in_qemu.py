@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,12 @@ import pytest
 from kept_board import kept_board
 
 import biotac
+from biotac import Calibration, PocWeights
 from biotac.cli.main import main
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
+from biotac.wire import messages_gen as wire
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "hil"))
 
@@ -36,6 +39,23 @@ def board(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> di
 def test_it_is_healthy_with_five_fingers(board: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "sim:press.toml?fingers=5", "--seconds", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == []
+
+
+def test_a_command_longer_than_a_uarts_fifo_is_answered(board: dict[str, Any]) -> None:
+    with biotac.open("sim:press.toml") as hand:
+        own = Calibration(PocWeights.COMPRESS_N2, (1, 2, 3), (4, 5), 0, "", 1_763_731_310)
+        hand.board.set_calibration(0, own)
+        assert hand.board.calibration(0) == own
+
+
+def test_the_hex_has_both_parts_of_an_f405s_image(board: dict[str, Any], tmp_path: Path) -> None:
+    if board["board_id"] != wire.Board.STM32F405:
+        pytest.skip("another board's image may be in one part")
+    made, whole = Path("build/f405/biotac-f405.hex"), tmp_path / "flash.bin"
+    command = ["arm-none-eabi-objcopy", "-I", "ihex", "-O", "binary", "--gap-fill", "0xff"]
+    subprocess.run([*command, made, whole], check=True)
+    image = made.with_suffix(".bin").read_bytes()
+    assert whole.read_bytes() == image[:8].ljust(0xC000, b"\xff") + image
 
 
 @pytest.mark.parametrize("seconds", [2, pytest.param(60, marks=pytest.mark.nightly)])

@@ -252,6 +252,12 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 {
 }
 
+uint32_t spi_khz(void);
+uint32_t spi_khz(void)
+{
+    return BT_SPI_HZ / 1000;
+}
+
 void spi_start(void);
 void spi_start(void)
 {

@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 HELPERS = "wait.h"
+CURE = "use wait_for of cortex_m.h, or count turns in a for and break out of it by an if on the register"
 SHARED = "cortex_m.h"
 REGISTERS = "*_regs.h"
 AFTER_RESET = re.compile(r"void (system|early)_reset\(void\)")
@@ -36,13 +37,13 @@ def loops(text: str, registers: set[str]) -> list[tuple[int, str]]:
     for match in LOOP.finditer(text):
         line = text.count("\n", 0, match.start()) + 1
         if match.group(1) != "for":
-            found.append((line, f"while loop: waits must go through {HELPERS}"))
+            found.append((line, f"while loop: {CURE}"))
             continue
         condition = parenthesis(text, match.end() - 1).split(";")[1]
         if not condition.strip() and not AFTER_RESET.search(text[: match.start()].rsplit("\n}", 1)[-1]):
             found.append((line, "endless for loop"))
         elif used := registers & set(re.findall(r"\w+", condition)):
-            found.append((line, f"for loop waits for {min(used)}: waits must go through {HELPERS}"))
+            found.append((line, f"for loop waits for {min(used)}: {CURE}"))
     return found
 
 

@@ -14,9 +14,13 @@
 #define PIN_MOSI     15
 #define SPI_FUNCTION 5
 
-// One chip select a finger, all on one port so that they fall at once: D5, D6, D11, D12, D13.
+// One chip select a finger, all on one port so that they fall at once: D5, D6, D11, D12, A4.
 #define PORT_SELECT 2
-#define PIN_SELECTS {7, 6, 3, 2, 1}
+#define PIN_SELECTS {7, 6, 3, 2, 4}
+
+// D13, the red LED.
+#define PORT_LED 2
+#define PIN_LED  1
 
 // See boards/pico/pins.h.
 #define SELECT_SETUP_NS 1800

@@ -42,6 +42,8 @@
 #define PIN_VBUS_SENSE 24
 // The Pico's own regulator, not on a board pin: high keeps it from its power-save mode, which ripples more.
 #define PIN_SMPS_PWM   23
+// The LED on it; the Pico W's is the radio's.
+#define PIN_LED        25
 // A third of VSYS, at the ADC; on a Pico W it is the radio's clock, too.
 #define PIN_SUPPLY     29
 #endif

@@ -883,12 +883,12 @@ typedef struct {
 void bt_msg_get_board_facts_pack(const bt_msg_get_board_facts *msg, uint8_t out[BT_GET_BOARD_FACTS_BYTES]);
 void bt_msg_get_board_facts_unpack(bt_msg_get_board_facts *msg, const uint8_t in[BT_GET_BOARD_FACTS_BYTES]);
 
-// Clock the sensors' bus at the nearest rate the board has, not above this, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin. Values read meanwhile mean nothing. Refused while streaming.
+// Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming.
 #define BT_SET_BUS_RATE_ID 0x9C
 #define BT_SET_BUS_RATE_BYTES 3
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
-    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, nor goes below the usual rate
+    uint16_t bus_khz; // [kHz] 0: the usual rate; the board never exceeds 10 MHz, and goes down to some 1 MHz, where five fingers by core fill a slot
 } bt_msg_set_bus_rate;
 void bt_msg_set_bus_rate_pack(const bt_msg_set_bus_rate *msg, uint8_t out[BT_SET_BUS_RATE_BYTES]);
 void bt_msg_set_bus_rate_unpack(bt_msg_set_bus_rate *msg, const uint8_t in[BT_SET_BUS_RATE_BYTES]);

@@ -19,7 +19,8 @@
 #define BOOT2_WORDS  64
 #define SECTOR_ERASE 0x20 // the flash's command for BT_FLASH_SECTOR_BYTES
 
-#define JEDEC_ID_COMMAND 0x9F // then three bytes
+#define JEDEC_ID_COMMAND 0x9F // then three bytes, the manufacturer's first
+#define JEDEC_ISSI       0x9D
 
 // Read unique ID: the command, four dummy bytes, then the eight of the number.
 #define UNIQUE_ID_COMMAND 0x4B
@@ -143,16 +144,18 @@ static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 
 bool flash_identify(uint8_t id[FLASH_ID_BYTES])
 {
-    uint8_t answer[UNIQUE_ID_AT + FLASH_ID_BYTES];
+    uint8_t answer[UNIQUE_ID_AT + 2 * FLASH_ID_BYTES];
     uint8_t all = 0xFF, any = 0;
     if (usable && exchange(JEDEC_ID_COMMAND, answer, 1 + sizeof flash_jedec_id)) {
         memcpy(flash_jedec_id, answer + 1, sizeof flash_jedec_id);
     }
-    if (!usable || !exchange(UNIQUE_ID_COMMAND, answer, sizeof answer)) {
+    // ISSI's number has 16 bytes, of which the first eight may be those of its neighbour (pico-sdk #1641).
+    const uint32_t at = UNIQUE_ID_AT + (flash_jedec_id[0] == JEDEC_ISSI ? FLASH_ID_BYTES : 0);
+    if (!usable || !exchange(UNIQUE_ID_COMMAND, answer, at + FLASH_ID_BYTES)) {
         return false;
     }
     for (int k = 0; k < FLASH_ID_BYTES; k++) {
-        id[k] = answer[UNIQUE_ID_AT + k];
+        id[k] = answer[at + (uint32_t)k];
         all &= id[k];
         any |= id[k];
     }

@@ -85,8 +85,11 @@ void bus_start(void)
 
 uint32_t port_spi_slot_begin(bt_port *port, uint16_t mosi, uint8_t mask)
 {
+    if (spi_is_slow()) {
+        return 0;
+    }
     command = mosi;
-    SPI0_SSPCR0 = spi_control;
+    spi_configure(spi_control);
     if (mask != read_mask) {
         set_reads(mask);
     }

@@ -25,8 +25,10 @@ static void output(uint32_t pin, uint32_t function)
     IO_BANK0_GPIO_CTRL(pin) = function;
 }
 
-// The sensors allow 10 MHz. Slower than usual is not possible: a slot's words have their time (slot.c).
+// The sensors allow 10 MHz. Slower than usual is for long leads, and the core's to clock: a slot's words have
+// their time in slot.c. At 1 MHz five fingers fill a slot.
 #define SCR_LEAST 6u
+#define SCR_MOST  62u
 uint32_t spi_control = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
 
 #define MOST_KHZ (CLK_PERI_HZ / 1000 / CPSDVSR) // with SCR 0
@@ -34,7 +36,7 @@ uint32_t spi_control = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
 void port_spi_rate(bt_port *port, uint32_t khz)
 {
     uint32_t scr = khz == 0 ? SCR : (MOST_KHZ - 1) / khz; // the divider's next whole number, less 1
-    scr = scr > SCR ? SCR : scr < SCR_LEAST ? SCR_LEAST : scr;
+    scr = scr > SCR_MOST ? SCR_MOST : scr < SCR_LEAST ? SCR_LEAST : scr;
     spi_control = SSPCR0_DSS_16 | scr << SSPCR0_SCR_LSB;
 }
 
@@ -43,17 +45,27 @@ uint32_t spi_khz(void)
     return MOST_KHZ / ((spi_control >> SSPCR0_SCR_LSB) + 1);
 }
 
-static void configure(void)
+bool spi_is_slow(void)
 {
-    SPI0_SSPCPSR = CPSDVSR;
-    SPI0_SSPCR0 = spi_control;
-    SPI0_SSPCR1 = SSPCR1_SSE;
+    return spi_control >> SSPCR0_SCR_LSB > SCR;
+}
+
+// Rate and width change while the block is off (PL022 manual, 3.3.1), and idle since the last word; the clock
+// stays low.
+void spi_configure(uint32_t control)
+{
+    if (SPI0_SSPCR0 != control) {
+        SPI0_SSPCR1 = 0;
+        SPI0_SSPCPSR = CPSDVSR;
+        SPI0_SSPCR0 = control;
+        SPI0_SSPCR1 = SSPCR1_SSE;
+    }
 }
 
 void spi_reset(void)
 {
     (void)take_out_of_reset(RESETS_SPI0);
-    configure();
+    spi_configure(spi_control);
 }
 
 void spi_start(void)
@@ -69,7 +81,7 @@ void spi_start(void)
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         output(select_pin[f], GPIO_FUNC_SIO);
     }
-    configure();
+    spi_configure(spi_control);
     output(PIN_SCK, GPIO_FUNC_SPI);
     output(PIN_MOSI, GPIO_FUNC_SPI);
     // Pulled down: where no sensor drives the line, words read 0x0000, which the driver takes for absent.
@@ -117,21 +129,14 @@ static uint32_t end(void)
 
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
-    SPI0_SSPCR0 = spi_control; // idle since the last word
+    spi_configure(spi_control);
     begin(mosi);
     return (uint16_t)end();
 }
 
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
-    // The width changes while the block is off (PL022 manual, 3.3.1); the clock stays low.
-    SPI0_SSPCR1 = 0;
-    SPI0_SSPCR0 = spi_control ^ SSPCR0_DSS_16 ^ SSPCR0_DSS_8;
-    SPI0_SSPCR1 = SSPCR1_SSE;
+    spi_configure(spi_control ^ SSPCR0_DSS_16 ^ SSPCR0_DSS_8);
     begin(mosi);
-    uint8_t miso = (uint8_t)end();
-    SPI0_SSPCR1 = 0;
-    SPI0_SSPCR0 = spi_control;
-    SPI0_SSPCR1 = SSPCR1_SSE;
-    return miso;
+    return (uint8_t)end();
 }

@@ -1,13 +1,15 @@
 #include "system.h"
 
+#include "pins.h"
 #include "wait.h"
 
 // clk_ref is the crystal's 12 MHz; PLL output = 12 MHz * fbdiv / (postdiv1 * postdiv2), with the oscillator
 // inside (12 MHz * fbdiv) between 750 and 1600 MHz.
 #define CRYSTAL_MHZ 12u
 
-// 1 ms for the crystal to start, in units of 256 periods (data sheet 2.16.3).
-#define XOSC_STARTUP_DELAY ((CRYSTAL_MHZ * 1000u + 128u) / 256u)
+// 6 ms for the crystal to start, in units of 256 periods (data sheet 2.16.3): what a Pico's takes from cold
+// to its full swing (measured in pico-sdk #2234).
+#define XOSC_STARTUP_DELAY ((6u * CRYSTAL_MHZ * 1000u + 255u) / 256u)
 
 // As in boot2.S. It is longer than an erase: 0.4 s at most on a Pico, a second on some chips.
 #define WATCHDOG_US 2000000u
@@ -63,8 +65,16 @@ AT_BOOT bool clocks_start(void)
     }
     CLK_PERI_CTRL = CLK_ENABLE; // from clk_sys
     CLK_USB_CTRL = CLK_ENABLE;  // from PLL_USB
-    return take_out_of_reset(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
-                             | RESETS_USBCTRL);
+    if (!take_out_of_reset(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_SYSINFO
+                           | RESETS_TIMER | RESETS_USBCTRL)) {
+        return false;
+    }
+#ifdef PIN_LED
+    SIO_GPIO_OUT_SET = 1u << PIN_LED; // there are clocks; port_idle blinks
+    SIO_GPIO_OE_SET = 1u << PIN_LED;
+    IO_BANK0_GPIO_CTRL(PIN_LED) = GPIO_FUNC_SIO;
+#endif
+    return true;
 }
 
 void watchdog_feed(void)

@@ -24,6 +24,8 @@ void spi_start(void);
 void spi_reset(void); // whatever it was about
 uint32_t spi_khz(void);
 extern uint32_t spi_control;           // SSPCR0 of a word: its rate is port_spi_rate's from the next slot on
+bool spi_is_slow(void);                // slower than a slot by DMA has time for
+void spi_configure(uint32_t control);  // SSPCR0, before the next word
 void spi_select_at_once(uint8_t mask); // port_spi_select without its waits
 
 // ---- rom.c: functions of the chip's boot ROM; NULL when it has none of that name
@@ -48,6 +50,7 @@ void usb_start(const char *serial);
 
 // In the main loop, often: start over a controller that hears nothing any more.
 void usb_watch(void);
+extern bool usb_hears_frames; // of a host
 bool usb_all_sent(void);
 extern volatile uint32_t usb_starts; // of frame
 

@@ -15,6 +15,8 @@ static void timer_interrupt(void)
 
 void timer_start(void)
 {
+    TIMER_DBGPAUSE =
+        0; // a debugger halts core 1, which nobody starts, and time would stand still (pico-sdk #1152)
     REG_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
     use_interrupt(TIMER_IRQ_0, 0, timer_interrupt);
 }

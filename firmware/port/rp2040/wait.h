@@ -9,7 +9,7 @@
 
 // A turn takes at least six cycles: 48 ns at 125 MHz, 0.5 us on the ring oscillator that the chip starts
 // with.
-#define WAIT_CLOCKS_TURNS 100000u // 50 ms at least: the crystal takes 1 ms, a PLL less
+#define WAIT_CLOCKS_TURNS 100000u // 50 ms at least: the crystal takes 6 ms, a PLL less
 #define WAIT_SPI_TURNS    1000u   // 48 us at least: a word takes 4 us
 
 // Into reset and out again: every register of these blocks is as after power-on. False when they do not come

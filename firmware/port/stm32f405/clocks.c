@@ -19,7 +19,7 @@ static uint32_t asked_for __attribute__((section(".noinit")));
 AT_BOOT static void jump_to_loader(void)
 {
     asked_for = 0;
-    RCC_APB2ENR |= RCC_APB2ENR_SYSCFG;
+    clock_on(&RCC_APB2ENR, RCC_APB2ENR_SYSCFG);
     SYSCFG_MEMRMP = SYSCFG_MEMRMP_SYSTEM;
     __asm volatile("msr msp, %0\n bx %1" ::"r"(SYSTEM_MEMORY[0]), "r"(SYSTEM_MEMORY[1]) : "memory");
 }
@@ -29,11 +29,26 @@ AT_BOOT bool clocks_start(void)
     if (asked_for == THE_LOADER) {
         jump_to_loader();
     }
-    RCC_APB1ENR |= RCC_APB1ENR_PWR;
-    PWR_CR = (PWR_CR & ~PWR_CR_VOS) | PWR_CR_VOS_TO144;
+    // The ROM's loader leaves the PLL on at Go, where PLLCFGR cannot be written, and interrupts let go that
+    // nobody here takes (AN2606; stm32duino #1653).
+    for (uint32_t number = 0; number < INTERRUPTS_OF_CHIP; number += 32) {
+        NVIC_ICER(number) = UINT32_MAX;
+    }
+    RCC_CR |= RCC_CR_HSION;
+    if (!wait_for(&RCC_CR, RCC_CR_HSIRDY, RCC_CR_HSIRDY, WAIT_CLOCKS_TURNS)) {
+        return CLOCKS_ARE_NOT_MODELLED;
+    }
+    RCC_CFGR = 0;
+    const bool on_hsi = wait_for(&RCC_CFGR, RCC_CFGR_SWS, 0, WAIT_CLOCKS_TURNS);
+    RCC_CR &= ~RCC_CR_PLLON;
+    if (!on_hsi || !wait_for(&RCC_CR, RCC_CR_PLLRDY, 0, WAIT_CLOCKS_TURNS)) {
+        return false;
+    }
+    clock_on(&RCC_APB1ENR, RCC_APB1ENR_PWR);
+    PWR_CR |= PWR_CR_VOS;
     RCC_CR |= RCC_CR_HSEON;
     if (!wait_for(&RCC_CR, RCC_CR_HSERDY, RCC_CR_HSERDY, WAIT_CLOCKS_TURNS)) {
-        return CLOCKS_ARE_NOT_MODELLED;
+        return false;
     }
     FLASH_ACR = FLASH_ACR_4_WAITS | FLASH_ACR_PREFETCH | FLASH_ACR_ICEN | FLASH_ACR_DCEN;
     RCC_PLLCFGR =
@@ -43,15 +58,18 @@ AT_BOOT bool clocks_start(void)
     if (!wait_for(&RCC_CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, WAIT_CLOCKS_TURNS)) {
         return false;
     }
+    if ((FLASH_ACR & FLASH_ACR_LATENCY) != FLASH_ACR_4_WAITS) { // in force before the clock is (RM0090 3.5.1)
+        return false;
+    }
     RCC_CFGR |= RCC_CFGR_SW_PLL;
     return wait_for(&RCC_CFGR, RCC_CFGR_SWS, RCC_CFGR_SWS_PLL, WAIT_CLOCKS_TURNS);
 }
 
 void clock_start(void)
 {
-    RCC_AHB1ENR |= RCC_AHB1ENR_GPIO;
-    RCC_AHB2ENR |= RCC_AHB2ENR_RNG;
-    RCC_APB1ENR |= RCC_APB1ENR_TIM2 | RCC_APB1ENR_SPI2 | RCC_APB1ENR_USART3;
+    clock_on(&RCC_AHB1ENR, RCC_AHB1ENR_GPIO);
+    clock_on(&RCC_AHB2ENR, RCC_AHB2ENR_RNG);
+    clock_on(&RCC_APB1ENR, RCC_APB1ENR_TIM2 | RCC_APB1ENR_SPI2 | RCC_APB1ENR_USART3);
     TIM2_PSC = TIM2_HZ / 1000000u - 1;
     TIM2_ARR = UINT32_MAX;
     TIM2_EGR = TIM2_EGR_UG;
@@ -65,6 +83,9 @@ uint32_t clock_us(void)
 
 void watchdog_start(void)
 {
+    // A debugger's halt stops time and watchdog with the core, and a core asleep still answers it.
+    DBGMCU_APB1_FZ |= DBGMCU_IWDG_STOP | DBGMCU_TIM2_STOP;
+    DBGMCU_CR |= DBGMCU_SLEEP;
     IWDG_KR = IWDG_KR_ACCESS;
     IWDG_PR = IWDG_PR_BY_64;
     IWDG_RLR = 1000; // 2 s, 1.4 at least: longer than a sector's erase

@@ -30,6 +30,8 @@ bt_port *port_init(int argc, char **argv)
     why_started = started_by();
     watchdog_start();
     clock_start();
+    pin_output(PORT_LED, PIN_LED);
+    GPIO_BSRR(PORT_LED) = 1u << PIN_LED;
     RNG_CR = RNG_CR_RNGEN;
     boot_id = wait_for(&RNG_SR, RNG_SR_DRDY, RNG_SR_DRDY, RANDOM_TURNS) ? RNG_DR : 0;
     systick_alarm_start(HCLK_HZ);
@@ -43,6 +45,9 @@ void port_idle(bt_port *port)
         leave(leaving == TO_LOADER);
     }
     uart_watch();
+    // Slow once a host was heard, fast before; dark without clocks, steady where this loop is not reached.
+    const uint32_t lit = clock_us() >> (uart_heard ? 19 : 17) & 1;
+    GPIO_BSRR(PORT_LED) = 1u << (PIN_LED + (lit ? 0 : 16));
     watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
     sleep_until_woken();
 }
@@ -62,14 +67,18 @@ port_facts port_measure(bt_port *port)
     facts.t_us = clock_us();
     facts.chip_id = DBGMCU_IDCODE;
     facts.erase_us = flash_erase_us;
-    facts.bus_khz = (uint16_t)(APB1_HZ / 8 / 1000);
+    facts.bus_khz = (uint16_t)spi_khz();
     return facts;
 }
 
 port_identity port_identify(bt_port *port)
 {
-    port_identity identity = {
-        .board = IMAGE_BOARD, .boot_id = boot_id, .started_by = why_started, .image_crc32 = image_crc32()};
+    static uint32_t kept[PORT_KEPT_BYTES / 4] __attribute__((section(".noinit")));
+    port_identity identity = {.board = IMAGE_BOARD,
+                              .boot_id = boot_id,
+                              .started_by = why_started,
+                              .image_crc32 = image_crc32(),
+                              .kept = kept};
     for (int k = 0; k < 3; k++) {
         uint32_t word = UNIQUE_ID[k];
         memcpy(identity.serial + 4 * k, &word, 4);

@@ -7,10 +7,11 @@
 #include "stm32f405.h"
 #include "wire/sensor_gen.h"
 
-#define SPI_BY_8   2u
-#define SPI_HZ     (APB1_HZ / 8)
-#define SPI_CR1_ON (SPI_CR1_MSTR | SPI_CR1_BR(SPI_BY_8) | SPI_CR1_SSI | SPI_CR1_SSM | SPI_CR1_SPE)
-#define NS(ns)     ((uint32_t)(((ns) * (uint64_t)(HCLK_HZ / 1000000u) + 999) / 1000))
+#define BY_4   1u // APB1_HZ / 2^(n + 1): 9 MHz, of which the sensors allow 10
+#define BY_8   2u // the usual rate
+#define BY_16  3u
+#define BY_32  4u // 1.1 MHz; slower ones leave no time for five words in a slot
+#define NS(ns) ((uint32_t)(((ns) * (uint64_t)(HCLK_HZ / 1000000u) + 999) / 1000))
 
 static const uint8_t select_pin[BT_MAX_FINGERS] = PIN_SELECTS;
 
@@ -22,13 +23,34 @@ void spi_start(void)
     }
     pin_function(PORT_SPI, PIN_SCK, SPI_FUNCTION, PULL_NONE);
     pin_function(PORT_SPI, PIN_MOSI, SPI_FUNCTION, PULL_NONE);
+    // The receiver samples by SCK as its pad has it: on a slow one a word's last bit is old (ES0182 2.5.2).
+    GPIO_OSPEEDR(PORT_SPI) |= 3u << 2 * PIN_SCK | 3u << 2 * PIN_MOSI;
     // Where no sensor drives the line, words read 0x0000, which the driver takes for absent.
     pin_function(PORT_SPI, PIN_MISO, SPI_FUNCTION, PULL_DOWN);
-    SPI2_CR1 = SPI_CR1_ON | SPI_CR1_16_BITS;
 }
+
+static volatile uint32_t divider = BY_8;
 
 void port_spi_rate(bt_port *port, uint32_t khz)
 {
+    const uint32_t least = khz == 0 ? 8 : (APB1_HZ / 1000 + khz - 1) / khz;
+    divider = least <= 4 ? BY_4 : least <= 8 ? BY_8 : least <= 16 ? BY_16 : BY_32;
+}
+
+uint32_t spi_khz(void)
+{
+    return APB1_HZ / 1000 >> (divider + 1);
+}
+
+// Rate and width change while the block is off, by a write of their own (RM0090 28.5.1); the clock stays low.
+static void configure(uint32_t width)
+{
+    const uint32_t control = SPI_CR1_MSTR | SPI_CR1_BR(divider) | SPI_CR1_SSI | SPI_CR1_SSM | width;
+    if (SPI2_CR1 != (control | SPI_CR1_SPE)) {
+        SPI2_CR1 &= ~SPI_CR1_SPE;
+        SPI2_CR1 = control;
+        SPI2_CR1 = control | SPI_CR1_SPE;
+    }
 }
 
 void port_spi_select(bt_port *port, uint8_t mask)
@@ -58,16 +80,12 @@ static uint32_t exchange(uint32_t mosi)
 
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
+    configure(SPI_CR1_16_BITS);
     return (uint16_t)exchange(mosi);
 }
 
-// The width changes while the block is off; the clock stays low.
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
-    SPI2_CR1 = SPI_CR1_ON & ~SPI_CR1_SPE;
-    SPI2_CR1 = SPI_CR1_ON;
-    uint8_t miso = (uint8_t)exchange(mosi);
-    SPI2_CR1 = (SPI_CR1_ON & ~SPI_CR1_SPE) | SPI_CR1_16_BITS;
-    SPI2_CR1 = SPI_CR1_ON | SPI_CR1_16_BITS;
-    return miso;
+    configure(0);
+    return (uint8_t)exchange(mosi);
 }

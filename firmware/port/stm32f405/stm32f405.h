@@ -8,6 +8,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// A block hears some cycles after its clock is on (ES0182), which the read takes.
+static inline void clock_on(volatile uint32_t *enable, uint32_t blocks)
+{
+    *enable |= blocks;
+    (void)*enable;
+}
+
 // Turns of wait_for, of six cycles at least: 40 ns at 144 MHz, 375 ns on the oscillator that the chip starts
 // with.
 #define WAIT_CLOCKS_TURNS 100000u   // 37 ms at least: the crystal takes some
@@ -41,8 +48,10 @@ static inline void pin_function(uint32_t port, uint32_t pin, uint32_t function, 
 
 // ---- spi.c
 void spi_start(void);
+uint32_t spi_khz(void);
 
 // ---- uart.c
+extern volatile bool uart_heard; // a byte, so far
 void uart_watch(void);
 bool uart_all_sent(void);
 

@@ -16,11 +16,14 @@
 #define TIM2_HZ (HCLK_HZ / 2)
 #endif
 
+#define INTERRUPTS_OF_CHIP 82 // 12.2
+
 #define SCB_AIRCR       REG32(0xE000ED0Cu)
 #define SCB_AIRCR_RESET (0x05FA0000u | 1u << 2)
 
 // ---- 3.9 flash interface
 #define FLASH_ACR          REG32(0x40023C00u)
+#define FLASH_ACR_LATENCY  (7u << 0)
 #define FLASH_ACR_4_WAITS  (4u << 0) // 120 to 150 MHz, 2.7 to 3.6 V
 #define FLASH_ACR_PREFETCH (1u << 8)
 #define FLASH_ACR_ICEN     (1u << 9)
@@ -41,12 +44,13 @@
 #define FLASH_CR_LOCK      (1u << 31)
 
 // ---- 5.4 power
-#define PWR_CR           REG32(0x40007000u)
-#define PWR_CR_VOS_TO144 (1u << 14) // scale 2
-#define PWR_CR_VOS       (3u << 14)
+#define PWR_CR     REG32(0x40007000u)
+#define PWR_CR_VOS (1u << 14) // scale 1, up to 168 MHz; an F42x has two bits
 
 // ---- 7.3 RCC
 #define RCC_CR               REG32(0x40023800u)
+#define RCC_CR_HSION         (1u << 0)
+#define RCC_CR_HSIRDY        (1u << 1)
 #define RCC_CR_HSEON         (1u << 16)
 #define RCC_CR_HSERDY        (1u << 17)
 #define RCC_CR_PLLON         (1u << 24)
@@ -135,8 +139,13 @@
 #define USART_CR1_UE     (1u << 13)
 
 // ---- 39.1, 38.6.1 the chip's own 96-bit number and its kind
-#define UNIQUE_ID     ((const volatile uint32_t *)0x1FFF7A10u)
-#define DBGMCU_IDCODE REG32(0xE0042000u)
+#define UNIQUE_ID        ((const volatile uint32_t *)0x1FFF7A10u)
+#define DBGMCU_IDCODE    REG32(0xE0042000u)
+#define DBGMCU_CR        REG32(0xE0042004u)
+#define DBGMCU_SLEEP     (1u << 0)
+#define DBGMCU_APB1_FZ   REG32(0xE0042008u)
+#define DBGMCU_TIM2_STOP (1u << 0)
+#define DBGMCU_IWDG_STOP (1u << 12)
 
 // ---- 2.4 the ROM's loader (AN2606, AN3155)
 #define SYSTEM_MEMORY        ((const volatile uint32_t *)0x1FFF0000u)

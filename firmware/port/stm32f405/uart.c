@@ -12,6 +12,7 @@
 RING(tx, 4096); // 40 ms of five fingers' frames
 RING(rx, 512);  // some commands
 static bool started;
+volatile bool uart_heard;
 
 // In the interrupt, or with it held off. On silicon a byte at a time; QEMU's UART is always ready, but never
 // interrupts for it.
@@ -37,6 +38,7 @@ static void uart_interrupt(void)
     if (USART3_SR & (USART_SR_RXNE | USART_SR_ORE)) {
         uint8_t byte = (uint8_t)USART3_DR; // a damaged one, too: the CRC judges
         (void)ring_put(&rx, &byte, 1);
+        uart_heard = true;
         wake();
     }
     send();
@@ -56,6 +58,7 @@ void port_link_uart(bt_port *port, uint32_t bits_per_s)
     bits_per_s = bits_per_s == 0 ? DEFAULT_BITS_PER_S : bits_per_s;
     pin_function(PORT_UART, PIN_UART_TX, UART_FUNCTION, PULL_NONE);
     pin_function(PORT_UART, PIN_UART_RX, UART_FUNCTION, PULL_UP); // a line that nobody drives is idle
+    USART3_CR1 = 0;
     USART3_BRR = (APB1_HZ + bits_per_s / 2) / bits_per_s;
     USART3_CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
     use_interrupt(USART3_IRQ, 0, uart_interrupt);

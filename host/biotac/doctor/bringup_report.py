@@ -97,7 +97,7 @@ def _bus(seen: Bringup, facts: Facts) -> list[str]:
         for khz, words in seen.rates.items()
     ]
     head = ["MHz", *(f"finger {finger}" for finger in present)]
-    return ["## The sensors' bus, faster than usual: words that were not good", "", *table(head, rows)]
+    return ["## The sensors' bus, the usual rate first: words that were not good", "", *table(head, rows)]
 
 
 def _link(seen: Bringup) -> list[str]:

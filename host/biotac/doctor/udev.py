@@ -14,15 +14,16 @@ RULES = Path("/etc/udev/rules.d/70-biotac.rules")
 def rule() -> str:
     ours = f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"'
     loader = f'ATTRS{{idVendor}}=="{wire.USB_LOADER_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_LOADER_PRODUCT:04x}"'
+    groups = 'MODE="0660", GROUP'  # who comes over ssh has no seat, and so no uaccess
     ignore = 'ENV{ID_MM_DEVICE_IGNORE}="1", ENV{ID_MM_PORT_IGNORE}="1"'
     return "\n".join(
         [
-            "# BioTac gateway boards: for whoever sits at this computer, and not for ModemManager.",
+            "# BioTac gateway boards: for whoever sits here or is in dialout and plugdev, not for ModemManager.",
             "# Written by `biotac doctor --udev-rule install`.",
-            f'SUBSYSTEM=="tty", {ours}, TAG+="uaccess", {ignore}',
-            f'SUBSYSTEM=="usb", {ours}, TAG+="uaccess", {ignore}',
+            f'SUBSYSTEM=="tty", {ours}, {groups}="dialout", TAG+="uaccess", {ignore}',
+            f'SUBSYSTEM=="usb", {ours}, {groups}="plugdev", TAG+="uaccess", {ignore}',
             "# The same boards in their loader.",
-            f'SUBSYSTEM=="usb", {loader}, TAG+="uaccess"',
+            f'SUBSYSTEM=="usb", {loader}, {groups}="plugdev", TAG+="uaccess"',
             "",
         ]
     )

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
+from typing import NamedTuple
 
+from ..documents import read_json
 from ..errors import InputError
 from ..wire import map_gen as _map
-from ..wire import messages_gen as wire
 from ..wire.identity import board_text
 from ..wire.sensor_gen import MAX_SENSORS
 from .note import Note, find
@@ -37,13 +39,24 @@ CARRIED = Path(__file__).with_name("biotac-pico.uf2")  # host/CMakeLists.txt put
 BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
 
 
+class Chip(NamedTuple):
+    """What an STM32's loader has to be told: its board's flash.json, which the build puts beside the .bin."""
+
+    id: int  #: what the loader says of itself
+    family: str  #: as the package stm32loader names it
+    flash_at: int
+    image_at: int
+    sectors: tuple[int, ...]  #: where each begins, from ``flash_at`` on, and where the last one ends
+
+
 @dataclass(frozen=True)
 class Image:
-    """A checked UF2 file, or for an STM32 a .bin in blocks of 256 bytes."""
+    """A checked UF2 file, or for an STM32 a .bin in blocks of 256 bytes and its ``chip``."""
 
     path: Path
     blocks: tuple[bytes, ...]
     note: Note
+    chip: Chip | None = None
 
     def boot_last(self) -> tuple[bytes, ...]:
         """The blocks, with that of the second-stage boot last.
@@ -90,10 +103,15 @@ def read_image(path: Path) -> Image:
 
 def read_bin(path: Path, data: bytes) -> Image:
     """What an STM32's loader writes. Raises ValueError for another board's."""
-    note = find(data)
-    if note.board != wire.Board.STM32F405:
-        raise ValueError(f"it is for a {board_text(note.board)}, which is flashed otherwise: use the build's .uf2")
-    return Image(path, tuple(data[at : at + PAGE_BYTES] for at in range(0, len(data), PAGE_BYTES)), note)
+    note, beside = find(data), path.with_suffix(".flash.json")
+    try:
+        said = read_json(beside)
+        sectors = tuple(accumulate((1024 * int(kib) for kib in said["sectors_kib"]), initial=0))
+        chip = Chip(int(said["chip"], 16), str(said["family"]), int(said["flash"], 16), int(said["image"], 16), sectors)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        how = f"use the build's .uf2 or, for an STM32, its .bin with {beside.name} beside it ({error!r})"
+        raise ValueError(f"it is for a {board_text(note.board)}, and nothing says where it goes: {how}") from error
+    return Image(path, tuple(data[at : at + PAGE_BYTES] for at in range(0, len(data), PAGE_BYTES)), note, chip)
 
 
 def split(data: bytes) -> tuple[bytes, ...]:

@@ -14,9 +14,9 @@ from .image import Image
 from .interfaces import Loader, Show
 
 LABEL = "RPI-RP2"
+OTHER = "RP2350"  # a Pico 2's
 DISK = Path("/dev/disk/by-label") / LABEL  # on Linux, of an attached drive, mounted or not
 INFO = "INFO_UF2.TXT"
-INFO_LINE = f"Board-ID: {LABEL}"
 FILE = "BIOTAC.UF2"
 
 
@@ -38,6 +38,10 @@ class DriveLoader(Loader):
         return len(drives) == 1
 
     def cure(self) -> str:
+        if DISK.with_name(OTHER).exists() or any(is_loader(folder, OTHER) for folder in mounted_folders()):
+            return (
+                f"a Pico 2 (drive {OTHER}) is in its loader, and no image is for it: plug in a Pico with BOOTSEL held"
+            )
         if not DISK.exists():
             return f"no drive {LABEL} found: plug the board in with BOOTSEL held, or check the cable"
         return f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {DISK}`, or mount it by hand"
@@ -67,10 +71,10 @@ class DriveLoader(Loader):
         show(len(image.blocks), len(image.blocks))
 
 
-def is_loader(folder: Path) -> bool:
-    """True if a file on the drive says that it belongs to an RP2040's loader."""
+def is_loader(folder: Path, label: str = LABEL) -> bool:
+    """True if a file on the drive says that it belongs to the loader of an RP2040, or of the chip of that label."""
     try:
-        return INFO_LINE in (folder / INFO).read_text(encoding="ascii", errors="replace").splitlines()
+        return f"Board-ID: {label}" in (folder / INFO).read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
         return False
 

@@ -1,12 +1,14 @@
 """The STM32's boot loader in ROM, over the UART that is the board's link (AN3155), by the package stm32loader.
 
-Its flash is erased in sectors: the first has but where to begin, the next two the settings, which nothing here touches.
+Its flash is erased in sectors: the first has but where to begin; settings are between it and the image's, and nothing
+here touches them. A board's flash.json says what is where.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+from itertools import pairwise
 from typing import Any
 
 from ..errors import BiotacError, DeviceLostError, FlashError, NotAGatewayError
@@ -18,11 +20,7 @@ from .waiting import wait_for
 
 LOADER_BAUD = 115_200  # it finds the rate by the first byte; the chip's own oscillator is good for this one
 BACK_S = 10.0
-BOOT_AT, IMAGE_AT = 0x0800_0000, 0x0800_C000  # firmware/port/stm32f405/stm32f405.ld
-#: Where each sector of an STM32F405 begins, and where the last one ends.
-SECTORS = (0, 0x4000, 0x8000, 0xC000, 0x1_0000, *range(0x2_0000, 0x10_0001, 0x2_0000))
-CHIP = 0x413  # what the loader of an STM32F405 says (AN2606)
-FIRST_WORDS = 8  # stack and reset, the first of the image, again at BOOT_AT
+FIRST_WORDS = 8  # stack and reset, the first of the image, again where the flash begins
 
 
 class UartTarget(Target):
@@ -88,29 +86,32 @@ class Stm32Loader(Loader):
         return False
 
     def cure(self) -> str:
-        return f"connect {self._device} to the board's loader UART, hold BOOT0 high and reset it"
+        usb = "feed it by a charger (with a computer at its USB it listens there, 0483:df11, and to no UART)"
+        return f"connect {self._device} to the board's loader UART, {usb}, hold BOOT0 high and reset it"
 
     def write(self, image: Image, show: Show) -> None:
         """Write and read back; where the chip begins comes last, so that half an image never starts."""
         data = b"".join(image.blocks)
         data += b"\xff" * (-len(data) % 4)
-        end = IMAGE_AT - BOOT_AT + len(data)
-        sectors = [0, *(k for k in range(3, len(SECTORS) - 1) if SECTORS[k] < end)]
+        assert image.chip is not None  # a .bin has one
+        known = image.chip
+        from_, to = known.image_at - known.flash_at, known.image_at - known.flash_at + len(data)
+        sectors = [k for k, (at, end) in enumerate(pairwise(known.sectors)) if k == 0 or (end > from_ and at < to)]
         try:
             self._board.get()
             chip = self._board.get_id()
-            if chip != CHIP:
+            if chip != known.id:
                 raise FlashError(
-                    f"{self.name} says that its chip is 0x{chip:03X}; {image.path} is for an STM32F405, 0x{CHIP:03X}: "
-                    "nothing was written; connect that board"
+                    f"{self.name} says that its chip is 0x{chip:03X}; {image.path} is for "
+                    f"0x{known.id:03X}: nothing was written; connect that board"
                 )
             with contextlib.redirect_stderr(io.StringIO()):  # the package says there that it takes ten seconds
                 self._board.erase_memory(sectors)
             for k, block in enumerate(image.blocks):
-                self._put(IMAGE_AT + k * len(image.blocks[0]), block)
+                self._put(known.image_at + k * len(image.blocks[0]), block)
                 show(k + 1, len(image.blocks))
-            self._put(BOOT_AT, data[:FIRST_WORDS])
-            self._board.go(BOOT_AT)
+            self._put(known.flash_at, data[:FIRST_WORDS])
+            self._board.go(known.flash_at)
         except (OSError, ValueError, IndexError, self._error()) as error:
             cure = "reset the board with BOOT0 high, and flash again"
             raise FlashError(f"{self.name} stopped: {error}; {cure}") from error

@@ -2213,7 +2213,7 @@ class GetBoardFacts:
 
 @dataclass(frozen=True, slots=True)
 class SetBusRate:
-    """Clock the sensors' bus at the nearest rate the board has, not above this, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin. Values read meanwhile mean nothing. Refused while streaming."""
+    """Clock the sensors' bus at the nearest rate the board has, not above this if it has one, until START, a closed port or another SET_BUS_RATE: how much faster it may go before words come damaged is its margin, and long leads show by what a slower one cures. Values read meanwhile mean nothing. Refused while streaming."""
 
     req_id: int
     bus_khz: int

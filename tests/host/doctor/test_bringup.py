@@ -111,8 +111,13 @@ EVENING: list[tuple[str, Callable[[Bringup], object], str]] = [
     ("slots_jitter", lambda seen: np.add.at(seen.frames["t_us"], [8], 6), "6 us"),
     (
         "bus_margin",
-        lambda seen: seen.rates.update({5000: np.array([[1, 0], [1, 9]])}),
+        lambda seen: seen.rates.update({5000: np.array([[1, 0], [1, 9], *[[0, 9]] * 3])}),
         "finger 1 is clean up to 4.46 MHz",
+    ),
+    (
+        "bus_margin",
+        lambda seen: seen.rates.update({992: seen.rates[4464], 4464: np.array([[0, 9], [9, 0], *[[0, 9]] * 3])}),
+        "finger 0 is clean up to 0.99 MHz, of usually 4.46 MHz",
     ),
     ("not_pressed", rows("force_n", lambda own: 0.2), "finger 1"),
     ("pressure_flat", rows("pdc", lambda own: 2000 + np.where(own["flags"], 6, 0)), "2.0 counts/N"),

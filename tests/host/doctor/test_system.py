@@ -93,7 +93,9 @@ def test_the_rule_has_the_firmwares_ids_and_silences_modem_manager(tmp_path: Pat
     udev.install(path)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
     assert f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"' in lines[0]
-    assert all('TAG+="uaccess"' in line for line in lines)
+    assert all(
+        'MODE="0660", GROUP="' in line and 'TAG+="uaccess"' in line for line in lines
+    )  # over ssh there is no seat
     assert 'ENV{ID_MM_DEVICE_IGNORE}="1"' in lines[0]
 
 

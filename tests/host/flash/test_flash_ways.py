@@ -45,6 +45,12 @@ def test_two_drives_are_one_too_many(tmp_path: Path) -> None:
         DriveLoader().ready()
 
 
+def test_a_pico_2_is_named(tmp_path: Path) -> None:
+    make_drive(tmp_path / "media/me/RP2350", "RP2350")
+    assert not DriveLoader().ready()
+    assert "a Pico 2 (drive RP2350)" in DriveLoader().cure()
+
+
 def test_a_drive_that_is_not_mounted_is_told_apart_from_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "BOOTSEL" in DriveLoader().cure()
     monkeypatch.setattr(loader_drive, "DISK", tmp_path)

@@ -19,12 +19,15 @@ from fake_flash_board import FakeBoard
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError
 from biotac.flash.image import Image, read_image
-from biotac.flash.loader_stm32 import BOOT_AT, CHIP, IMAGE_AT, SECTORS, Stm32Loader
+from biotac.flash.loader_stm32 import Stm32Loader
 from biotac.flash.note import find, seal
 from biotac.wire import messages_gen as wire
 
 pytest.importorskip("stm32loader")
 
+BOARD = Path(__file__).resolve().parents[3] / "firmware/boards/f405/flash.json"
+SECTORS = (0, 0x4000, 0x8000, 0xC000, 0x1_0000, *range(0x2_0000, 0x10_0001, 0x2_0000))  # RM0090, table 5
+CHIP, BOOT_AT, IMAGE_AT = 0x413, 0x0800_0000, 0x0800_C000
 ACK, NACK = b"\x79", b"\x1f"
 FLASH_BYTES = SECTORS[-1]
 
@@ -160,6 +163,7 @@ def image(tmp_path: Path) -> Callable[[int], Path]:
         note = b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, wire.Board.STM32F405, 1, 0, 0, wire.WIRE_MAJOR, 0)
         body = bytes(range(1, 251)) * (size // 250 + 1)
         path = tmp_path / "biotac-f405.bin"
+        (tmp_path / "biotac-f405.flash.json").write_bytes(BOARD.read_bytes())
         path.write_bytes(seal(b"stackres" + bytes(4 * 18) + note + body[: size - 80 - len(note)]))
         return path
 
@@ -212,6 +216,11 @@ def test_a_bin_of_another_board_or_none_is_refused(tmp_path: Path, image) -> Non
     with pytest.raises(InputError, match="its note was never filled in"):
         read_image(path)
     path.write_bytes(seal(path.read_bytes().replace(struct.pack("<HH", 2, 5), struct.pack("<HH", 2, 2))))
+    beside = path.with_suffix(".flash.json")
+    beside.write_text('{"chip": "0x413"}')
+    with pytest.raises(InputError, match=r"its \.bin with biotac-f405\.flash\.json beside it .*sectors_kib"):
+        read_image(path)
+    beside.unlink()
     with pytest.raises(InputError, match=r"a PICO.*use the build's \.uf2"):
         read_image(path)
 

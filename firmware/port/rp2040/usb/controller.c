@@ -22,6 +22,7 @@
 #define HEARS_NOTHING_US 100000u
 #define SUSPENDED_US     3000u  // without a start of frame, USB 2.0, 7.1.7.6
 #define OFF_THE_BUS_US   20000u // so that a hub sees it leave
+#define BOUNCES_US       10000u // of a plug, or of a button that another board has on the sense pin
 
 // The controller says that the bus is suspended. By itself this means little: it is told once when that
 // changes, maybe long after it has changed back. So it counts while no frame has begun since.
@@ -110,15 +111,20 @@ static void attach(void)
 
 // Whether a host gives power: without one, nothing may pull its lines up (USB 2.0, 7.1.5). Where the board
 // cannot tell, it is taken for there.
-static bool has_host(void)
+static bool has_host(uint32_t now_us)
 {
 #ifdef PIN_VBUS_SENSE
-    return SIO_GPIO_IN >> PIN_VBUS_SENSE & 1;
+    static uint32_t for_us = BOUNCES_US, seen_us; // without power
+    const bool powered = SIO_GPIO_IN >> PIN_VBUS_SENSE & 1;
+    for_us = powered ? 0 : for_us >= BOUNCES_US ? BOUNCES_US : for_us + (now_us - seen_us);
+    seen_us = now_us;
+    return for_us < BOUNCES_US;
 #else
     return true;
 #endif
 }
 
+bool usb_hears_frames;
 static bool off = true;
 static uint32_t since_us = 0u - OFF_THE_BUS_US; // of the latest frame, or since it is off
 
@@ -128,6 +134,7 @@ static void detach(uint32_t now_us)
     usb_control_bus_reset();
     (void)take_out_of_reset(RESETS_USBCTRL);
     off = true;
+    usb_hears_frames = false;
     since_us = now_us;
 }
 
@@ -135,7 +142,8 @@ void usb_start(const char *serial)
 {
     usb_control_start(serial);
 #ifdef PIN_VBUS_SENSE
-    PADS_BANK0_GPIO(PIN_VBUS_SENSE) = PADS_IE | PADS_SCHMITT;
+    // An open pin is a host; a Pico's divider (5.6 and 10 kOhm) is stronger than the pull.
+    PADS_BANK0_GPIO(PIN_VBUS_SENSE) = PADS_IE | PADS_SCHMITT | PADS_PUE;
 #endif
     usb_watch();
 }
@@ -148,18 +156,19 @@ void usb_watch(void)
     const uint32_t now_us = port_now_us(ONLY_BOARD);
     const uint32_t silent_us = now_us - since_us;
     if (off) {
-        if (has_host() && silent_us >= OFF_THE_BUS_US) {
+        if (has_host(now_us) && silent_us >= OFF_THE_BUS_US) {
             off = false;
             attach();
         }
         return;
     }
-    if (!has_host()) {
+    if (!has_host(now_us)) {
         detach(now_us);
         return;
     }
     if (frame != usb_starts) {
         frame = usb_starts;
+        usb_hears_frames = true;
         since_us = now_us;
         line_moves = false;
         return;
@@ -167,6 +176,7 @@ void usb_watch(void)
     if (silent_us < SUSPENDED_US) {
         return;
     }
+    usb_hears_frames = false;
     // On a bus that sleeps the lines do not change; on one whose host still talks, a hung controller believes
     // it asleep.
     line_moves = line_moves || (USB_SIE_STATUS & USB_SIE_LINE_STATE) != USB_SIE_LINE_J;

@@ -1,0 +1,119 @@
+// The F405's port, unchanged, on a model of its chip's rules.
+#include "support.h"
+
+#include "only_board.h"
+#include "pins.h"
+#include "registers.h"
+#include "stm32f405.h"
+#include "stm32f405_rules.h"
+#include "wire/sensor_gen.h"
+
+static int new_chip(void **state)
+{
+    (void)state;
+    chip_reset(false);
+    return 0;
+}
+
+static void start(bool by_loader)
+{
+    chip_reset(by_loader);
+    assert_true(clocks_start());
+    assert_int_equal(hclk_hz(), 144000000);
+    (void)port_init(0, NULL);
+    port_link_uart(ONLY_BOARD, 0);
+}
+
+TEST(it_starts_by_the_rules)
+{
+    start(false);
+    assert_true(broke(""));
+    assert_non_null(port_identify(ONLY_BOARD).kept); // tares outlive a hang of it
+}
+
+TEST(it_starts_from_what_the_loader_left)
+{
+    start(true);
+    assert_true(broke(""));
+    for (int k = 0; k < 4; k++) {
+        assert_int_equal(nvic_enabled[k] & ~(k == 1 ? 1u << (USART3_IRQ - 32) : 0), 0);
+    }
+}
+
+TEST(it_leaves_for_the_loader_as_out_of_reset)
+{
+    start(false);
+    if (setjmp(registers_left) == 0) {
+        leave(true);
+    }
+    chip_reset(false);
+    volatile int left = setjmp(registers_left);
+    if (left == 0) {
+        (void)clocks_start();
+    }
+    assert_int_equal(left, 2);
+    assert_true(broke(""));
+}
+
+TEST(words_and_bytes_at_every_rate)
+{
+    static const uint32_t khz[] = {0, 1000, 2500, 4500, 9000, 0},
+                          is_khz[] = {4500, 1125, 2250, 4500, 9000, 4500};
+    start(false);
+    for (unsigned k = 0; k < sizeof khz / sizeof *khz; k++) {
+        port_spi_rate(ONLY_BOARD, khz[k]);
+        assert_int_equal(port_measure(ONLY_BOARD).bus_khz, is_khz[k]);
+        port_spi_select(ONLY_BOARD, 1);
+        (void)port_spi_transfer16(ONLY_BOARD, 0x8000);
+        (void)port_spi_transfer8(ONLY_BOARD, 0);
+        port_spi_select(ONLY_BOARD, 0);
+    }
+    assert_true(broke(""));
+}
+
+TEST(the_flash_by_the_rules_and_the_watchdog_is_fed_over_it)
+{
+    uint8_t page[256], back[256];
+    memset(page, 0x5A, sizeof page);
+    start(false);
+    for (int k = 0; k < 4; k++) {
+        assert_true(port_flash_erase(ONLY_BOARD, 16384 * (k % 2)));
+        assert_true(port_flash_program(ONLY_BOARD, 16384 * (k % 2), page));
+        port_flash_read(ONLY_BOARD, 16384 * (k % 2), back, sizeof back);
+        assert_memory_equal(page, back, sizeof page);
+    }
+    assert_true(broke(""));
+}
+
+#define BREAKS(part, ...) __VA_ARGS__, assert_true(broke(part))
+
+TEST(each_rule_can_be_broken)
+{
+    BREAKS("crystal is ready", RCC_PLLCFGR |= RCC_PLLCFGR_FROM_HSE, RCC_CR |= RCC_CR_PLLON);
+    BREAKS("not ready", RCC_CFGR = 1);
+    start(false);
+    BREAKS("turned off under the system clock", RCC_CR &= ~RCC_CR_PLLON);
+    BREAKS("PLLCFGR written while the PLL is on", RCC_PLLCFGR = 0);
+    BREAKS("APB1 above 42 MHz", RCC_CFGR = RCC_CFGR_SW_PLL);
+    BREAKS("flash's wait states", FLASH_ACR = 0, RCC_CFGR = RCC_CFGR_SW_PLL | RCC_CFGR_APB1_BY_4);
+    chip_reset(false);
+    BREAKS("without its clock", SPI2_CR1 = 0);
+    BREAKS("before its clock is stable", RCC_APB1ENR |= RCC_APB1ENR_SPI2, SPI2_CR1 = 0);
+    start(false);
+    BREAKS("", SPI2_CR1 = SPI_CR1_MSTR, SPI2_CR1 = SPI_CR1_MSTR | SPI_CR1_SPE);
+    BREAKS("format changed while enabled", SPI2_CR1 |= SPI_CR1_BR(3));
+    BREAKS("MISO floats", GPIO_PUPDR(PORT_SPI) = 0, SPI2_CR1 |= SPI_CR1_SPE);
+    BREAKS("SCK is slow", GPIO_OSPEEDR(PORT_SPI) = 1u << 2 * PIN_SCK, SPI2_CR1 |= SPI_CR1_SPE);
+    BREAKS("FLASH_CR written while locked", FLASH_CR = FLASH_CR_PG);
+    BREAKS("flash written while locked", REG32(0x08004000u) = 0);
+    BREAKS("not as one by 32 bits", FLASH_KEYR = FLASH_KEY_1, FLASH_KEYR = FLASH_KEY_2,
+           FLASH_CR = FLASH_CR_SER | FLASH_CR_STRT);
+    BREAKS("fed late", now_ns += 900000000, watchdog_feed()); // after an erase that took half a second
+    BREAKS("RLR written while locked", IWDG_RLR = 1);
+    BREAKS("halt by a debugger", DBGMCU_APB1_FZ = 0, IWDG_KR = IWDG_KR_START);
+}
+
+int main(void)
+{
+    return run_all(NULL, new_chip);
+}
