@@ -63,12 +63,9 @@ static bool trim_text(uint8_t *text, unsigned bytes)
     return ends && end > 0;
 }
 
-// Sensors with 24 electrodes (BioTac SP: BTSP; BTTB) answer the same commands, but have other electrodes in
-// other places.
 static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
 {
-    return trim_text(serial, BT_SERIAL_CHARS) && memcmp(serial, "BT", 2) == 0
-           && memcmp(serial + 2, "SP", 2) != 0 && memcmp(serial + 2, "TB", 2) != 0;
+    return trim_text(serial, BT_SERIAL_CHARS) && memcmp(serial, "BT", 2) == 0;
 }
 
 bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
@@ -125,7 +122,7 @@ void bt_properties_read(bt_port *port, uint8_t finger, bt_msg_sensor_info *info)
     info->finger = finger;
     read_once(port, finger, &thrown_away, BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
     read_text(port, finger, BT_PROPERTY_SERIAL, info->serial, sizeof info->serial);
-    info->present = trim_serial(info->serial);
+    info->present = trim_serial(info->serial) && !bt_serial_is_foreign(info->serial);
     if (!info->present) {
         return;
     }

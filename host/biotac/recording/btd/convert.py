@@ -13,7 +13,7 @@ from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
 from ...wire import slots
 from ...wire.framing import encode
-from ...wire.identity import NO_IMAGE
+from ...wire.identity import NO_IMAGE, SENSOR_SERIAL_BYTES, is_foreign
 from ..facts import Facts
 from ..mcap_file import RecordingFile
 from ..rounds import Rounds, frames_and_tares
@@ -47,7 +47,8 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
     for finger in range(fingers):
         own = words[:, finger]
         pdc, tac, tdc = (own[:, slot] for slot in (slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT))
-        rounds = Rounds(finger, own[:, slots.ELECTRODE_SLOT], pdc, tac, tdc, own[:, slots.PAC_SLOT], t_us)
+        channels = own[:, slots.ELECTRODE_SLOT], pdc, tac, tdc, own[:, slots.PAC_SLOT]
+        rounds = Rounds(finger, *channels, t_us, foreign=is_foreign(read.serials[finger]))
         rows, tares = frames_and_tares(rounds, settings, ran_rows)
         answered = np.flatnonzero((own != wire.INVALID_COUNT).any(axis=1))
         for k, row in enumerate(rows):
@@ -60,23 +61,30 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
             messages.append((at, 2, encode(wire.Pac.ID, pac.pack())))
         made += len(rows)
     messages.sort(key=lambda message: message[:2])
-    _write(path, out, fingers, settings, messages)
+    _write(path, out, read.serials, settings, messages)
     show(1.0)
     return {"fingers": fingers, "frames": made, "skipped": read.skipped}
 
 
 def _write(
-    path: Path, out: Path, fingers: int, settings: dict[wire.Setting, int], messages: list[tuple[int, int, bytes]]
+    path: Path,
+    out: Path,
+    serials: tuple[bytes, ...],
+    settings: dict[wire.Setting, int],
+    messages: list[tuple[int, int, bytes]],
 ) -> None:
     """Write one block per second. The file has no date: its first frame is at 0 on the host's clock."""
     major, minor, patch = (int(part) for part in __version__.split(".")[:3])
     hello = wire.Hello(
         req_id=0, nonce=0, wire_major=wire.WIRE_MAJOR, wire_minor=wire.WIRE_MINOR, schema_hash=wire.SCHEMA_HASH,
         firmware_major=major, firmware_minor=minor, firmware_patch=patch, board=NO_BOARD, board_serial=(0,) * 12,
-        boot_id=0, slot_hz=sensor.SLOT_HZ, fingers_present=(1 << fingers) - 1,
+        boot_id=0, slot_hz=sensor.SLOT_HZ, fingers_present=(1 << len(serials)) - 1,
         image_crc32=NO_IMAGE, fingers=sensor.MAX_SENSORS, map_bytes=0, board_name=(0,) * 16,
     )  # fmt: skip
-    sensors = [wire.SensorInfo(0, finger, 1, (0,) * 2, (0,) * 4, (0,) * 16, 0, 0) for finger in range(fingers)]
+    padded = [tuple(own.ljust(SENSOR_SERIAL_BYTES, b"\0")) for own in serials]
+    sensors = [
+        wire.SensorInfo(0, f, not is_foreign(own), (0,) * 2, (0,) * 4, own, 0, 0) for f, own in enumerate(padded)
+    ]
     metadata = Facts(hello, sensors, settings).metadata(f"btd:{path.name}")
     with out.open("xb") as stream:
         file = RecordingFile(stream, metadata)
