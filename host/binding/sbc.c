@@ -110,6 +110,7 @@ void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uin
                   uint8_t sp_fingers, const uint16_t *sp_counts)
 {
     bt_session *session = &sbc->gateway.session;
+    session->unsure = 0; // who sends the round says whose it is
     bt_session_begin(session, t_us);
     for (uint8_t s = 0; s < BT_SLOTS; s++, counts += BT_MAX_FINGERS) {
         for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -118,7 +119,6 @@ void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uin
         bt_session_slot(session, s, counts, t_us + slot_us[s]);
     }
     bt_session_end_round(session);
-    session->unsure &= (uint8_t)~bt_session_present(session); // who sends it says whose it is
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         const bool streams = session->streams & BT_STREAM_FLAG_FRAMES && session->fingers >> f & 1;
         if (sp_fingers >> f & 1 && streams) {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ..errors import PortError
 from ..hand.opening import open as open_hand
@@ -17,6 +18,7 @@ from .state import State
 # A scenario is repeated seamlessly for so long; generating more would keep people waiting.
 SCENARIO_S = 120
 RECORDING_SUFFIX = ".mcap"
+ROUNDS_FILES = ("bag:", "csv:")
 
 
 class Viewing:
@@ -30,7 +32,8 @@ class Viewing:
     """
 
     def __init__(self, source: str, *, port: int | None = None, folder: Path | None = None, again: bool = True) -> None:
-        opener = opener_of(source, writable(folder or Path()))
+        self._recorded = TemporaryDirectory(prefix="biotac-view-")
+        opener = opener_of(source, writable(folder or Path()), Path(self._recorded.name))
         self.state = State(source)
         if isinstance(opener, RecordingOpener):
             self.state.recording = overview(opener.recording)
@@ -64,10 +67,18 @@ class Viewing:
         self.server.shutdown()
         self.server.server_close()
         self._thread.join()
+        self._recorded.cleanup()
 
 
-def opener_of(source: str, folder: Path) -> Opener:
-    """An opener for ``source``; a recording is read now, only once."""
+def opener_of(source: str, folder: Path, scratch: Path) -> Opener:
+    """An opener for ``source``; a recording is read now, only once. Bags are recorded first, to ``scratch``."""
+    if source.startswith(ROUNDS_FILES):
+        target = scratch / "rounds.mcap"
+        with open_hand(source) as hand, hand.record(target):
+            hand.stream("results", "events")
+            for _ in hand.batches():
+                pass
+        return RecordingOpener(str(target), folder)
     if source.endswith(RECORDING_SUFFIX):
         return RecordingOpener(source, folder)
     port = lasting(source)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +15,7 @@ from ...export import FORMATS, export
 from ...export.formats import writer_for
 from ...partial_file import whole
 from ...recording.btd.convert import import_btd
+from ...recording.layout import finger_of
 from ...recording.reader import Recording
 from ...recording.recompute import recompute
 from ...wire import messages_gen as wire
@@ -47,6 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-tare", action="store_true", help="recompute with the recorded tares, not with the tare machine's"
     )
+    parser.add_argument(
+        "--frame",
+        metavar="FINGER=ID",
+        action="append",
+        default=[],
+        help="a finger's frame: index=rh_ffdistal, for rviz",
+    )
+    parser.add_argument("--beside", metavar="BAG", type=Path, help="with all messages of this bag, in .bag or .ros2")
     lake.add_export_arguments(parser)
 
 
@@ -94,7 +103,8 @@ def run(args: argparse.Namespace) -> int:
             text = f"{made['frames']} frames, {changed},"
         else:
             recording = load(source)
-            written += export(recording, out, overwrite=args.force, show=show)
+            how = {"frames": frames_of(args.frame, recording.names), "beside": args.beside}
+            written += export(recording, out, overwrite=args.force, show=show, **how)
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
     names = [str(path) for path in written]
@@ -117,6 +127,15 @@ def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]
             written += export(Recording(target), out, overwrite=force)
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt(*interrupt.args or (f"{out} was not written",)) from None
+
+
+def frames_of(given: list[str], names: Mapping[str, int]) -> dict[int, str]:
+    """Coordinate frames by finger from FINGER=ID. Raises InputError for a finger that is unknown."""
+    try:
+        parts = [one.partition("=") for one in given]
+        return {finger_of(int(finger) if finger.isdecimal() else finger, names): name for finger, _, name in parts}
+    except KeyError as error:
+        raise InputError(f"--frame: {error.args[0]}") from error
 
 
 def read_settings(path: Path) -> dict[wire.Setting, int]:
