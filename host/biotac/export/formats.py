@@ -30,8 +30,8 @@ FORMATS = {
     ".mat": Format("biotac.export.mat", "MATLAB and Octave, one struct per finger: finger0.frames.force_n"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
     ".png": Format("biotac.export.png", "a picture of force and pressure over time, with labels and gaps", "plot"),
-    ".bag": Format("biotac.export.ros1", "the same as a ROS 1 bag"),
-    ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
+    ".bag": Format("biotac.export.ros", "the same as a ROS 1 bag"),
+    ".ros2": Format("biotac.export.ros", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
 }
 
 

@@ -14,6 +14,7 @@ from ..wire import sensor_gen as sensor
 from .message import Counts
 
 ELECTRODES = len(sensor.ELECTRODE_NAMES)
+SP = "24 electrodes are a BioTac SP's: it has contact, but no force"
 # Rounds for which an electrode says one count while most others do not; fewer while those move by more than noise.
 STALE_ROUNDS, STALE_MOVED_ROUNDS, MOVED_COUNTS = 100, 30, 8
 LEAST_REST_COUNTS = 1000  # real ones rest at 1870 to 3600
@@ -44,8 +45,8 @@ class Judge:
         self._same = np.where(alive | (not old), 0, STALE_ROUNDS)
         self._dead = self._beyond = self._wrong = 0
         if len(first[-1].electrodes) != ELECTRODES:
-            self.foreign = f"{len(first[-1].electrodes)} electrodes are a BioTac SP's: it has contact, but no force"
-        elif ((counts < 0) | (counts > sensor.FULL_SCALE_COUNT)).any(axis=1).mean() > 0.5:
+            self.foreign = SP
+        elif _beyond(counts).any(axis=1).mean() > 0.5:
             self._condemn(f"counts of {counts.max()} and {counts.min()}, expected 0 to {sensor.FULL_SCALE_COUNT}")
         elif len(first) >= DEAD_ROUNDS and (dead := int((counts == 0).all(axis=0).sum())) >= DEAD:
             self._condemn(f"{dead} electrodes say 0")
@@ -55,14 +56,14 @@ class Judge:
     def words(self, own: Counts) -> NDArray[np.uint16]:
         """The round's electrodes (19,), INVALID_COUNT where stale or out of range."""
         counts = own.electrodes[:ELECTRODES]
-        beyond = (counts < 0) | (counts > sensor.FULL_SCALE_COUNT)
+        beyond = _beyond(counts)
         self._same = np.where(counts == self._last, self._same + 1, 0)
         self._last = counts
         self._recent = np.vstack([self._recent[1 - STALE_MOVED_ROUNDS :], counts])
         stale = self._find_stale()
         self.stale = int((1 << np.flatnonzero(stale)).sum())
         if not self.foreign:
-            self._look(counts, own.pdc, beyond)
+            self._look(own, counts, beyond)
         return np.where(beyond | stale, wire.INVALID_COUNT, counts).astype(np.uint16)
 
     def _find_stale(self) -> NDArray[np.bool_]:
@@ -74,12 +75,15 @@ class Judge:
         stale: NDArray[np.bool_] = long if moved else self._same >= STALE_ROUNDS
         return stale
 
-    def _look(self, counts: NDArray[np.int64], pdc: int | None, beyond: NDArray[np.bool_]) -> None:
+    def _look(self, own: Counts, counts: NDArray[np.int64], beyond: NDArray[np.bool_]) -> None:
         zeros = int((counts == 0).sum())
+        if len(own.electrodes) != ELECTRODES:
+            self.foreign = SP
+            return
         self._dead = self._dead + 1 if zeros >= DEAD else 0
         self._beyond += bool(beyond.any())
-        if pdc is not None and self._rest_pdc is not None:
-            pressed, moved = pdc - self._rest_pdc, float((counts - self._rest).sum())
+        if own.pdc is not None and self._rest_pdc is not None:
+            pressed, moved = own.pdc - self._rest_pdc, float((counts - self._rest).sum())
             if abs(pressed) > SHOWN_PDC and abs(moved) > SHOWN_SUM:
                 self._wrong += 1 if pressed * moved > 0 else -1
         if self._dead >= DEAD_ROUNDS:
@@ -91,3 +95,8 @@ class Judge:
 
     def _condemn(self, why: str) -> None:
         self.foreign = f"these are not a BioTac's counts: {why}; no force"
+
+
+def _beyond(counts: NDArray[np.int64]) -> NDArray[np.bool_]:
+    beyond: NDArray[np.bool_] = (counts < 0) | (counts > sensor.FULL_SCALE_COUNT) & (counts != wire.INVALID_COUNT)
+    return beyond

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..wire import sensor_gen as sensor
 
 KINDS = (len(sensor.ELECTRODE_NAMES), sensor.FOREIGN_ELECTRODES)
+SLOT_US = (np.arange(len(sensor.SLOTS)) * 1e6 / sensor.SLOT_HZ).astype(np.uint32)
 MAX_PAC = 4096  # in one message: two seconds
 
 

@@ -10,12 +10,11 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 
 from ..wire import sensor_gen as sensor
 from ..wire import slots
-from .message import Message, RefusedError, counts_of
+from .message import SLOT_US, Message, RefusedError, counts_of
 
 #: By the type's last word: Shadow's sr_robot_msgs/BiotacAll, and biotac_sensors/BioTacHand of Penn and KTH.
 TYPES = ("BiotacAll", "BioTacHand")
 MAX_BYTES = 1 << 20
-_SLOT_US = np.arange(slots.SLOTS_PER_FRAME) * 1e6 / sensor.SLOT_HZ
 Decode = Callable[[bytes, int], Message]
 
 
@@ -98,5 +97,5 @@ def _slot_us(times: Any) -> Any:
     at_ns[slots.ELECTRODE_SLOT], at_ns[slots.PAC_SLOT] = times.electrode_ns_offset, times.pac_ns_offset
     for slot, own in zip((slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT), ("pdc", "tac", "tdc"), strict=True):
         at_ns[slot] = getattr(times, f"{own}_ns_offset")
-    ours = (np.abs(at_ns / 1e3 - _SLOT_US) < 1e6 / sensor.SLOT_HZ / 2).all()
+    ours = (np.abs(at_ns / 1e3 - SLOT_US) < 1e6 / sensor.SLOT_HZ / 2).all()
     return (at_ns / 1e3).astype(np.uint32) if ours else None

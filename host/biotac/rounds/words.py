@@ -87,12 +87,10 @@ class Rounds:
         if not self.judges:
             raise PortError(f"{port}: {len(first)} messages, and all counts are zero: no sensor")
 
-    def note(self, text: str) -> bool:
-        """Add ``text`` unless it is there; whether it is new."""
-        if text in self.notes or len(self.notes) >= 100:
-            return False
-        self.notes.append(text)
-        return True
+    def note(self, text: str) -> None:
+        """Add ``text`` unless it is there."""
+        if text not in self.notes and len(self.notes) < 100:
+            self.notes.append(text)
 
     def _begin(self, f: int, messages: list[Message]) -> None:
         counts = [own for message in messages if (own := message.fingers[f]) is not None]
@@ -172,11 +170,12 @@ def resampled(pac: NDArray[np.int64], slots_due: int) -> NDArray[np.uint16]:
     if len(pac) < 0.5 * slots_due:
         return out
     good = (pac >= 0) & (pac <= sensor.FULL_SCALE_COUNT)
-    if not good.all():
-        return out
     if len(pac) != slots_due:
+        if not good.all():
+            return out
         due = np.arange(1, slots_due + 1) / slots_due
         pac = np.rint(np.interp(due, np.arange(1, len(pac) + 1) / len(pac), pac)).astype(np.int64)
+        good = np.ones(len(pac), bool)
     n = min(len(out), len(pac))
-    out[len(out) - n :] = pac[-n:]
+    out[len(out) - n :] = np.where(good, pac, wire.INVALID_COUNT)[-n:]
     return out

@@ -13,11 +13,13 @@ from ...documents import read_json
 from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
+from ...hand.opening import shake_hands
 from ...partial_file import whole
-from ...recording.btd.convert import import_btd
 from ...recording.layout import finger_of
 from ...recording.reader import Recording
 from ...recording.recompute import recompute
+from ...rounds.btd import Btd
+from ...rounds.link import MessagesLink
 from ...wire import messages_gen as wire
 from ...wire.identity import setting_text
 from .. import outputs
@@ -87,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
 
         if imports:
             with _recording_at(out, args.force, written) as target:
-                made: dict[str, Any] = import_btd(source, target, show)
+                made: dict[str, Any] = import_btd(source, target)
                 text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
             changes = read_settings(args.settings) if args.settings else {}
@@ -127,6 +129,17 @@ def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]
             written += export(Recording(target), out, overwrite=force)
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt(*interrupt.args or (f"{out} was not written",)) from None
+
+
+def import_btd(path: Path, out: Path) -> dict[str, Any]:
+    """Record what the board's own code makes of a .btd's counts; the numbers of fingers, frames and incomplete ones."""
+    source = Btd(path)
+    with shake_hands(MessagesLink(f"btd:{path.name}", source)) as hand, hand.record(out) as recorder:
+        hand.stream("results", "events")
+        for _ in hand.batches():
+            pass
+        recorder.close()
+        return {"fingers": len(hand.fingers), "frames": recorder.frames, "skipped": source.read.skipped}
 
 
 def frames_of(given: list[str], names: Mapping[str, int]) -> dict[int, str]:

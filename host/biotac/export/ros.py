@@ -1,4 +1,4 @@
-"""ROS 2 bag (rosbag2, mcap storage), with standard messages only, so that it plays without our own package."""
+"""ROS 2 bag (rosbag2, mcap storage), or ROS 1 bag by its suffix; standard messages only, so it plays anywhere."""
 
 from __future__ import annotations
 
@@ -37,12 +37,11 @@ _TOPICS = {
 }
 
 
-def write(
-    path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None, ros1: bool = False
-) -> None:
+def write(path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None) -> None:
     """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``flags``,
     ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
+    ros1 = path.suffix == ".bag"
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     serialize, log_kind = (store.serialize_ros1, LOG_1) if ros1 else (store.serialize_cdr, LOG)
     total = sum(len(table) for table in made)
