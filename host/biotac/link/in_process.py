@@ -77,14 +77,8 @@ class InProcessLink(Link):
     def _run(self) -> None:
         raise NotImplementedError
 
-    def _us(self) -> int:
-        raise NotImplementedError
-
     def _delay(self, us: int) -> None:
         """Without a bus there is nothing to wait for."""
-
-    def _exchange(self, finger: int, data: Any) -> None:
-        raise NotImplementedError
 
     def _fail(self, error: BaseException) -> None:
         with self._changed:
@@ -108,9 +102,8 @@ class InProcessLink(Link):
         return data
 
 
-def _of(handle: Any) -> InProcessLink:
-    link: InProcessLink = ffi.from_handle(handle)
-    return link
+def _of(handle: Any) -> Any:
+    return ffi.from_handle(handle)
 
 
 def _failed(kind: Any, error: Any, trace: Any) -> None:
@@ -120,7 +113,7 @@ def _failed(kind: Any, error: Any, trace: Any) -> None:
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_now_us(handle: Any) -> int:
-    return _of(handle)._us() % 2**32
+    return int(_of(handle)._us() % 2**32)
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
@@ -135,7 +128,7 @@ def bt_sbc_exchange(handle: Any, finger: int, data: Any, n: int) -> None:
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_link_write(handle: Any, data: Any, n: int) -> bool:
-    return _of(handle)._send(bytes(ffi.buffer(data, n)))
+    return bool(_of(handle)._send(bytes(ffi.buffer(data, n))))
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]

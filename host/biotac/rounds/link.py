@@ -92,6 +92,10 @@ class MessagesLink(InProcessLink):
     def release(self) -> None:
         self._held = False
 
+    def close(self) -> None:
+        super().close()
+        self._messages = iter(())  # which gives the file or the connection back
+
     def ports(self) -> list[str]:
         return [self.port] if self._source.live else []
 

@@ -33,7 +33,10 @@ class Table:
     def __init__(self, path: Path, columns: str | None) -> None:
         self._where = f"{path} by {columns}"
         if columns is None:
-            raise InputError(f"{path}: what are its columns? expected csv:{path}?columns=FILE.toml, with {EXPECTED}")
+            raise InputError(
+                f"{path}: what are its columns? expected csv:{path.name}?columns=FILE.toml, with {EXPECTED}; "
+                "its rows must follow one another in time, some of them at rest: one row a grasp has none, and so no tare"
+            )
         try:
             facts = parse_toml(read_text(Path(columns), 1 << 16))
             lines = read_text(path, MAX_BYTES).lstrip("\ufeff").splitlines()

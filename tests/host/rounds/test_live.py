@@ -47,7 +47,7 @@ def bridge() -> Iterator[Callable[..., Bridge]]:
     with socket.create_server(("127.0.0.1", 0)) as free:
         number = free.getsockname()[1]
 
-    def make(kind: str = "ros1", fingers: int = 1, seconds: float = 600.0) -> Bridge:
+    def make(kind: str = "ros1", fingers: int = 1, seconds: float = SECONDS + 300.0) -> Bridge:
         made.append(Bridge(kind, fingers, seconds, number))
         return made[-1]
 

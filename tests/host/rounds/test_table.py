@@ -28,13 +28,16 @@ def write(folder: Path, columns: str, rows: np.ndarray = ROWS, t_s: np.ndarray |
 
 def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
     steps_s = np.random.default_rng(1).uniform(0.009, 0.011, len(ROWS))
-    port = write(tmp_path, f'time = "t"\n{ONE}', t_s=np.cumsum(steps_s))
-    with biotac.open(port) as hand:
-        assert bytes(hand.sensor_info(0).serial) == b"BT2P00000000000A" and list(hand.link.notes) == []
+    times_s = np.cumsum(steps_s)
+    times_s[100] = np.nan
+    with biotac.open(write(tmp_path, f'time = "t"\n{ONE}', t_s=times_s)) as hand:
+        assert bytes(hand.sensor_info(0).serial) == b"BT2P00000000000A"
         batch = hand.read_batch(100.0)
-    np.testing.assert_array_equal(batch.frames["counts"], ROWS[:, slots.ELECTRODE_SLOT])
-    np.testing.assert_array_equal(batch.pac["pac"], ROWS[:, slots.PAC_SLOT])
-    np.testing.assert_allclose(batch.frames["t_us"], 1e6 * (np.cumsum(steps_s) - steps_s[0]), atol=101)
+        assert list(hand.link.notes) == ["a message was refused: row 101: its time is nan s"]
+    good = ~np.isnan(times_s)
+    np.testing.assert_array_equal(batch.frames["counts"], ROWS[good][:, slots.ELECTRODE_SLOT])
+    np.testing.assert_array_equal(batch.pac["pac"], ROWS[good][:, slots.PAC_SLOT])
+    np.testing.assert_allclose(batch.frames["t_us"], 1e6 * (times_s[good] - times_s[0]), atol=101)
 
 
 @pytest.mark.parametrize(

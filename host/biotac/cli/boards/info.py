@@ -70,7 +70,8 @@ def run(args: argparse.Namespace) -> int:
         finger = s["finger"]
         own = f", calibration {made_text(calibrations[finger].made_s)}" if finger in calibrations else ""
         own += f", wrench map {made_text(made_s_of(maps[finger]))}" if finger in maps else ""
-        lines.append(f"finger {finger}: BioTac {s['serial']}, software {s['software']}{own}")
+        named = f"{s['serial'] or 'of unknown serial number'}, software {s['software'] or 'unknown'}"
+        lines.append(f"finger {finger}: BioTac {named}{own}")
     say(args, facts, "\n".join([*lines, *(setting_text(setting, value) for setting, value in settings.items())]))
     return 0
 
