@@ -35,7 +35,7 @@ class Table:
         if columns is None:
             raise InputError(
                 f"{path}: what are its columns? expected csv:{path.name}?columns=FILE.toml, with {EXPECTED}; "
-                "its rows must follow one another in time, some of them at rest: one row a grasp has none, and so no tare"
+                "rows must follow one another in time, some of them at rest: one row a grasp has none, and so no tare"
             )
         try:
             facts = parse_toml(read_text(Path(columns), 1 << 16))
