@@ -87,12 +87,13 @@ void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[BT_SERIAL_BYTES]
         bt_sensors_answer(session, f, serial);
         return;
     }
+    const bool other = known && memcmp(session->info[f].serial, serial, BT_SERIAL_BYTES) != 0;
     memcpy(session->info[f].serial, serial, BT_SERIAL_BYTES);
     session->info[f].finger = f;
     session->info[f].present = !foreign;
     session->finger[f].foreign = foreign;
     session->finger[f].present = true;
-    bt_session_sensor_changed(session, f, known);
+    bt_session_sensor_changed(session, f, other);
 }
 
 static void send_sp(bt_session *session, const bt_finger *finger,

@@ -77,13 +77,9 @@ class Rounds:
             slow = self.period_us / ROUND_US
             self.note(f"{100 / slow:.0f} rounds a second: what counts rounds takes {slow:.2f} times as long")
         self.timed = self._each == 1 and all(message.slot_us is not None for message in first)
-        seen: dict[int, list[Message]] = {}
-        for message in first:
-            for f, own in enumerate(message.fingers):
-                if own is not None:
-                    seen.setdefault(f, []).append(message)
-        for f, messages in seen.items():
-            self._begin(f, messages)
+        for f in range(sensor.MAX_SENSORS):
+            if messages := [message for message in first if message.fingers[f] is not None]:
+                self._begin(f, messages)
         if not self.judges:
             raise PortError(f"{port}: {len(first)} messages, and all counts are zero: no sensor")
 
