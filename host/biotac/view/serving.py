@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 import threading
+import weakref
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from ..errors import PortError
 from ..hand.opening import open as open_hand
@@ -32,8 +34,7 @@ class Viewing:
     """
 
     def __init__(self, source: str, *, port: int | None = None, folder: Path | None = None, again: bool = True) -> None:
-        self._recorded = TemporaryDirectory(prefix="biotac-view-")
-        opener = opener_of(source, writable(folder or Path()), Path(self._recorded.name))
+        opener = opener_of(source, writable(folder or Path()))
         self.state = State(source)
         if isinstance(opener, RecordingOpener):
             self.state.recording = overview(opener.recording)
@@ -67,18 +68,20 @@ class Viewing:
         self.server.shutdown()
         self.server.server_close()
         self._thread.join()
-        self._recorded.cleanup()
 
 
-def opener_of(source: str, folder: Path, scratch: Path) -> Opener:
-    """An opener for ``source``; a recording is read now, only once. Bags are recorded first, to ``scratch``."""
+def opener_of(source: str, folder: Path) -> Opener:
+    """An opener for ``source``; a recording is read now, only once. A bag or a table is recorded first."""
     if source.startswith(ROUNDS_FILES):
-        target = scratch / "rounds.mcap"
-        with open_hand(source) as hand, hand.record(target):
-            hand.stream("results", "events")
-            for _ in hand.batches():
-                pass
-        return RecordingOpener(str(target), folder)
+        with open_hand(source) as hand:
+            scratch = Path(tempfile.mkdtemp(prefix="biotac-view-"))
+            with hand.record(scratch / "rounds.mcap"):
+                hand.stream("results", "events")
+                for _ in hand.batches():
+                    pass
+        opener = RecordingOpener(str(scratch / "rounds.mcap"), folder)
+        weakref.finalize(opener, shutil.rmtree, scratch, ignore_errors=True)
+        return opener
     if source.endswith(RECORDING_SUFFIX):
         return RecordingOpener(source, folder)
     port = lasting(source)
