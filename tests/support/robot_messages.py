@@ -112,7 +112,7 @@ def serve(port: int, seconds: float, kind: str, fingers: int) -> None:
     source = load_source("grasp.toml", fingers=fingers, seconds=20.0).samples
     robot, topic = channel(True)
     print("ready", flush=True)
-    begin_s, published, stopped = time.monotonic(), 0, False
+    begin_s, begin_ns, published, stopped = time.monotonic(), time.time_ns(), 0, False
     for k in range(int(seconds * 100)):
         time.sleep(max(0.0, begin_s + k / 100 - time.monotonic()))
         said = commands.pop(0) if commands else ""
@@ -123,7 +123,7 @@ def serve(port: int, seconds: float, kind: str, fingers: int) -> None:
             topic.close()
             robot, topic = channel(False)
         if not stopped:
-            ns = time.time_ns()
+            ns = begin_ns + 10_000_000 * k  # when it is due: a message that is missing shows
             topic.log(robot.bytes_of(robot.message(ns, list(source[k % len(source)]))), log_time=ns)
             published += 1
     print(f"published {published}", flush=True)

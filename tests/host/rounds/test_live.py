@@ -98,7 +98,7 @@ def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_pa
     assert (stats.frames_lost, stats.crc_errors, stats.gaps) == (0, 0, 0)
     for finger in range(5):
         own = frames[frames["finger"] == finger]
-        assert (np.diff(own["seq"]) == 1).all() and np.median(np.diff(own["t_us"])) == pytest.approx(10_000, abs=500)
+        assert (np.diff(own["seq"]) == 1).all() and (np.diff(own["t_us"]) == 10_000).all()
     recording = biotac.Recording(tmp_path / "a.mcap")
     assert len(recording.frames) >= len(frames) and recording.problems == []
     print(f"{kind}: {len(frames)} frames; stamp to Python {np.percentile(came_ms, [50, 99]).round(1)} ms (median, p99)")
