@@ -189,7 +189,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         .measure = measure,
         .set_bus_rate = clock_bus,
         .maps = can.map_bytes != 0 ? &gateway->map_flash : NULL,
-        .now_us = now_us,
+        .now_us = can.no_bus ? NULL : now_us,
     };
     gateway->port = port;
     gateway->flash = (bt_flash){.sector_bytes = can.erase_bytes,
@@ -212,6 +212,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     bt_identity identity = {
         .board = board.board,
         .fingers = can.fingers,
+        .untimed = can.untimed,
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
         .boot_id = board.boot_id,
         .image_crc32 = board.image_crc32,
@@ -228,8 +229,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.faults |= board.started_by;
-    for (uint8_t f = 0; f < can.fingers; f++) {
+    for (uint8_t f = 0; f < can.fingers && !can.no_bus; f++) {
         bt_properties_read(port, f, &gateway->sampler.query[f], &gateway->session.info[f]);
+        gateway->session.finger[f].foreign = bt_serial_is_foreign(gateway->session.info[f].serial);
         gateway->session.finger[f].present = gateway->session.info[f].present;
         if (!gateway->session.info[f].present) {
             bt_sensors_doubt(&gateway->session, f);
@@ -243,6 +245,9 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     gateway->round_open = false;
     for (unsigned link = 0; link < PORT_LINKS; link++) {
         gateway->link_turns[link] = port_link_turns(port, link);
+    }
+    if (can.no_bus) {
+        return;
     }
     // Absent sensors are read too: one that is plugged in later shows up by itself.
     uint32_t start_us = port_now_us(port) + START_AHEAD_US;

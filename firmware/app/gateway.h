@@ -24,7 +24,7 @@ typedef struct {
     bt_kept_tares *kept;             // NULL: the board has no memory for them
 } bt_gateway;
 
-// Wait for the sensors to power up, identify them, start sampling.
+// Wait for the sensors to power up, identify them, start sampling; without a bus, none of this.
 void bt_gateway_init(bt_gateway *gateway, bt_port *port);
 
 // Main loop: host bytes, finished slots, periodic work.

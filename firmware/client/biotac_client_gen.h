@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x601B7537u
+#define BT_SCHEMA_HASH 0x1BA84306u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -53,6 +53,7 @@ enum bt_sensor_fault {
     BT_SENSOR_FAULT_TOGETHER = 6, // all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     BT_SENSOR_FAULT_NOISY = 7, // it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
     BT_SENSOR_FAULT_EXCHANGED = 8, // its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
+    BT_SENSOR_FAULT_OTHER_KIND = 9, // no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque
 };
 
 // The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE.
@@ -93,6 +94,7 @@ enum bt_board {
     BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
     BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
     BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
+    BT_BOARD_MESSAGES = 7, // a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
     BT_BOARD_PRIVATE = 32768, // the first of the private ids
 };
 
@@ -229,7 +231,7 @@ typedef struct {
     uint16_t board; // [enum board] what the firmware runs on
     uint8_t board_serial[12]; // [1] unique id of the microcontroller
     uint32_t boot_id; // [1] random at each boot: if it changes, the board has restarted
-    uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor
+    uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor. 0: no bus, rounds come whole, and when their slots were sampled is unknown
     uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
     uint32_t image_crc32; // [1] CRC-32 of the running flash image, computed at boot (firmware/app/image_note.h); 0xFFFFFFFF: unknown
     uint8_t fingers; // [1] how many sensors the board has chip selects for
@@ -439,7 +441,7 @@ typedef struct {
     uint16_t seq; // [1] seq of the current round
     uint32_t t_us; // [us] device time at which the slot was sampled
     uint8_t finger; // [1] chip select index
-    uint8_t slot; // [1] slot within the round
+    uint8_t slot; // [1] slot within the round; 255: unknown, and t_us is the round's
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals in the round so far
 } bt_msg_touch;
 
@@ -450,7 +452,7 @@ typedef struct {
     uint16_t seq; // [1] seq of the current round
     uint32_t t_us; // [us] device time at which the slot was sampled
     uint8_t finger; // [1] chip select index
-    uint8_t slot; // [1] slot within the round
+    uint8_t slot; // [1] slot within the round; 255: unknown, and t_us is the round's
     uint8_t kind; // [enum event_kind] what happened; ignore a kind that you do not know
     uint8_t tare_state; // [enum tare_state] state after the previous round
     uint32_t onset_us; // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when dynamic pressure left its noise; else t_us
@@ -486,6 +488,16 @@ typedef struct {
     uint32_t slots_dma_late; // [1] slots lost since boot because the DMA was late with a word
     uint16_t early_faults; // [1] starts before this one that failed before the firmware ran
 } bt_msg_board_facts;
+
+// The counts of a BioTac SP's 24 electrodes in one round. Sent only by a board whose rounds come as messages; the FRAME has the first 19.
+#define BT_SP_COUNTS_ID 0x1F
+#define BT_SP_COUNTS_BYTES 55
+typedef struct {
+    uint16_t seq; // [1] seq of the same round's FRAME
+    uint32_t t_us; // [us] t_us of the same round's FRAME
+    uint8_t finger; // [1] chip select index
+    uint16_t counts[24]; // [count] E1 to E24; 0xFFFF: no good word
+} bt_msg_sp_counts;
 
 // First command of a host. Allowed at any time.
 #define BT_HELLO_REQUEST_ID 0x80
@@ -837,6 +849,7 @@ static const uint8_t bt_client_layout[] = {
     BT_EVENT_ID, 5, 0x41, 0x81, 0x04, 0x82, 0x41,
     BT_BANDS_ID, 4, 0x41, 0x81, 0x02, 0x86,
     BT_BOARD_FACTS_ID, 9, 0x01, 0x81, 0x41, 0x82, 0x03, 0x81, 0x43, 0x81, 0x41,
+    BT_SP_COUNTS_ID, 4, 0x41, 0x81, 0x01, 0x58,
     BT_HELLO_REQUEST_ID, 2, 0x01, 0x81,
     BT_START_ID, 2, 0x03, 0x41,
     BT_STOP_ID, 1, 0x01,
@@ -895,6 +908,7 @@ typedef char bt_msg_touch_lies_so[sizeof(bt_msg_touch) == 16 ? 1 : -1];
 typedef char bt_msg_event_lies_so[sizeof(bt_msg_event) == 24 ? 1 : -1];
 typedef char bt_msg_bands_lies_so[sizeof(bt_msg_bands) == 36 ? 1 : -1];
 typedef char bt_msg_board_facts_lies_so[sizeof(bt_msg_board_facts) == 44 ? 1 : -1];
+typedef char bt_msg_sp_counts_lies_so[sizeof(bt_msg_sp_counts) == 60 ? 1 : -1];
 typedef char bt_msg_hello_request_lies_so[sizeof(bt_msg_hello_request) == 8 ? 1 : -1];
 typedef char bt_msg_start_lies_so[sizeof(bt_msg_start) == 6 ? 1 : -1];
 typedef char bt_msg_stop_lies_so[sizeof(bt_msg_stop) == 1 ? 1 : -1];
@@ -953,6 +967,7 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
 #define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
+#define BT_SP_COUNTS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(counts, u16, 24)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
@@ -990,7 +1005,7 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1) X(live, u8, 1)
 #define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif

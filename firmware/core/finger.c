@@ -8,6 +8,10 @@
 
 #define PDC_FREE 6 // counts above the tare
 
+// What follows from where the electrodes lie.
+#define BT_OF_GEOMETRY                                                                                       \
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_SIGMA)
+
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
     bt_settings initial;
@@ -210,10 +214,15 @@ bool bt_finger_moved(const bt_finger *finger)
     return energy > finger->tare.threshold_count2;
 }
 
-static uint32_t health_flags(const bt_health *health)
+uint8_t bt_finger_sensor_fault(const bt_finger *finger)
 {
-    return (bt_health_sensor_fault(health) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
-           | (health->alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
+    return finger->foreign ? BT_SENSOR_FAULT_OTHER_KIND : bt_health_sensor_fault(&finger->health);
+}
+
+static uint32_t health_flags(const bt_finger *finger)
+{
+    return (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
+           | (finger->health.alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }
 
 // The sequence number of the round that has ended.
@@ -280,6 +289,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
                      bt_msg_frame *msg)
 {
     const bt_round *round = &finger->round;
+    quantities &= finger->foreign ? (uint8_t)~BT_OF_GEOMETRY : UINT8_MAX;
     msg->seq = seq_of(finger);
     msg->t_us = round->t_us;
     msg->finger = finger->index;
@@ -291,7 +301,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     memcpy(msg->counts, round->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
     tell_results(finger, settings, quantities, shed, msg);
-    msg->flags |= health_flags(&finger->health);
+    msg->flags |= health_flags(finger);
     msg->electrodes_out = finger->tare.trigger.without;
     tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
@@ -300,7 +310,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
 
 uint32_t bt_finger_flags(const bt_finger *finger)
 {
-    return bt_channel_flags(&finger->round, &finger->tare) | health_flags(&finger->health);
+    return bt_channel_flags(&finger->round, &finger->tare) | health_flags(finger);
 }
 
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg)
@@ -355,7 +365,7 @@ void bt_finger_point(bt_finger *finger, const bt_solve_settings *settings, bt_ms
     int32_t e_q4[BT_ELECTRODES];
     bt_point point = {.um = {BT_INVALID_I16, BT_INVALID_I16, BT_INVALID_I16}};
     bt_point_signals(&finger->round, &finger->tare, e_q4);
-    if (finger->tare.tared) {
+    if (finger->tare.tared && !finger->foreign) {
         (void)bt_poc(e_q4, settings->poc_weights, &point);
     }
     msg->finger = finger->index;

@@ -37,6 +37,7 @@ enum bt_shed { BT_SHED_SIGMA = 1, BT_SHED_MAP = 2, BT_SHED_FRAME = 4 };
 
 typedef struct {
     uint8_t index;
+    bool foreign; // no BioTac, whose electrodes lie elsewhere or are none: no point, force or torque
     bool present; // the last complete round had at least one good word
     uint16_t seq; // of the next frame; does not count rounds in which nothing answered
     uint8_t silent_rounds;
@@ -95,6 +96,9 @@ void bt_finger_pass(bt_finger *finger);
 
 // The flags of the round that do not depend on any result.
 uint32_t bt_finger_flags(const bt_finger *finger);
+
+// What is wrong with the whole sensor, an enum bt_sensor_fault.
+uint8_t bt_finger_sensor_fault(const bt_finger *finger);
 
 // Another sensor is connected: forget the tare, and what was wrong with the one before.
 void bt_finger_forget(bt_finger *finger);

@@ -131,6 +131,8 @@ typedef struct {
     uint16_t map_bytes;
     uint8_t *map_ram;    // fingers * map_bytes, aligned to 4: the maps in force
     const uint8_t *maps; // all slots as memory, aligned to 4, which changes with the flash
+    bool no_bus;         // rounds come from elsewhere, whole: nothing is sampled, and no sensor is asked
+    bool untimed;        // and when their slots were sampled is unknown
 } port_abilities;
 port_abilities port_describe(bt_port *port);
 

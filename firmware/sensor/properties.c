@@ -170,7 +170,7 @@ void bt_properties_read(bt_port *port, uint8_t finger, bt_serial_query *query, b
             bt_serial_query_step(query, port, finger);
             pause(port, read);
         }
-        info->present = bt_serial_query_answer(query, info->serial);
+        info->present = bt_serial_query_answer(query, info->serial) && !bt_serial_is_foreign(info->serial);
     }
     if (!info->present) {
         memset(info->serial, 0, query->patience == 0 ? sizeof info->serial : 0); // another type's is told

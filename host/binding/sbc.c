@@ -1,3 +1,6 @@
+// The port of boards in this process: their link, their clock, and flash that is memory. One has its sensors
+// on a bus, spidev's; the other has none, and is given whole rounds.
+//
 // How spidev's bus differs from a microcontroller's, and what is done about it:
 // - It selects one sensor at a time. A word for several is sent to one after the other, so fingers sample
 //   not at once but one transfer apart; the 50 us run from the last of them.
@@ -8,6 +11,8 @@
 #include "map/store.h"
 #include "port.h"
 #include "spi_word_by_word.h"
+#include "talk/rounds.h"
+#include "talk/sensors.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +21,7 @@ struct bt_port {
     bt_gateway gateway;
     void *python;
     uint8_t devices; // bit mask of fingers that are wired
+    bool no_bus, untimed;
     uint32_t boot_id;
     uint32_t due_us;
     uint8_t selected;
@@ -31,6 +37,16 @@ bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id)
         sbc->python = python;
         sbc->devices = (uint8_t)((1u << devices) - 1);
         sbc->boot_id = boot_id;
+    }
+    return sbc;
+}
+
+bt_sbc *bt_sbc_new_of_rounds(void *python, bool timed, uint32_t boot_id)
+{
+    bt_sbc *sbc = bt_sbc_new(python, 0, boot_id);
+    if (sbc != NULL) {
+        sbc->no_bus = true;
+        sbc->untimed = !timed;
     }
     return sbc;
 }
@@ -58,6 +74,58 @@ void bt_sbc_alarm(bt_sbc *sbc)
 uint32_t bt_sbc_due_us(const bt_sbc *sbc)
 {
     return sbc->due_us;
+}
+
+// ---- whole rounds ------------------------------------------------------------------------------
+
+void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[BT_SERIAL_BYTES], bool foreign)
+{
+    bt_session *session = &sbc->gateway.session;
+    const bool known = session->info[f].present || session->finger[f].foreign;
+    foreign = foreign || bt_serial_is_foreign(serial);
+    if (known && !foreign && !session->finger[f].foreign) {
+        bt_sensors_answer(session, f, serial);
+        return;
+    }
+    const bool other = known && memcmp(session->info[f].serial, serial, BT_SERIAL_BYTES) != 0;
+    memcpy(session->info[f].serial, serial, BT_SERIAL_BYTES);
+    session->info[f].finger = f;
+    session->info[f].present = !foreign;
+    session->finger[f].foreign = foreign;
+    session->finger[f].present = true;
+    bt_session_sensor_changed(session, f, other);
+}
+
+static void send_sp(bt_session *session, const bt_finger *finger,
+                    const uint16_t counts[BT_FOREIGN_ELECTRODES])
+{
+    uint8_t payload[BT_SP_COUNTS_BYTES];
+    bt_msg_sp_counts msg = {
+        .seq = (uint16_t)(finger->seq - 1), .t_us = finger->round.t_us, .finger = finger->index};
+    memcpy(msg.counts, counts, sizeof msg.counts);
+    bt_msg_sp_counts_pack(&msg, payload);
+    bt_session_send(session, BT_SP_COUNTS_ID, payload);
+}
+
+void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uint16_t *counts,
+                  uint8_t sp_fingers, const uint16_t *sp_counts)
+{
+    bt_session *session = &sbc->gateway.session;
+    session->unsure = 0; // who sends the round says whose it is
+    bt_session_begin(session, t_us);
+    for (uint8_t s = 0; s < BT_SLOTS; s++, counts += BT_MAX_FINGERS) {
+        for (int f = 0; f < BT_MAX_FINGERS; f++) {
+            session->finger[f].words.good += counts[f] != BT_INVALID_COUNT;
+        }
+        bt_session_slot(session, s, counts, t_us + slot_us[s]);
+    }
+    bt_session_end_round(session);
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        const bool streams = session->streams & BT_STREAM_FLAG_FRAMES && session->fingers >> f & 1;
+        if (sp_fingers >> f & 1 && streams) {
+            send_sp(session, &session->finger[f], sp_counts + f * BT_FOREIGN_ELECTRODES);
+        }
+    }
 }
 
 // ---- time -------------------------------------------------------------------------------------
@@ -187,23 +255,29 @@ void port_spi_rate(bt_port *board, uint32_t khz)
 
 port_identity port_identify(bt_port *board)
 {
-    return (port_identity){
-        .board = BT_BOARD_LINUX_SBC,
-        .serial = "linux-spidev",
-        .boot_id = board->boot_id,
-        .started_by = BT_FAULT_FLAG_STARTED,
-        .image_crc32 = UINT32_MAX,
+    static const port_identity of[] = {
+        {.board = BT_BOARD_LINUX_SBC, .serial = "linux-spidev"},
+        {.board = BT_BOARD_MESSAGES, .serial = "messages"},
     };
+    port_identity identity = of[board->no_bus];
+    identity.boot_id = board->boot_id;
+    identity.started_by = BT_FAULT_FLAG_STARTED;
+    identity.image_crc32 = UINT32_MAX;
+    return identity;
 }
 
 port_abilities port_describe(bt_port *board)
 {
-    return (port_abilities){
-        .name = "Linux spidev",
+    static const char *const name[] = {"Linux spidev", "messages"};
+    port_abilities abilities = {
+        .no_bus = board->no_bus,
+        .untimed = board->untimed,
         .fingers = BT_MAX_FINGERS,
         .erase_bytes = BT_FLASH_SECTOR_BYTES,
         .map_bytes = BT_MAP_MAX_BYTES,
         .map_ram = board->map_ram[0],
         .maps = board->maps,
     };
+    memcpy(abilities.name, name[board->no_bus], strlen(name[board->no_bus]));
+    return abilities;
 }

@@ -14,6 +14,8 @@ typedef struct bt_port bt_sbc; // port.h's board
 // devices: how many sensors are wired, fingers 0 to devices - 1. python: handed to every function below.
 // NULL without memory. Several may live at once, each on a thread of its own.
 bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id);
+// A board without a bus, whose rounds come whole; timed: with the times of their slots.
+bt_sbc *bt_sbc_new_of_rounds(void *python, bool timed, uint32_t boot_id);
 void bt_sbc_free(bt_sbc *sbc);
 
 // main.c, taken apart, since Python has the loop: start once, then poll, and alarm whenever bt_sbc_due_us()
@@ -22,6 +24,15 @@ void bt_sbc_start(bt_sbc *sbc);
 void bt_sbc_poll(bt_sbc *sbc);
 void bt_sbc_alarm(bt_sbc *sbc);
 uint32_t bt_sbc_due_us(const bt_sbc *sbc);
+
+// Of a board without a bus: which sensor finger f has (zeros: unknown), and whether it is no BioTac with 19
+// electrodes. Again when that changes.
+void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[16], bool foreign);
+
+// A round of counts [44][5] by slot and finger, BT_INVALID_COUNT where there is none; slot_us: after t_us. Of
+// the fingers in sp_fingers, a bit mask, the counts [5][24] of a BioTac SP are sent too.
+void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uint16_t *counts,
+                  uint8_t sp_fingers, const uint16_t *sp_counts);
 
 // Python's part of port.h. exchange: one chip-select period of one sensor; what MISO carried replaces bytes.
 #ifdef BT_CDEF

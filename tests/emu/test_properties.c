@@ -124,6 +124,7 @@ TEST(a_sensor_of_another_type_is_named_and_never_sure)
     assert_true(host.frames[2] > 200);
     for (int k = 0; k < host.frames[2]; k++) {
         assert_true(host.frame[2][k].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
+        assert_true(k < 40 || host.frame[2][k].force_100un[2] == BT_INVALID_I32);
     }
 }
 

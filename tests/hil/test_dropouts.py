@@ -115,6 +115,7 @@ def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tm
     assert (sensor.present, bytes(sensor.serial)) == (0, b"BTSP050400018017")
     foreign, other = of(frames, 1), of(frames, 0)
     assert len(foreign) > 200 and np.all(foreign["flags"] & FrameFlags.SENSOR_UNSURE)
+    assert np.all(foreign["flags"] & FrameFlags.SENSOR_FAULT) and np.isnan(foreign["force_n"]).all()
     assert not np.any(other["flags"] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER))
     latched = hand.board.faults().by_index
     assert latched[1] & FrameFlags.SENSOR_UNSURE and not latched[0] & FrameFlags.SENSOR_UNSURE

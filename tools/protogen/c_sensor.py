@@ -52,8 +52,10 @@ def header(contract: Contract) -> str:
     l1 = lambda vectors: max(sum(abs(v[d]) for v in vectors) for d in range(3))  # noqa: E731
     arms = [arm_nm(r, n) for _, r, n in table]
     lines = [
+        "#include <stdbool.h>",
         "#include <stdint.h>",
         "",
+        f"#define BT_FOREIGN_ELECTRODES {sensor['foreign']['electrodes']}",
         f"#define BT_CHANNELS {len(channels)}",
         f"#define BT_SLOTS {len(slots)}",
         f"#define BT_ELECTRODES {len(table)}",
@@ -107,6 +109,8 @@ def header(contract: Contract) -> str:
         "extern const int16_t bt_normal_milli[BT_ELECTRODES][3];",
         "extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact",
         "extern const uint16_t bt_normal_length_milli[3];  // of all normals' x, y and z, as three vectors",
+        "",
+        "bool bt_serial_is_foreign(const uint8_t *serial); // of a sensor with other electrodes, such as a BioTac SP",
     ]
     about = [
         "The sensor's side: channels and their command bytes, slot order, electrode geometry.",
@@ -118,7 +122,7 @@ def header(contract: Contract) -> str:
 def source(contract: Contract) -> str:
     channels, slots = contract.sensor["channel"], contract.sensor["frame"]["slots"]
     table = electrodes(contract)
-    lines = [f"// {GENERATED}", '#include "wire/sensor_gen.h"', ""]
+    lines = [f"// {GENERATED}", '#include "wire/sensor_gen.h"', "", "#include <string.h>", ""]
     lines += ["const uint8_t bt_channel_command[BT_CHANNELS] = {"]
     lines += [f"    [BT_CHANNEL_{c['name']}] = 0x{c['command']:02X}," for c in channels] + ["};", ""]
     lines += ["const uint8_t bt_slot_channel[BT_SLOTS] = {"]
@@ -136,4 +140,6 @@ def source(contract: Contract) -> str:
         lines += ["};", ""]
     lengths = [round(math.hypot(*(n[d] for _, _, n in table))) for d in range(3)]
     lines += [f"const uint16_t bt_normal_length_milli[3] = {row(lengths, 6)};", ""]
+    same = " || ".join(f'memcmp(serial, "{s}", {len(s)}) == 0' for s in contract.sensor["foreign"]["serials"])
+    lines += ["bool bt_serial_is_foreign(const uint8_t *serial)", "{", f"    return {same};", "}", ""]
     return "\n".join(lines)

@@ -24,6 +24,8 @@ def sensor(contract: Contract) -> str:
     ]
     for key, value in s["bus"].items():
         out.append(f"{key.upper()} = {value}")
+    out.append(f"FOREIGN_ELECTRODES = {s['foreign']['electrodes']}")
+    out += table("FOREIGN_SERIALS: tuple[bytes, ...]", "(", ")", (f'b"{start}",' for start in s["foreign"]["serials"]))
     out.append("")
     commands = (f'"{c["name"]}": 0x{c["command"]:02X},' for c in s["channel"])
     out += table("CHANNEL_COMMAND: dict[str, int]", "{", "}", commands)

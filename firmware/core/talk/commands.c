@@ -80,7 +80,7 @@ static uint8_t hello_request(bt_session *session, const uint8_t *payload)
         .fingers = identity->fingers,
         .map_bytes = session->board.maps != NULL ? session->board.maps->max_bytes : 0,
         .boot_id = identity->boot_id,
-        .slot_hz = BT_SLOT_HZ,
+        .slot_hz = identity->untimed ? 0 : BT_SLOT_HZ,
         .fingers_present = bt_session_present(session),
         .image_crc32 = identity->image_crc32,
     };

@@ -68,6 +68,10 @@ void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_
     if (serial == NULL) {
         return;
     }
+    session->finger[f].foreign = bt_serial_is_foreign(serial);
+    if (session->finger[f].foreign) {
+        return; // it stays in doubt, as nothing kept can be for it
+    }
     session->unsure &= (uint8_t)~(1u << f);
     session->query[f].bad_words = 0;
     if (info->present && memcmp(info->serial, serial, BT_SERIAL_BYTES) == 0) {

@@ -22,6 +22,7 @@ typedef struct {
     uint16_t board; // enum bt_board, or a private id
     uint8_t board_name[BT_BOARD_NAME_BYTES];
     uint8_t fingers; // it has chip selects for, at most BT_MAX_FINGERS
+    bool untimed;    // rounds come whole: when their slots were sampled is unknown
     uint8_t firmware_version[3];
     uint8_t board_serial[BT_BOARD_SERIAL_BYTES];
     uint32_t boot_id;

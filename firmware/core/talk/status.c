@@ -64,7 +64,7 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
         .last_error_word = finger->words.last_error_word,
         .electrodes_out = finger->tare.trigger.without,
         .electrode_fault = electrode_fault(finger),
-        .sensor_fault = bt_health_sensor_fault(&finger->health),
+        .sensor_fault = bt_finger_sensor_fault(finger),
     };
     bt_msg_sensor_status_pack(&msg, payload);
     bt_session_send(session, BT_SENSOR_STATUS_ID, payload);

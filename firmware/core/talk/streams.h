@@ -5,6 +5,8 @@
 
 #include "talk/session.h"
 
+#define BT_SLOT_UNKNOWN UINT8_MAX
+
 // A round begins: which fingers send EVENTs in it.
 void bt_streams_begin(bt_session *session);
 

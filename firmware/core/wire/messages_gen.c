@@ -912,6 +912,35 @@ void bt_msg_board_facts_unpack(bt_msg_board_facts *msg, const uint8_t in[BT_BOAR
     (void)at;
 }
 
+void bt_msg_sp_counts_pack(const bt_msg_sp_counts *msg, uint8_t out[BT_SP_COUNTS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->seq, 2);
+    at = put(at, (uint32_t)msg->t_us, 4);
+    at = put(at, (uint32_t)msg->finger, 1);
+    for (int k = 0; k < 24; k++) {
+        at = put(at, (uint32_t)msg->counts[k], 2);
+    }
+    (void)at;
+}
+
+void bt_msg_sp_counts_unpack(bt_msg_sp_counts *msg, const uint8_t in[BT_SP_COUNTS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 2);
+    msg->seq = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->t_us = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    for (int k = 0; k < 24; k++) {
+        at = get(at, &value, 2);
+        msg->counts[k] = (uint16_t)value;
+    }
+    (void)at;
+}
+
 void bt_msg_hello_request_pack(const bt_msg_hello_request *msg, uint8_t out[BT_HELLO_REQUEST_BYTES])
 {
     uint8_t *at = out;
@@ -1778,6 +1807,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_BANDS_BYTES;
     case BT_BOARD_FACTS_ID:
         return BT_BOARD_FACTS_BYTES;
+    case BT_SP_COUNTS_ID:
+        return BT_SP_COUNTS_BYTES;
     case BT_HELLO_REQUEST_ID:
         return BT_HELLO_REQUEST_BYTES;
     case BT_START_ID:

@@ -4,8 +4,10 @@
 #ifndef BIOTAC_SENSOR_GEN_H
 #define BIOTAC_SENSOR_GEN_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
+#define BT_FOREIGN_ELECTRODES 24
 #define BT_CHANNELS 28
 #define BT_SLOTS 44
 #define BT_ELECTRODES 19
@@ -96,5 +98,7 @@ extern const int16_t bt_electrode_um[BT_ELECTRODES][3];
 extern const int16_t bt_normal_milli[BT_ELECTRODES][3];
 extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact
 extern const uint16_t bt_normal_length_milli[3];  // of all normals' x, y and z, as three vectors
+
+bool bt_serial_is_foreign(const uint8_t *serial); // of a sensor with other electrodes, such as a BioTac SP
 
 #endif

@@ -63,6 +63,7 @@ class Outlet:
         self._stamps = Stamps(hand, self._lsl.local_clock)
         self.infos: list[Any] = []  #: pylsl.StreamInfo of each stream
         self._outlets: dict[tuple[int, str], Any] = {}
+        # 0, no bus, is LSL's IRREGULAR_RATE.
         rounds_hz = hand.info.slot_hz / len(SLOTS)
         for finger in hand.fingers:
             frame = [(name, column) for column in _FRAME_COLUMNS for name in column.flat_names()]

@@ -47,7 +47,8 @@ VERBS = {
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, uart:DEVICE?baud=N for a board's UART,
-zenoh:NAME, one that is shared; sim:SOURCE, a simulated board that plays a scenario (sim:press.toml) or recorded
+zenoh:NAME, one that is shared; bag:FILE, csv:FILE?columns=TOML and foxglove://HOST:PORT/topic, counts of another
+driver; sim:SOURCE, a simulated board that plays a scenario (sim:press.toml) or recorded
 counts (sim:trial.npz, sim:data.btd), emu:pico?source=SOURCE, a Pico's image in an emulator, or replay:REC, a
 recording that answers as its board did.
 

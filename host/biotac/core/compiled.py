@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..wire import messages_gen as wire
+from ..wire.identity import columns_text
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import ELECTRODE_NAMES, FULL_SCALE_COUNT
 
@@ -164,5 +165,6 @@ def _shaped(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[An
     array = np.asarray(values)
     if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
         wanted = ", ".join("n" if size is None else str(size) for size in shape) + ("," if len(shape) == 1 else "")
-        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
+        sp = columns_text(array.shape[-1]) if array.ndim and shape[-1] == ELECTRODES else ""
+        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted}){sp}")
     return array

@@ -17,6 +17,7 @@ from ..map.board_map import BoardMap, opened
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
+from ..wire.identity import columns_text
 from ..wire.native import ffi, lib
 from .compiled import FORCE_GAINS, TORQUE_GAINS, board_settings, default_settings, formula_settings
 
@@ -180,7 +181,8 @@ def _checked_counts(counts: Any) -> NDArray[np.uint16]:
     """uint16 (n, 19) or (19,) with adjacent columns; other integer types are converted if in range."""
     raw = np.asarray(counts)
     if raw.ndim not in (1, 2) or raw.shape[-1] != _ELECTRODES:
-        raise ValueError(f"counts have shape {raw.shape}, expected (n, 19) or (19,)")
+        sp = columns_text(raw.shape[-1]) if raw.ndim else ""
+        raise ValueError(f"counts have shape {raw.shape}, expected (n, 19) or (19,){sp}")
     if raw.dtype != _COUNT:
         if raw.dtype.kind not in "iu":
             raise ValueError(f"counts are {raw.dtype}, expected integers, preferably uint16")

@@ -20,6 +20,7 @@ from ..wire import slots
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
+from ..wire.identity import is_foreign
 from ..wire.native import ffi, lib
 from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
 
@@ -51,8 +52,10 @@ class Finger:
 
     ``settings`` are the board's; what they leave out has its default. ``index`` (0..4) is the finger's number in the
     rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds standard deviations.
-    ``wrench_map``, a map or its blob, replaces the gains. Raises ValueError for a setting or an index out of range,
-    InputError for a blob that a board would refuse.
+    ``wrench_map``, a map or its blob, replaces the gains. ``serial``, ASCII, is the sensor's serial number, b"" where
+    unknown: a BioTac SP (BTSP, BTTB), as any sensor said to be ``foreign``, is flagged SENSOR_FAULT and has no point,
+    force or torque. Raises ValueError for a setting or an index out of range or a longer serial number than a sensor
+    has, InputError for a blob that a board would refuse.
 
     >>> finger = Finger()
     >>> rows = finger.feed(np.full((30, 19), 3000))
@@ -67,6 +70,8 @@ class Finger:
         index: int = 0,
         quantities: wire.QuantityFlags | None = None,
         wrench_map: BoardMap | bytes | None = None,
+        serial: bytes = b"",
+        foreign: bool = False,
     ) -> None:
         if not 0 <= index < sensor.MAX_SENSORS:
             raise ValueError(f"index is {index}, expected 0 to {sensor.MAX_SENSORS - 1}")
@@ -76,6 +81,7 @@ class Finger:
         self._index = index
         self._quantities = quantities
         self._map = None if wrench_map is None else opened(wrench_map)
+        self._foreign = foreign or is_foreign(serial)
         self.reset()
 
     def __repr__(self) -> str:
@@ -85,6 +91,7 @@ class Finger:
     def reset(self) -> None:
         """Return to the state after power-up: no tare, and seq 0 comes next."""
         lib.bt_finger_reset(self._finger, self._index)
+        self._finger.foreign = self._foreign
         if self._quantities is not None:
             self._finger.quantities = int(self._quantities)
         self._next_us = 0

@@ -89,6 +89,10 @@ CATALOGUE: dict[str, Entry] = {
         "finger.",
         "End that, or use `biotac doctor --take-link`, which ends its stream and leaves held what it holds.",
     ),
+    "rounds": warning(
+        "The rounds are another driver's messages, and this was found about them: what they lack, and what was done.",
+        "host/docs/guides/owners.md has what each means, and what the numbers are worth.",
+    ),
     # ---- version
     "wire_version": error(
         "Firmware and library speak different major versions of the protocol, and do not understand each other.",
@@ -130,8 +134,8 @@ CATALOGUE: dict[str, Entry] = {
         "Check V+ (3.3 to 5 V) at the sensor, GND, and MISO, MOSI, SCLK and SS against the board's wiring table.",
     ),
     "wrong_sensor": error(
-        "A sensor of another type, such as a BioTac SP (BTSP...), whose 24 electrodes lie elsewhere. Its counts are "
-        "sent, but no force can be computed from them; all its frames carry SENSOR_UNSURE.",
+        "A sensor of another type, such as a BioTac SP (BTSP...), whose 24 electrodes lie elsewhere, or another skin. "
+        "Its counts are sent, but no point and no force; all its frames carry SENSOR_FAULT.",
         "Replace it with a BioTac.",
     ),
     "sensor_missing": error(

@@ -37,6 +37,7 @@ SENSOR_FAULTS = {
     wire.SensorFault.FROZEN: "sensor_frozen",
     wire.SensorFault.TOGETHER: "electrodes_shifted",
     wire.SensorFault.EXCHANGED: "sensor_exchanged",
+    wire.SensorFault.OTHER_KIND: "wrong_sensor",
 }
 
 # Presses of real fingers move the static pressure by 50 to 120 counts a newton; without a calibration the newtons may
@@ -52,7 +53,10 @@ def check(board: BoardFacts) -> Iterator[Finding]:
     for finger in board.present:
         found = dict(_by_the_board(board.sensors_after[finger]))
         if "sensor_frozen" not in found:
-            for code, names in _judge(_channels(board, finger)).items():
+            channels = _channels(board, finger)
+            if board.hello.board == wire.Board.MESSAGES:  # what was never said is no fault of a sensor
+                channels = {name: counts for name, counts in channels.items() if (counts != wire.INVALID_COUNT).any()}
+            for code, names in _judge(channels).items():
                 found[code] = list(dict.fromkeys(names + found.get(code, [])))
         for code, names in found.items():
             if names:

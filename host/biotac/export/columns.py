@@ -49,18 +49,20 @@ HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": _stamped(IDLE_FIELDS)}
 class Table:
     """One finger's rows of one kind, such as ``frames``, ``pac`` or ``bands``.
 
-    ``arrays`` are (n,) or (n, parts), by column name. ``finger`` is None for rows of the board itself.
+    ``arrays`` are (n,) or (n, parts), by column name. ``finger`` is None for rows of the board itself. ``frame``: the
+    name of its coordinate frame, where it is not ours.
     """
 
     kind: str
     finger: int | None
     columns: tuple[Field, ...]
     arrays: dict[str, NDArray[Any]]
+    frame: str | None = None
 
     @property
     def frame_id(self) -> str | None:
         """The coordinate frame of its vectors."""
-        return None if self.finger is None else frame_id(self.finger)
+        return self.frame or (None if self.finger is None else frame_id(self.finger))
 
     def __len__(self) -> int:
         return len(self.arrays["t_us"])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -29,24 +30,38 @@ FORMATS = {
     ".mat": Format("biotac.export.mat", "MATLAB and Octave, one struct per finger: finger0.frames.force_n"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
     ".png": Format("biotac.export.png", "a picture of force and pressure over time, with labels and gaps", "plot"),
-    ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
+    ".bag": Format("biotac.export.ros", "the same as a ROS 1 bag"),
+    ".ros2": Format("biotac.export.ros", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC"),
 }
 
 
-def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Show = lambda share: None) -> list[Path]:
+def export(
+    recording: Recording,
+    out: Path,
+    *,
+    overwrite: bool = False,
+    frames: Mapping[int, str] | None = None,
+    beside: Path | None = None,
+    show: Show = lambda share: None,
+) -> list[Path]:
     """Write ``recording`` in the format given by ``out``'s suffix; return the paths written.
+
+    ``frames``: names of fingers' coordinate frames. ``beside``: a bag whose messages are in the written one, too.
 
     An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an extra that is
     not installed, a recording without rows, or a path that exists or cannot be written.
     """
     module = writer_for(out)
-    made = tables(recording)
+    made = [replace(table, frame=(frames or {}).get(table.finger or 0)) for table in tables(recording)]
+    if beside is not None and not hasattr(module, "BESIDE"):
+        raise InputError(f"{out}: only a bag can have another bag's messages; name it .bag or .ros2")
     if not any(len(table) for table in made):
         raise InputError(f"{recording.path} holds no frames and no PAC; there is nothing to export")
     written: list[Path] = []
     with ExitStack() as together:  # no file is put in place before all are complete
         for path, part in parts(out, made, apart=module.KINDS_APART):
-            module.write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
+            more = {} if beside is None else {"beside": beside}
+            module.write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show, **more)
             written.append(path)
     return written
 

@@ -110,8 +110,8 @@ class Hand:
 
     @property
     def warnings(self) -> list[HandWarning]:
-        """Where this board's firmware and this library do not fit together; empty when they fit."""
-        return handshake.warnings(self.info, self.port)
+        """Where firmware and library do not fit together, and what was found about rounds that another driver made."""
+        return [*handshake.warnings(self.info, self.port), *(HandWarning("rounds", text) for text in self.link.notes)]
 
     @property
     def stats(self) -> LinkStats:

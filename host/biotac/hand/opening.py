@@ -26,16 +26,17 @@ def open(
     """Open a board, shake hands, and read it from now on.
 
     Without ``port``, opens the only board on USB, found by its USB ids; no other port is opened. ``port`` is
-    ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
-    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE per finger
-    (``?calibration=1:0x50:24c02``, one for each, loads the calibrations stored in the EEPROMs on their harnesses);
-    ``sim:SOURCE`` for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts
-    (``.npz``, ``.btd``); or ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the
-    same. ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
-    commands that would change a board raise CommandRefusedError. ``uart:DEVICE?baud=N`` is a board's UART,
+    ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``); ``spidev:0.0,0.1``
+    for sensors on this computer's own SPI bus, one BUS.DEVICE per finger (``?calibration=1:0x50:24c02``, one for each,
+    loads the calibrations stored in the EEPROMs on their harnesses); ``sim:SOURCE`` for a simulated board, where SOURCE
+    is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``); or ``emu:pico?source=SOURCE`` for the
+    board's own flash image in an emulator, playing the same. ``replay:press.mcap?from=12.5&to=20`` plays a recording,
+    or that part of it: the board's stream again, while commands that would change a board raise CommandRefusedError.
+    ``uart:DEVICE?baud=N`` is a board's UART, ``bag:FILE``, ``csv:FILE?columns=FILE.toml`` and
+    ``foxglove://HOST:PORT/topic`` are counts that another driver published (host/docs/guides/owners.md).
     ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT`` a serial port on the network, and ``zenoh:NAME`` a board that
-    another computer shares. ``pace`` is for simulated and emulated boards and recordings:
-    device seconds per second, or 0 for as fast as this side reads.
+    another computer shares. ``pace`` is for simulated and emulated boards and recordings: device seconds per second, or
+    0 for as fast as this side reads.
 
     With ``reconnect``, a board that went away is looked for, by its serial number, until it is back. Then what this
     session changed (settings, calibrations, maps, subscriptions) is restored, the stream resumes, and the first batch

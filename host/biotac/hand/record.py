@@ -67,6 +67,8 @@ class Recorder:
         self._due = threading.Event()
         self._thread = board.reader.thread(self._run, "recorder")
         self._thread.start()
+        self._noted: list[str] = []
+        self._note()
         board.reader.add(self)
 
     def mark(self, text: str, finger: int | None, facts: Mapping[str, str | float], *, timed: bool = True) -> Mark:
@@ -90,6 +92,8 @@ class Recorder:
         if reader.is_inherited():
             return  # the file is the parent's
         reader.remove(self)
+        if not self.closed:
+            self._note()
         self._append(self._chunk)
         self._chunk = b""
         self._over = True
@@ -181,7 +185,15 @@ class Recorder:
         commands, kept, hello = self._commands, self._kept, self._board.info
         sensors = [commands.sensor_info(f) for f in range(MAX_SENSORS) if hello.fingers_present >> f & 1]
         settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
-        return Facts(hello, sensors, settings, calibrations, maps, dict(commands.names))
+        zero_ns = self._board.link.zero_ns
+        return Facts(hello, sensors, settings, calibrations, maps, dict(commands.names), zero_ns)
+
+    def _note(self) -> None:
+        """Label the recording with what was found about another driver's rounds since the last call."""
+        for text in self._board.link.notes:
+            if text not in self._noted:
+                self._noted.append(text)
+                self.mark(text, None, {}, timed=False)
 
 
 class Mark:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -56,6 +56,16 @@ class Link(Protocol):
     #: Whether the board streams to this link alone, so that a STATUS tells what was started here. Not so for
     #: recordings, nor for a board that several share.
     owns_stream: bool = True
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What a user should know of rounds that another driver made, in words, so far."""
+        return ()
+
+    @property
+    def zero_ns(self) -> int | None:
+        """Unix ns of device time 0, by the clock of who stamped the rounds; None: device time is the board's own."""
+        return None
 
     #: The bit rate of a UART. None where everything fits: USB, a network, this computer.
     bits_per_s: int | None = None

@@ -20,6 +20,9 @@ OPENERS = {
     "sim": "biotac.sim.ports:open_sim",
     "emu": "biotac.sim.ports:open_sim",
     "replay": "biotac.recording.replay.link:open_replay",
+    "bag": "biotac.rounds.ports:open_bag",
+    "csv": "biotac.rounds.ports:open_csv",
+    "foxglove": "biotac.rounds.ports:open_foxglove",
     "zenoh": "biotac.fleet.zenoh_link:ZenohLink",
 }
 PATH = "biotac.link.serial_port:SerialLink"
@@ -38,9 +41,10 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
         raise PortError(
             f"unknown kind of port {scheme!r}; expected a device path, serial:NUMBER, "
             "uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, "
-            "replay:REC or zenoh:NAME"
+            "replay:REC, bag:FILE, csv:FILE, foxglove://HOST:PORT/TOPIC or zenoh:NAME"
         )
-    cure = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim"}.get(os.path.splitext(port)[1].lower())
+    players = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim", ".bag": "bag", ".csv": "csv"}
+    cure = players.get(os.path.splitext(port)[1].lower())
     if cure and not known:
         raise PortError(f"{port} is a file, not a port; play it with {cure}:{port}")
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")

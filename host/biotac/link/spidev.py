@@ -13,18 +13,15 @@ The firmware's own sampler, session and framing run here (host/binding/sbc.c); P
 from __future__ import annotations
 
 import secrets
-import threading
 import time
 from contextlib import ExitStack, suppress
 from typing import Any
 
-from ..errors import DeviceLostError, PortError
+from ..errors import PortError
 from ..wire import sensor_gen as sensor
-from ..wire.native import ffi, lib
-from .base import Link
+from ..wire.native import lib
+from .in_process import InProcessLink
 
-# As much as a board and the operating system would buffer for a slow host; beyond that, whole frames are dropped.
-OUTBOX_BYTES = 262_144
 # Linux wakes a sleeping thread some 60 us late, even from sleep(0), so the end of each wait is spent awake. Other
 # threads get the interpreter whenever the board's C code runs, several times per slot.
 AWAKE_NS = 100_000
@@ -92,58 +89,24 @@ def open_devices(port: str) -> list[Any]:
     return opened
 
 
-class SpidevLink(Link):
+class SpidevLink(InProcessLink):
     """A Link to the gateway that runs in this process."""
 
+    cure = "check the SPI bus and open it again"
+
     def __init__(self, port: str) -> None:
-        self.port = port
+        super().__init__(port)
         self._devices = open_devices(port)
         self._clock = MonotonicClock()
         self._start_ns = self._clock.now_ns()
-        self._inbox = bytearray()
-        self._outbox = bytearray()
-        self._changed = threading.Condition()
-        self._closing = False
-        self._failure: BaseException | None = None
-        self._handle = ffi.new_handle(self)
-        board = lib.bt_sbc_new(self._handle, len(self._devices), secrets.randbits(32))
-        if board == ffi.NULL:
-            raise MemoryError("no memory for a board")
-        self._board = ffi.gc(board, lib.bt_sbc_free)
-        self._thread = threading.Thread(target=self._run, name=port, daemon=True)
-        self._thread.start()
-
-    # ---- the host's thread -----------------------------------------------------------------------
-
-    def read(self, timeout_s: float) -> bytes:
-        with self._changed:
-            self._changed.wait_for(lambda: self._outbox or self._failure or self._closing, timeout_s)
-            data = bytes(self._outbox)
-            self._outbox.clear()
-        if not data:
-            self._check()
-        return data
-
-    def write(self, data: bytes) -> None:
-        self._check()
-        with self._changed:
-            self._inbox += data
+        self.begin(lib.bt_sbc_new(self._handle, len(self._devices), secrets.randbits(32)))
 
     def close(self) -> None:
-        self._closing = True
-        self._thread.join()
+        super().close()
         for spi in self._devices:
             with suppress(OSError):  # a device that is gone needs no closing
                 spi.close()
         self._devices = []
-
-    def _check(self) -> None:
-        if self._failure is not None:
-            raise DeviceLostError(
-                f"{self.port} failed while it was open ({self._failure}); check the SPI bus and open it again"
-            ) from self._failure
-
-    # ---- the board's thread ----------------------------------------------------------------------
 
     def _run(self) -> None:
         """The main loop of firmware/app/main.c, but with an end."""
@@ -162,64 +125,9 @@ class SpidevLink(Link):
     def _us(self) -> int:
         return (self._clock.now_ns() - self._start_ns) // 1000
 
-    def _fail(self, error: BaseException) -> None:
-        with self._changed:
-            self._failure = self._failure or error
-            self._changed.notify_all()
+    def _delay(self, us: int) -> None:
+        self._clock.delay_ns(us * 1000)
 
     def _exchange(self, finger: int, data: Any) -> None:
         # After a failure the rest of the slot reads as zeros; then the loop ends.
         data[:] = bytes(len(data)) if self._failure else bytes(self._devices[finger].xfer2(list(bytes(data))))
-
-    def _send(self, data: bytes) -> bool:
-        with self._changed:
-            if len(self._outbox) + len(data) > OUTBOX_BYTES:
-                return False
-            self._outbox += data
-            self._changed.notify_all()
-        return True
-
-    def _receive(self, most: int) -> bytes:
-        if not self._inbox:
-            return b""
-        with self._changed:
-            data = bytes(self._inbox[:most])
-            del self._inbox[:most]
-        return data
-
-
-def _of(handle: Any) -> SpidevLink:
-    link: SpidevLink = ffi.from_handle(handle)
-    return link
-
-
-def _failed(kind: Any, error: Any, trace: Any) -> None:
-    """Keep what a callback below raised from being lost in C: it ends the board, and the host gets the error."""
-    _of(trace.tb_frame.f_locals["handle"])._fail(error)
-
-
-@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
-def bt_sbc_now_us(handle: Any) -> int:
-    return _of(handle)._us() % 2**32
-
-
-@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
-def bt_sbc_delay_us(handle: Any, us: int) -> None:
-    _of(handle)._clock.delay_ns(us * 1000)
-
-
-@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
-def bt_sbc_exchange(handle: Any, finger: int, data: Any, n: int) -> None:
-    _of(handle)._exchange(finger, ffi.buffer(data, n))
-
-
-@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
-def bt_sbc_link_write(handle: Any, data: Any, n: int) -> bool:
-    return _of(handle)._send(bytes(ffi.buffer(data, n)))
-
-
-@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
-def bt_sbc_link_read(handle: Any, data: Any, most: int) -> int:
-    received = _of(handle)._receive(most)
-    ffi.buffer(data, most)[: len(received)] = received
-    return len(received)

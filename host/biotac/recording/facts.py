@@ -25,7 +25,7 @@ Settings = Mapping[wire.Setting, int]
 class Facts:
     """Board, sensors, and the settings, calibrations and maps in force when the recording began.
 
-    ``calibrations`` and ``maps`` are by finger; ``names`` are fingers by name.
+    ``calibrations`` and ``maps`` are by finger; ``names`` are fingers by name. ``zero_ns``: see link.base.
     """
 
     info: wire.Hello
@@ -34,6 +34,7 @@ class Facts:
     calibrations: dict[int, Calibration] = field(default_factory=dict)
     maps: dict[int, bytes] = field(default_factory=dict)
     names: dict[str, int] = field(default_factory=dict)
+    zero_ns: int | None = None
 
     @classmethod
     def read(cls, metadata: Mapping[str, str]) -> Facts:
@@ -49,6 +50,7 @@ class Facts:
                 {int(finger): from_dict(calibration) for finger, calibration in own.items()},
                 {int(finger): as_blob(base64.b64decode(blob, validate=True)) for finger, blob in maps.items()},
                 layout.names_of(metadata),
+                int(metadata["zero_ns"]) if "zero_ns" in metadata else None,
             )
             messages: list[Any] = [facts.info, *facts.sensors]
             for message in messages:
@@ -71,6 +73,7 @@ class Facts:
             **in_force(self.settings, self.calibrations, self.maps),
             layout.NAMES: json.dumps(self.names),
             "sensors": json.dumps([asdict(s) for s in self.sensors]),
+            **({} if self.zero_ns is None else {"zero_ns": str(self.zero_ns)}),
         }
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ..errors import RecordingError
 from ..wire import sensor_gen as _sensor
+from ..wire.identity import columns_text
 
 # Of all wanted fields: an hour of every channel as float64 is 150 MB; one zipped byte can unpack to 1000.
 MAX_BYTES = 192 << 20
@@ -69,7 +70,8 @@ def counts_field(
     good = len(shape) == (1 if columns is None else 2) and shape[0] > 0
     good = good and (rows is None or shape[0] == rows) and (columns is None or shape[1] == columns)
     if not good:
-        raise RecordingError(f"{path}: field {name} has shape {shape}: expected {wanted}, one row per frame")
+        sp = columns_text(shape[-1]) if len(shape) == 2 else ""
+        raise RecordingError(f"{path}: field {name} has shape {shape}: expected {wanted}, one row per frame{sp}")
     expected = f"expected whole counts 0..{_sensor.FULL_SCALE_COUNT}; save raw counts"
     if array.dtype.kind not in "iuf":
         raise RecordingError(f"{path}: field {name} holds {array.dtype}: {expected}")

@@ -229,9 +229,10 @@ class Recording:
 
         The result is ``begin_ns`` plus the time elapsed on the host's clock; the drift between the two clocks is
         measured from the arrival times of the blocks. In recordings shorter than ten seconds, or when the board did
-        not keep pace with the host, it is ``begin_ns`` plus the time elapsed on the board's clock.
+        not keep pace with the host, it is ``begin_ns`` plus the time elapsed on the board's clock. Where another driver
+        stamped the rounds, it is these stamps.
         """
-        return self._stamps(t_us)
+        return self._stamps(t_us) if self._zero_ns is None else self._zero_ns + t_us * 1000
 
     @cached_property
     def _stamps(self) -> Stamps:
@@ -271,6 +272,7 @@ class Recording:
             ) from error
         self.metadata = metadata
         self.info, self.sensors, self.names = facts.info, facts.sensors, facts.names
+        self._zero_ns = facts.zero_ns
         self.calibrations, self.maps, self.settings = facts.calibrations, facts.maps, facts.settings
 
     @property
@@ -299,5 +301,7 @@ class Recording:
 
     @property
     def begin_ns(self) -> int:
-        """``begin_us`` on the host's clock (Unix), in ns; late by the delay of the link."""
+        """``begin_us`` on the host's clock (Unix), in ns, late by the delay of the link, or as stamped."""
+        if self._zero_ns is not None:
+            return self._zero_ns + self.begin_us * 1000
         return self.heads()[0].arrived_ns if self.heads() else 0

@@ -26,6 +26,7 @@ from ..wire import slots
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
 from ..wire.framing import encode
+from ..wire.identity import is_foreign
 from ..wire.native import lib
 from .block import Packet
 from .facts import in_force
@@ -106,7 +107,7 @@ def _with_kept_tares(
         # Frames of another sensor have no results: the settings are not that sensor's.
         refused = wire.FrameFlags.SENSOR_OTHER | wire.FrameFlags.NOT_ASKED
         known = (new["flags"] & wire.FrameFlags.UNTARED == 0) & (new["flags"] & refused != refused)
-        at = np.flatnonzero((new["finger"] == finger) & known)
+        at = np.flatnonzero((new["finger"] == finger) & known & ~_is_foreign(recording, int(finger)))
         new[at] = _recomputed(new[at], own.get(int(finger), settings), maps.get(int(finger)))
     # The standard deviations depend on the gains and on the noise, which a frame does not hold.
     for name in ("poc_sigma_um", "force_sigma_100un"):
@@ -226,7 +227,15 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
         notes.append(f"finger {finger}: PAC was not recorded, by which the board knows another sensor's words")
     commands = {row: [told[row] for told in (tares, holds) if row in told] for row in {*tares, *holds}}
     pdc, tac, tdc = (sent[name] for name in ("pdc", "tac", "tdc"))
-    return Rounds(finger, sent["counts"], pdc, tac, tdc, pac, t_us, commands, quantities, own_map)
+    foreign = _is_foreign(recording, finger)
+    return Rounds(finger, sent["counts"], pdc, tac, tdc, pac, t_us, commands, quantities, own_map, foreign)
+
+
+def _is_foreign(recording: Recording, finger: int) -> bool:
+    """Whether its sensor is no BioTac with 19 electrodes: by its serial number, or as the board said."""
+    said = [m for m in recording.messages if isinstance(m, wire.SensorStatus) and m.finger == finger]
+    by_serial = any(is_foreign(info.serial) for info in recording.sensors if info.finger == finger)
+    return by_serial or any(m.sensor_fault == wire.SensorFault.OTHER_KIND for m in said)
 
 
 def _pac_at(t_us: NDArray[np.int64], rows: StructArray) -> NDArray[np.uint16]:

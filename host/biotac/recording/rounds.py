@@ -26,7 +26,8 @@ Command = Callable[[Finger], object]
 class Rounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc``, device time ``t_us`` (n,), ``pac`` (n, 22).
 
-    ``commands``: by the round before which they came, in order. ``wrench_map``: in force throughout.
+    ``commands``: by the round before which they came, in order. ``wrench_map``: in force throughout. ``foreign``: the
+    sensor is no BioTac with 19 electrodes.
     """
 
     finger: int
@@ -39,6 +40,7 @@ class Rounds:
     commands: dict[int, list[Command]] = field(default_factory=dict)
     quantities: wire.QuantityFlags | None = None
     wrench_map: BoardMap | None = None
+    foreign: bool = False
 
 
 def with_silence(rounds: Rounds) -> Rounds:
@@ -73,7 +75,8 @@ def frames_and_tares(
 
     ``show`` is called with the number of rounds just run; at most twice their number are run in all.
     """
-    finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities, wrench_map=rounds.wrench_map)
+    own_map, foreign = rounds.wrench_map, rounds.foreign
+    finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities, wrench_map=own_map, foreign=foreign)
     rows = np.concatenate(list(_run(rounds, finger, [], show)))
     changed = np.flatnonzero((rows["flags"] & wire.FrameFlags.TARE_CHANGED).astype(bool) & (rows["present"] != 0))
     # Rows do not hold the tare in 1/65536 count: a second run stops at each change to read it.

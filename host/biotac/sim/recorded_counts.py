@@ -66,11 +66,12 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
 def load_btd(path: Path, *, fingers: int | None = None, seconds: float | None = None) -> Source:
     """The sensors present in a .btd or .btd.gz file; incomplete frames are left out and counted.
 
+    The board's sensors have the file's serial numbers: a BioTac SP's gives no force.
     Raises RecordingError naming the line.
     """
     read = read_btd(path)
     samples = np.where(read.samples == INVALID_COUNT, EmuFault.BAD_PARITY, read.samples).astype(np.uint16)
-    return _source(path, samples, fingers, seconds, skipped=read.skipped)
+    return _source(path, samples, fingers, seconds, skipped=read.skipped, serials=read.serials)
 
 
 def _source(
@@ -82,6 +83,7 @@ def _source(
     tare_q4: npt.NDArray[np.uint16] | None = None,
     force_n: npt.NDArray[np.float64] | None = None,
     skipped: int = 0,
+    serials: tuple[bytes, ...] = (b"",),
 ) -> Source:
     """Crop to ``seconds`` and cut or copy to ``fingers``."""
     end = None if seconds is None else max(1, round(seconds * slots.FRAME_HZ))
@@ -92,6 +94,6 @@ def _source(
         samples=samples[:end, which],
         tare_q4=None if tare_q4 is None else tare_q4[which],
         truth_force_n=None if force_n is None else force_n[:end, which],
-        serials=tuple(f"BTREC{k:011d}" for k in range(len(which))),
+        serials=tuple(serials[f].decode() or f"BTREC{k:011d}" for k, f in enumerate(which)),
         skipped_frames=skipped,
     )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 import threading
+import weakref
 from pathlib import Path
 
 from ..errors import PortError
@@ -17,6 +20,7 @@ from .state import State
 # A scenario is repeated seamlessly for so long; generating more would keep people waiting.
 SCENARIO_S = 120
 RECORDING_SUFFIX = ".mcap"
+ROUNDS_FILES = ("bag:", "csv:")
 
 
 class Viewing:
@@ -67,7 +71,17 @@ class Viewing:
 
 
 def opener_of(source: str, folder: Path) -> Opener:
-    """An opener for ``source``; a recording is read now, only once."""
+    """An opener for ``source``; a recording is read now, only once. A bag or a table is recorded first."""
+    if source.startswith(ROUNDS_FILES):
+        with open_hand(source) as hand:
+            scratch = Path(tempfile.mkdtemp(prefix="biotac-view-"))
+            with hand.record(scratch / "rounds.mcap"):
+                hand.stream("results", "events")
+                for _ in hand.batches():
+                    pass
+        opener = RecordingOpener(str(scratch / "rounds.mcap"), folder)
+        weakref.finalize(opener, shutil.rmtree, scratch, ignore_errors=True)
+        return opener
     if source.endswith(RECORDING_SUFFIX):
         return RecordingOpener(source, folder)
     port = lasting(source)

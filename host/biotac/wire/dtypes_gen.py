@@ -249,6 +249,14 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("early_faults", "<u2"),
         ]
     ),
+    wire.SpCounts.ID: np.dtype(
+        [
+            ("seq", "<u2"),
+            ("t_us", "<u4"),
+            ("finger", "u1"),
+            ("counts", "<u2", (24,)),
+        ]
+    ),
     wire.HelloRequest.ID: np.dtype(
         [
             ("req_id", "u1"),

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from . import messages_gen as wire
+from . import sensor_gen as sensor
+
+SENSOR_SERIAL_BYTES = 16
 
 # HELLO's image_crc32 where there is no image, or one from before that field.
 NO_IMAGE = 0xFFFFFFFF
@@ -64,3 +67,18 @@ def ascii_text(values: Iterable[int]) -> str:
     """A sensor's zero-padded ASCII, such as its serial number; U+FFFD for what is not printable ASCII."""
     text = bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
     return "".join(c if c.isprintable() else "\ufffd" for c in text)
+
+
+def is_foreign(serial: Iterable[int]) -> bool:
+    """Whether a sensor's serial number is of one with other electrodes (BioTac SP): no point or force follows."""
+    return bytes(serial).startswith(sensor.FOREIGN_SERIALS)
+
+
+def columns_text(columns: int) -> str:
+    """What to add to the refusal of an array with so many columns for electrodes; empty unless a BioTac SP's."""
+    if columns != sensor.FOREIGN_ELECTRODES:
+        return ""
+    return (
+        f"; {columns} columns are a BioTac SP's, whose electrodes lie elsewhere: cutting them to 19 does not make it a "
+        "BioTac"
+    )

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x601B7537
+SCHEMA_HASH = 0x1BA84306
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -68,6 +68,7 @@ class SensorFault(IntEnum):
     TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
     NOISY = 7  # it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
     EXCHANGED = 8  # its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
+    OTHER_KIND = 9  # no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque
 
 
 class TareReason(IntEnum):
@@ -112,6 +113,7 @@ class Board(IntEnum):
     PICO_SENSOR = 4  # Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
     STM32F405 = 5  # STM32F405 with a UART to the host (firmware/boards/f405)
     PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
+    MESSAGES = 7  # a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
     PRIVATE = 32768  # the first of the private ids
 
 
@@ -261,6 +263,7 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
     7: "it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken",
     8: "its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor",
+    9: "no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque",
 }
 
 
@@ -301,6 +304,7 @@ BOARD_DOC: dict[int, str] = {
     4: "Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages",
     5: "STM32F405 with a UART to the host (firmware/boards/f405)",
     6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
+    7: "a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so",
     32768: "the first of the private ids",
 }
 
@@ -1392,6 +1396,39 @@ class BoardFacts:
             v[11],
             v[12],
             v[13],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SpCounts:
+    """The counts of a BioTac SP's 24 electrodes in one round. Sent only by a board whose rounds come as messages; the FRAME has the first 19."""
+
+    seq: int
+    t_us: int
+    finger: int
+    counts: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x1F
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIB24H")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 55 bytes."""
+        return self.STRUCT.pack(
+            self.seq,
+            self.t_us,
+            self.finger,
+            *self.counts,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> SpCounts:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 27],
         )
 
 
@@ -2490,7 +2527,7 @@ class EmuKeep:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | BoardFacts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2511,6 +2548,7 @@ MESSAGES: dict[int, type[Any]] = {
     Event.ID: Event,
     Bands.ID: Bands,
     BoardFacts.ID: BoardFacts,
+    SpCounts.ID: SpCounts,
     HelloRequest.ID: HelloRequest,
     Start.ID: Start,
     Stop.ID: Stop,
@@ -2601,6 +2639,7 @@ STREAMS_OF: dict[type[Any], StreamFlags] = {
     Touch: StreamFlags.FRAMES,
     Event: StreamFlags.FRAMES | StreamFlags.PAC,
     Bands: StreamFlags.BANDS,
+    SpCounts: StreamFlags.FRAMES,
 }
 
 # What each round of a touched finger consists of, as far as it is streamed.

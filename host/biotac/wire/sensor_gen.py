@@ -13,6 +13,12 @@ POWER_ON_MS = 100
 LISTEN_WORD = 1
 MAX_SENSORS = 5
 FULL_SCALE_COUNT = 4095
+FOREIGN_ELECTRODES = 24
+FOREIGN_SERIALS: tuple[bytes, ...] = (
+    b"BTSP",
+    b"BTTB",
+)
+
 
 CHANNEL_COMMAND: dict[str, int] = {
     "PAC": 0x80,

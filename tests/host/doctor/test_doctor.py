@@ -134,6 +134,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("refused", Facts(PORT, error=CommandRefusedError("LINK_BUSY")), "LINK_BUSY"),
     ("wire_version", Facts(PORT, error=WireVersionError("speaks wire 9.0")), "wire 9.0"),
     ("schema_differs", board(warnings=[HandWarning("schema_differs", "other schema")]), "other schema"),
+    ("rounds", board(warnings=[HandWarning("rounds", "2 of 22 samples of PAC")]), "2 of 22 samples"),
     (
         "firmware_older",
         board(hello=hello(0, 0, 9, fingers_present=0b11)),

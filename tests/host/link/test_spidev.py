@@ -16,6 +16,7 @@ from overheard import Overheard
 import biotac
 from biotac.keep import eeprom
 from biotac.keep.chip import Chip
+from biotac.link import in_process
 from biotac.link import spidev as spidev_link
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
@@ -138,7 +139,7 @@ def test_a_bus_too_slow_for_every_slot_loses_counted_slots_and_no_time(board: Bo
 
 
 def test_a_host_that_does_not_read_loses_whole_frames(board: Board, monkeypatch) -> None:
-    monkeypatch.setattr(spidev_link, "OUTBOX_BYTES", 8192)
+    monkeypatch.setattr(in_process, "OUTBOX_BYTES", 8192)
     hand, bus = board("press.toml", 1)
     hand.stream()
     standstill = Overheard(still=True)

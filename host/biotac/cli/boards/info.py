@@ -21,6 +21,7 @@ from .. import values
 from ..outputs import say
 from ..recordings.loading import load
 
+NO_BUS = "no bus, rounds come as messages"
 EXAMPLE = "biotac info /dev/ttyACM0"
 
 
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     }
     lines = [
         f"{facts['board']}, firmware {facts['firmware']}, wire {facts['wire']}",
-        f"{hello.fingers} chip selects, {maps_text(hello)}",
+        f"{NO_BUS if hello.board == wire.Board.MESSAGES else f'{hello.fingers} chip selects'}, {maps_text(hello)}",
         f"serial {facts['serial_number']}, boot {hello.boot_id:08x}, up {status.uptime_s} s",
         *(f"warning: {warning.text}" for warning in warnings),
     ]
@@ -69,7 +70,8 @@ def run(args: argparse.Namespace) -> int:
         finger = s["finger"]
         own = f", calibration {made_text(calibrations[finger].made_s)}" if finger in calibrations else ""
         own += f", wrench map {made_text(made_s_of(maps[finger]))}" if finger in maps else ""
-        lines.append(f"finger {finger}: BioTac {s['serial']}, software {s['software']}{own}")
+        named = f"{s['serial'] or 'of unknown serial number'}, software {s['software'] or 'unknown'}"
+        lines.append(f"finger {finger}: BioTac {named}{own}")
     say(args, facts, "\n".join([*lines, *(setting_text(setting, value) for setting, value in settings.items())]))
     return 0
 

@@ -51,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
         recorder.close()
         stats = hand.stats
         faults = [line for line in latched_faults(hand) if line not in earlier]
+        for warning in hand.warnings:
+            note(warning.text)
     facts: dict[str, Any] = {
         "recording": str(args.out),
         "frames": recorder.frames,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,10 +13,13 @@ from ...documents import read_json
 from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
+from ...hand.opening import shake_hands
 from ...partial_file import whole
-from ...recording.btd.convert import import_btd
+from ...recording.layout import finger_of
 from ...recording.reader import Recording
 from ...recording.recompute import recompute
+from ...rounds.btd import Btd
+from ...rounds.link import MessagesLink
 from ...wire import messages_gen as wire
 from ...wire.identity import setting_text
 from .. import outputs
@@ -47,6 +50,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-tare", action="store_true", help="recompute with the recorded tares, not with the tare machine's"
     )
+    parser.add_argument(
+        "--frame",
+        metavar="FINGER=ID",
+        action="append",
+        default=[],
+        help="a finger's frame: index=rh_ffdistal, for rviz",
+    )
+    parser.add_argument("--beside", metavar="BAG", type=Path, help="with all messages of this bag, in .bag or .ros2")
     lake.add_export_arguments(parser)
 
 
@@ -78,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
 
         if imports:
             with _recording_at(out, args.force, written) as target:
-                made: dict[str, Any] = import_btd(source, target, show)
+                made: dict[str, Any] = import_btd(source, target)
                 text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
             changes = read_settings(args.settings) if args.settings else {}
@@ -94,7 +105,8 @@ def run(args: argparse.Namespace) -> int:
             text = f"{made['frames']} frames, {changed},"
         else:
             recording = load(source)
-            written += export(recording, out, overwrite=args.force, show=show)
+            how = {"frames": frames_of(args.frame, recording.names), "beside": args.beside}
+            written += export(recording, out, overwrite=args.force, show=show, **how)
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
     names = [str(path) for path in written]
@@ -117,6 +129,26 @@ def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]
             written += export(Recording(target), out, overwrite=force)
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt(*interrupt.args or (f"{out} was not written",)) from None
+
+
+def import_btd(path: Path, out: Path) -> dict[str, Any]:
+    """Record what the board's own code makes of a .btd's counts; the numbers of fingers, frames and incomplete ones."""
+    source = Btd(path)
+    with shake_hands(MessagesLink(f"btd:{path.name}", source)) as hand, hand.record(out) as recorder:
+        hand.stream("results", "events")
+        for _ in hand.batches():
+            pass
+        recorder.close()
+        return {"fingers": len(hand.fingers), "frames": recorder.frames, "skipped": source.read.skipped}
+
+
+def frames_of(given: list[str], names: Mapping[str, int]) -> dict[int, str]:
+    """Coordinate frames by finger from FINGER=ID. Raises InputError for a finger that is unknown."""
+    try:
+        parts = [one.partition("=") for one in given]
+        return {finger_of(int(finger) if finger.isdecimal() else finger, names): name for finger, _, name in parts}
+    except KeyError as error:
+        raise InputError(f"--frame: {error.args[0]}") from error
 
 
 def read_settings(path: Path) -> dict[wire.Setting, int]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from ...errors import RecordingError
 from ...wire import sensor_gen as _sensor
+from ...wire.identity import SENSOR_SERIAL_BYTES, is_foreign
 from ...wire.messages_gen import INVALID_COUNT
 
 _FIRST_PAIR = 4
@@ -34,12 +36,14 @@ class BtdFrames:
     """Complete frames of the sensors that were present.
 
     ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, INVALID_COUNT where the parity was bad. ``t_s``
-    (frames,) is the file's time of each frame in s. ``skipped`` counts incomplete frames.
+    (frames,) is the file's time of each frame in s. ``skipped`` counts incomplete frames. ``serials``: of each sensor,
+    b"" where the header does not say.
     """
 
     samples: npt.NDArray[np.uint16]
     t_s: npt.NDArray[np.float64]
     skipped: int
+    serials: tuple[bytes, ...] = ()
 
 
 def read_btd(path: Path) -> BtdFrames:
@@ -82,7 +86,19 @@ def read_btd(path: Path) -> BtdFrames:
     there = np.argsort(_SLOT_CHANNELS, kind="stable")
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
     samples[:, :, there] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
-    return BtdFrames(samples=samples, t_s=table[starts, 0], skipped=skipped)
+    serials = zip(_serials(header, len(present)), present, strict=True)
+    return BtdFrames(samples, table[starts, 0], skipped, tuple(serial for serial, there in serials if there))
+
+
+def _serials(header: bytes, places: int) -> list[bytes]:
+    """Of the adapter's ``places``, by the line ``Serial Number: ,,BTSP050400018017``; b"" where there is none.
+
+    A BioTac SP's is that of every place without one: no force must come of a file that names one anywhere.
+    """
+    line = re.search(rb"^\s*Serial Number:([^\r\n]*)", header, re.M)
+    found = [re.sub(rb"[^!-~]", b"", text)[:SENSOR_SERIAL_BYTES] for text in (line[1] if line else b"").split(b",")]
+    foreign = next((serial for serial in found if is_foreign(serial)), b"")
+    return [serial or foreign for serial in [*found, *[b""] * places][:places]]
 
 
 def _complete_frames(

@@ -1,4 +1,4 @@
-"""ROS 2 bag (rosbag2, mcap storage), with standard messages only, so that it plays without our own package."""
+"""ROS 2 bag (rosbag2, mcap storage), or ROS 1 bag by its suffix; standard messages only, so it plays anywhere."""
 
 from __future__ import annotations
 
@@ -7,14 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from ..errors import InputError
 from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
 from .columns import Show, Table
 
 KINDS_APART = False
+BESIDE = True
+LOG_1 = "rosgraph_msgs/msg/Log"
+LEVELS_1 = {INFO: 2, WARN: 4}  # of a ROS 1 log
 _SHOW_ROWS = 1000
 _COUNTS = "std_msgs/msg/UInt16MultiArray"
 #: By kind of table: its topics, with their types.
@@ -30,18 +37,22 @@ _TOPICS = {
 }
 
 
-def write(path: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Write a bag with topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``
-    and ``bands``, and ``/biotac/log`` with gaps and labels.
+def write(path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None) -> None:
+    """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``flags``,
+    ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
-    store = get_typestore(Stores.ROS2_HUMBLE)
+    ros1 = path.suffix == ".bag"
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    serialize, log_kind = (store.serialize_ros1, LOG_1) if ros1 else (store.serialize_cdr, LOG)
     total = sum(len(table) for table in made)
     done = 0
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+    with Writer1(path) if ros1 else Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        if beside is not None:
+            _copy(beside, bag, ros1)
 
         def topic(name: str, kind: str) -> Callable[[int, Any], None]:
             connection = bag.add_connection(f"/biotac/{name}", kind, typestore=store)
-            return lambda stamp_ns, message: bag.write(connection, stamp_ns, store.serialize_cdr(message, kind))
+            return lambda stamp_ns, message: bag.write(connection, stamp_ns, serialize(message, kind))
 
         for table in made:
             topics = {name: topic(f"finger{table.finger}/{name}", kind) for name, kind in _TOPICS[table.kind].items()}
@@ -55,9 +66,38 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
         at_ns = recording.stamp_ns(np.array([label.t_us or begin_us for label in recording.labels], np.int64)).tolist()
         logged = [(ns, INFO, label.line()) for ns, label in zip(at_ns, recording.labels, strict=True)]
         logged += [(gap.back_at_ns, WARN, gap.line()) for gap in recording.gaps]
-        log = topic("log", LOG) if logged else lambda stamp_ns, message: None
+        log = topic("log", log_kind) if logged else lambda stamp_ns, message: None
         for stamp_ns, level, text in logged:
-            log(stamp_ns, store.types[LOG](_time(store.types, stamp_ns), level, "biotac", text, "", "", 0))
+            if ros1:
+                said: Any = (_header(store.types, stamp_ns, ""), LEVELS_1[level], "biotac", text, "", "", 0, [])
+            else:
+                said = (_time(store.types, stamp_ns), level, "biotac", text, "", "", 0)
+            log(stamp_ns, store.types[log_kind](*said))
+
+
+def _copy(source: Path, bag: Any, ros1: bool) -> None:
+    """All messages of the bag ``source``. Raises InputError for one that cannot be read, or of the other ROS."""
+    if (source.suffix == ".bag") != ros1:
+        raise InputError(f"{source} is no bag of ROS {1 if ros1 else 2}: name the output {'.ros2' if ros1 else '.bag'}")
+    try:
+        with Reader1(source) if ros1 else Reader2(source) as reader:
+            digest = "md5sum" if ros1 else "rihs01"
+            to = {
+                c.id: bag.add_connection(c.topic, c.msgtype, msgdef=c.msgdef.data, **{digest: c.digest})
+                for c in reader.connections
+            }
+            for connection, logged_ns, raw in reader.messages():
+                bag.write(to[connection.id], logged_ns, raw)
+    except InputError:
+        raise
+    except Exception as error:  # rosbags raises what it finds
+        raise InputError(f"{source} cannot be read as a ROS bag ({error})") from error
+
+
+def _header(types: Any, stamp_ns: int, frame_id: str | None) -> Any:
+    kind = types["std_msgs/msg/Header"]
+    seq = {"seq": 0} if "seq" in kind.__dataclass_fields__ else {}
+    return kind(**seq, stamp=_time(types, stamp_ns), frame_id=frame_id)
 
 
 def _time(types: Any, stamp_ns: int) -> Any:
@@ -79,7 +119,7 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
     counts = np.column_stack([arrays[name] for name in ("counts", "pdc", "tac", "tdc")])
     lists = stamps_ns, force_n.tolist(), torque_nm.tolist(), poc_m.tolist(), arrays["flags"].tolist(), counts
     for stamp_ns, force, torque, poc, flags, row in zip(*lists, strict=True):
-        header = types["std_msgs/msg/Header"](_time(types, stamp_ns), table.frame_id)
+        header = _header(types, stamp_ns, table.frame_id)
         wrench = types["geometry_msgs/msg/Wrench"](vector(*force), vector(*torque))
         yield (
             stamp_ns,

@@ -1,0 +1,31 @@
+"""The ports whose rounds are messages, by their text. All raise PortError, or InputError for a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import imported
+from ..link.port_text import options_of
+from .link import MessagesLink
+
+
+def open_bag(port: str) -> MessagesLink:
+    """``bag:FILE?topic=T``, of ROS 1 or ROS 2."""
+    path, options = options_of(port, ("topic",), "bag:FILE?topic=/rh/tactile")
+    bag = imported("biotac.rounds.bag", port, "robot")
+    return MessagesLink(port, bag.Bag(Path(path), options.get("topic", "")))
+
+
+def open_csv(port: str) -> MessagesLink:
+    """``csv:FILE?columns=FILE.toml``."""
+    from .table import Table
+
+    path, options = options_of(port, ("columns",), "csv:FILE?columns=FILE.toml")
+    return MessagesLink(port, Table(Path(path), options.get("columns")))
+
+
+def open_foxglove(port: str) -> MessagesLink:
+    """``foxglove://HOST:PORT/topic``."""
+    host, _, topic = port.partition("://")[2].partition("/")
+    foxglove = imported("biotac.rounds.foxglove", port, "robot")
+    return MessagesLink(port, foxglove.Foxglove(port, host, topic and f"/{topic}"))

@@ -1,0 +1,101 @@
+"""Messages of ROS drivers, of any variant: decoded by the definition that comes with them, and read by field names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+from ..wire import sensor_gen as sensor
+from ..wire import slots
+from .message import SLOT_US, Message, RefusedError, counts_of
+
+#: By the type's last word: Shadow's sr_robot_msgs/BiotacAll, and biotac_sensors/BioTacHand of Penn and KTH.
+TYPES = ("BiotacAll", "BioTacHand")
+MAX_BYTES = 1 << 20
+Decode = Callable[[bytes, int], Message]
+
+
+def is_known(kind: str) -> bool:
+    """Whether a type's name is one of TYPES, in any package."""
+    return kind.split("/")[-1] in TYPES
+
+
+def decoder(kind: str, definition: str, *, ros1: bool, idl: bool = False) -> Decode:
+    """A function from a message's bytes, and the time at which it was logged, to what it says.
+
+    Raises RefusedError for a definition that cannot be read; so does the function for a message.
+    """
+    name = kind if "/msg/" in kind else kind.replace("/", "/msg/")
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    try:
+        types = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
+        store.register({k: v for k, v in types.items() if k not in store.types})
+    except Exception as error:  # it is another program's text
+        raise RefusedError(f"the definition of {kind} cannot be read ({error})") from error
+    deserialize = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+    read = _all if kind.endswith("BiotacAll") else _Hand()
+
+    def decode(raw: bytes, logged_ns: int) -> Message:
+        if len(raw) > MAX_BYTES:
+            raise RefusedError(f"a message of {len(raw)} bytes, expected at most {MAX_BYTES}")
+        try:
+            message: Any = deserialize(raw, name)
+            return read(message, _stamp_ns(message.header.stamp) or logged_ns)
+        except RefusedError:
+            raise
+        except Exception as error:  # a hostile message can fail anywhere in rosbags
+            raise RefusedError(
+                f"{kind} of {len(raw)} bytes is no such message ({error or type(error).__name__})"
+            ) from None
+
+    return decode
+
+
+def _stamp_ns(stamp: Any) -> int:
+    if not (0 <= stamp.sec < 2**32 and 0 <= stamp.nanosec < 10**9):
+        raise RefusedError(f"the stamp is {stamp.sec} s and {stamp.nanosec} ns, expected 0 to 10^9 ns")
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def _all(message: Any, stamp_ns: int) -> Message:
+    """sr_robot_msgs/BiotacAll: first, middle, ring, little finger, thumb, which are our default names."""
+    tactiles = message.tactiles
+    if len(tactiles) > sensor.MAX_SENSORS:
+        raise RefusedError(f"tactiles has {len(tactiles)} entries, expected at most {sensor.MAX_SENSORS}")
+    found = []
+    for f, own in enumerate(tactiles):
+        pac = getattr(own, "pac", ())  # all since the message before; without it, the last two
+        pac = pac if len(pac) else (own.pac0, own.pac1)
+        found.append(counts_of(f, own.electrodes, own.pdc, own.tac, own.tdc, pac))
+    return Message(stamp_ns, tuple([*found, *[None] * sensor.MAX_SENSORS][: sensor.MAX_SENSORS]))
+
+
+class _Hand:
+    """biotac_sensors/BioTacHand: sensors in order of their positions, all slots with their times."""
+
+    def __init__(self) -> None:
+        self._finger_at: dict[int, int] = {}
+
+    def __call__(self, message: Any, stamp_ns: int) -> Message:
+        found: list[Any] = [None] * sensor.MAX_SENSORS
+        for own in sorted(message.bt_data, key=lambda own: int(own.bt_position)):
+            f = self._finger_at.setdefault(int(own.bt_position), len(self._finger_at))
+            if f >= sensor.MAX_SENSORS or found[f] is not None:
+                raise RefusedError(f"sensor position {own.bt_position} is one too many, or comes twice")
+            serial = own.bt_serial.encode("ascii", "replace")[:16]
+            channels = own.electrode_data, own.pdc_data, own.tac_data, own.tdc_data, own.pac_data
+            found[f] = counts_of(f, *channels, serial)
+        return Message(stamp_ns, tuple(found), _slot_us(message.bt_time))
+
+
+def _slot_us(times: Any) -> Any:
+    """Each slot's time after the stamp, if the frame was sampled in our order; else None."""
+    at_ns = np.empty(slots.SLOTS_PER_FRAME)
+    at_ns[slots.ELECTRODE_SLOT], at_ns[slots.PAC_SLOT] = times.electrode_ns_offset, times.pac_ns_offset
+    for slot, own in zip((slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT), ("pdc", "tac", "tdc"), strict=True):
+        at_ns[slot] = getattr(times, f"{own}_ns_offset")
+    ours = (np.abs(at_ns / 1e3 - SLOT_US) < 1e6 / sensor.SLOT_HZ / 2).all()
+    return (at_ns / 1e3).astype(np.uint32) if ours else None

@@ -1,0 +1,64 @@
+"""csv: ports: named columns are rounds; a table without time or rest is refused in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.errors import InputError
+from biotac.sim.loading import load_source
+from biotac.wire import slots
+
+HEAD = ["t", "label", *(f"E{k}" for k in range(1, 20)), "P", *(f"pac{k}" for k in range(1, 23))]
+ONE = '[[finger]]\nelectrodes = "E{}"\npdc = "P"\npac = "pac{}"\nserial = "BT2P00000000000A"\n'
+ROWS = load_source("press.toml", fingers=1, seconds=3.0).samples[:, 0].astype(int)
+
+
+def write(folder: Path, columns: str, rows: np.ndarray = ROWS, t_s: np.ndarray | None = None) -> str:
+    times = 100.0 + np.arange(len(rows)) * 0.01 if t_s is None else t_s
+    order = [*slots.ELECTRODE_SLOT, slots.PDC_SLOT, *slots.PAC_SLOT]
+    lines = [f'{t:.4f},"a",' + ",".join(str(row[k]) for k in order) for t, row in zip(times, rows, strict=True)]
+    (folder / "a.csv").write_text("\n".join([",".join(HEAD), *lines]))
+    (folder / "a.toml").write_text(columns)
+    return f"csv:{folder / 'a.csv'}?columns={folder / 'a.toml'}"
+
+
+def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
+    steps_s = np.random.default_rng(1).uniform(0.009, 0.011, len(ROWS))
+    times_s = np.cumsum(steps_s)
+    times_s[100] = np.nan
+    with biotac.open(write(tmp_path, f'time = "t"\n{ONE}', t_s=times_s)) as hand:
+        assert bytes(hand.sensor_info(0).serial) == b"BT2P00000000000A"
+        batch = hand.read_batch(100.0)
+        assert list(hand.link.notes) == ["a message was refused: row 101: its time is nan s"]
+    good = ~np.isnan(times_s)
+    np.testing.assert_array_equal(batch.frames["counts"], ROWS[good][:, slots.ELECTRODE_SLOT])
+    np.testing.assert_array_equal(batch.pac["pac"], ROWS[good][:, slots.PAC_SLOT])
+    np.testing.assert_allclose(batch.frames["t_us"], 1e6 * (times_s[good] - times_s[0]), atol=101)
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        (ONE, "a tare needs a row at rest"),
+        ("rate_hz = 100", r"no \[\[finger\]\]"),
+        ('rate_hz = 100\n[[finger]]\nelectrodes = "F{}"', "no column 'F1', expected one of t, label, E1"),
+        ('rate_hz = 100\n[[finger]]\nelectrodes = "label"', "expected numbers"),
+        ("rate_hz = [", "cannot be read"),
+        (f'time = "E1"\n{ONE}', "expected 50 to 125|no messages"),
+    ],
+)
+def test_a_table_that_says_too_little_is_refused(tmp_path: Path, columns: str, words: str) -> None:
+    with pytest.raises(biotac.BiotacError, match=words):
+        biotac.open(write(tmp_path, columns))
+
+
+def test_one_row_a_grasp_has_no_rest(tmp_path: Path) -> None:
+    rows = ROWS + np.random.default_rng(0).integers(-300, 300, ROWS.shape)
+    with pytest.raises(InputError, match="finger 0 has no row at rest: of 300, no 30 one after the other are still"):
+        biotac.open(write(tmp_path, f"rate_hz = 100\n{ONE}", rows))
+    with pytest.raises(InputError, match=r"what are its columns\? expected csv:"):
+        biotac.open(f"csv:{tmp_path / 'a.csv'}")
