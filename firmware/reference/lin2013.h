@@ -11,6 +11,9 @@
 //  III.D            "cross product of force and the moment" means r x F, as in Eq 4 itself.
 //
 // Units: counts for signals (double), mm, N, N*mm; gains N per count.
+//
+// Of signals in whole sixteenths of a count, every sum is exact, in whatever order it is taken: its terms are
+// whole numbers of 1/256 count^2 um or larger, below 2^53 of them. Only the steps after the sums round.
 #ifndef BIOTAC_LIN2013_H
 #define BIOTAC_LIN2013_H
 
@@ -26,12 +29,9 @@ typedef struct {
 } lin2013_settings;
 
 typedef struct {
-    double centroid_mm[3]; // Eq 1, before it is moved to the surface
-    double poc_mm[3];      // Eq 2; NaN when all weights are 0
-    double force_sum[3];   // sum of e n, count
-    double torque_sum[3];  // sum of e (r x n), count*mm
-    double force_n[3];     // Eq 3
-    double torque_nmm[3];  // x: lever, NaN without a PoC; y, z: Eq 4
+    double poc_mm[3];     // Eq 1 and 2; NaN when all weights are 0
+    double force_n[3];    // Eq 3
+    double torque_nmm[3]; // x: lever, NaN without a PoC; y, z: Eq 4
 } lin2013_result;
 
 void lin2013(const double e[BT_ELECTRODES], const lin2013_settings *settings, lin2013_result *result);

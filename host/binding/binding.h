@@ -5,9 +5,9 @@
 #define BIOTAC_BINDING_H
 
 #include "batch.h"
-#include "blocks.h"
 #include "bounds.h"
 #include "columns.h"
+#include "compute.h"
 #include "decode/decode.h"
 #include "decode/descriptor.h"
 #include "decode/intake.h"

@@ -186,7 +186,7 @@ static void oracle(const frame_input *in, lin2013_result *want, load *of)
     lin2013(e, &settings, want);
     for (int d = 0; d < 2; d++) {
         of->gain_n[d] = fabs(settings.torque_gain[d]);
-        of->sum[d] = fabs(want->torque_sum[d + 1]) * 1000;
+        of->sum[d] = of->gain_n[d] > 0 ? fabs(want->torque_nmm[d + 1]) / of->gain_n[d] * 1000 : 0;
     }
     of->force_n = fabs(want->force_n[1]) + fabs(want->force_n[2]);
 }

@@ -103,8 +103,6 @@ class Board:
     def turn(self) -> Iterator[None]:
         """No other thread's command gets in between."""
         self.reader.check()
-        # Another thread's command may wait for a reply, and this one for its turn.
-        self.reader.read_elsewhere()
         with self._asking:
             yield
 

@@ -21,8 +21,6 @@ from .reader import Reader
 LIMIT_ROWS = 16_384
 # At the end, what waits is passed to callbacks for this long; the rest is skipped.
 BACKLOG_S = 1.0
-# Of five fingers, the Pico's ring holds 40 ms of frames; what comes until then has to fit in the computer's buffers.
-SLOW_S = 0.04
 
 Unsubscribe = Callable[[], None]
 
@@ -168,23 +166,19 @@ class Troubles:
 
 
 class Callbacks:
-    """A reader.Last: functions that are called with batches, or with messages of one kind.
+    """Functions that are called with batches, or with messages of one kind, on a thread of their own.
 
-    They are called on the reading thread, which costs no switch between threads, until one of them has taken longer
-    than SLOW_S, or gives a command: from then on that thread calls them, another one reads, and what they are too slow
-    for is dropped.
-    What they raise is logged when it happens and kept in ``troubles``. A callback that raised stays subscribed.
+    What they are too slow for is dropped, as by every Queue. What they raise is logged when it happens and kept in
+    ``troubles``. A callback that raised stays subscribed.
     """
 
     def __init__(self, reader: Reader, troubles: Troubles) -> None:
-        self.queue = Queue(reader)
-        self.wanted: tuple[tuple[type[Any], Callable[[Any], Any]], ...] = ()
+        self._wanted: tuple[tuple[type[Any], Callable[[Any], Any]], ...] = ()
+        self._queue = Queue(reader)
         self._reader = reader
         self._troubles = troubles
         self._lock = threading.Lock()
-        self._since_s = math.inf  # since when the reading thread has been calling
-        self._thread: threading.Thread | None = None  # that calls and does not read
-        self._is_slow = False
+        self._thread = reader.thread(self._run, "callbacks")
         self._give_up_s = math.inf
 
     def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
@@ -193,62 +187,41 @@ class Callbacks:
 
         def unsubscribe() -> None:
             with self._lock:
-                self.wanted = tuple(one for one in self.wanted if one is not entry)
+                self._wanted = tuple(one for one in self._wanted if one is not entry)
 
         with self._lock:
-            self._reader.last = self
-            self.wanted = (*self.wanted, entry)
+            self._wanted = (*self._wanted, entry)
+            if self._thread.ident is None:
+                self._thread.start()
+                self._reader.add(self._queue)
         return unsubscribe
 
     def close(self) -> None:
         """Call with what has arrived for up to one more second, and end; a running callback is waited for."""
+        self._reader.close()  # what it is about to pass on has arrived, too
         self._give_up_s = time.monotonic() + BACKLOG_S
-        self.queue.wake()
-        if self._thread is not None:
+        self._queue.wake()
+        if self._thread.ident is not None:
             self._thread.join()
-        self.queue.leave()
+        self._queue.leave()
 
-    def put(self, batch: Batch) -> None:
-        if self._is_slow:
-            self.queue.put(batch)
-            return
-        self._since_s = time.monotonic()
-        self._call(batch)
-        with self._lock:
-            self._since_s = math.inf
-            if not self._is_slow:
-                return
-        self._go_on()
-
-    def wake(self) -> None:
-        self.queue.wake()
-
-    def is_full(self) -> bool:
-        return self.queue.is_full()
-
-    def relieve(self, *, at_once: bool = False) -> None:
-        """Let another thread read, if a callback has been keeping the reading thread for too long; or ``at_once``."""
-        with self._lock:
-            if time.monotonic() - self._since_s > (-1.0 if at_once else SLOW_S):
-                self._since_s, self._is_slow = math.inf, True
-                self._thread = self._reader.read_in_another_thread()
-
-    def _go_on(self) -> None:
-        """Call with what waits. Another thread reads."""
-        closing = self._reader.closing
-        while True:
-            batch = self.queue.take(wait=not closing.is_set())
-            if batch is None:
-                if closing.is_set():
+    def _run(self) -> None:
+        try:
+            while True:
+                closing = self._give_up_s < math.inf
+                batch = self._queue.take(wait=not closing)
+                if batch is not None and time.monotonic() < self._give_up_s:
+                    self._call(batch)
+                elif batch is not None:
+                    self._queue.put_back(batch)
                     return
-            elif time.monotonic() >= self._give_up_s:
-                self.queue.put_back(batch)
-                return
-            else:
-                self._call(batch)
+                elif closing:
+                    return
+        except BaseException as error:  # unforeseen errors too: a thread that just ended would look like silence
+            self._reader.fail(error)
 
     def _call(self, batch: Batch) -> None:
-        wanted = self.wanted
+        wanted = self._wanted
         for one in (batch, *batch.messages):
             for kind, fn in wanted:
                 if type(one) is kind:

@@ -47,13 +47,6 @@ class Consumer(Protocol):
         """Whether a board whose time waits for its reader has to wait for this consumer."""
 
 
-class Last(Consumer, Protocol):
-    """Comes after the other consumers, and may hold up the reading thread."""
-
-    def relieve(self, *, at_once: bool) -> None:
-        """Let another thread read, if this one is held up or, ``at_once``, will be."""
-
-
 @runtime_checkable
 class Tap(Consumer, Protocol):
     """Takes the bytes themselves too, before the batch that they completed."""
@@ -93,7 +86,6 @@ class Reader:
         self.parked = False  #: nothing is read, because the board is lost
         self.gaps = Gaps()
         self.consumers: tuple[Consumer, ...] = ()
-        self.last: Last | None = None
         self._taps: tuple[Tap, ...] = ()
         #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
         self.changed = threading.Condition()
@@ -122,18 +114,6 @@ class Reader:
         """Pass everything that arrives from now on to ``consumer`` too."""
         with self.changed:
             self._set((*self.consumers, consumer))
-
-    def read_in_another_thread(self) -> threading.Thread:
-        """Let a new thread read. Returns the one that did, in which a consumer holds it up, and reads no more."""
-        before = self._thread
-        self._thread = self.thread(self._run, "reader")
-        self._thread.start()
-        return before
-
-    def read_elsewhere(self) -> None:
-        """Let another thread read if this one does: it is about to wait for what it would read itself."""
-        if threading.current_thread() is self._thread and self.last is not None:
-            self.last.relieve(at_once=True)
 
     def remove(self, consumer: Consumer) -> None:
         """Pass nothing more to ``consumer``."""
@@ -199,7 +179,7 @@ class Reader:
         """Let everybody who waits look again."""
         with self.changed:
             self.changed.notify_all()
-        for consumer in (*self.consumers, *([self.last] if self.last else [])):
+        for consumer in self.consumers:
             consumer.wake()
 
     def wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
@@ -233,7 +213,7 @@ class Reader:
 
     def _run(self) -> None:
         try:
-            while threading.current_thread() is self._thread and not self.closing.is_set():
+            while not self.closing.is_set():
                 if self.lost is not None:
                     self._park()
                 elif self._waits_for_room and self._is_full():
@@ -253,7 +233,7 @@ class Reader:
     def _is_full(self) -> bool:
         if self.awaited:
             return False
-        return any(consumer.is_full() for consumer in self.consumers) or bool(self.last and self.last.is_full())
+        return any(consumer.is_full() for consumer in self.consumers)
 
     def _read(self) -> None:
         had_ended = self.link.ended
@@ -300,8 +280,6 @@ class Reader:
             self.replies.extend((message, batch.arrived_s) for message in messages)
             with self.changed:
                 self.changed.notify_all()
-        if counted is not None and self.last is not None:
-            self.last.put(counted)
 
     def _counted(self, batch: Batch) -> Batch | None:
         """``batch`` for the consumers, counted and with its Gap; None when nothing is in it."""

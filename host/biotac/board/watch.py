@@ -10,12 +10,10 @@ from __future__ import annotations
 import functools
 import operator
 import secrets
-import time
 
 from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError, StreamTakenError
 from ..wire import messages_gen as wire
 from .board import Board
-from .consumers import SLOW_S, Callbacks
 from .gap import Reason
 from .stream import KEEPALIVE_S, Stream
 
@@ -31,11 +29,10 @@ SILENCE_S = 3.0
 class StreamWatch:
     """Watches ``stream`` of ``board``; with ``reconnect``, also brings back a board that was lost."""
 
-    def __init__(self, board: Board, stream: Stream, callbacks: Callbacks, *, reconnect: bool) -> None:
+    def __init__(self, board: Board, stream: Stream, *, reconnect: bool) -> None:
         self._board = board
         self._reader = board.reader
         self._stream = stream
-        self._callbacks = callbacks
         self._reader.reconnects = reconnect
         self._started: wire.Start | None = None  # the stream that was looked at last
         self._heard_us: int | None = None  # the board's time at the last look; None before the first after a START
@@ -60,11 +57,7 @@ class StreamWatch:
                 except DeviceLostError as error:
                     if not reader.closing.is_set():  # with a cause: the link's own error
                         reader.lose(error, "unplugged" if error.__cause__ else "silence")
-                due_s = time.monotonic() + LOOK_S
-                while not reader.wait_for(self._is_due, SLOW_S if self._callbacks.wanted else LOOK_S):
-                    self._callbacks.relieve()
-                    if time.monotonic() >= due_s:
-                        break
+                reader.wait_for(self._is_due, LOOK_S)
         except BaseException as error:  # unforeseen errors too: a stream that nobody keeps alive would stop unseen
             reader.fail(error)
 

@@ -1,13 +1,13 @@
 """Point of contact, force and torque of whole recordings, in float64.
 
-The formulas are those of core.compiled.reference_q4 and map.population, in C: host/binding/blocks.c,
-population_float64.c.
+In C (host/binding/compute.c): core.compiled.reference_q4 is Lin's part, and map.population has the population map's
+formulas once more, in NumPy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -33,9 +33,9 @@ _ONE = (_ELECTRODES,)
 _ALL_GOOD = -1
 
 # Looked up once: a call with one frame takes less time than a few of these would.
-_blocks = lib.bt_blocks
 _buffer = ffi.from_buffer
-_one_frame = lib.bt_one_frame
+_compute = lib.bt_compute
+_compute_one = lib.bt_compute_one
 
 
 def compute(
@@ -82,7 +82,7 @@ def compute(
         for name in RESULT_DTYPE.names or ():
             out[name] = plain[name]
         return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
-    plan = _default_plan() if settings is None else _plan_of(tuple(settings.items()))
+    formulas = _formulas(() if settings is None else tuple(settings.items()))
     # The fast path for one frame with the types of a live frame: there the checks would take longer than the maths.
     # Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
@@ -92,7 +92,7 @@ def compute(
     if one and (out is None or (out.dtype is RESULT_DTYPE and out.shape == () and out.flags.carray)):
         if out is None:
             out = np.empty((), RESULT_DTYPE)
-        if not _one_frame(plan, counts.tobytes(), tare.tobytes(), _buffer(out)):
+        if not _compute_one(formulas, counts.tobytes(), tare.tobytes(), _buffer(out)):
             raise ValueError(_explain(0, counts, tare))
         return out
 
@@ -104,7 +104,7 @@ def compute(
     base_stride = base.strides[0] if base.ndim == 2 else 0
     if base.size == 0:  # no rows: NumPy may give a stride of 0, which means a single row to C
         return out
-    bad = _blocks(plan, n, _address(raw), raw_stride, _address(base), base_stride, _buffer(out))
+    bad = _compute(formulas, n, _address(raw), raw_stride, _address(base), base_stride, _buffer(out))
     if bad != _ALL_GOOD:
         raise ValueError(_explain(bad, raw, base))
     return out
@@ -131,11 +131,11 @@ def per_frame(
     Tare and settings are checked once, and every call fills and returns the same RESULT_DTYPE array of shape (): copy
     what has to last. This saves half of the time that compute() takes for one frame. Raises ValueError as compute().
     """
-    plan = _default_plan() if settings is None else _plan_of(tuple(settings.items()))
+    formulas = _formulas(() if settings is None else tuple(settings.items()))
     base = _checked_tare(tare, _ONE)
     out = np.empty((), RESULT_DTYPE)
     compute(np.zeros(_ONE, _COUNT), base, settings, out)  # raises for a tare that is out of range
-    base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), lib.bt_one_frame, _COUNT, _ONE
+    base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), _compute_one, _COUNT, _ONE
 
     def results(counts: NDArray[np.uint16]) -> StructArray:
         if getattr(counts, "dtype", None) is not dtype or counts.shape != shape:
@@ -143,38 +143,32 @@ def per_frame(
                 f"{counts.dtype} of shape {counts.shape}" if isinstance(counts, np.ndarray) else type(counts).__name__
             )
             raise ValueError(f"counts are {seen}, expected uint16 of shape (19,)")
-        if not one_frame(plan, counts.tobytes(), base_bytes, result):
+        if not one_frame(formulas, counts.tobytes(), base_bytes, result):
             raise ValueError(_explain(0, counts, base))
         return out
 
     return results
 
 
-_PLAN_SETTINGS = (wire.Setting.POC_WEIGHTS, *FORCE_GAINS, *TORQUE_GAINS, wire.Setting.FORCE_MODEL)
+_FORMULA_SETTINGS = (wire.Setting.POC_WEIGHTS, *FORCE_GAINS, *TORQUE_GAINS, wire.Setting.FORCE_MODEL)
 _DEFAULTS = default_settings()
 
 
-@cache
-def _default_plan() -> Any:
-    return _plan_of(tuple(_DEFAULTS.items()))
-
-
 @lru_cache(maxsize=16)
-def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
-    """The bt_block_plan for these settings. It is only read, so calls may share it."""
+def _formulas(items: tuple[tuple[Any, Any], ...]) -> Any:
+    """The bt_formulas for these settings. It is only read, so calls may share it."""
     settings = dict(items)
     for key in settings:
         if key not in _DEFAULTS:
             raise ValueError(f"settings contain {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
-    chosen = {key: int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS}
+    chosen = {key: int(settings.get(key, _DEFAULTS[key])) for key in _FORMULA_SETTINGS}
     board_settings(chosen)  # raises ValueError for a value out of range
-    plan = ffi.new("bt_block_plan *")
     from ..map import population  # here: everybody would wait for it at `import biotac`
 
-    coefficients = population.compiled_coefficients() if population.in_force(chosen) else ffi.NULL
-    if not lib.bt_block_plan_init(plan, formula_settings(chosen), coefficients):
-        raise RuntimeError("host/binding/blocks.c mirrors a different geometry from the generated one")
-    return plan
+    formulas = ffi.new("bt_formulas *", {"lin": formula_settings(chosen)[0]})
+    if population.in_force(chosen):
+        formulas.population = population.compiled_coefficients()
+    return formulas
 
 
 def _checked_counts(counts: Any) -> NDArray[np.uint16]:

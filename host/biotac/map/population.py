@@ -2,7 +2,7 @@
 
 The board has the same map in 16 bits, firmware/core/map/population.c, made by board_map(). This module reads the
 coefficients as trained, and makes the columns as training does; boards are checked against it. biotac.compute runs the
-same formulas in host/binding/population_float64.c. See SPEC.md, Population map.
+same formulas in host/binding/compute.c. See SPEC.md, Population map.
 """
 
 from __future__ import annotations
@@ -146,9 +146,8 @@ def replace_force(
 
 @cache
 def compiled_coefficients() -> Any:
-    """The coefficients as host/binding/population_float64.h wants them; they live as long as the process."""
-    if tuple(blocks()) != GATED:
-        raise ValueError(
-            f"{SHIPPED} has different blocks from host/binding/population_float64.c; retrain it with this version"
-        )
-    return ffi.new("double[]", (np.concatenate(list(blocks().values())) / SIGNAL_COUNTS).ravel().tolist())
+    """The coefficients as host/binding/compute.h wants them; they live as long as the process."""
+    if list(blocks()) != list(GATED):
+        raise ValueError(f"{SHIPPED} has different blocks from host/binding/compute.c; retrain it with this version")
+    by_gate = np.concatenate(list(blocks().values())).reshape(3, -1, 3) / SIGNAL_COUNTS
+    return ffi.new("bt_population_column[]", by_gate.transpose(1, 0, 2).reshape(-1, 9).tolist())

@@ -1,4 +1,4 @@
-"""biotac.compute against the float64 reference: any counts, any length, any memory layout."""
+"""biotac.compute: the float64 reference, whose formulas tests/crosscheck judges, on any counts and memory layout."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ MISSING = 0xFFFF
 WEIGHTS = list(PocWeights)
 LIN = {Setting.FORCE_MODEL: wire.ForceModel.LIN}  # whom the reference knows; test_population_force has the default
 GAIN_MAX = 100_000_000  # nN/count, the largest setting
-# mm, N, N*mm at the largest gains, whose forces go to 5 kN: 13 digits. What was asked: 1e-5, 1e-5, 1e-4.
-BOUNDS = {"poc_mm": 1e-12, "force_n": 1e-10, "torque_nmm": 1e-9}
 
 
 def with_weights(weights: PocWeights, gain_nn: int | None = None) -> dict[Setting, int]:
@@ -36,10 +34,8 @@ def agrees(counts, tare, chosen=None, **given) -> np.ndarray:
     want = reference(counts, tare, chosen)
     assert got.dtype == RESULT_DTYPE
     assert got.shape == np.shape(counts)[:-1]
-    for name, bound in BOUNDS.items():
-        theirs = getattr(want, name).reshape(got[name].shape)
-        assert np.array_equal(np.isnan(got[name]), np.isnan(theirs))
-        assert np.nanmax(np.abs(got[name] - theirs), initial=0) <= bound
+    for name in RESULT_DTYPE.names:
+        np.testing.assert_array_equal(got[name], getattr(want, name).reshape(got[name].shape))
     return got
 
 
@@ -60,35 +56,8 @@ def test_random_recordings_agree_with_the_reference(weights, missing, gain_nn) -
 
 
 @pytest.mark.parametrize("weights", WEIGHTS)
-def test_small_signals_agree_with_the_reference(weights) -> None:
-    moved = np.random.default_rng(2).integers(-3, 4, (2000, 19))
-    agrees(2000 + moved, np.full(19, 2000.0), with_weights(weights))
-
-
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_corners_agree_with_the_reference(weights) -> None:
-    """Each electrode alone at either end, all at either end, nothing at all, nothing there."""
-    rest = np.full((1, 19), 2000)
-    alone = [np.where(np.eye(19, dtype=bool), value, 2000) for value in (0, 1999, 2001, 4095, MISSING)]
-    whole = [np.full((1, 19), value) for value in (0, 1999, 2001, 4095, MISSING)]
-    counts = np.vstack([rest, *alone, *whole])
-    for tare in (2000.0, 0.0, 4095.0, 2000.0625):
-        agrees(counts, np.full(19, tare), with_weights(weights, GAIN_MAX))
-
-
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_the_tip_meets_the_cylinder(weights) -> None:
-    """E1 and E2 pressed so that x passes 0, where the two branches of Eq 2 meet."""
-    counts = np.full((1000, 19), 2000)
-    counts[:, 0] -= np.arange(400, 1400)
-    counts[:, 1] -= 400
-    x = agrees(counts, np.full(19, 2000.0), with_weights(weights))["poc_mm"][:, 0]
-    assert (x > 0).any() and (x <= 0).any()
-
-
-@pytest.mark.parametrize("weights", WEIGHTS)
 def test_no_weight_is_no_point_of_contact(weights) -> None:
-    got = agrees(np.full((17, 19), 2000), np.full(19, 2000.0), with_weights(weights))
+    got = agrees(np.full((2, 19), 2000), np.full(19, 2000.0), with_weights(weights))
     assert np.isnan(got["poc_mm"]).all()
     assert np.isnan(got["torque_nmm"][:, 0]).all()
     assert not got["torque_nmm"][:, 1:].any()
@@ -108,7 +77,7 @@ def test_any_counts_and_any_tare(counts, tare, weights, gain_nn) -> None:
     agrees(counts, tare, with_weights(weights, gain_nn))
 
 
-@pytest.mark.parametrize("n", [0, 1, 15, 16, 17, 40])
+@pytest.mark.parametrize("n", [0, 1, 17])
 def test_a_frame_does_not_depend_on_its_neighbours(n) -> None:
     counts = random_counts(n, seed=n, missing=0.01)
     tares = np.random.default_rng(n).uniform(0, 4095, (n, 19))
@@ -164,7 +133,7 @@ def test_tares_of_other_types() -> None:
 
 
 def test_out_is_filled_and_returned() -> None:
-    for n in (1, 16, 33):
+    for n in (1, 3):
         counts = random_counts(n)
         out = np.zeros(n, RESULT_DTYPE)
         assert biotac.compute(counts, TARE, out=out) is out
@@ -191,7 +160,7 @@ def test_an_out_that_does_not_fit_is_refused() -> None:
             biotac.compute(random_counts(1)[0], TARE, out=out)
 
 
-@pytest.mark.parametrize("n", [1, 16, 17])
+@pytest.mark.parametrize("n", [1, 3])
 @pytest.mark.parametrize("value", [4096, 0xFFFE])
 def test_a_count_out_of_range_is_named_with_its_row(n, value) -> None:
     for row in range(n):
@@ -217,7 +186,7 @@ def test_wide_integers_are_not_wrapped(value) -> None:
 @pytest.mark.parametrize("value", [-0.001, 4095.001, np.nan])
 def test_a_tare_out_of_range_is_named_with_its_row(value) -> None:
     counts = random_counts(40)
-    for row in (0, 15, 16, 39):
+    for row in (0, 39):
         tares = np.tile(TARE, (40, 1))
         tares[row, 4] = value
         with pytest.raises(ValueError, match=rf"tare of row {row} has E5 = {value}, expected 0\.\.4095"):

@@ -117,14 +117,19 @@ def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) ->
     assert stats.frames_skipped == 100 - len(calls[0].wire) and stats.batches_skipped > 90
 
 
-def test_commands_of_callbacks_and_the_watchs_looks_do_not_wait_for_each_other(live: Live, quick) -> None:
-    answered: list[None] = []
-    live.hand.on_batch(lambda batch: answered.append(live.hand.ping()))
-    live.hand.stream()
-    for k in range(50):
-        live.send(frame(k))
-        until(lambda: len(answered) > k)  # noqa: B023
-    assert live.hand.connected
+def test_an_unpaced_board_waits_for_a_callback_that_is_slow() -> None:
+    seqs: list[int] = []
+    with biotac.open("sim:press.toml?seconds=20") as hand:
+
+        def slow(batch: Batch) -> None:
+            if len(batch.seq) and not seqs:
+                assert not hand._reader.wait_for(lambda: hand.ended, 0.5)
+            seqs.extend(batch.seq.tolist())
+
+        hand.on_batch(slow)
+        hand.stream()
+        until(lambda: hand.ended)
+    assert seqs == list(range(2000))
 
 
 def test_a_callback_may_give_commands_stop_and_close(live: Live) -> None:

@@ -85,7 +85,7 @@ def test_two_threads_that_close_a_hand_close_it_once(scripted_board, hello) -> N
     assert len(closed) == 1
 
 
-def test_a_hand_collected_on_its_own_reading_thread_ends_too(scripted_board, hello) -> None:
+def test_a_hand_collected_on_its_own_thread_ends_too(scripted_board, hello) -> None:
     firmware = Firmware(hello)
     board = scripted_board(firmware)
     hands = [Hand(SerialLink(board.path))]

@@ -31,7 +31,7 @@ LIN = {Setting.FORCE_MODEL: ForceModel.LIN}  # what all contestants compute
 WARM, FRESH = "compute, out= reused", "compute, new result"
 WHOLE, BEST = "NumPy, whole-array matrix products", "NumPy, blocked, buffers reused"
 ONE, ONE_WHOLE = "per_frame, one frame per call", "NumPy, whole-array code, one frame per call"
-ASKED: Asked = ((WARM, WHOLE, 6.0), (WARM, BEST, 2.0), (ONE, ONE_WHOLE, 50.0))
+ASKED: Asked = ((WARM, WHOLE, None), (WARM, BEST, None), (ONE, ONE_WHOLE, 50.0))
 
 Array = NDArray[np.float64]
 Three = tuple[Array, Array, Array]

@@ -18,7 +18,7 @@ EXAMPLE = "biotac-lab bench batch"
 WHAT = {
     "batch": ("biotac.compute on whole recordings, against NumPy", ("frames",)),
     "decode": ("the link's bytes to arrays, against pymavlink and Python", ("frames",)),
-    "live": ("reading thread to callback, against a pyserial thread", ("rounds",)),
+    "live": ("link to callback, against a pyserial thread", ("rounds",)),
     "newtons": ("cycles of a force against its error on real fingers", ("files", "picture")),
     "world": ("a round of physics in the loop, in hundreds of rounds", ("rounds",)),
     "recording": ("size and load time of a recording", ("source", "fingers", "seconds")),

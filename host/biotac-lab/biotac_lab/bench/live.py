@@ -32,7 +32,7 @@ from ..report import Show, Table
 from . import flood
 
 RATES = (5_000, 50_000)
-OURS, PYSERIAL = "reading thread + callback", "pyserial thread, read(in_waiting or 1)"
+OURS, PYSERIAL = "biotac, on_batch", "pyserial thread, read(in_waiting or 1)"
 ASKED_LOSS = {5_000: 0.0, 50_000: 0.001}
 ASKED_LATENCY_US = 100.0
 ASKED_CPU = {50_000: 0.6}

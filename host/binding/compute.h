@@ -1,0 +1,28 @@
+// Results of recorded frames in double, for the host: Lin 2013 (firmware/reference/lin2013.h), and the
+// population map (firmware/core/map/population.h) for its force.
+#ifndef BIOTAC_COMPUTE_H
+#define BIOTAC_COMPUTE_H
+
+#include "lin2013.h"
+
+#include <stdint.h>
+
+// Of an electrode, compressed or bulging: force in N a count, the same a count and gate x, and gate y.
+typedef double bt_population_column[9];
+
+typedef struct {
+    lin2013_settings lin;
+    const bt_population_column *population; // compressed, then bulging electrodes; NULL: force is Lin's
+} bt_formulas;
+
+// counts: n rows of 19 uint16, counts_stride bytes apart, of any alignment; 0..4095 or BT_INVALID_COUNT.
+// tare: n rows of 19 doubles in counts, 0..4095, tare_stride bytes apart, or one row for all of them if
+// tare_stride is 0; rounded to 1/16 count as on the board. results: n lin2013_result, NaN where there is no
+// PoC. Returns -1, or the first row that is out of range; then results are not to be used.
+int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, int64_t counts_stride,
+                   const void *tare, int64_t tare_stride, void *results);
+
+// The same for one frame; true if it is in range. Fewer arguments: converting them counts here.
+int bt_compute_one(const bt_formulas *formulas, const void *counts, const void *tare, void *results);
+
+#endif
