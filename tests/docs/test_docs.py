@@ -96,7 +96,6 @@ def test_the_reference_has_every_public_name() -> None:
 SCENARIO = """
 name = "press"
 seed = 1
-gains = "fit"
 [[step]]
 do = "rest"
 seconds = 2.0

@@ -8,7 +8,7 @@ from scipy import special
 
 from biotac.core import geometry as surface
 from biotac.sim import physics
-from biotac.sim.physics import Finger, Footprints, States
+from biotac.sim.physics import Finger, States
 from biotac_lab.learn import probes
 from biotac_lab.learn.probes import BAR, PROBES, footprints
 
@@ -62,17 +62,6 @@ def test_a_bar_lies_as_it_is_turned() -> None:
     y = surface.ELECTRODE_MM * [1.0, -1.0, 1.0]
     partner = [int(np.argmin(((surface.ELECTRODE_MM - one) ** 2).sum(axis=1))) for one in y]
     assert counts[0][partner] == pytest.approx(counts[1], abs=1.0)
-
-
-def test_a_round_footprint_is_the_tip_it_stands_for() -> None:
-    cells = surface.project(surface.ELECTRODE_MM)
-    states = press(cells, 3.0)
-    size = states.tip_radius_mm + physics.FOOTPRINT_GROWTH_MM * np.cbrt(3.0)
-    along = surface.tangents_at(surface.normals_at(cells))[0]
-    for round_one, ellipse in zip(
-        physics.deform(states), physics.deform(states, Footprints(size, size, along)), strict=True
-    ):
-        np.testing.assert_allclose(ellipse, round_one, rtol=1e-9, atol=1e-12)
 
 
 def test_two_contacts_add_squeeze_and_volume_and_nothing_adds_nothing() -> None:

@@ -11,6 +11,7 @@ from biotac import BiotacError, InputError
 
 from .bench import command as bench
 from .calibrate import direction_command as direction
+from .calibrate import finger_command as finger
 from .calibrate import population_command as population
 from .experiments import command as experiments
 from .grasp import command as grasp
@@ -20,8 +21,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
     parser = argparse.ArgumentParser(prog="biotac-lab", description=__doc__.splitlines()[0], allow_abbrev=False)
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    known = {"experiment": experiments, "population": population, "direction": direction, "bench": bench}
-    known["grasp"] = grasp
+    known = {
+        "experiment": experiments,
+        "population": population,
+        "direction": direction,
+        "finger": finger,
+        "grasp": grasp,
+        "bench": bench,
+    }
     for name, module in known.items():
         verb = verbs.add_parser(name, help=module.ABOUT, description=module.ABOUT, allow_abbrev=False)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")

@@ -5,7 +5,21 @@ from __future__ import annotations
 from .faults import EVERY_FAULT, FAULTS
 from .gains import fit_gains
 from .loading import bundled_scenarios, load_source
-from .physics import GAP_MM, PROFILES, Finger, Footprints, Profile, States, deform
+from .physics import (
+    GAP_MM,
+    PLATE_MM,
+    PROFILES,
+    SKIN,
+    Finger,
+    Footprints,
+    Profile,
+    Skin,
+    States,
+    counts_at,
+    deform,
+    resistance_at,
+    resistance_share,
+)  # fmt: skip
 from .random_loads import plate_recording, random_loads
 from .sampling import Sampler, sample, tdc_counts
 from .scenario import FLAT_MM
@@ -17,8 +31,8 @@ from .world import LockStep, World, wired_world, world
 SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 
 __all__ = [
-    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PROFILES", "Course", "Finger", "Footprints", "Load", "LockStep",
-    "Pose", "Profile", "Sampler", "SimFinger", "Source", "States", "Touch", "Track", "Truth", "World",
-    "bundled_scenarios", "deform", "fit_gains", "load_source", "plate_recording", "random_loads", "sample",
-    "tdc_counts", "wired_world", "world",
+    "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Finger", "Footprints",
+    "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track", "Truth",
+    "World", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source", "plate_recording", "random_loads",
+    "resistance_at", "resistance_share", "sample", "tdc_counts", "wired_world", "world",
 ]  # fmt: skip

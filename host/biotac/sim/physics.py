@@ -37,12 +37,13 @@ PAD_MM, PAD_REACH_MM = -3.0, 4.0  # x of the pad's middle; towards the tip skin 
 SKIN_MM = 2.0  # fluid and skin spread what presses
 SQUEEZE_MAX = 4.2  # log compression: 10 MOhm
 SQUEEZE_MAX_PER_N = 2.0  # of an electrode that faces the contact: E1 of a third finger, 1.5 at about 1 N (trial_15330)
-TORSION_NMM_PER_RAD = 25.0
-TORSION_MAX_RAD = 0.6
+TORSION_NMM_PER_RAD = 75.0  # as stiff as skin that is dragged 5 mm from the middle
+TORSION_MAX_RAD = 0.2
 TEMPERATURE_PER_C = -0.02  # of log resistance
 PDC_REST = (1300, 2700)  # counts of static pressure at rest: real sensors' is 1326, 2412, and 2582 to 2695
 MESH_MM = 1.2
-OTHERWISE = 0.04  # of log sensitivity: half of what two halves of one recording differ by; more cannot be known
+R0_ALONE = 0.05  # of log resistance: no two mirror images of F1 and F2 rest alike
+OTHERWISE = 0.03  # of log sensitivity, as alike in neighbours; the prior of the fit, as more cannot be known
 SPREAD_REACH_MM = 6.0  # F1 and F2 differ alike in electrodes 5 mm apart, and by chance in those 7 mm apart
 WORN_LEVEL = -0.53  # of log resistance: trial_15330's finger against F1 and F2
 
@@ -187,7 +188,7 @@ def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
 
     along_mm = (shear * to_tip).sum(axis=1)[:, None] / skin.drag_along_n_mm
     across_mm = (shear * to_side).sum(axis=1)[:, None] / skin.drag_across_n_mm
-    length = np.hypot(along_mm, across_mm) + 1e-9
+    length = np.maximum(np.hypot(along_mm, across_mm), 1e-12)
     limited = skin.drag_max_mm * np.tanh(length / skin.drag_max_mm) / length
     along_mm, across_mm = limited * along_mm, limited * across_mm
     radial = _RADIAL[:ELECTRODES]
@@ -251,7 +252,8 @@ class Finger:
         self.profile: Profile = profile
         # along the line through the two fingers that are known, and a little in all directions
         apart, rest = rng.normal(), OTHERWISE * _SMOOTH @ rng.normal(0.0, 1.0, ELECTRODES)
-        self.r0_ohm: Floats = SKIN.r0_ohm * np.exp(WORN_LEVEL * worn + apart * SKIN.r0_apart)
+        alone = R0_ALONE * rng.normal(0.0, 1.0, ELECTRODES)
+        self.r0_ohm: Floats = SKIN.r0_ohm * np.exp(WORN_LEVEL * worn + apart * SKIN.r0_apart + alone)
         self.gap_gain: Floats = np.exp(apart * SKIN.gain_apart + rest)
         # real drift is one-dimensional: one rate a finger, loadings 0.82 to 1.16 (biotac.md finding 6)
         self.drift_per_min: Floats = rng.uniform(-15.0, 15.0) * rng.uniform(0.82, 1.16, ELECTRODES)
@@ -262,7 +264,7 @@ class Finger:
 
     def rest_counts(self, warm_c: Floats) -> Floats:
         """Counts (n, 19) without contact at temperatures (n,) above 30 C."""
-        return _divider(self.r0_ohm * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
+        return counts_at(self.r0_ohm * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
@@ -271,7 +273,7 @@ class Finger:
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
         """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""
         share = resistance_share(compression * self.gap_gain, bulge * self.gap_gain, SKIN.fixed_share)
-        return _divider(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
+        return counts_at(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
 
 
 def resistance_share(compression: Floats, bulge: Floats, fixed_share: float) -> Floats:
@@ -280,5 +282,11 @@ def resistance_share(compression: Floats, bulge: Floats, fixed_share: float) -> 
     return fixed_share + (1.0 - fixed_share) * np.exp(2.0 * (squeezed - bulge))
 
 
-def _divider(resistance_ohm: Floats) -> Floats:
+def counts_at(resistance_ohm: Floats) -> Floats:
+    """The divider's counts, not rounded, at resistances in ohm."""
     return _sensor.FULL_SCALE_COUNT * _sensor.LOAD_OHM / (resistance_ohm + _sensor.LOAD_OHM)
+
+
+def resistance_at(counts: Floats) -> Floats:
+    """The resistances in ohm of counts above 0."""
+    return (_sensor.FULL_SCALE_COUNT / counts - 1.0) * _sensor.LOAD_OHM

@@ -75,32 +75,44 @@ def test_a_rehearsal_finds_what_the_scenario_hides(
     assert [line.split(" of ")[0] for line in prompts[1:-1:2]] == [str(k + 1) for k in range(presses)]
     assert prompts[2:-1:2] == [f"held: {then}"] * presses and prompts[-1] == "done"
     facts = json.loads(printed.out)
-    (hidden,) = parse_scenario(bundled_scenario(scenario), file=scenario).fingers
-    assert hidden.scale is not None
-    assert abs(facts["gain"] - hidden.scale.gain) < facts["gain_sigma"] < few_shot.GAIN_SPREAD
-    assert abs(facts["balance"] - hidden.scale.balance) < facts["balance_sigma"] < few_shot.BALANCE_SPREAD
+    assert facts["gain_sigma"] < few_shot.GAIN_SPREAD and facts["balance_sigma"] < few_shot.BALANCE_SPREAD
     assert not facts["why_not"] and facts["board"]["outside"] == 0
 
-    # between the places of the rehearsal
-    x_mm, force_n = np.repeat([-7.0, -4.0, -2.5], 3), np.tile([2.5, 3.5, 5.0], 3)
+    # pressed straight between the places of the rehearsal: nearer to what is applied than by the map before
+    (spec,) = parse_scenario(bundled_scenario(scenario), file=scenario).fingers
+    x_mm, force_n = np.repeat([-3.5, -2.5, -1.0], 3), np.tile([2.5, 3.5, 5.0], 3)
     nothing, contact_mm = np.zeros(9), np.column_stack([x_mm, np.zeros(9), np.full(9, -RADIUS_MM)])
     states = States(contact_mm, force_n, np.zeros((9, 3)), nothing, np.full(9, 3.5), nothing)
-    finger = Finger(hidden.seed, hidden.profile, hidden.scale)
-    own, trained = load_fitted(out), population_map.load(None)
-    e = finger.counts(states) - finger.rest_counts(np.zeros(1))
-    for error_n, held_out_n, before_n in zip(
-        np.abs(own.predict(own.tare + e) - states.wrench()[0]).max(axis=0)[[0, 2]],
-        np.array(facts["held_out_n"])[[0, 2]],
-        np.array(facts["before_n"])[[0, 2]],
-        strict=True,
-    ):
-        assert error_n < 2.0 * held_out_n < 2.0 * before_n
-    assert (np.array(facts["held_out_n"]) < trained.sigma_scale5_n).all()
+    finger = Finger(spec.seed, spec.profile)
+    own, population = load_fitted(out), population_map.load(None).population
+    counts, rest = finger.counts(states), finger.rest_counts(np.zeros(1))[0]
+    off_n, before_n = (
+        np.linalg.norm(felt - states.wrench()[0]) / 3.0
+        for felt in (own.predict(own.tare + counts - rest), population.force(counts, rest))
+    )
+    assert off_n < before_n < 2.0
 
 
-def test_a_finger_that_the_map_does_not_know_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_presses_that_the_map_does_not_know_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    step = '[[step]]\ndo = "{}"\nseconds = {}\n{}'
+    pokes = [step.format("rest", 2.0, "")]
+    for name, force_n in (("E2", 2.0), ("E12", 3.5), ("E9", 5.0)):  # from all sides, and with a pin
+        pokes += [step.format("press", 0.4, f'at = "{name}"\ntip_mm = 1.0\nforce_n = {force_n}\n')]
+        pokes += [
+            step.format("hold", 1.4, ""),
+            step.format("press", 0.3, "force_n = 0\n"),
+            step.format("rest", 2.0, ""),
+        ]
+    (tmp_path / "pokes.toml").write_text('name = "pokes"\n' + "".join(pokes))
     # An idle simulated board plays on: not to be over before a busy computer has fitted the map.
-    argv = ["calibrate", "press", "sim:fingers.toml?fingers=1&seconds=2400&pace=fast", "--scale", "--finger", "index"]
+    argv = [
+        "calibrate",
+        "press",
+        f"sim:{tmp_path / 'pokes.toml'}?seconds=2400&pace=fast",
+        "--scale",
+        "--finger",
+        "index",
+    ]
     argv += ["--presses", "3", "--json"]
     assert main(argv) == 1
     facts = json.loads(capsys.readouterr().out)

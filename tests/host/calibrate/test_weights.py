@@ -63,8 +63,8 @@ def test_a_recording_says_the_same_and_goes_to_no_board(recording: Path, capsys:
     argv = ["calibrate", "press", str(recording), "--weights", "--finger", "0", "--json"]
     assert main(argv) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert facts["gain"] == pytest.approx(1.05, abs=facts["gain_sigma"]) and not facts["why_not"]
-    assert facts["serial"] == "BTSIM00000000003" and "board" not in facts
+    assert np.linalg.norm(facts["held_out_n"]) < np.linalg.norm(facts["before_n"]) and not facts["why_not"]
+    assert facts["serial"] == "BTSIM00000000009" and "board" not in facts
     assert np.linalg.norm(facts["force_n"], axis=1) == pytest.approx([0.2 * G, 0.5 * G] * 5)
     assert main([*argv, "--masses", "200,500,700"]) != 0  # more than were laid on it
     assert "press 11" in capsys.readouterr().err
@@ -72,12 +72,21 @@ def test_a_recording_says_the_same_and_goes_to_no_board(recording: Path, capsys:
     assert "--save" in capsys.readouterr().err
 
 
-def test_a_plate_corrects_directions_from_all_sides_alone(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plate_corrects_directions_from_all_sides_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    step = '[[step]]\ndo = "{}"\nseconds = {}\n{}'
+    text = 'name = "plate"\n' + step.format("rest", 2.0, "")
+    for x, y in ((-3, 0), (2, 0), (-2, 0), (-4, 0), (-3, 2), (-3, -2), (-5, 2), (-5, -2), (1, 2), (1, -2)):
+        text += step.format("press", 0.4, f"at_mm = [{x}.0, {y}.0]\nforce_n = 3.0\n") + step.format("hold", 1.4, "")
+        text += step.format("press", 0.3, "force_n = 0\n") + step.format("rest", 2.0, "")
+    (tmp_path / "plate.toml").write_text(text)
+    recording = tmp_path / "plate.mcap"
+    assert main(["record", f"sim:{tmp_path / 'plate.toml'}", str(recording)]) == 0
     capsys.readouterr()
     argv = ["calibrate", "press", str(recording), "--plate", "--finger", "index", "--json", "--presses"]
     assert main([*argv, "10"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert facts["held_out_deg"] < 2.0 < facts["before_deg"] and not facts["why_not"]
+    # population.md: 8 and 10 degrees on the halves of a real finger's recording
+    assert facts["held_out_deg"] < min(10.0, facts["before_deg"])
     assert main([*argv, "5"]) != 0
     assert "roll the finger further to both sides" in capsys.readouterr().err
 

@@ -53,7 +53,7 @@ def test_every_channel_lands_in_its_slots(tmp_path: Path) -> None:
         assert words[7::2] == list(fields["E"][row])
         assert words[0::2] == list(fields["PAC"][row])
         assert [words[k] for k in (1, 3, 5)] == [fields[name][row] for name in ("PDC", "TAC", "TDC")]
-    assert source.truth is None and source.settings == {} and source.name == "a.npz"
+    assert source.truth is None and source.name == "a.npz"
 
 
 def test_force_is_turned_into_lins_frame(tmp_path: Path) -> None:

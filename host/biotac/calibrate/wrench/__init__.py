@@ -14,11 +14,11 @@ from .crossvalidation import Validation, validate
 from .figures import rmse
 from .lag import Lags
 from .moments import DRIFT_NODES
-from .run import Run, load_run
+from .run import Run, load_run, run_of
 from .sources import load
 from .splits import Blocks
 
 __all__ = [
     "DRIFT_NODES", "MESH_STEP_MM", "Blocks", "Lags", "Run", "Validation", "load", "load_run", "locate",
-    "locate_on_mesh", "moment", "rmse", "validate",
+    "locate_on_mesh", "moment", "rmse", "run_of", "validate",
 ]  # fmt: skip

@@ -1,0 +1,221 @@
+"""biotac-lab finger F1 F2"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from biotac import InputError
+from biotac.calibrate.population import Population
+from biotac.calibrate.population import load as load_population
+from biotac.calibrate.press import scale_of
+from biotac.calibrate.wrench import Run, load, rmse, run_of, validate
+from biotac.core import geometry as surface
+from biotac.sim import Finger, States, plate_recording
+
+from ..report import Show, Table
+from . import training
+from .finger_fit import Fit, Floats, Half, completed, dumps, halves
+
+ABOUT = "The simulated finger: its numbers fitted to two real fingers, and how it compares with them."
+EXAMPLE = "biotac-lab finger F1.npz F2.npz --check"
+FINGERS = 20
+UNSEEN_N = np.array([0.54, 0.37, 0.44])  # of the map of F1 on F2 (`biotac-lab population F1.npz --test F2.npz`)
+LEAST_SHARE, MOST_SHARE, MOST_OUTSIDE = 0.5, 1.2, 0.1
+PROBE_MM, PROBE_N = 1.0, 2.0
+PRESSES, PRESS_N = 5, (2.0, 6.0)
+BANDS_N, MOST_BIAS_N, MOST_BIAS_SHARE = (0.5, 1.0, 2.0, 5.0, 10.0), 0.15, 0.08
+CALIBRATED, LOADS, CELL = 2, 4000, (1.5, 0.17)  # fingers, loads of each, and a place's cell in mm and rad
+HEAD = ["", "x", "y", "z", "outside"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the two recordings and where the numbers go."""
+    parser.add_argument("files", metavar="REC", nargs=2, type=Path, help="a finger on a plate, as for calibrate wrench")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="the numbers go here (skin.json)")
+    parser.add_argument("--source", metavar="TEXT", default="not stated", help="origin and licence, stored in the file")
+    parser.add_argument("--force", action="store_true", help="overwrite the file")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of the first simulated finger (0)")
+    limits = f"exit with 1 unless the default map's error is {LEAST_SHARE:g} to {MOST_SHARE:g} times a real finger's"
+    parser.add_argument("--check", action="store_true", help=limits)
+
+
+@dataclass(frozen=True)
+class Touched:
+    """A simulated finger under loads: ``counts`` (n, 19), its ``tare`` (19,), ``truth`` (n, 3) in N."""
+
+    counts: Floats
+    tare: Floats
+    truth: Floats
+
+    @classmethod
+    def by(cls, seed: int, states: Sequence[States]) -> Touched:
+        """Finger ``seed`` under ``states``, with its noise."""
+        finger, rng = Finger(seed), np.random.default_rng([seed, 41])
+        counts = np.concatenate([finger.counts(one) for one in states])
+        noisy = np.clip(np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape)), 0.0, 4095.0)
+        return cls(noisy, finger.rest_counts(np.zeros(1))[0], np.concatenate([one.wrench()[0] for one in states]))
+
+    def run(self, like: Run) -> Run:
+        """As a recording, with the drift of ``like``."""
+        nothing = np.zeros(len(self.counts), np.bool_)
+        return replace(
+            like, counts=self.counts, tare=self.tare, truth=self.truth, rest=nothing, contact=None, pdc=None, air=None
+        )
+
+
+def run(args: argparse.Namespace, show: Show) -> int:
+    """Fit, write, compare."""
+    if args.out is not None and args.out.exists() and not args.force:
+        raise InputError(f"{args.out} exists; overwrite it (--force) or name another")
+    with threadpool_limits(limits=2, user_api="blas"):
+        show("fitting")
+        runs = [training.aligned(load(path).run) for path in args.files]
+        fit = Fit([half for one in runs for half in halves(one)])
+        skin = completed(fit, runs)
+        if args.out is not None:
+            args.out.write_text(dumps(skin, args.source), encoding="utf-8")
+        names = [f"{path.stem}, {which} half" for path in args.files for which in ("first", "second")]
+        rows: list[list[Any]] = [list(row) for row in zip(names, fit.rms_counts, fit.explained, strict=True)]
+        tables = [Table("Fit", ["recording", "RMS counts left", "share explained"], rows)]
+        plate = [half.states(place) for half, place in zip(fit.parts, fit.places, strict=True)]
+        seeds = range(args.seed, args.seed + FINGERS)
+        touched = [Touched.by(seed, plate) for seed in seeds]
+        default, passed = _default(touched, seeds)
+        back = _back(touched, runs, [path.stem for path in args.files])
+        own, exact = _calibrated(fit, list(seeds)[:CALIBRATED])
+        tables += [default, own, back, _alike(fit.parts, touched, [path.stem for path in args.files])]
+    print(
+        json.dumps([table.facts() for table in tables])
+        if args.json
+        else "\n\n".join("\n".join(t.page()) for t in tables)
+    )
+    return int(args.check and not (passed and exact))
+
+
+def _judged(population: Population, touched: Sequence[Touched]) -> tuple[Floats, float]:
+    """RMSE (fingers, 3) in N as boards publish the force, and the share flagged OUTSIDE."""
+    errors, outside = [], []
+    for one in touched:
+        likeness = population.judged(one.counts, one.tare)
+        errors.append(rmse(likeness.mixed(population.force(one.counts, one.tare)), one.truth))
+        outside.append(likeness.outside.mean())
+    return np.array(errors), float(np.mean(outside))
+
+
+def _default(touched: Sequence[Touched], seeds: range) -> tuple[Table, bool]:
+    population = load_population(None).population
+    errors, outside = _judged(population, touched)
+    pooled = np.sqrt((errors**2).mean(axis=0))
+    n = len(surface.ELECTRODE_MM)
+    at, still = surface.project(surface.ELECTRODE_MM), np.zeros(n)
+    pokes = States(at, np.full(n, PROBE_N), np.zeros((n, 3)), still, np.full(n, PROBE_MM), still)
+    poked, unlike = _judged(population, [Touched.by(seed, [pokes]) for seed in seeds])
+    scaled = np.array([_pressed(population, one, seed) for one, seed in zip(touched, seeds, strict=True)])
+    rows: list[list[Any]] = [
+        [f"{len(seeds)} fingers on a plate, all together", *pooled, outside],
+        ["the median finger", *np.median(errors, axis=0), None],
+        ["the worst of each axis", *errors.max(axis=0), None],
+        [f"all after {PRESSES} straight presses (z gain, balance)", *np.sqrt((scaled**2).mean(axis=0)), None],
+        [f"{2 * PROBE_MM:g} mm tip on each electrode, {PROBE_N:g} N", *np.sqrt((poked**2).mean(axis=0)), unlike],
+        ["F2 by the map of F1", *UNSEEN_N, None],
+        ["ratio of the first to it", *(pooled / UNSEEN_N), None],
+    ]
+    shares = pooled / UNSEEN_N
+    passed = bool((shares >= LEAST_SHARE).all() and (shares <= MOST_SHARE).all() and outside <= MOST_OUTSIDE)
+    return Table("The default map on simulated fingers: RMSE [N]", HEAD, rows, digits=2), passed
+
+
+def _pressed(population: Population, one: Touched, seed: int) -> Floats:
+    """RMSE (3,) in N of the map alone after five straight presses where the plate touched."""
+    felt = population.force(one.counts, one.tare)
+    straight = np.hypot(one.truth[:, 0], one.truth[:, 1]) < 0.08 * one.truth[:, 2]
+    good = np.flatnonzero(straight & (one.truth[:, 2] > PRESS_N[0]) & (one.truth[:, 2] < PRESS_N[1]))
+    chosen = np.random.default_rng([seed, 42]).choice(good, PRESSES, replace=False)
+    return rmse(scale_of(felt[chosen], one.truth[chosen, 2]).applied(felt), one.truth)
+
+
+def _calibrated(fit: Fit, seeds: Sequence[int]) -> tuple[Table, bool]:
+    """`biotac calibrate wrench` on simulated fingers pressed where and as the real ones were: its bias, held out."""
+    rng = np.random.default_rng(43)
+    of = rng.integers(0, sum(map(len, fit.places)), LOADS)
+    place, force_n = np.concatenate(fit.places)[of], np.concatenate([half.force_n for half in fit.parts])[of]
+    size_n = BANDS_N[0] * (BANDS_N[-1] / BANDS_N[0]) ** rng.random(LOADS)
+    force_n *= (size_n / np.linalg.norm(force_n, axis=1))[:, None]
+    states = replace(fit.parts[0], force_n=force_n).states(place)
+    x, roll = np.floor(place / CELL).T
+    rows: list[list[Any]] = []
+    passed = True
+    for seed in seeds:
+        arrays = plate_recording(Finger(seed), states, (100 * x + roll).astype(np.int64), seed)
+        run = run_of(Path("plate"), {name: arrays[name] for name in ("E", "F", "E_base", "E_idle", "contact")})
+        held_out = validate(run).predicted[0]
+        rows.append([f"finger {seed}, RMSE", *rmse(held_out, run.truth), None])
+        off = np.linalg.norm(held_out, axis=1) - size_n
+        for low, high in pairwise(BANDS_N):
+            bias = float(off[(size_n >= low) & (size_n < high)].mean())
+            rows.append([f"finger {seed}, bias of the strength, {low:g} to {high:g} N", None, None, None, bias])
+            passed &= abs(bias) <= max(MOST_BIAS_N, MOST_BIAS_SHARE * low)
+    return Table("After `calibrate wrench`, held out [N]", [*HEAD[:4], "strength"], rows, digits=3), passed
+
+
+def _back(touched: Sequence[Touched], runs: Sequence[Run], names: Sequence[str]) -> Table:
+    """A map of simulated fingers alone on the real ones, beside the map of the other real finger."""
+    simulated = training.train([training.sums_of(one.run(runs[0])) for one in touched], symmetric=True)
+    real = [training.train([training.sums_of(one)], symmetric=True) for one in runs]
+    rows: list[list[Any]] = []
+    for run, name, other in zip(runs, names, reversed(real), strict=True):
+        by_other, by_simulated = (rmse(one.published(run.counts, run.tare), run.truth) for one in (other, simulated))
+        rows += [[f"{name} by the other", *by_other], [f"{name} by {len(touched)} simulated", *by_simulated]]
+        rows += [[f"{name}, ratio", *(by_simulated / by_other)]]
+    return Table("The other way round: RMSE [N]", HEAD[:4], rows, digits=2)
+
+
+def _alike(parts: Sequence[Half], touched: Sequence[Touched], names: Sequence[str]) -> Table:
+    """What real and simulated fingers have in common under the same loads, the real ones' first."""
+    real = [np.concatenate([half.counts - half.tare for half in parts[k : k + 2]]) for k in (0, 2)]
+    force = [np.concatenate([half.force_n for half in parts[k : k + 2]]) for k in (0, 2)]
+    split = len(real[0])
+    model = [[(one.counts - one.tare)[:split], (one.counts - one.tare)[split:]] for one in touched]
+    columns = [*[f"{name}{of}" for name in names for of in ("", ", model")]]
+
+    def both(value: Any) -> list[float]:
+        return [float(x) for k in (0, 1) for x in (value(real[k], k), np.median([value(one[k], k) for one in model]))]
+
+    def per_n(e: Floats, k: int) -> Any:
+        return np.median(np.linalg.norm(e, axis=1) / np.linalg.norm(force[k], axis=1))
+
+    def bulge(e: Floats, k: int) -> Any:
+        return np.median((np.maximum(e, 0.0) ** 2).sum(axis=1) / (e**2).sum(axis=1))
+
+    default = load_population(None).population
+
+    def z_slope(e: Floats, k: int) -> Any:
+        tare = parts[2 * k].tare
+        return np.polyfit(force[k][:, 2], default.published(tare + e, tare)[:, 2], 1)[0]
+
+    upper = np.triu_indices(19, 1)
+    corr = [np.corrcoef(one.T)[upper] for one in real]
+
+    def pattern(e: Floats, k: int) -> Any:
+        return np.corrcoef(np.corrcoef(e.T)[upper], corr[1 - k])[0, 1]
+
+    def swing(e: Floats, k: int) -> Any:
+        return np.corrcoef(e.std(axis=0), real[1 - k].std(axis=0))[0, 1]
+
+    rows = [
+        ["signal per newton [count/N], median", *both(per_n)],
+        ["share of bulges in the energy, median", *both(bulge)],
+        ["slope of the default map's z, trained on both, over the plate's", *both(z_slope)],
+        ["correlations of electrodes, alike those of the other real finger", *both(pattern)],
+        ["swings of electrodes, alike those of the other real finger", *both(swing)],
+    ]
+    return Table("What agrees", ["", *columns], rows, digits=2)
