@@ -12,7 +12,7 @@ import numpy as np
 
 from biotac import InputError
 
-from .plant import LAG_S, MOST_MM_S, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, G, Thing
+from .plant import LAG_S, MOST_MM_S, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, SLIP_MM_S, G, Thing
 
 try:
     import mujoco
@@ -100,7 +100,7 @@ class MujocoPlant:
         apart = self._relative()
         moved_mm = float(np.hypot(*(apart - self._apart)))
         self._apart, speed = apart, moved_mm / ROUND_S
-        self.slip_mm_s = min(speed, 300.0) if speed > CREEP_MM_S else 0.0
+        self.slip_mm_s = min(speed, SLIP_MM_S) if speed > CREEP_MM_S else 0.0
         self.slid_mm += self.slip_mm_s * ROUND_S
         self.in_air = self._data.xpos[self._thing][2] * 1e3 - HALF_MM > AIR_MM
 

@@ -17,7 +17,7 @@ SKIN_N_PER_MM, SHEAR_N_PER_MM = 2.5, 3.0  # one finger's skin
 CLOSED_MM = 2.0  # each finger touches there
 LAG_S, MOST_MM_S = 0.02, 40.0  # of the actuators
 KINETIC = 0.85  # of the static friction, once it slides
-DROPPED_MM = 15.0
+DROPPED_MM, SLIP_MM_S = 15.0, 200.0  # the latter is the fastest that a simulated finger feels
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Plant:
                 self.slid_mm += slid_mm
                 held_n = max(min(stretched_n, can_n), -can_n)
                 self.in_air = held_n >= pull_n
-            self.slip_mm_s = max(self.slip_mm_s, min(slid_mm / dt, 300.0))
+            self.slip_mm_s = max(self.slip_mm_s, min(slid_mm / dt, SLIP_MM_S))
         self._shear_n = held_n / 2
 
     def touch(self, side: int) -> tuple[float, float, float, float]:
