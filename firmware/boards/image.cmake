@@ -66,7 +66,7 @@ function(emulated_image name port_name cpu linker)
   set(port ${fw}/port/${port_name})
   file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c
     ${fw}/../tests/target/semihosted.c ${port}/*.c)
-  list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$|/emu/stream\\.c$")
+  list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$")
   qemu_executable(${name} ${port_name} ${cpu} ${linker} "${sources}" ${ARGN})
   target_link_options(${name} PRIVATE
     -Wl,--wrap=clock_us,--wrap=port_alarm_at,--wrap=port_delay_us,--wrap=bt_port_alarm,--wrap=port_idle

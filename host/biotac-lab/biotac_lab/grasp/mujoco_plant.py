@@ -12,7 +12,7 @@ import numpy as np
 
 from biotac import InputError
 
-from .plant import LAG_S, MOST_MM_S, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, G, Thing
+from .plant import CLOSED_MM, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, SLIP_MM_S, G, Plant, Thing
 
 try:
     import mujoco
@@ -20,7 +20,7 @@ except ImportError as error:
     raise InputError("--plant mujoco needs MuJoCo: pip install 'biotac-lab[mujoco]'") from error
 
 STEPS, CREEP_MM_S = 20, 1.0
-CLOSED_MM, HALF_MM, AIR_MM = 2.0, 30.0, 0.05
+HALF_MM, AIR_MM = 30.0, 0.05
 SIDE = """<body pos="{x} 0 0"><joint name="close{name}" type="slide" axis="{axis} 0 0"/>
  <geom size=".002" mass=".05" contype="0" conaffinity="0"/>
  <body name="pad{name}"><joint name="normal{name}" type="slide" axis="{axis} 0 0" stiffness="{normal}" damping="4"/>
@@ -40,71 +40,55 @@ MODEL = """<mujoco>
 </actuator></mujoco>"""
 
 
-class MujocoPlant:
-    """See plant.Plant."""
+class MujocoPlant(Plant):
+    """See Plant."""
 
     def __init__(self, thing: Thing) -> None:
-        self.thing, self.extra_kg, self.hit_n = thing, 0.0, 0.0
-        self.slip_mm_s, self.slid_mm, self.most_n, self.in_air = 0.0, 0.0, 0.0, False
+        super().__init__(thing)
         self._spring = 1e3 / (1 / SKIN_N_PER_MM + 1 / (2 * thing.stiffness)), 1e3 * SHEAR_N_PER_MM
-        self._closed_mm = self._speed_mm_s = self._hand_mm = 0.0
-        normal, shear = self._spring
+        values = dict(zip(("normal", "shear"), self._spring, strict=True), friction=thing.friction)
         off = (HALF_MM + CLOSED_MM + 2.0) / 1e3
-        sides = "".join(
-            SIDE.format(x=-axis * off, name=name, axis=axis, normal=normal, shear=shear, friction=thing.friction)
-            for name, axis in (("L", 1), ("R", -1))
-        )
-        text = MODEL.format(dt=ROUND_S / STEPS, mass=thing.mass_kg, sides=sides)
+        both = (SIDE.format(x=-axis * off, name=name, axis=axis, **values) for name, axis in (("L", 1), ("R", -1)))
+        text = MODEL.format(dt=ROUND_S / STEPS, mass=thing.mass_kg, sides="".join(both))
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
         self._pads = [self._model.geom(f"pad{name}").id for name in "LR"]
         self._springs = [self._model.joint(f"normal{name}").qposadr[0] for name in "LR"]
-        self._thing = self._model.body("thing").id
+        self._body = self._model.body("thing").id
         self._apart = self._relative()
 
     @property
     def need_n(self) -> float:
-        """See plant.Plant."""
+        """See Plant; the knock is from the side."""
         weight_n = (self.thing.mass_kg + self.extra_kg) * G
         return float(np.hypot(weight_n, self.hit_n)) / (2 * self.thing.friction)
 
-    @property
-    def normal_n(self) -> float:
-        """The mean of both sides."""
-        return -float(self._data.qpos[self._springs].mean()) * self._spring[0]  # pulled apart by no more than inertia
-
     def touch(self, side: int) -> tuple[float, float, float, float]:
-        """See plant.Plant."""
+        """See Plant."""
         normal, up, across = self._data.qpos[self._springs[side] :][:3]
-        torsion = np.zeros(6)
-        total = 0.0
+        force, torsion = np.zeros(6), 0.0
         for k, contact in enumerate(self._data.contact):
             if self._pads[side] in (contact.geom1, contact.geom2):
-                mujoco.mj_contactForce(self._model, self._data, k, torsion)
-                total += torsion[3] * 1e3
-        return max(-normal * self._spring[0], 0.0), -up * self._spring[1], across * self._spring[1], total
+                mujoco.mj_contactForce(self._model, self._data, k, force)
+                torsion += force[3] * 1e3
+        return max(-normal * self._spring[0], 0.0), -up * self._spring[1], across * self._spring[1], torsion
 
     def step(self, close_mm_s: float, up_mm_s: float) -> None:
-        """See plant.Plant."""
-        dt, wanted = ROUND_S / STEPS, min(max(close_mm_s, -MOST_MM_S), MOST_MM_S)
+        """See Plant."""
         for _ in range(STEPS):
-            self._speed_mm_s += (wanted - self._speed_mm_s) * dt / LAG_S
-            self._closed_mm = max(self._closed_mm + self._speed_mm_s * dt, 0.0)
-            if up_mm_s > 0 or self.in_air:
-                self._hand_mm += up_mm_s * dt
+            self._actuate(ROUND_S / STEPS, close_mm_s, up_mm_s)
             self._data.ctrl[:] = self._hand_mm / 1e3, self._closed_mm / 1e3, self._closed_mm / 1e3
-            self._data.xfrc_applied[self._thing, 1:3] = self.hit_n, -self.extra_kg * G
+            self._data.xfrc_applied[self._body, 1:3] = self.hit_n, -self.extra_kg * G
             mujoco.mj_step(self._model, self._data)
+            self.normal_n = -float(self._data.qpos[self._springs].mean()) * self._spring[0]
             self.most_n = max(self.most_n, self.normal_n)
-        apart = self._relative()
-        moved_mm = float(np.hypot(*(apart - self._apart)))
-        self._apart, speed = apart, moved_mm / ROUND_S
-        self.slip_mm_s = min(speed, 300.0) if speed > CREEP_MM_S else 0.0
+        before, self._apart = self._apart, self._relative()
+        speed = float(np.hypot(*(self._apart - before))) / ROUND_S
+        self.slip_mm_s = min(speed, SLIP_MM_S) if speed > CREEP_MM_S else 0.0
         self.slid_mm += self.slip_mm_s * ROUND_S
-        self.in_air = self._data.xpos[self._thing][2] * 1e3 - HALF_MM > AIR_MM
+        self.in_air = bool(self._data.xpos[self._body][2] * 1e3 - HALF_MM > AIR_MM)
 
     def _relative(self) -> Any:
         """Where the thing is between the pads, along their faces, mm."""
-        pads = self._data.geom_xpos[self._pads].mean(axis=0)
-        return (self._data.xpos[self._thing] - pads)[1:] * 1e3
+        return (self._data.xpos[self._body] - self._data.geom_xpos[self._pads].mean(axis=0))[1:] * 1e3

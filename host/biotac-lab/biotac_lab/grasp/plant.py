@@ -17,7 +17,7 @@ SKIN_N_PER_MM, SHEAR_N_PER_MM = 2.5, 3.0  # one finger's skin
 CLOSED_MM = 2.0  # each finger touches there
 LAG_S, MOST_MM_S = 0.02, 40.0  # of the actuators
 KINETIC = 0.85  # of the static friction, once it slides
-DROPPED_MM = 15.0
+DROPPED_MM, SLIP_MM_S = 15.0, 200.0  # the latter is the fastest that a simulated finger feels
 
 
 @dataclass(frozen=True)
@@ -58,27 +58,27 @@ class Plant:
     """
 
     def __init__(self, thing: Thing) -> None:
-        self.thing, self.extra_kg, self.hit_n, self.normal_n, self._shear_n = thing, 0.0, 0.0, 0.0, 0.0
-        self.slip_mm_s, self.slid_mm, self.most_n, self.in_air = 0.0, 0.0, 0.0, False
-        self._stiffness = 1 / (2 / SKIN_N_PER_MM + 1 / thing.stiffness)
-        self._closed_mm = self._speed_mm_s = self._hand_mm = self._slide_mm_s = 0.0
+        self.thing, self.extra_kg, self.hit_n, self.normal_n, self.most_n = thing, 0.0, 0.0, 0.0, 0.0
+        self.slip_mm_s, self.slid_mm, self.in_air = 0.0, 0.0, False
+        self._closed_mm = self._speed_mm_s = self._hand_mm = self._slide_mm_s = self._shear_n = 0.0
 
     @property
     def need_n(self) -> float:
         """The least that each side has to press with now, in the air."""
         return ((self.thing.mass_kg + self.extra_kg) * G + self.hit_n) / (2 * self.thing.friction)
 
+    def touch(self, side: int) -> tuple[float, float, float, float]:
+        """Of a side, on its finger: normal N, shear N by which the thing pulls down and across, torsion N mm."""
+        return self.normal_n, self._shear_n, 0.0, 0.0
+
     def step(self, close_mm_s: float, up_mm_s: float) -> None:
         """A round of 10 ms: the fingers close at this speed, the hand goes up at that."""
-        dt, wanted = ROUND_S / STEPS, min(max(close_mm_s, -MOST_MM_S), MOST_MM_S)
-        mass_kg, self.slip_mm_s = self.thing.mass_kg + self.extra_kg, 0.0
+        dt, mass_kg, self.slip_mm_s = ROUND_S / STEPS, self.thing.mass_kg + self.extra_kg, 0.0
         pull_n, spring = mass_kg * G + self.hit_n, 2 * SHEAR_N_PER_MM
+        stiffness = 1 / (2 / SKIN_N_PER_MM + 1 / self.thing.stiffness)
         for _ in range(STEPS):
-            self._speed_mm_s += (wanted - self._speed_mm_s) * dt / LAG_S
-            self._closed_mm = max(self._closed_mm + self._speed_mm_s * dt, 0.0)
-            if up_mm_s > 0 or self.in_air:  # a hand that goes down stops as the thing stands
-                self._hand_mm += up_mm_s * dt
-            self.normal_n = max(self._stiffness * (self._closed_mm - CLOSED_MM), 0.0)
+            self._actuate(dt, close_mm_s, up_mm_s)
+            self.normal_n = max(stiffness * (self._closed_mm - CLOSED_MM), 0.0)
             self.most_n = max(self.most_n, self.normal_n)
             can_n = 2 * self.thing.friction * self.normal_n * (KINETIC if self._slide_mm_s > 0 else 1)
             if self.in_air:
@@ -93,9 +93,12 @@ class Plant:
                 self.slid_mm += slid_mm
                 held_n = max(min(stretched_n, can_n), -can_n)
                 self.in_air = held_n >= pull_n
-            self.slip_mm_s = max(self.slip_mm_s, min(slid_mm / dt, 300.0))
+            self.slip_mm_s = max(self.slip_mm_s, min(slid_mm / dt, SLIP_MM_S))
         self._shear_n = held_n / 2
 
-    def touch(self, side: int) -> tuple[float, float, float, float]:
-        """Of a side, on its finger: normal N, shear N by which the thing pulls down and across, torsion N mm."""
-        return self.normal_n, self._shear_n, 0.0, 0.0
+    def _actuate(self, dt: float, close_mm_s: float, up_mm_s: float) -> None:
+        wanted = min(max(close_mm_s, -MOST_MM_S), MOST_MM_S)
+        self._speed_mm_s += (wanted - self._speed_mm_s) * dt / LAG_S
+        self._closed_mm = max(self._closed_mm + self._speed_mm_s * dt, 0.0)
+        if up_mm_s > 0 or self.in_air:  # a hand that goes down stops as the thing stands
+            self._hand_mm += up_mm_s * dt

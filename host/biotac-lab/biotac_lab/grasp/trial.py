@@ -59,7 +59,7 @@ def grasp(plant: Any, law: Any, sense: TrueForce, fault: str = "", trace: list[A
     """
     slides, in_air, flagged, k, speed = Slides(), [], 0, 0, CLOSE_MM_S
     lifted, opened, held, thing = math.inf, math.inf, False, plant.thing
-    while plant.slid_mm <= DROPPED_MM and k <= opened + OPENING_ROUNDS:
+    while plant.slid_mm <= DROPPED_MM and plant.most_n <= thing.limit_n and k <= opened + OPENING_ROUNDS:
         if k < lifted and (law.settled > SETTLED or k > LIFT_AT_LATEST):
             lifted = k
         since_s, up_mm_s = (k - lifted) * ROUND_S, 0.0
