@@ -94,7 +94,8 @@ void commands_start(bt_emu_stream *stream)
     };
     _Static_assert(sizeof hello.board_serial == PORT_SERIAL_BYTES, "the board's serial number is sent whole");
     memcpy(hello.board_serial, identity.serial, sizeof hello.board_serial);
-    feed = (bt_emu_feed){.stream = stream, .hello = &hello, .send = send_frame, .obey = command_besides, .fill = fill_status};
+    feed = (bt_emu_feed){
+        .stream = stream, .hello = &hello, .send = send_frame, .obey = command_besides, .fill = fill_status};
     bt_emu_feed_begin(&feed);
 }
 
