@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from biotac import Calibration, EventKind, Frame, FrameFlags
+from biotac import Calibration, DeviceLostError, EventKind, Frame, FrameFlags
 from biotac.core import geometry as surface
 from biotac.sim import SimFinger, Touch, world
 
@@ -98,7 +99,8 @@ class Board(TrueForce):
 
     def hold(self, held: bool) -> None:
         """See TrueForce."""
-        (self._world.hand.hold if held else self._world.hand.release)(*self._names)
+        with suppress(DeviceLostError):  # dropped while the board is away
+            (self._world.hand.hold if held else self._world.hand.release)(*self._names)
 
     def fault(self, name: str) -> None:
         """See TrueForce."""
