@@ -57,6 +57,7 @@ class Rounds:
         self._expected: set[int] = set()  # fingers of the round before: with them a round is complete
         self._news = threading.Condition()
         self._given_us = -1
+        self._is_new = True
         reader.add(self)
 
     # ---- the reading thread --------------------------------------------------------------------
@@ -84,8 +85,9 @@ class Rounds:
 
     def wait(self, after: Round | None, timeout_s: float) -> Round:
         """The newest complete round after ``after``, or after this call. Raises TimeoutError when none comes."""
-        after_us = max(self._rows, default=-1) if after is None else after.t_us
-        reader = self._reader
+        # All that the first call finds has come since it was made.
+        before_us = -1 if self._is_new else max(self._rows, default=-1)
+        after_us, self._is_new, reader = before_us if after is None else after.t_us, False, self._reader
 
         def is_there() -> bool:
             gone = reader.failure is not None or reader.closing.is_set()
