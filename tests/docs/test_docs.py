@@ -19,6 +19,9 @@ import pytest
 
 import biotac
 from biotac.cli.main import parser
+from biotac.core import geometry
+from biotac.demo.answers import own_map
+from biotac.sim.scenario import FingerSpec
 
 ROOT = Path(__file__).parents[2]
 PAGES = [page for folder in ("docs", "biotac-lab/docs") for page in sorted((ROOT / "host" / folder).rglob("*.md"))]
@@ -115,18 +118,24 @@ def test_the_controllers_page_has_every_flag() -> None:
     assert [flag.name for flag in biotac.FrameFlags if f"`{flag.name}`" not in table] == []
 
 
-def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path) -> None:
+def test_the_drawings_signs_are_what_a_calibrated_board_measures(tmp_path: Path) -> None:
     drawing = html.unescape((ROOT / "host/docs/reference/frames.svg").read_text(encoding="utf-8"))
     pressed = re.findall(r">pressed at (E\d+): ([^<]*(?:[<>] 0,? ?[^<]*)*)</text>", drawing)
+    wrench_map, _ = own_map(FingerSpec(1, "new", "BTSIM00000000001"))
     checked = 0
     for name, readings in pressed:
         (tmp_path / "press.toml").write_text(SCENARIO.format(at=name))
         with biotac.open(f"sim:{tmp_path / 'press.toml'}") as hand:
+            hand.board.set_map(0, wrench_map)
             frames = hand.read(10.0)
         held = frames[-50:]
+        # 5 N into the surface, by hand; at the tip its line passes through the origin, so that torque has no sign
+        at_mm = geometry.ELECTRODE_MM[int(name[1:]) - 1]
+        force_n = -5.0 * geometry.normals_at(at_mm[None])[0]
+        applied = {"F": force_n, "M": np.cross(at_mm, force_n)}
         measured = {"F": held["force_n"].mean(axis=0), "M": held["torque_nmm"].mean(axis=0)}
         for letter, axis, sign in re.findall(r"([FM])([xyz]) ([<>]) 0", readings):
-            value = measured[letter]["xyz".index(axis)]
-            assert np.sign(value) == (1 if sign == ">" else -1), (name, letter, axis, value)
+            for value in (applied[letter]["xyz".index(axis)], measured[letter]["xyz".index(axis)]):
+                assert abs(value) > 0.1 and np.sign(value) == (1 if sign == ">" else -1), (name, letter, axis, value)
             checked += 1
     assert len(pressed) == 3 and checked >= 8

@@ -107,7 +107,7 @@ def test_a_calibration_reads_the_scale_at_every_press(capsys: pytest.CaptureFixt
     argv = ["calibrate", "press", "sim:fingers.toml?fingers=1&pace=fast", "--finger", "index", "--presses", "3"]
     shown = [b"S S     204.0 g\r\n", b"S S     357.0 g\r\n", b"S S     510.0 g\r\n"]
     with printing(shown) as port:
-        # the map of a finger poked by a point is not uploaded
-        assert main([*argv, "--json", "--scale", f"{port}?baud=9600"]) == 1
+        assert main([*argv, "--json", "--scale", f"{port}?baud=9600"]) == 0
     facts = json.loads(capsys.readouterr().out)
+    assert facts["serial"] == "BTSIM00000000001" and not facts["refused"]
     assert facts["shown_n"] == pytest.approx([0.204 * G, 0.357 * G, 0.510 * G])

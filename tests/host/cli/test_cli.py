@@ -204,14 +204,6 @@ def simulated(link: Path, *options: str) -> Iterator[str]:
     assert not link.is_symlink()
 
 
-def test_a_simulated_board_has_its_fingers_own_gains(tmp_path: Path) -> None:
-    with biotac.open("sim:press.toml") as hand:
-        want = hand.board.settings()
-    link = tmp_path / "board"
-    with simulated(link), biotac.open(link) as hand:
-        assert hand.board.settings() == want != biotac.core.compiled.default_settings()
-
-
 def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
     link = tmp_path / "board"
     with simulated(link, "--fingers", "2", "--json") as output:

@@ -208,9 +208,9 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected an image, .uf2", f"flash {NO_PORT} +no.uf2"),
     (2, "use the build's .uf2", f"flash {NO_PORT} @text.uf2"),
     (2, "no SOURCE is given", "sim"),
-    (2, "kinds are none", "sim press.toml --sensor-port /dev/null --fault 2=loose"),
+    (2, "no fault 'loose', expected one of", "sim press.toml --sensor-port /dev/null --fault 2=loose"),
     (2, "--link is for a board on a pty", "sim press.toml --sensor-port /dev/null --link +link"),
-    (2, "--fault is for a sensor board", "sim press.toml --fault 2=none"),
+    (2, "press has 1, expected 0 to 0", "sim press.toml --fault 2=none"),
     (2, "name an IMAGE", "flash"),
 ]
 

@@ -210,7 +210,7 @@ def test_bundled_scenarios_play_and_can_be_repeated(name: str) -> None:
 
 
 def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
-    source = load_source("drift.toml")
+    source = load_source("drift.toml", fingers=5)
     assert source.truth is not None and not source.truth.contact.any() and len(source.samples) == 6000
     counts = source.samples[:, :, slots.ELECTRODE_SLOT].astype(float)
     # 10 s means are 10 s apart; the tare follows 0.5 count/s (numerics.md 1.4)

@@ -30,9 +30,9 @@ RAIL_LOW, RAIL_HIGH = 0, lib.BT_THRESHOLD_RAIL_COUNT  # beyond these an electrod
 MAX_RAILED_SHARE = 0.01
 LEAST_SWING_COUNTS = 2  # over so many rows, the noise alone of a live electrode exceeds this
 MAX_CLIPPED_SHARE = 0.005
-# |F| per RMS count: the physics model presses at a point and gives 0.06, a flat plate affects all electrodes and gives
-# 0.01 (medians over rows). Grams (x 102) and millinewtons (x 1000) are outside however the finger is pressed.
-NEWTON_PER_COUNT = (0.002, 0.5)
+# |F| per RMS count: a flat plate affects all electrodes and gives 0.005 to 0.01, a point 0.06 (medians over rows).
+# Grams (x 102) and millinewtons (x 1000) are at least 0.49: the limit is the geometric mean of that and 0.06.
+NEWTON_PER_COUNT = (0.002, 0.17)
 MIN_DRIFT_SHARE = 0.5  # of the idle recording's variance: less is noise, which has no direction
 # RMS difference of the electrodes between two rests, about the mean, which is drift. Two rests of one finger differ by
 # how unevenly its electrodes drift (10 % of some hundred counts), rests of two fingers by the electrodes themselves (86
