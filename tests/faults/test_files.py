@@ -44,7 +44,7 @@ MORE_BYTES = 500 << 20
 
 CALIBRATION = calibration_file.to_dict(Calibration(wire.PocWeights.COMPRESS_N2, (1, 2, 3), (4, 5), 0, "BT1", 1_763_731))
 MAP = map_file.to_dict(make_map(1))
-COEFFICIENTS = np.full((columns.width(with_pdc=False) + 1, 3), 0.5)
+COEFFICIENTS = np.full((columns.width(columns.blocks(with_pdc=False)) + 1, 3), 0.5)
 FITTED = json.loads(
     map_file.dumps_fitted(WrenchMap("all", columns.AXES[:3], np.full(19, 2e3), 5, (1, 1, 1), COEFFICIENTS))
 )

@@ -21,8 +21,6 @@ LEAST_REST_COUNTS = 1000  # real ones rest at 1870 to 3600
 DEAD = 3
 DEAD_ROUNDS = 30
 BEYOND_ROUNDS = 10  # with a count that no BioTac has
-# A press lowers the sum of a BioTac's electrodes, as pressure rises: of the rounds that show, all but 9 % say so.
-SHOWN_PDC, SHOWN_SUM, WRONG_ROUNDS = 50, 500, 8
 
 
 class Judge:
@@ -35,12 +33,10 @@ class Judge:
         self.foreign = ""
         self.stale = 0
         counts = np.array([own.electrodes[:ELECTRODES] for own in first])
-        pressures = [own.pdc for own in first if own.pdc is not None]
         self._rest = np.median(counts, axis=0)
-        self._rest_pdc = float(np.median(pressures)) if pressures else None
         self._last, self._recent = counts[0], counts[:1]
         self._same = np.zeros(ELECTRODES, int)
-        self._dead = self._beyond = self._wrong = 0
+        self._dead = self._beyond = 0
         for own in first:
             self.words(own)
         if not self.foreign and np.median(self._rest) < LEAST_REST_COUNTS:
@@ -75,16 +71,10 @@ class Judge:
             return
         self._dead = self._dead + 1 if zeros >= DEAD else 0
         self._beyond += bool(beyond.any())
-        if own.pdc is not None and self._rest_pdc is not None:
-            pressed, moved = own.pdc - self._rest_pdc, float((counts - self._rest).sum())
-            if abs(pressed) > SHOWN_PDC and abs(moved) > SHOWN_SUM:
-                self._wrong += 1 if pressed * moved > 0 else -1
         if self._dead >= DEAD_ROUNDS:
             self._condemn(f"{zeros} electrodes say 0")
         elif self._beyond >= BEYOND_ROUNDS:
             self._condemn(f"counts of up to {counts.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}")
-        elif self._wrong >= WRONG_ROUNDS:
-            self._condemn("they rise when pressed, and a BioTac's fall")
 
     def _condemn(self, why: str) -> None:
         self.foreign = f"these are not a BioTac's counts: {why}; no force"

@@ -38,8 +38,6 @@ def board(monkeypatch, tmp_path: Path) -> Iterator[Board]:
         monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
         hands.append(biotac.open("spidev:" + ",".join(f"0.{f}" for f in range(fingers))))
         hands[-1].link.pace = 0  # the bus's time runs ahead of the computer's, so nothing may be kept alive by that
-        for name, value in source.settings.items():
-            hands[-1].board.set_setting(biotac.Setting[name.upper()], value)
         return hands[-1], bus
 
     yield make
