@@ -32,7 +32,7 @@ SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 
 __all__ = [
     "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Finger", "Footprints",
-    "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track", "Truth",
-    "World", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source", "plate_recording", "random_loads",
-    "resistance_at", "resistance_share", "sample", "tdc_counts", "wired_world", "world",
+    "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track",
+    "Truth", "World", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source", "plate_recording",
+    "random_loads", "resistance_at", "resistance_share", "sample", "tdc_counts", "wired_world", "world",
 ]  # fmt: skip
