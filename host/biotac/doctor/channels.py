@@ -23,9 +23,12 @@ STUCK_ROUNDS = 100
 STUCK_TDC_ROUNDS = 280
 
 # Two electrodes that moved by as much, and never differed by more than an eighth of it, are one: those of the public
-# recordings that came closest differed by half of it.
+# recordings that came closest differed by half of it. Mirror images pressed on the midline may differ by less, but not
+# two readings of one voltage: over so many rounds their mean differs by no more than 5 sigma, a settling converter's
+# counts, and what the voltage moves within a round.
 SAME_MOVED_COUNTS = 40.0
 SAME_SHARE = 8.0
+SAME_ROUNDS, SAME_SETTLING_COUNTS = 25, 2.0
 
 # By what the board found (SENSOR_STATUS): the finding's code. What it calls RAILED or MISSING shows in the frames.
 ELECTRODE_FAULTS = {
@@ -125,5 +128,18 @@ def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
         f"{one} and {two}"
         for one, two in combinations(moved, 2)
         if np.abs(moved[one] - moved[two]).max() * SAME_SHARE <= np.ptp(moved[one])
+        and _one_voltage(moved[one], moved[two])
     ]
     return found
+
+
+def _one_voltage(one: NDArray[np.floating], two: NDArray[np.floating]) -> bool:
+    """Whether counts (rounds,) of two electrodes differ by no more than readings of the same voltage may."""
+    sigma = 1.05 * float(np.median(np.abs(np.diff(one - two)))) if len(one) > 1 else 0.0
+    for begin in range(0, len(one) - SAME_ROUNDS + 1, SAME_ROUNDS):
+        block = slice(begin, begin + SAME_ROUNDS)
+        per_round = np.ptp(one[block]) / (SAME_ROUNDS - 1)
+        limit = 5.0 * sigma / np.sqrt(SAME_ROUNDS) + SAME_SETTLING_COUNTS + per_round
+        if abs((one[block] - two[block]).mean()) > limit:
+            return False
+    return True
