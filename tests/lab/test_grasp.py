@@ -22,7 +22,7 @@ from biotac_lab.grasp.trial import Slides
 THING = Thing(mass_kg=0.2, friction=0.5, stiffness=5.0, added_kg=0.1, knock_n=1.0, limit_n=50.0)
 WEIGHT_N = 0.2 * 9.81
 CASE = Case("true", "", 0, 7, "numpy", 2, "new", "E17", "")
-IN_C = law.EXAMPLE.with_name("grip_in_c.py")
+IN_C = Path(__file__).resolve().parents[2] / "host/docs/guides/examples/grip_in_c.py"
 
 
 def lifted(press_n: float) -> Plant:

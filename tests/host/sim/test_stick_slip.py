@@ -47,4 +47,4 @@ def test_a_grasp_is_told_from_touch_to_release() -> None:
     # 0.1 s after the power came. Letting go at 20 N/s drags the skin: that is told as a slip, too.
     assert [round(s, 2) for s in at_s[EventKind.SLIP] if s < 8.0] == [4.91]
     assert len(at_s[EventKind.SLIP]) == len(at_s[EventKind.STUCK])
-    assert 8.6 <= at_s[EventKind.LIFT][-1] <= 8.9
+    assert 8.6 <= at_s[EventKind.LIFT][-1] <= 9.2  # the residue of a finger as sensitive as real ones takes 0.3 s more
