@@ -61,11 +61,11 @@ def undisturbed(rig: Rig, tmp_path: Path, seconds: float) -> np.ndarray:
 
 
 # "unplugged" is mute until it is asked.
-AWAY_S = (0.010, 0.014, 0.1, 0.4, 1.0, 2.0, 4.0)
+GONE_S = (0.010, 0.014, 0.1, 0.4, 1.0, 2.0, 4.0)
 KINDS = ("stuck_low", "unplugged")
 OPEN = "off by 0.9 of 7.3 N: the tare of the undisturbed finger follows the creep of a hold, which grew with its signal"
 DROPOUTS = [
-    *((seconds, kind) for kind in KINDS for seconds in AWAY_S),
+    *((seconds, kind) for kind in KINDS for seconds in GONE_S),
     *(pytest.param(10.0, kind, marks=pytest.mark.xfail(reason=OPEN)) for kind in KINDS),
 ]
 

@@ -80,9 +80,17 @@ def test_five_fingers_with_pac_lose_nothing(tmp_path) -> None:
     assert facts["crosscheck"]["torque_nmm_max"] <= 0.02
 
 
-@pytest.mark.parametrize(
-    "name", ["syntouchcontact/F1.npz", "robotic_finger/trial_15330.npz", "btd_biotacsp/data.btd.gz"]
-)
+def test_a_biotac_sp_arrives_without_a_force(shared_data, tmp_path) -> None:
+    """The board asks it who it is, as any sensor that it does not know, before it believes that it answers."""
+    name = shared_data / "btd_biotacsp/data.btd.gz"
+    demo, source = run_demo(str(name), tmp_path, show=quiet), load_source(name)
+    frames, rows = demo.batch.frames, source.samples[:, 0, 7::2]
+    assert len(frames) > 0.95 * len(rows) and demo.facts["crosscheck"]["violations"] == 0
+    assert np.array_equal(frames["counts"], rows[frames["seq"]])
+    assert np.isnan(frames["force_n"]).all() and (frames["flags"] & biotac.FrameFlags.SENSOR_FAULT).all()
+
+
+@pytest.mark.parametrize("name", ["syntouchcontact/F1.npz", "robotic_finger/trial_15330.npz"])
 def test_every_recorded_row_arrives_in_order(shared_data, tmp_path, name: str) -> None:
     demo = run_demo(str(shared_data / name), tmp_path, show=quiet)
     source = load_source(shared_data / name)
