@@ -86,7 +86,10 @@ def test_a_biotac_sp_arrives_without_a_force(shared_data, tmp_path) -> None:
     demo, source = run_demo(str(name), tmp_path, show=quiet), load_source(name)
     frames, rows = demo.batch.frames, source.samples[:, 0, 7::2]
     assert len(frames) > 0.95 * len(rows) and demo.facts["crosscheck"]["violations"] == 0
-    assert np.array_equal(frames["counts"], rows[-len(frames) :])
+    played = map(bytes, rows)
+    assert all(bytes(counts) in played for counts in frames["counts"]), (
+        "each is the next, or after rows that were asked"
+    )
     assert np.isnan(frames["force_n"]).all() and (frames["flags"] & biotac.FrameFlags.SENSOR_FAULT).all()
 
 
