@@ -14,4 +14,5 @@ with biotac.open(sys.argv[1] if len(sys.argv) > 1 else "sim:press.toml?pace=real
         if finger.stale:
             print(f"no force: {finger.stale}")
             continue
-        print(f"force {finger.force_n} N at {finger.poc_mm} mm, {finger.age_s * 1e3:.0f} ms old, {finger.flags!r}")
+        frame = finger.frame  # of one round: two properties of a finger may come from two
+        print(f"force {frame.force_n} N at {frame.poc_mm} mm, {finger.age_s * 1e3:.0f} ms old, {frame.flags!r}")
