@@ -110,9 +110,7 @@ bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHA
         query->form = hold ? BT_FORM_HELD : query->form == BT_FORM_BYTES ? BT_FORM_WORDS : BT_FORM_BYTES;
     }
     memcpy(serial, query->serial, BT_SERIAL_CHARS);
-    // Sensors with 24 electrodes (BioTac SP: BTSP; BTTB) answer the same commands, but have other electrodes
-    // in other places.
-    return sure && memcmp(serial + 2, "SP", 2) != 0 && memcmp(serial + 2, "TB", 2) != 0;
+    return sure;
 }
 
 // ---- all of them ------------------------------------------------------------------------------------

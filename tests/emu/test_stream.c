@@ -245,7 +245,8 @@ TEST(test_by_the_clock_every_sample_is_of_its_own_slot_and_a_missing_round_is_kn
 
 TEST(test_by_the_clock_a_board_that_was_reset_goes_on_with_the_round_that_comes_next)
 {
-    (void)put(0, 2 * BT_SLOTS);
+    (void)put(0, BT_SLOTS);
+    (void)put(BT_SLOTS, BT_SLOTS);
     stream.begins_at = stream.at = 2 * BT_SLOTS;
     assert_true(bt_emu_stream_lacks(&stream, 0));
     (void)put(2 * BT_SLOTS, BT_SLOTS);
