@@ -43,8 +43,8 @@ typedef struct {
 void bt_serial_query_begin(bt_serial_query *query);
 void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger);
 
-// The serial number, padded with zeros. Returns false if it is not sure yet, or not that of a BioTac with 19
-// electrodes. Once after each round; chooses the next one's form.
+// The serial number, padded with zeros, of whatever kind (bt_serial_is_foreign). Returns false if it is not
+// sure yet. Once after each round; chooses the next one's form.
 bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS]);
 
 // Read all properties into info, before sampling begins; takes some 1.5 ms, and up to 10 of a sensor that
