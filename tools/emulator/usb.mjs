@@ -121,7 +121,7 @@ export class UsbHost {
     this.#after(SUSPEND_NS, () => {
       this.usb.sieStatus |= SUSPENDED
       this.usb.sieStatusUpdated()
-      this.#after(PULLUP_GONE_NS, () => (this.drivenUnpowered += this.#isUp ? 1 : 0))
+      this.#after(PULLUP_GONE_NS, () => (this.drivenUnpowered += this.#isUp && !this.plugged ? 1 : 0)) // or it is back
     })
   }
 
