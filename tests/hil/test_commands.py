@@ -74,6 +74,9 @@ REFUSED = [
 FOR_MAPS = (wire.BeginMap, wire.WriteMap, wire.EndMap, wire.ClearMap)
 
 
+REQ_ID = 249  # the hand numbers its own commands from 1, and does not come so far
+
+
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
     """All that comes back for a message, sent so many times, and the PING behind it, but not the PING's reply."""
     overheard = Overheard()
@@ -81,7 +84,7 @@ def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int
     hand.link.write(times * encode(message_id, payload))
     hand.ping()
     hand._reader.remove(overheard)
-    seen = [m for m in overheard.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == 7]
+    seen = [m for m in overheard.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == REQ_ID]
     assert seen.pop().command == wire.Ping.ID
     return seen
 
@@ -93,7 +96,7 @@ def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
     of_a_gateway = range(0x80, 0xC0)  # from there on they are the sensor board's
     assert {m.ID for m in COMMANDS} == {m for m in wire.MESSAGES if m in of_a_gateway}
     for kind, (values, reply) in COMMANDS.items():
-        answers = replies_to(hand, kind.ID, kind(7, *values).pack())
+        answers = replies_to(hand, kind.ID, kind(REQ_ID, *values).pack())
         assert [type(a) for a in answers] == [reply], kind
         if kind is wire.Start:
             hand.stop()
@@ -105,16 +108,16 @@ def test_what_cannot_be_done_is_refused_with_its_reason(board) -> None:
     for kind, values, error in REFUSED:
         if hand.info.map_bytes == 0 and kind in FOR_MAPS and error != wire.Error.NO_SUCH_FINGER:
             error = wire.Error.NOT_HERE
-        (answer,) = replies_to(hand, kind.ID, kind(249, *values).pack())  # no command of the hand has come so far
+        (answer,) = replies_to(hand, kind.ID, kind(REQ_ID, *values).pack())
         assert (type(answer), answer.command, answer.error) == (wire.Reply, kind.ID, error), (kind, values)
 
 
 @pytest.mark.long
 def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words(board) -> None:
     hand = board("press.toml")
-    (unknown,) = replies_to(hand, 0xEE, bytes([7, 1, 2]))
+    (unknown,) = replies_to(hand, 0xEE, bytes([REQ_ID, 1, 2]))
     assert (unknown.command, unknown.error) == (0xEE, wire.Error.UNKNOWN_COMMAND)
-    (short,) = replies_to(hand, wire.GetSetting.ID, bytes([7]))
+    (short,) = replies_to(hand, wire.GetSetting.ID, bytes([REQ_ID]))
     assert (short.command, short.error) == (wire.GetSetting.ID, wire.Error.BAD_LENGTH)
     assert short.req_id == 0  # where it would stand in a message of another length is anybody's guess
 
@@ -130,7 +133,7 @@ def hurt(message: Any) -> list[bytes]:
 def test_what_is_damaged_on_its_way_is_counted_and_never_obeyed(board) -> None:
     hand = board("press.toml")
     before = hand.status()
-    pieces = hurt(wire.SetSetting(7, int(Setting.IDLE_PERIOD_MS), 250))
+    pieces = hurt(wire.SetSetting(REQ_ID, int(Setting.IDLE_PERIOD_MS), 250))
     for piece in pieces:
         hand.link.write(piece)
     hand.link.write(b"\0")  # as every program begins
@@ -144,9 +147,16 @@ def test_what_is_damaged_on_its_way_is_counted_and_never_obeyed(board) -> None:
 
 def test_a_command_that_comes_twice_is_answered_twice_and_done_once(rig, board) -> None:
     hand = board("press.toml")
-    start = wire.Start(7, int(wire.StreamFlags.FRAMES), 1, 0)
-    set_it = wire.SetSetting(7, int(Setting.IDLE_PERIOD_MS), 250)
-    for message in (set_it, wire.Hold(7, 1), wire.Release(7, 1), wire.ClearFaults(7, 0, (0,) * 5), start, wire.Stop(7)):
+    start = wire.Start(REQ_ID, int(wire.StreamFlags.FRAMES), 1, 0)
+    set_it = wire.SetSetting(REQ_ID, int(Setting.IDLE_PERIOD_MS), 250)
+    for message in (
+        set_it,
+        wire.Hold(REQ_ID, 1),
+        wire.Release(REQ_ID, 1),
+        wire.ClearFaults(REQ_ID, 0, (0,) * 5),
+        start,
+        wire.Stop(REQ_ID),
+    ):
         first, again = replies_to(hand, message.ID, message.pack(), times=2)
         assert first == again and getattr(first, "error", wire.Error.OK) == wire.Error.OK
     assert (hand.board.setting(Setting.IDLE_PERIOD_MS), hand.status().streams) == (250, 0)
