@@ -220,6 +220,18 @@ def broken_electrode(kind: str, channel: str | None) -> int:
     return _sensor.ELECTRODE_NAMES.index(name)
 
 
+def begin(
+    kind: str, channel: str | None, rest: Floats, other_rest: Floats, seed: int | list[int]
+) -> Callable[[Words, Words], Words]:
+    """A fault that begins now on one finger: called with the next rounds of it and of the finger beside it, (n, 44).
+
+    Returns words for a tape. Raises InputError for an unknown fault or channel.
+    """
+    lay = fault_named(kind, channel)
+    faulty = Faulty(broken_electrode(kind, channel), rest, other_rest, np.random.default_rng(seed))
+    return lambda words, other: on_the_bus(lay(faulty, words, other))
+
+
 def on_the_bus(words: Words) -> Words:
     """Words for a tape: a word that did not come good is one of bad parity there."""
     return np.where(words == INVALID_COUNT, np.uint16(EmuFault.BAD_PARITY), words)

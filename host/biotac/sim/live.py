@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..wire.messages_gen import EmuStatus
 from ..wire.sensor_gen import MAX_SENSORS
 from . import touch
 from .emulated import EmulatedBoard
-from .faults import Fault, Faulty, broken_electrode, fault_named, on_the_bus
+from .faults import begin
 from .physics import Finger
 from .process import SimBoard, SimLink
 from .sampling import Sampler, Words
@@ -32,7 +32,7 @@ class LiveFingers:
         self._fingers = tuple(fingers.values())
         self._samplers = [Sampler(finger) for finger in self._fingers]
         self._rest = [finger.rest_counts(np.zeros(1))[0] for finger in self._fingers]
-        self._faults: dict[tuple[int, str], tuple[Fault, Faulty]] = {}
+        self._faults: dict[tuple[int, str], Callable[[Words, Words], Words]] = {}
 
     def at_rest(self, rounds: int = 1) -> Source:
         """The next rounds, in which nothing touches."""
@@ -47,9 +47,9 @@ class LiveFingers:
         states = [touch.states(loads.get(name)) for name in self.names]
         words = np.stack([sampler.step(*state) for sampler, state in zip(self._samplers, states, strict=True)])
         spoilt: Words = words.copy()
-        for (number, _), (lay, faulty) in self._faults.items():
+        for (number, _), lay in self._faults.items():
             beside = words[(number + 1) % len(words)]
-            spoilt[number] = on_the_bus(lay(faulty, spoilt[None, number], beside[None]))[0]
+            spoilt[number] = lay(spoilt[None, number], beside[None])[0]
         return spoilt
 
     def number(self, name: str) -> int:
@@ -64,10 +64,9 @@ class LiveFingers:
         if kind is None:
             self._faults = {key: laid for key, laid in self._faults.items() if key[0] != number}
             return
-        electrode, lay = broken_electrode(kind, channel), fault_named(kind, channel)
-        rng = np.random.default_rng([self._fingers[number].seed, 7])
         rest, other_rest = self._rest[number], self._rest[(number + 1) % len(self._rest)]
-        self._faults[number, f"{kind} {channel}"] = lay, Faulty(electrode, rest, other_rest, rng)
+        seed = [self._fingers[number].seed, 7]
+        self._faults[number, f"{kind} {channel}"] = begin(kind, channel, rest, other_rest, seed)
 
 
 def live_board(fingers: LiveFingers, board: str, image: str | None = None) -> SimBoard:

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
-from .faults import BUS_FAULTS, FAULTS, IS_CHANNEL, Faulty, broken_electrode, fault_named, on_the_bus
+from .faults import BUS_FAULTS, FAULTS, IS_CHANNEL, begin
 from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
@@ -113,10 +113,7 @@ def with_fault(source: Source, finger: int, kind: str, channel: str | None = Non
         raise InputError(f"finger {finger}: {source.name} has {fingers}, expected 0 to {fingers - 1}")
     samples, beside = source.samples.copy(), (finger + 1) % fingers
     rest, other_rest = (samples[0, k, slots.ELECTRODE_SLOT].astype(np.float64) for k in (finger, beside))
-    electrode = broken_electrode(kind, channel)
-    faulty = Faulty(electrode, rest, other_rest, np.random.default_rng(7))
-    lay = fault_named(kind, channel)
-    samples[:, finger] = on_the_bus(lay(faulty, samples[:, finger], source.samples[:, beside]))
+    samples[:, finger] = begin(kind, channel, rest, other_rest, 7)(samples[:, finger], source.samples[:, beside])
     return replace(source, samples=samples)
 
 
@@ -124,11 +121,8 @@ def _lay(fault: Fault, samples: sampling.Words, emulated: tuple[Finger, ...], k:
     """Lay a fault of the sensor over finger ``k`` of samples (frames, fingers, 44), anew in each repetition."""
     beside = (k + 1) % len(emulated)
     rest, other_rest = (emulated[finger].rest_counts(np.zeros(1))[0] for finger in (k, beside))
-    begin, end = (round(t * slots.FRAME_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
-    lay = fault_named(fault.kind)
-    for first in range(0, len(samples) - begin, period):
-        rows = slice(first + begin, first + end)
-        faulty = Faulty(
-            broken_electrode(fault.kind, fault.channel), rest, other_rest, np.random.default_rng([emulated[k].seed, 7])
-        )
-        samples[rows, k] = on_the_bus(lay(faulty, samples[rows, k], samples[rows, beside]))
+    from_row, to_row = (round(t * slots.FRAME_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
+    for first in range(0, len(samples) - from_row, period):
+        rows = slice(first + from_row, first + to_row)
+        lay = begin(fault.kind, fault.channel, rest, other_rest, [emulated[k].seed, 7])
+        samples[rows, k] = lay(samples[rows, k], samples[rows, beside])
