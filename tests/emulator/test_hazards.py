@@ -119,6 +119,13 @@ def test_a_corrupt_handshake_hangs_the_controller(board: Board, verb: str) -> No
     comes_back(*board.open(), verb)
 
 
+def test_what_follows_a_release_meets_a_board_whose_time_runs(board: Board) -> None:
+    """Otherwise the host's time-out goes by while the watchdog's clock stands still, and the board never comes back."""
+    _, emulated = board.open()
+    emulated.say("run\ncorrupt a control handshake\nopen and close 1 times")  # in one piece, as under load
+    emulated.until(0.3, usb={"hangs": 1, "resets": 2, "state": "configured"})
+
+
 @known_from("RP2040-E15; data sheet 4.1.4, SIE_STATUS")
 def test_a_hung_controller_takes_the_bus_for_suspended(board: Board) -> None:
     """it is reset all the same, as the lines move"""

@@ -213,14 +213,17 @@ function line(words) {
 }
 
 let unfinished = ''
+const waitingLines = []
 process.stdin.on('data', (chunk) => {
   const lines = (unfinished + chunk).split('\n')
   unfinished = lines.pop()
-  for (const words of lines) line(words)
+  waitingLines.push(...lines)
 })
 process.stdin.on('end', () => process.exit(0)) // whoever started us is gone
 
 function loop() {
+  // What follows `run` meets a board whose time runs: a host's time-out would go by while the board's stands still.
+  while (waitingLines.length > 0 && !(asked && rig?.waiting)) line(waitingLines.shift())
   if (turn()) setTimeout(loop, POLL_MS)
   else setImmediate(loop)
 }
