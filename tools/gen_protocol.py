@@ -53,6 +53,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "host/biotac/wire/dtypes_gen.py": python_code.dtypes(contract),
         root / "host/biotac/wire/map_gen.py": python_code.wrench_map(contract),
         root / "protocol/MESSAGES.md": docs.messages(contract),
+        root / docs.CONTROLLER: docs.controller(root, contract),
         root / "protocol/schema.json": schema.canonical(contract, with_docs=True),
     }
 

@@ -112,6 +112,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
     msg->seq = finger->seq;
     msg->finger = finger->index;
     msg->slot = slot;
+    msg->trust = event == BT_EVENT_KIND_TRUST ? finger->trust : UINT8_MAX;
 }
 
 static void fall_silent(bt_finger *finger)
@@ -219,9 +220,10 @@ uint8_t bt_finger_sensor_fault(const bt_finger *finger)
     return finger->foreign ? BT_SENSOR_FAULT_OTHER_KIND : bt_health_sensor_fault(&finger->health);
 }
 
+// Of the sensor as a whole.
 static uint32_t health_flags(const bt_finger *finger)
 {
-    return (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
+    return finger->sensor_flags | (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
            | (finger->health.alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }
 
@@ -305,12 +307,27 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     msg->electrodes_out = finger->tare.trigger.without;
     tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
+    bool valid = msg->force_100un[2] != BT_INVALID_I32;
+    msg->trust = valid ? bt_trust(msg->flags, 0, BT_INVALID_COUNT) : BT_TRUST_NONE;
+    finger->trust = msg->trust;
     finger->sent = finger->tare.trigger.smooth;
 }
 
 uint32_t bt_finger_flags(const bt_finger *finger)
 {
     return bt_channel_flags(&finger->round, &finger->tare) | health_flags(finger);
+}
+
+bool bt_finger_trust_changed(bt_finger *finger)
+{
+    bool higher = finger->trust > finger->trust_reported;
+    finger->trust_rounds = higher ? (uint8_t)(finger->trust_rounds + 1) : 0;
+    if (finger->trust == finger->trust_reported || (higher && finger->trust_rounds < BT_TRUST_ROUNDS)) {
+        return false;
+    }
+    finger->trust_reported = finger->trust;
+    finger->trust_rounds = 0;
+    return true;
 }
 
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg)
@@ -320,6 +337,7 @@ void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
     msg->flags = bt_finger_flags(finger) | BT_FRAME_FLAG_NOT_ASKED;
+    msg->trust = bt_trust(msg->flags, 0, BT_INVALID_COUNT);
     msg->frames = finger->unsent;
     msg->energy_count2 = bt_trigger_energy(&finger->tare.trigger);
     msg->pdc = finger->round.pdc;

@@ -7,6 +7,7 @@
 #include "signal/bands.h"
 #include "signal/health.h"
 #include "signal/round.h"
+#include "solve/flags.h"
 #include "solve/pressure.h"
 #include "solve/results.h"
 #include "touch/tare.h"
@@ -53,9 +54,13 @@ typedef struct {
     bt_pressure pressure;
     bt_lanes sent; // filtered counts when the last FRAME was sent
     bt_kept_wrench kept;
-    bt_events events; // updated only while a host subscribes to them
-    bt_bands bands;   // updated only while they are streamed
-    bool shed;        // FRAMEs were left out since the last one sent, because time was short
+    bt_events events;       // updated only while a host subscribes to them
+    bt_bands bands;         // updated only while they are streamed
+    uint32_t sensor_flags;  // BT_FRAME_FLAG_SENSOR_*, by the sensor's serial number
+    uint8_t trust;          // enum bt_trust of the latest FRAME or IDLE
+    uint8_t trust_reported; // what hosts were told, with the FRAMEs or by events
+    uint8_t trust_rounds;   // in which it has been higher
+    bool shed;              // FRAMEs were left out since the last one sent, because time was short
     bt_word_counts words;
 } bt_finger;
 
@@ -96,6 +101,11 @@ void bt_finger_pass(bt_finger *finger);
 
 // The flags of the round that do not depend on any result.
 uint32_t bt_finger_flags(const bt_finger *finger);
+
+// After a FRAME or a round of an IDLE: whether an EVENT is to report its trust. A fall is reported at once, a
+// rise once it has lasted for BT_TRUST_ROUNDS.
+#define BT_TRUST_ROUNDS 10
+bool bt_finger_trust_changed(bt_finger *finger);
 
 // What is wrong with the whole sensor, an enum bt_sensor_fault.
 uint8_t bt_finger_sensor_fault(const bt_finger *finger);

@@ -59,3 +59,4 @@ from .wire.messages_gen import Tare as Tare
 from .wire.messages_gen import TareReason as TareReason
 from .wire.messages_gen import TareState as TareState
 from .wire.messages_gen import Touch as Touch
+from .wire.messages_gen import Trust as Trust

@@ -46,6 +46,7 @@ MEANINGS: dict[Any, dict[int, str]] = {
     wire.QuantityFlags: wire.QUANTITY_FLAG_DOC,
     wire.PocWeights: wire.POC_WEIGHTS_DOC,
     wire.TareReason: wire.TARE_REASON_DOC,
+    wire.Trust: wire.TRUST_DOC,
     wire.TareState: wire.TARE_STATE_DOC,
     wire.CalibrationState: wire.CALIBRATION_STATE_DOC,
     wire.Setting: {

@@ -95,8 +95,7 @@ TEST(a_missing_slot_is_marked_and_never_stale)
     rounds(20);
     for (int slot = 0; slot < BT_SLOTS; slot++) {
         assert_true(round_without((uint64_t)1 << slot));
-        uint32_t want = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK | BT_FRAME_FLAG_POC_LOW
-                        | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE
+        uint32_t want = BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE
                         | BT_FRAME_FLAG_TARE_UNSURE;
         if (slot % 2 == 0) {
             assert_int_equal(pac.pac[slot / 2], BT_INVALID_COUNT);
@@ -174,8 +173,7 @@ TEST(a_sensor_that_was_away_keeps_its_tare_until_it_is_told_to_be_another)
 TEST(results_without_a_tare_are_invalid_and_not_zero)
 {
     rounds(1);
-    assert_int_equal(frame.flags, BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_MX_DERIVED
-                                      | BT_FRAME_FLAG_FX_WEAK);
+    assert_int_equal(frame.flags, BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID);
     assert_int_equal(frame.tare_state, BT_TARE_STATE_INIT);
     assert_int_equal(frame.pdc_tare_q4, BT_INVALID_COUNT);
     for (int d = 0; d < 3; d++) {

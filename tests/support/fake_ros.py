@@ -19,6 +19,7 @@ USED = (
     "geometry_msgs/msg/PointStamped",
     "geometry_msgs/msg/WrenchStamped",
     "std_msgs/msg/String",
+    "std_msgs/msg/UInt8",
     "std_msgs/msg/UInt32",
 )
 

@@ -43,7 +43,7 @@ def frame(seq: int, finger: int = 0, force_z_n: float = 0.0, t_us: int | None = 
 
 def heartbeat(seq: int, finger: int = 0, frames: int = 1) -> bytes:
     """An IDLE in place of so many frames, the last of device time 10 ms * seq."""
-    return packed(wire.Idle(seq % 65536, seq * 10_000, finger, 0, 0, frames, 0, 2000, 2000))
+    return packed(wire.Idle(seq % 65536, seq * 10_000, finger, 0, 0, frames, 0, 2000, 2000, 0))
 
 
 def batch_of(*frames: bytes) -> Batch:

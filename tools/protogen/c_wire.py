@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from .schema import FINGER_AT, GENERATED, REQ_ID_AT, TYPE_BYTES, Contract, Field, Message, c_header, entries
+from .schema import (
+    FINGER_AT,
+    GENERATED,
+    REQ_ID_AT,
+    TYPE_BYTES,
+    Contract,
+    Field,
+    Message,
+    c_header,
+    entries,
+    latched,
+    trust_levels,
+)
 
 PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
@@ -52,6 +64,9 @@ def vocabulary(contract: Contract) -> list[str]:
         ]
         known = sum(1 << entry["bit"] for entry in entries(flags).values())
         out += [f"#define BT_{name.upper()}_FLAGS 0x{known:X}u // all there are", ""]
+    out += ["// Flags of a FRAME or IDLE that hold trust down to this level."]
+    out += [f"#define BT_TRUST_FLAGS_{name} 0x{mask:08X}u" for name, mask in trust_levels(link).items()]
+    out += [f"#define BT_FRAME_FLAGS_LATCHED 0x{latched(link):08X}u // in STATUS, until CLEAR_FAULTS", ""]
     out += ["enum bt_setting {"]
     out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
     out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]
@@ -115,7 +130,7 @@ def header(contract: Contract) -> str:
         out += [f"void {struct}_pack(const {struct} *msg, uint8_t out[BT_{upper}_BYTES]);"]
         if message.name in PACKED_AS_HALFWORDS:
             out += ["// The same into aligned halfwords, in a third of the time; little-endian cores only."]
-            out += [f"void {struct}_pack_even(const {struct} *msg, uint16_t out[BT_{upper}_BYTES / 2]);"]
+            out += [f"void {struct}_pack_even(const {struct} *msg, uint16_t out[(BT_{upper}_BYTES + 1) / 2]);"]
         out += [f"void {struct}_unpack({struct} *msg, const uint8_t in[BT_{upper}_BYTES]);", ""]
     out += [
         "// Payload length of a message id, without id and CRC; -1 when the id is unknown.",
@@ -190,7 +205,7 @@ def pack_even(message: Message) -> list[str]:
     """A pack function that stores halfwords. Raises ValueError if a wider field is at an odd offset."""
     struct = struct_name(message)
     out = ['_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "halfwords are stored as they are");', ""]
-    out += [f"void {struct}_pack_even(const {struct} *msg, uint16_t out[BT_{message.name}_BYTES / 2])", "{"]
+    out += [f"void {struct}_pack_even(const {struct} *msg, uint16_t out[(BT_{message.name}_BYTES + 1) / 2])", "{"]
     at, low = 0, ""
     for field in message.fields:
         size, ref = TYPE_BYTES[field.type], f"msg->{field.name}"
@@ -207,6 +222,7 @@ def pack_even(message: Message) -> list[str]:
             if size == 4:
                 out += [f"    out[{at // 2 + 1}] = (uint16_t)((uint32_t){value} >> 16);"]
             at += size
+    out += [f"    out[{at // 2}] = {low};"] if at % 2 else []
     return [*out, "}", ""]
 
 

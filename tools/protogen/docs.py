@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .schema import GENERATED, Contract, Message, entries, type_range
+
+CONTROLLER = "host/docs/guides/controller.md"
 
 
 def messages(contract: Contract) -> str:
@@ -36,6 +40,25 @@ def messages(contract: Contract) -> str:
         own = f"value[{contract.per_finger.index(name)}]" if name in contract.per_finger else ""
         out.append(f"| {s['id']} | `{name}` | {own} | {s['unit']} | {low} to {high} | {s['default']} | {s['doc']} |")
     return "\n".join(out) + "\n"
+
+
+TRUST_BEGIN, TRUST_END = "<!-- trust: generated from link.toml -->\n", "<!-- end of trust -->\n"
+
+
+def controller(root: Path, contract: Contract) -> str:
+    """controller.md with its tables of levels and of flags as the contract says them, the lowest level first."""
+    levels, flags = entries(contract.link["enum"]["trust"]), entries(contract.link["flags"]["frame"])
+    rows = ["| trust | | |", "|---|---|---|"]
+    rows += [f"| {level['value']} | `{name}` | {level['doc']} |" for name, level in levels.items()]
+    rows += ["", "| flag | at most | the force is | do |", "|---|---|---|---|"]
+    for name in levels:
+        rows += [
+            f"| `{key}` | {name if 'trust' in flag else ''} | {flag['force']} | {flag['do']} |"
+            for key, flag in flags.items()
+            if flag.get("trust", "ACT") == name
+        ]
+    head, rest = (root / CONTROLLER).read_text(encoding="utf-8").split(TRUST_BEGIN)
+    return head + TRUST_BEGIN + "\n".join(rows) + "\n" + TRUST_END + rest.split(TRUST_END)[1]
 
 
 def field_table(message: Message) -> list[str]:

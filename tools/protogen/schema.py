@@ -132,6 +132,21 @@ def entries(table: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {name: entry for name, entry in table.items() if name != "doc"}
 
 
+def trust_levels(link: dict[str, Any]) -> dict[str, int]:
+    """Levels below ACT, the lowest first, each with the mask of frame flags that hold a force down to it."""
+    flags = entries(link["flags"]["frame"])
+    return {
+        name: sum(1 << flag["bit"] for flag in flags.values() if flag.get("trust") == name)
+        for name in entries(link["enum"]["trust"])
+        if name != "ACT"
+    }
+
+
+def latched(link: dict[str, Any]) -> int:
+    """Mask of the frame flags that STATUS keeps."""
+    return sum(1 << flag["bit"] for flag in entries(link["flags"]["frame"]).values() if flag.get("latched"))
+
+
 def per_finger(link: dict[str, Any]) -> list[str]:
     named = ((setting["id"], name) for name, setting in link["setting"].items() if setting.get("per_finger"))
     return [name for _, name in sorted(named)]
@@ -142,6 +157,9 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
     if len(set(ids)) != len(ids):
         raise ValueError("link.toml: a message id occurs twice")
     names = {message.name for message in messages}
+    for name, flag in entries(link["flags"]["frame"]).items():
+        if flag.get("trust", "NONE") not in entries(link["enum"]["trust"]) or not (flag["force"] and flag["do"]):
+            raise ValueError(f"link.toml: flag {name} needs a force and a do; a trust is of [enum.trust]")
     setting_ids = [setting["id"] for setting in link["setting"].values()]
     if len(set(setting_ids)) != len(setting_ids):
         raise ValueError("link.toml: a setting id occurs twice")
@@ -205,7 +223,7 @@ def canonical(contract: Contract, *, with_docs: bool) -> str:
 
 def strip_docs(node: Any) -> Any:
     if isinstance(node, dict):
-        return {k: strip_docs(v) for k, v in node.items() if k != "doc"}
+        return {k: strip_docs(v) for k, v in node.items() if k not in ("doc", "force", "do")}
     if isinstance(node, list):
         return [strip_docs(v) for v in node]
     return node

@@ -3,12 +3,12 @@
 #include "fixed_point.h"
 #include "map/complete.h"
 #include "signal/signals.h"
+#include "solve/flags.h"
 #include "solve/uncertainty.h"
 
 #include <stddef.h>
 
-#define POC_LOW         4                     // times the contact threshold
-#define BASE_OLD_FRAMES (60000 / BT_FRAME_MS) // one minute
+#define POC_LOW 4 // times the contact threshold
 
 // Energies of a round's signals, truncated to 1/2 count.
 typedef struct {
@@ -59,47 +59,6 @@ static signal_shape signals(const uint16_t counts[BT_ELECTRODES], const bt_tare 
     shape.energy >>= 2;
     shape.bulge >>= 2;
     return shape;
-}
-
-static BT_NOINLINE uint32_t trouble(const bt_round *round, const bt_tare *tare)
-{
-    uint32_t flags = 0;
-    flags |= tare->trigger.without != 0 ? BT_FRAME_FLAG_ELECTRODE_OUT : 0;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint16_t count = round->electrode[i];
-        flags |= count == BT_INVALID_COUNT ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
-        flags |= bt_count_railed(count) ? BT_FRAME_FLAG_RAIL : 0;
-    }
-    flags |= bt_tare_faulty(tare) ? BT_FRAME_FLAG_FAULT : 0;
-    flags |= !bt_count_usable(round->pdc) ? BT_FRAME_FLAG_PDC_MISSING : 0;
-    flags |= round->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
-    flags |= round->tdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_TDC_MISSING : 0;
-    return flags;
-}
-
-_Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
-                   && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
-               "the OR of counts must exceed full scale only where a word is missing");
-
-uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
-{
-    uint32_t flags = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
-    // One comparison for what hardly ever happens: a missing word is above every count.
-    uint32_t counts = (uint32_t)(round->tac | round->tdc);
-    if (counts > BT_FULL_SCALE_COUNT || !bt_count_usable(round->pdc) || tare->trigger.without != 0) {
-        flags |= trouble(round, tare);
-    }
-    if (!tare->tared) {
-        flags |= BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID;
-    }
-    flags |= tare->held ? BT_FRAME_FLAG_HELD : 0;
-    if (bt_tare_touched(tare)) {
-        flags |= tare->state == BT_TARE_STATE_DOUBT ? BT_FRAME_FLAG_DOUBT : BT_FRAME_FLAG_CONTACT;
-        flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
-    }
-    flags |= tare->unsure && tare->tared ? BT_FRAME_FLAG_TARE_UNSURE : 0;
-    flags |= tare->witness.flat ? BT_FRAME_FLAG_PDC_FLAT : 0;
-    return flags;
 }
 
 // The PoC's outward normal is within 60 degrees of -z: c_z <= -r/2, on tip and cylinder alike.

@@ -28,7 +28,4 @@ static inline uint32_t bt_not_asked(uint32_t quantities)
 }
 #endif
 
-// The flags that do not depend on any result.
-uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare);
-
 #endif

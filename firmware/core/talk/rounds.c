@@ -34,8 +34,9 @@ static bool end_finger(bt_session *session, unsigned f)
         bt_finger_pass(finger);
         return false;
     }
+    finger->sensor_flags = bt_sensors_flags(session, f);
     if (finger->answered) {
-        bt_faults_of_round(session, f, bt_sensors_flags(session, f));
+        bt_faults_of_round(session, f, finger->sensor_flags);
     }
     if (!bt_finger_end(finger, &session->tare[f])) {
         // Without a serial number, only the silence shows that another sensor may come.

@@ -125,7 +125,6 @@ static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows
     uint8_t payload[BT_IDLE_BYTES];
     bt_msg_idle msg;
     bt_finger_idle_message(finger, frame_follows, &msg);
-    msg.flags |= bt_sensors_flags(session, finger->index);
     bt_msg_idle_pack(&msg, payload);
     bt_session_send(session, BT_IDLE_ID, payload);
     finger->unsent = 0;
@@ -168,11 +167,20 @@ static void send_frame(bt_session *session, bt_finger *finger)
     }
     uint8_t quantities = bt_sensors_refused(session, finger->index) ? 0 : finger->quantities;
     bt_finger_frame(finger, solve, quantities, shed, &msg);
-    msg.flags |= bt_sensors_flags(session, finger->index);
     bt_faults_of_round(session, finger->index, msg.flags);
     bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
     bt_session_send_sealed(session, BT_FRAME_ID, (uint8_t *)frame);
     count_skips(&session->skips, finger->quantities);
+}
+
+// At the end of a round, in whose last slot it is said to have changed.
+static void report_trust(bt_session *session, bt_finger *finger)
+{
+    const uint8_t slot = BT_SLOTS - 1;
+    if (session->event_fingers >> finger->index & 1 && bt_finger_trust_changed(finger)) {
+        send_event(session, finger, BT_EVENT_KIND_TRUST, slot,
+                   finger->round.t_us + slot * 1000000u / BT_SLOT_HZ);
+    }
 }
 
 // Send a FRAME, or count the round for an IDLE. An IDLE is sent when its period is over and before the next
@@ -191,10 +199,14 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
             send_idle(session, finger, true);
         }
         finger->kept.valid = finger->kept.valid && !finger->fresh;
-        finger->fresh = false;
         send_frame(session, finger);
+        finger->trust_reported = finger->fresh ? finger->trust : finger->trust_reported;
+        finger->fresh = false;
+        report_trust(session, finger);
         return;
     }
+    finger->trust = bt_trust(bt_finger_flags(finger), 0, BT_INVALID_COUNT);
+    report_trust(session, finger);
     session->skips.frames++;
     count_skips(&session->skips, 0);
     if (++finger->unsent >= session->idle_rounds) {

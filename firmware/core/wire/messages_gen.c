@@ -360,12 +360,13 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     at = put(at, (uint32_t)msg->torsion_mnmm, 4);
     at = put(at, (uint32_t)msg->wrench_age_ms, 2);
     at = put(at, (uint32_t)msg->electrodes_out, 4);
+    at = put(at, (uint32_t)msg->trust, 1);
     (void)at;
 }
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "halfwords are stored as they are");
 
-void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[BT_FRAME_BYTES / 2])
+void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[(BT_FRAME_BYTES + 1) / 2])
 {
     out[0] = (uint16_t)msg->seq;
     out[1] = (uint16_t)msg->t_us;
@@ -442,6 +443,7 @@ void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[BT_FRAME_BYTES
     out[72] = (uint16_t)msg->wrench_age_ms;
     out[73] = (uint16_t)msg->electrodes_out;
     out[74] = (uint16_t)((uint32_t)msg->electrodes_out >> 16);
+    out[75] = msg->trust;
 }
 
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
@@ -502,6 +504,8 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->wrench_age_ms = (uint16_t)value;
     at = get(at, &value, 4);
     msg->electrodes_out = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->trust = (uint8_t)value;
     (void)at;
 }
 
@@ -731,6 +735,7 @@ void bt_msg_idle_pack(const bt_msg_idle *msg, uint8_t out[BT_IDLE_BYTES])
     at = put(at, (uint32_t)msg->energy_count2, 4);
     at = put(at, (uint32_t)msg->pdc, 2);
     at = put(at, (uint32_t)msg->tdc, 2);
+    at = put(at, (uint32_t)msg->trust, 1);
     (void)at;
 }
 
@@ -756,6 +761,8 @@ void bt_msg_idle_unpack(bt_msg_idle *msg, const uint8_t in[BT_IDLE_BYTES])
     msg->pdc = (uint16_t)value;
     at = get(at, &value, 2);
     msg->tdc = (uint16_t)value;
+    at = get(at, &value, 1);
+    msg->trust = (uint8_t)value;
     (void)at;
 }
 
@@ -799,6 +806,7 @@ void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES])
     at = put(at, (uint32_t)msg->onset_us, 4);
     at = put(at, (uint32_t)msg->energy_count2, 4);
     at = put(at, (uint32_t)msg->peak_count, 2);
+    at = put(at, (uint32_t)msg->trust, 1);
     (void)at;
 }
 
@@ -824,6 +832,8 @@ void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES])
     msg->energy_count2 = (uint32_t)value;
     at = get(at, &value, 2);
     msg->peak_count = (uint16_t)value;
+    at = get(at, &value, 1);
+    msg->trust = (uint8_t)value;
     (void)at;
 }
 

@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x1BA84306u
+#define BT_SCHEMA_HASH 0x0C23BFB6u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -83,6 +83,14 @@ enum bt_tare_reason {
     BT_TARE_REASON_RESTORED = 13, // the tare from before a reset of the board, with HELD as it was
 };
 
+// What a force is good for: the lowest level of the flags that are set (trust in [flags.frame]), INTERVAL too if its interval is wide or unknown, NONE without a number.
+enum bt_trust {
+    BT_TRUST_NONE = 0, // there is no force: hold the actuators where they are, and grasp nothing
+    BT_TRUST_HOLD = 1, // there is a number, but do not act on it: hold what you have
+    BT_TRUST_INTERVAL = 2, // act on it with margins as wide as its interval
+    BT_TRUST_ACT = 3, // act on it
+};
+
 // Weight of an electrode's signal e in the point of contact (Lin Eq 1).
 enum bt_poc_weights {
     BT_POC_WEIGHTS_ABS_N2 = 0, // e^2, as in the paper
@@ -134,6 +142,7 @@ enum bt_event_kind {
     BT_EVENT_KIND_JOLT = 3, // a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip
     BT_EVENT_KIND_SLIP = 4, // the held object slips: dynamic pressure vibrates in both directions
     BT_EVENT_KIND_STUCK = 5, // the slip has ended; one for each SLIP
+    BT_EVENT_KIND_TRUST = 6, // trust fell, or has been higher for 100 ms
 };
 
 // State of a frame's counts and results.
@@ -146,8 +155,6 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
-#define BT_FRAME_FLAG_MX_DERIVED (1u << 9) // (always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it
-#define BT_FRAME_FLAG_FX_WEAK (1u << 10) // (always) force x has two to three times the noise of y and z
 #define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
@@ -169,7 +176,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
 #define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
 #define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
-#define BT_FRAME_FLAGS 0xFFFFFFFFu // all there are
+#define BT_FRAME_FLAGS 0xFFFFF9FFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
@@ -204,6 +211,12 @@ enum bt_event_kind {
 #define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure and, if calibrated, the force from it
 #define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages; sent while FRAMES or PAC is on
 #define BT_QUANTITY_FLAGS 0xFFu // all there are
+
+// Flags of a FRAME or IDLE that hold trust down to this level.
+#define BT_TRUST_FLAGS_NONE 0x40008002u
+#define BT_TRUST_FLAGS_HOLD 0x09800000u
+#define BT_TRUST_FLAGS_INTERVAL 0xB6292170u
+#define BT_FRAME_FLAGS_LATCHED 0x71E1A1F0u // in STATUS, until CLEAR_FAULTS
 
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]
@@ -393,7 +406,7 @@ void bt_msg_map_data_unpack(bt_msg_map_data *msg, const uint8_t in[BT_MAP_DATA_B
 
 // One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md).
 #define BT_FRAME_ID 0x10
-#define BT_FRAME_BYTES 150
+#define BT_FRAME_BYTES 151
 typedef struct {
     uint16_t seq; // [1] counts this finger's rounds with a good word, sent or not; wraps
     uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later; wraps
@@ -406,7 +419,7 @@ typedef struct {
     uint16_t tdc; // [count] temperature; 0xFFFF: no good word
     int16_t poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: invalid
     int32_t force_100un[3]; // [100 uN] x, y, z of the force on the finger; -2147483648: invalid
-    int32_t torque_mnmm[3]; // [mN*mm] x, y, z of the torque on the finger about the origin; -2147483648: invalid; for x see MX_DERIVED
+    int32_t torque_mnmm[3]; // [mN*mm] x, y, z of the torque on the finger about the origin; -2147483648: invalid; x is derived from PoC and force unless a wrench map gives it, as electrodes hardly sense it
     uint16_t tare_q4[19]; // [count q4] tare subtracted from counts, in 1/16 count; 0xFFFF: electrode never read
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: never read
     uint16_t poc_sigma_um; // [um] standard deviation of the PoC due to noise, saturating; 0xFFFF: not computed, or noise not measured yet
@@ -416,10 +429,11 @@ typedef struct {
     int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench map gives it; else -2147483648
     uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
     uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its signal
+    uint8_t trust; // [enum trust] what the force is good for
 } bt_msg_frame;
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES]);
 // The same into aligned halfwords, in a third of the time; little-endian cores only.
-void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[BT_FRAME_BYTES / 2]);
+void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[(BT_FRAME_BYTES + 1) / 2]);
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES]);
 
 // The 22 dynamic pressure samples of one finger in one round.
@@ -474,7 +488,7 @@ typedef struct {
     uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed second
     uint32_t frames_shed; // [1] FRAMEs not sent, for lack of time; shed last
     uint16_t faults; // [flags fault] what went wrong since boot or the last CLEAR_FAULTS
-    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that make its values doubtful; not DOUBT or OUTSIDE, which occur in any touch; UNTARED only if a tare was lost
+    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that are latched in link.toml; UNTARED only if a tare was lost
 } bt_msg_status;
 void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES]);
 void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES]);
@@ -506,7 +520,7 @@ void bt_msg_sensor_status_unpack(bt_msg_sensor_status *msg, const uint8_t in[BT_
 
 // Heartbeat of an untouched finger, in place of the FRAMEs that were not sent.
 #define BT_IDLE_ID 0x15
-#define BT_IDLE_BYTES 22
+#define BT_IDLE_BYTES 23
 typedef struct {
     uint16_t seq; // [1] seq of the latest round that it covers
     uint32_t t_us; // [us] t_us of the round that the other fields describe: that of seq, or the one after it if a FRAME follows at once
@@ -517,6 +531,7 @@ typedef struct {
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals
     uint16_t pdc; // [count] static pressure; 0xFFFF: no good word
     uint16_t tdc; // [count] temperature; 0xFFFF: no good word
+    uint8_t trust; // [enum trust] what a force would be good for, as far as nothing needs one to be seen
 } bt_msg_idle;
 void bt_msg_idle_pack(const bt_msg_idle *msg, uint8_t out[BT_IDLE_BYTES]);
 void bt_msg_idle_unpack(bt_msg_idle *msg, const uint8_t in[BT_IDLE_BYTES]);
@@ -536,7 +551,7 @@ void bt_msg_touch_unpack(bt_msg_touch *msg, const uint8_t in[BT_TOUCH_BYTES]);
 
 // Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on.
 #define BT_EVENT_ID 0x17
-#define BT_EVENT_BYTES 20
+#define BT_EVENT_BYTES 21
 typedef struct {
     uint16_t seq; // [1] seq of the current round
     uint32_t t_us; // [us] device time at which the slot was sampled
@@ -547,6 +562,7 @@ typedef struct {
     uint32_t onset_us; // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when dynamic pressure left its noise; else t_us
     uint32_t energy_count2; // [count^2] TOUCH, LIFT: sum of squares of the filtered signals, from the latest word of every electrode; else 0xFFFFFFFF
     uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began; else 0xFFFF
+    uint8_t trust; // [enum trust] TRUST: the new one; else 255
 } bt_msg_event;
 void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES]);
 void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES]);
@@ -1011,14 +1027,14 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
 #define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1) X(trust, u8, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
 #define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1) X(electrodes_out, u32, 1) X(electrode_fault, u8, 1) X(sensor_fault, u8, 1)
-#define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
+#define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1) X(trust, u8, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
-#define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
+#define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1) X(trust, u8, 1)
 #define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
 #define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
 #define BT_SP_COUNTS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(counts, u16, 24)

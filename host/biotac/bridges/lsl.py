@@ -34,7 +34,7 @@ from ..wire.sensor_gen import SLOTS
 
 TYPE = "Tactile"
 EVENTS = " events"
-_SENT = ("force_n", "torque_nmm", "poc_mm", "flags", "counts", "pdc", "tac", "tdc")
+_SENT = ("force_n", "torque_nmm", "poc_mm", "flags", "trust", "counts", "pdc", "tac", "tdc")
 _FRAME_COLUMNS = tuple(column for name in _SENT for column in COLUMNS if column.name == name)
 _PAC_COLUMN = PAC_COLUMNS[-1]
 _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
@@ -44,8 +44,8 @@ class Outlet:
     """Three streams for each finger of ``hand``; use as a context manager, and push every batch.
 
     ``BioTac finger0``: one sample per round, 100 per second, of force (N), torque (N*mm), point of contact (mm),
-    flags, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports. ``BioTac finger0 PAC``:
-    counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind);
+    flags, trust, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports. ``BioTac finger0
+    PAC``: counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind);
     markers come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold
     labels, units and meanings.
 
@@ -128,7 +128,7 @@ class Outlet:
 
 
 def samples(frames: StructArray) -> NDArray[np.float64]:
-    """FRAME_DTYPE (n,) as samples of a frame stream, float64 (n, 32)."""
+    """FRAME_DTYPE (n,) as samples of a frame stream, float64 (n, 33)."""
     return np.column_stack([frames[name].astype(np.float64) for name in _SENT])
 
 

@@ -168,3 +168,12 @@ def _shaped(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[An
         sp = columns_text(array.shape[-1]) if array.ndim and shape[-1] == ELECTRODES else ""
         raise ValueError(f"{name} have shape {array.shape}, expected ({wanted}){sp}")
     return array
+
+
+def trust_of(flags: NDArray[np.uint32], force_100un: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Trust (n,) of FRAMEs with these flags (n,) and forces (n, 3), as the board gives it."""
+    out = np.full(len(flags), wire.Trust.ACT, np.uint8)
+    for level in reversed(wire.TRUST_FLAGS):
+        out[(flags & np.uint32(wire.TRUST_FLAGS[level])) != 0] = level
+    out[force_100un[:, 2] == wire.INVALID_I32] = wire.Trust.NONE
+    return out

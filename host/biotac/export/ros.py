@@ -30,6 +30,7 @@ _TOPICS = {
         "wrench": "geometry_msgs/msg/WrenchStamped",
         "poc": "geometry_msgs/msg/PointStamped",
         "flags": "std_msgs/msg/UInt32",
+        "trust": "std_msgs/msg/UInt8",
         "counts": _COUNTS,
     },
     "pac": {"pac": _COUNTS},
@@ -39,7 +40,7 @@ _TOPICS = {
 
 def write(path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None) -> None:
     """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``flags``,
-    ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
+    ``trust``, ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
     ros1 = path.suffix == ".bag"
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
@@ -117,8 +118,16 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
         return
     force_n, torque_nm, poc_m = arrays["force_n"], arrays["torque_nmm"] / 1000, arrays["poc_mm"] / 1000  # REP 103
     counts = np.column_stack([arrays[name] for name in ("counts", "pdc", "tac", "tdc")])
-    lists = stamps_ns, force_n.tolist(), torque_nm.tolist(), poc_m.tolist(), arrays["flags"].tolist(), counts
-    for stamp_ns, force, torque, poc, flags, row in zip(*lists, strict=True):
+    lists = (
+        stamps_ns,
+        force_n.tolist(),
+        torque_nm.tolist(),
+        poc_m.tolist(),
+        arrays["flags"].tolist(),
+        arrays["trust"].tolist(),
+        counts,
+    )
+    for stamp_ns, force, torque, poc, flags, trust, row in zip(*lists, strict=True):
         header = _header(types, stamp_ns, table.frame_id)
         wrench = types["geometry_msgs/msg/Wrench"](vector(*force), vector(*torque))
         yield (
@@ -127,6 +136,7 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
                 "wrench": types[_TOPICS["frames"]["wrench"]](header, wrench),
                 "poc": types[_TOPICS["frames"]["poc"]](header, point(*poc)),
                 "flags": types[_TOPICS["frames"]["flags"]](flags),
+                "trust": types[_TOPICS["frames"]["trust"]](trust),
                 "counts": types[_COUNTS](layout, row),
             },
         )

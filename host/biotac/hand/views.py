@@ -18,7 +18,7 @@ from ..board.reader import Reader
 from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.frames import FRAME_DTYPE, Frame, StructArray, frames_from_wire
-from ..wire.messages_gen import INVALID_COUNT, FrameFlags
+from ..wire.messages_gen import INVALID_COUNT, FrameFlags, Trust
 from ..wire.sensor_gen import MAX_SENSORS
 
 T = TypeVar("T")
@@ -174,7 +174,7 @@ def _latest_row(batch: Batch, finger: int) -> StructArray:
     beat = batch.idle[beats[0]]
     flags = FrameFlags(int(beat["flags"])) | FrameFlags.POC_INVALID | FrameFlags.NOT_ASKED
     out = _empty(finger, int(beat["t_us"]), int(beat["seq"]), flags)
-    out["pdc"], out["tdc"] = beat["pdc"], beat["tdc"]
+    out["pdc"], out["tdc"], out["trust"] = beat["pdc"], beat["tdc"], beat["trust"]
     return out
 
 
@@ -231,8 +231,8 @@ class FingerView:
     def _now(self) -> list[str]:
         row, age_s, why = self._latest.state(self.finger)
         force = ", ".join(f"{value:.3f}" for value in row["force_n"][0])
-        flags = FrameFlags(int(row["flags"][0]))
-        return [why] if why else [f"force ({force}) N", repr(flags), f"{age_s * 1e3:.0f} ms old"]
+        flags, trust = FrameFlags(int(row["flags"][0])), Trust(row["trust"][0])
+        return [why] if why else [f"force ({force}) N", trust.name, repr(flags), f"{age_s * 1e3:.0f} ms old"]
 
     def _row(self) -> Any:
         return self._latest.state(self.finger)[0][0]
@@ -269,6 +269,7 @@ class FingerView:
     tdc = _value("tdc", int, "Temperature in counts, 65535 where missing.")
     touched = _value("flags", lambda bits: bool(int(bits) & FrameFlags.CONTACT), "The finger is touched.")
     flags = _value("flags", lambda bits: FrameFlags(int(bits)), "What to think of the results.")
+    trust = _value("trust", Trust, "What the force is good for, an enum Trust; NONE where the values are stale.")
     t_us = _value("t_us", int, "Device time in us, unwrapped; -1 before anything came.")
 
     @property

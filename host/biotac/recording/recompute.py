@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
-from ..core.compiled import completed, on_board_q4, pressure_force_100un
+from ..core.compiled import completed, on_board_q4, pressure_force_100un, trust_of
 from ..core.finger import ROUND_US, Finger
 from ..errors import CommandRefusedError, InputError
 from ..keep.calibration import own_settings
@@ -132,6 +132,7 @@ def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | Non
     flags |= np.uint32(0 if own_map is None else wire.FrameFlags.MAPPED)
     flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
     frames["flags"] = flags
+    frames["trust"] = trust_of(flags, force_100un)
     return frames
 
 
@@ -187,6 +188,7 @@ def _through_the_machine(
             )
         frames["seq"] = recording.wire["seq"][at]
         frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # not in counts
+        frames["trust"] = trust_of(frames["flags"], frames["force_100un"])
         new[at] = frames
         for row, message in changes.items():
             tares[int(at[row])] = dataclasses.replace(message, seq=int(frames["seq"][row]))

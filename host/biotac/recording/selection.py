@@ -235,7 +235,8 @@ class Selection:
         """The means of each finger's rows over steps of 1 / ``rate_hz``, above 0 and at most the board's 100.
 
         ``t_us`` is the middle of a step. All means are float64, NaN where no row has a value; ``flags`` are those that
-        any of the rows has, other integers those of the first row. Steps without a row are left out.
+        any of the rows has, ``trust`` is the lowest, other integers those of the first row. Steps without a row are
+        left out.
         """
         if not 0 < rate_hz <= FRAME_HZ:
             raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ}")
@@ -253,6 +254,8 @@ class Selection:
             values = rows[field.name]
             if field.name == "flags":
                 out["flags"] = np.bitwise_or.reduceat(values, first) if len(first) else values
+            elif field.name == "trust":
+                out["trust"] = np.minimum.reduceat(values, first) if len(first) else values
             elif field.dtype != "<f8":
                 out[field.name] = values[first]
             elif len(first):

@@ -5,7 +5,9 @@ static/model.js reads these rows. ``FRAME_ROW`` names their columns and is sent 
 
 from __future__ import annotations
 
+import functools
 import json
+import operator
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,7 @@ from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM
 #: contact on the unrolled skin, across and along, in um; null where it is invalid. ``applied_100un``: Reader.applied_n.
 FRAME_ROW = (
     "finger", "seq", "t_us", "flags", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un", "torque_mnmm",
-    "map_um", "applied_100un",
+    "map_um", "applied_100un", "trust",
 )  # fmt: skip
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
@@ -42,11 +44,12 @@ def frame_rows(batch: Batch, applied_n: NDArray[np.float64] | None = None) -> li
         *(with_null(messages[name], wire.INVALID_I32) for name in ("force_100un", "torque_mnmm")),
         map_um(frames),
         applied,
+        frames["trust"].tolist(),
         strict=True,
     )
     timed = [(row[2], compact(row)) for row in columns]
     for row in batch.idle:
-        values = {name: row[name].item() for name in ("finger", "seq", "t_us", "flags")}
+        values = {name: row[name].item() for name in ("finger", "seq", "t_us", "flags", "trust")}
         values |= {name: with_null(row[name], wire.INVALID_COUNT) for name in ("pdc", "tdc")}
         timed.append((values["t_us"], compact([values.get(name) for name in FRAME_ROW])))
     return [text for _, text in sorted(timed, key=lambda item: item[0])]
@@ -102,15 +105,20 @@ def facts() -> dict[str, Any]:
         "pac_hz": sensor.SLOT_HZ * sensor.SLOTS.count("PAC") / len(sensor.SLOTS),
         "pac_pa_per_count": sensor.PAC_PA_PER_COUNT,
         "flags": [
-            {"mask": int(flag), "name": flag.name, "words": wire.FRAME_FLAG_DOC[int(flag)], "warns": flag not in CALM}
+            {
+                "mask": int(flag),
+                "name": flag.name,
+                "words": wire.FRAME_FLAG_DOC[int(flag)],
+                "warns": bool(flag & WARNINGS),
+            }
             for flag in wire.FrameFlags
         ],
+        "trust": {int(t): {"name": t.name, "words": wire.TRUST_DOC[t]} for t in wire.Trust},
         "tare_states": {int(s): {"name": s.name, "words": wire.TARE_STATE_DOC[s]} for s in wire.TareState},
         "sensor_faults": {int(f): wire.SENSOR_FAULT_DOC[f] for f in wire.SensorFault},
         "tare_reasons": {int(r): {"name": r.name, "words": wire.TARE_REASON_DOC[r]} for r in wire.TareReason},
     }
 
 
-#: Flags that are informational; every other one is a warning.
-_F = wire.FrameFlags
-CALM = _F.CONTACT | _F.MX_DERIVED | _F.FX_WEAK | _F.TORSION_OK | _F.TARE_CHANGED | _F.NOT_ASKED
+#: Flags that say something against the numbers: those that lower trust, or that STATUS keeps.
+WARNINGS = functools.reduce(operator.or_, wire.TRUST_FLAGS.values(), wire.LATCHED_FLAGS)

@@ -121,6 +121,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("torsion_mnmm", "<i4"),
             ("wrench_age_ms", "<u2"),
             ("electrodes_out", "<u4"),
+            ("trust", "u1"),
         ]
     ),
     wire.Pac.ID: np.dtype(
@@ -200,6 +201,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("energy_count2", "<u4"),
             ("pdc", "<u2"),
             ("tdc", "<u2"),
+            ("trust", "u1"),
         ]
     ),
     wire.Touch.ID: np.dtype(
@@ -222,6 +224,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("onset_us", "<u4"),
             ("energy_count2", "<u4"),
             ("peak_count", "<u2"),
+            ("trust", "u1"),
         ]
     ),
     wire.Bands.ID: np.dtype(

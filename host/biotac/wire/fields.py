@@ -85,6 +85,7 @@ _TORSION = "torque about the outward normal at the contact; NaN unless a wrench 
 _AGE = "how much older force, torque and torsion are than the row; 0 unless REPEATED"
 _OUT = "bit mask, bit i for electrode i + 1: results do without it"
 _TARE_STATE = Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state")
+_TRUST = Field("trust", "u1", "1", "what the force is good for: enum trust in MESSAGES.md", (), "trust")
 
 #: One row per finger and round of slots (10 ms).
 FRAME_FIELDS = (
@@ -107,6 +108,7 @@ FRAME_FIELDS = (
     _real("torsion_nmm", _TORSION, "torsion_mnmm", MNMM_PER_NMM),
     Field("wrench_age_ms", "<u2", "ms", _AGE, (), "wrench_age_ms"),
     Field("electrodes_out", "<u4", "1", _OUT, (), "electrodes_out"),
+    _TRUST,
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),
 )
 
@@ -138,6 +140,7 @@ IDLE_FIELDS = (
     _count("pdc", "static pressure"),
     _count("tdc", "temperature"),
     _TARE_STATE,
+    _TRUST,
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md", (), "flags"),
 )
 

@@ -19,7 +19,7 @@ from .fields import MNMM_PER_NMM as MNMM_PER_NMM
 from .fields import Q4_PER_COUNT as Q4_PER_COUNT
 from .fields import UM_PER_MM as UM_PER_MM
 from .fields import to_units as to_units
-from .messages_gen import INVALID_COUNT, FrameFlags, TareState
+from .messages_gen import INVALID_COUNT, TRUST_FLAGS, FrameFlags, TareState, Trust
 from .sensor_gen import FULL_SCALE_COUNT
 
 StructArray = NDArray[np.void]
@@ -68,6 +68,12 @@ class Frame:
     torsion_nmm: float = math.nan
     wrench_age_ms: int = 0
     electrodes_out: int = 0
+    trust: Trust = Trust.NONE
+
+    @property
+    def reasons(self) -> FrameFlags:
+        """The flags that hold ``trust`` down to what it is; without one, its interval does, or there is no number."""
+        return self.flags & TRUST_FLAGS.get(self.trust, FrameFlags(0))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frame):
@@ -82,7 +88,7 @@ class Frame:
     def from_row(cls, row: Any) -> Frame:
         """Make a Frame from one row of a FRAME_DTYPE array."""
         values = {name: row[name].copy() if row[name].shape else row[name].item() for name in FRAME_DTYPE.names or ()}
-        return cls(**values | {"flags": FrameFlags(values["flags"])})
+        return cls(**values | {"flags": FrameFlags(values["flags"]), "trust": Trust(values["trust"])})
 
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x1BA84306
+SCHEMA_HASH = 0x0C23BFB6
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -89,6 +89,15 @@ class TareReason(IntEnum):
     RESTORED = 13  # the tare from before a reset of the board, with HELD as it was
 
 
+class Trust(IntEnum):
+    """What a force is good for: the lowest level of the flags that are set (trust in [flags.frame]), INTERVAL too if its interval is wide or unknown, NONE without a number."""
+
+    NONE = 0  # there is no force: hold the actuators where they are, and grasp nothing
+    HOLD = 1  # there is a number, but do not act on it: hold what you have
+    INTERVAL = 2  # act on it with margins as wide as its interval
+    ACT = 3  # act on it
+
+
 class PocWeights(IntEnum):
     """Weight of an electrode's signal e in the point of contact (Lin Eq 1)."""
 
@@ -146,6 +155,7 @@ class EventKind(IntEnum):
     JOLT = 3  # a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip
     SLIP = 4  # the held object slips: dynamic pressure vibrates in both directions
     STUCK = 5  # the slip has ended; one for each SLIP
+    TRUST = 6  # trust fell, or has been higher for 100 ms
 
 
 class FrameFlags(IntFlag):
@@ -160,8 +170,6 @@ class FrameFlags(IntFlag):
     PDC_MISSING = 1 << 6  # no good static pressure word; contact is judged by the electrodes alone
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
-    MX_DERIVED = 1 << 9  # (always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it
-    FX_WEAK = 1 << 10  # (always) force x has two to three times the noise of y and z
     TORSION_OK = 1 << 11  # suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
     SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
     BASE_OLD = 1 << 13  # in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
@@ -284,6 +292,14 @@ TARE_REASON_DOC: dict[int, str] = {
 }
 
 
+TRUST_DOC: dict[int, str] = {
+    0: "there is no force: hold the actuators where they are, and grasp nothing",
+    1: "there is a number, but do not act on it: hold what you have",
+    2: "act on it with margins as wide as its interval",
+    3: "act on it",
+}
+
+
 POC_WEIGHTS_DOC: dict[int, str] = {
     0: "e^2, as in the paper",
     1: "max(-e, 0)",
@@ -334,6 +350,7 @@ EVENT_KIND_DOC: dict[int, str] = {
     3: "a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip",
     4: "the held object slips: dynamic pressure vibrates in both directions",
     5: "the slip has ended; one for each SLIP",
+    6: "trust fell, or has been higher for 100 ms",
 }
 
 
@@ -347,8 +364,6 @@ FRAME_FLAG_DOC: dict[int, str] = {
     64: "no good static pressure word; contact is judged by the electrodes alone",
     128: "no good thermal flux word",
     256: "no good temperature word",
-    512: "(always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it",
-    1024: "(always) force x has two to three times the noise of y and z",
     2048: "suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing",
     4096: "more than half of the signal energy is bulge: the PoC is probably biased",
     8192: "in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes",
@@ -408,6 +423,16 @@ QUANTITY_FLAG_DOC: dict[int, str] = {
     64: "filtered static pressure and, if calibrated, the force from it",
     128: "EVENT messages; sent while FRAMES or PAC is on",
 }
+
+
+# Flags that hold trust down to a level.
+TRUST_FLAGS: dict[Trust, FrameFlags] = {
+    Trust.NONE: FrameFlags(0x40008002),
+    Trust.HOLD: FrameFlags(0x09800000),
+    Trust.INTERVAL: FrameFlags(0xB6292170),
+}
+
+LATCHED_FLAGS = FrameFlags(0x71E1A1F0)  # in STATUS, until CLEAR_FAULTS
 
 
 class Setting(IntEnum):
@@ -881,12 +906,13 @@ class Frame:
     torsion_mnmm: int
     wrench_age_ms: int
     electrodes_out: int
+    trust: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiHI")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiHIB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 150 bytes."""
+        """Payload without id and CRC, 151 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -909,6 +935,7 @@ class Frame:
             self.torsion_mnmm,
             self.wrench_age_ms,
             self.electrodes_out,
+            self.trust,
         )
 
     @classmethod
@@ -937,6 +964,7 @@ class Frame:
             v[62],
             v[63],
             v[64],
+            v[65],
         )
 
 
@@ -1187,12 +1215,13 @@ class Idle:
     energy_count2: int
     pdc: int
     tdc: int
+    trust: int
 
     ID: ClassVar[int] = 0x15
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBIHIHH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBIHIHHB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 22 bytes."""
+        """Payload without id and CRC, 23 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -1203,6 +1232,7 @@ class Idle:
             self.energy_count2,
             self.pdc,
             self.tdc,
+            self.trust,
         )
 
     @classmethod
@@ -1219,6 +1249,7 @@ class Idle:
             v[6],
             v[7],
             v[8],
+            v[9],
         )
 
 
@@ -1271,12 +1302,13 @@ class Event:
     onset_us: int
     energy_count2: int
     peak_count: int
+    trust: int
 
     ID: ClassVar[int] = 0x17
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBBBIIH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBBBIIHB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 20 bytes."""
+        """Payload without id and CRC, 21 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -1287,6 +1319,7 @@ class Event:
             self.onset_us,
             self.energy_count2,
             self.peak_count,
+            self.trust,
         )
 
     @classmethod
@@ -1303,6 +1336,7 @@ class Event:
             v[6],
             v[7],
             v[8],
+            v[9],
         )
 
 

@@ -1,7 +1,7 @@
 // What a hand holds is never zeroed: doubt, the host's word, and the way back from a tare that was wrong.
 #include "emulated_finger.h"
 
-#include "solve/results.h"
+#include "solve/flags.h"
 
 // Squeezed, then let down to a light hold of which neither size nor pattern tells what it is.
 static emulated_finger light_hold(double load, double pdc_load)

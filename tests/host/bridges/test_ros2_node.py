@@ -62,7 +62,7 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
     events = [(topic, message.data) for topic, message in ros.published if topic.endswith("event")]
     assert {("biotac/finger0/event", "TOUCH"), ("biotac/finger1/event", "TOUCH")} <= {*events}
     topics = {topic for topic, _ in ros.published if not topic.endswith("event")}
-    assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in ("wrench", "poc", "flags")}
+    assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in ("wrench", "poc", "flags", "trust")}
     for topic in topics:
         sent = [values(message) for name, message in ros.published if name == topic]
         assert len(sent) == 300

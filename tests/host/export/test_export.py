@@ -96,6 +96,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "wrench_age_ms": sent["wrench_age_ms"],
         "electrodes_out": sent["electrodes_out"],
         "flags": sent["flags"],
+        "trust": sent["trust"],
         "gap_s": np.where(
             np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0
         ),
@@ -238,9 +239,8 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
             got.setdefault(connection.topic, []).append((stamp_ns, bag.deserialize(data, connection.msgtype)))
     for finger in range(FINGERS):
         wanted, pac = expected(recorded, finger), expected_pac(recorded, finger)
-        topics = {
-            name: got[f"/biotac/finger{finger}/{name}"] for name in ("wrench", "poc", "flags", "counts", "pac", "bands")
-        }
+        names = ("wrench", "poc", "flags", "trust", "counts", "pac", "bands")
+        topics = {name: got[f"/biotac/finger{finger}/{name}"] for name in names}
         for name, vectors in (
             ("force_n", [m.wrench.force for _, m in topics["wrench"]]),
             ("torque_nmm", [m.wrench.torque for _, m in topics["wrench"]]),
@@ -254,7 +254,8 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
             headers = [m.header for _, m in topics[name]]
             assert [h.stamp.sec * 10**9 + h.stamp.nanosec for h in headers] == stamps
             assert {h.frame_id for h in headers} == {f"biotac_finger{finger}"}
-        assert [m.data for _, m in topics["flags"]] == wanted["flags"].tolist()
+        for name in ("flags", "trust"):
+            assert [m.data for _, m in topics[name]] == wanted[name].tolist()
         slow = np.column_stack([wanted["counts"], wanted["pdc"], wanted["tac"], wanted["tdc"]])
         assert np.array_equal([m.data for _, m in topics["counts"]], slow)
         assert np.array_equal([m.data for _, m in topics["pac"]], pac["pac"])

@@ -43,9 +43,9 @@ def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:
     assert live.firmware.of(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
     assert len(live.firmware.of(wire.Subscribe)) == 1
     now_us = live.firmware.now_us()
-    touch = wire.Event(3, now_us, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT)
-    slip = wire.Event(5, now_us, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
-    old = wire.Event(5, now_us - 30_000_000, 3, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
+    touch = wire.Event(3, now_us, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT, 255)
+    slip = wire.Event(5, now_us, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120, 255)
+    old = wire.Event(5, now_us - 30_000_000, 3, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120, 255)
     live.send(*(packed(event) for event in (old, touch, slip)))
     until(lambda: len(seen) == 3)
     stop()

@@ -478,11 +478,11 @@ def test_without_contact_numbers_are_dim_and_notices_are_apart(
     player = make_player()
     touch = replace(touch, wire=touch.wire.copy())
     flags = biotac.FrameFlags
-    touch.wire["flags"] = int(contact | flags.MX_DERIVED | flags.FX_WEAK | flags.FAULT)
+    touch.wire["flags"] = int(contact | flags.TORSION_OK | flags.HELD | flags.FAULT)
     player.script.put(touch)
     page = open_page(view_of(lambda: player))
     page.wait_for_selector("#flags [data-flag=FAULT]")
     until(page, f"() => getComputedStyle(document.querySelector('[data-key=forceN]')).fontWeight === '{heavy}'")
     named = "place => [...document.querySelectorAll(`${place} li`)].map(e => e.dataset.flag).sort().join()"
     assert page.evaluate(named, "#flags") == "FAULT"
-    assert page.evaluate(named, "#notices").replace("CONTACT,", "") == "FX_WEAK,MX_DERIVED"
+    assert page.evaluate(named, "#notices").replace("CONTACT,", "") == "HELD,TORSION_OK"

@@ -240,7 +240,7 @@ def test_a_browser_that_reads_nothing_does_not_hold_the_reader(make_player, view
 
 
 def test_events_are_marks_in_their_fingers_time(make_player, touch) -> None:
-    event = wire.Event(3, int(touch.t_us[-1]) % 2**32, 1, 5, wire.EventKind.SLIP, 2, 0, 0, 99)
+    event = wire.Event(3, int(touch.t_us[-1]) % 2**32, 1, 5, wire.EventKind.SLIP, 2, 0, 0, 99, 255)
     state = State("sim:")
     state.take(replace(touch, messages=[event]), make_player())
     health = json.loads(state.wait(state.cursor(), 1.0))["health"]

@@ -26,7 +26,7 @@ def status(uptime_s: int) -> bytes:
 
 
 def idle(finger: int, seq: int, t_us: int, frames: int) -> bytes:
-    message = wire.Idle(seq % 2**16, t_us % 2**32, finger, 1, 0, frames, 17, 2400, 1000)
+    message = wire.Idle(seq % 2**16, t_us % 2**32, finger, 1, 0, frames, 17, 2400, 1000, 3)
     return encode(wire.Idle.ID, message.pack())
 
 

@@ -112,5 +112,6 @@ def as_line(frame: Frame) -> str:
     torque = " ".join(f"{v:8.2f}" for v in frame.torque_nmm)
     flags = "|".join(flag.name or "" for flag in FrameFlags if flag in frame.flags)
     return (
-        f"{frame.t_us / 1e6:9.3f} s finger {frame.finger}  poc {poc} mm  force {force} N  torque {torque} N*mm  {flags}"
+        f"{frame.t_us / 1e6:9.3f} s finger {frame.finger}  poc {poc} mm  force {force} N  torque {torque} N*mm  "
+        f"{frame.trust.name:8}  {flags}"
     )

@@ -20,7 +20,7 @@ class Page {
     this.frozen = false; // pause of a board: only the picture stands still
     this.limit = new Limit();
     this.plots = [
-      new TimePlot(byId("force-plot"), ["x", "y", "z"], ["x", "y", "z"], { least: 1, digits: 1, zero: true, wide: ["appliedX", "appliedY", "appliedZ"] }),
+      new TimePlot(byId("force-plot"), ["x", "y", "z"], ["x", "y", "z"], { least: 1, digits: 1, zero: true, wide: ["appliedX", "appliedY", "appliedZ"], trust: true }),
       new TimePlot(byId("pdc-plot"), ["pdc"], ["text"], { least: 20, digits: 0, zero: false }),
     ];
     this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));

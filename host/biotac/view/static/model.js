@@ -52,6 +52,7 @@ export class Model {
       seq: row[column.seq],
       tUs: row[column.t_us],
       flags: row[column.flags],
+      trust: row[column.trust],
       signal: scaled("signal_q4"),
       pdc: plain("pdc"),
       tac: plain("tac"),
@@ -70,7 +71,7 @@ export class Finger {
     this.latest = null;
     this.addedMs = 0; // when the latest came, by the browser's clock
     const ring = () => new Float64Array(HISTORY_ROWS).fill(NaN);
-    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring(), appliedX: ring(), appliedY: ring(), appliedZ: ring() };
+    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring(), appliedX: ring(), appliedY: ring(), appliedZ: ring(), trust: ring() };
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
     this.pacSamples = 0;
@@ -86,6 +87,7 @@ export class Finger {
     [this.history.x[at], this.history.y[at], this.history.z[at]] = frame.forceN;
     [this.history.appliedX[at], this.history.appliedY[at], this.history.appliedZ[at]] = frame.appliedN;
     this.history.pdc[at] = frame.pdc;
+    this.history.trust[at] = frame.trust;
     this.trail.push(frame.mapMm);
     if (this.trail.length > TRAIL_POINTS) this.trail.shift();
   }

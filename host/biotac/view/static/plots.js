@@ -60,8 +60,8 @@ class Area {
 
 export class TimePlot {
   // names: columns of Finger.history; wide: those drawn behind them; colours: of both in the theme; least: the smallest span shown
-  constructor(canvas, names, colours, { least, digits, zero, wide = [] }) {
-    Object.assign(this, { canvas, names, colours, least, digits, zero, wide });
+  constructor(canvas, names, colours, { least, digits, zero, wide = [], trust = false }) {
+    Object.assign(this, { canvas, names, colours, least, digits, zero, wide, trust });
   }
 
   // marks: events of this finger, { t_us, name }
@@ -77,6 +77,7 @@ export class TimePlot {
       area.tick(theme, { y: area.y((v - low) / (high - low)), text: v.toFixed(step < 1 ? this.digits : 0).replace("-", "−") });
     }
     area.timeTicks(theme);
+    if (this.trust) this.band(area, theme, finger, shown, endS);
     let free = area.right; // the newest comes first; a text that would reach into it is left out
     for (const mark of marks.toReversed()) free = this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / zoom.s, mark.name, free);
     c.lineJoin = "round";
@@ -104,6 +105,16 @@ export class TimePlot {
       c.stroke();
     });
     c.setLineDash([]);
+  }
+
+  // Below the lines, where the force is not one to act on: NONE the highest, INTERVAL the lowest.
+  band(area, theme, finger, shown, endS) {
+    const { c } = area;
+    c.fillStyle = theme.warn;
+    for (const k of shown) {
+      const height = 4 * (3 - finger.history.trust[k]);
+      if (height > 0) c.fillRect(area.x(1 - (endS - finger.history.t[k]) / zoom.s), area.bottom - height, 1.5, height);
+    }
   }
 
   // Returns where it begins, in pixels.
