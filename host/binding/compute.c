@@ -3,6 +3,7 @@
 #include "map/map_gen.h"
 #include "map/population.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -73,12 +74,20 @@ static void replace_force(const bt_population_column *columns, const int32_t e_q
     result->torque_nmm[0] = result->poc_mm[1] * force[2] - result->poc_mm[2] * force[1];
 }
 
+static void drop(const uint32_t wanted, const uint32_t quantity, double result[3])
+{
+    for (int d = 0; d < 3 && !(wanted & quantity); d++) {
+        result[d] = NAN;
+    }
+}
+
 int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, int64_t counts_stride,
                    const void *tare, int64_t tare_stride, void *results)
 {
     int32_t tare_q4[BT_ELECTRODES], e_q4[BT_ELECTRODES];
     double e[BT_ELECTRODES];
     lin2013_result *result = results;
+    const uint32_t wanted = formulas->wanted;
     if (tare_stride == 0 && !read_tare(tare, tare_q4)) {
         return 0;
     }
@@ -91,9 +100,13 @@ int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, i
             e[i] = e_q4[i] / 16.0;
         }
         lin2013(e, &formulas->lin, result);
-        if (formulas->population != NULL) {
+        // Torque x is made of the map's force.
+        if (formulas->population != NULL && wanted & (BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)) {
             replace_force(formulas->population, e_q4, e, result);
         }
+        drop(wanted, BT_QUANTITY_FLAG_POC, result->poc_mm);
+        drop(wanted, BT_QUANTITY_FLAG_FORCE, result->force_n);
+        drop(wanted, BT_QUANTITY_FLAG_TORQUE, result->torque_nmm);
     }
     return -1;
 }

@@ -13,6 +13,7 @@ typedef double bt_population_column[9];
 typedef struct {
     lin2013_settings lin;
     const bt_population_column *population; // compressed, then bulging electrodes; NULL: force is Lin's
+    uint32_t wanted;                        // BT_QUANTITY_FLAG_POC, FORCE and TORQUE; the others become NaN
 } bt_formulas;
 
 // counts: n rows of 19 uint16, counts_stride bytes apart, of any alignment; 0..4095 or BT_INVALID_COUNT.

@@ -16,8 +16,9 @@ from kernel_errors import MILLI, NAMES, QUANTITIES
 
 ROOT = Path(__file__).resolve().parents[2]
 # The double is its own rounding; a float is off by 26 half units of 2^-23 of a sum, which the projection magnifies by
-# up to 4.6; exact rounds to nm; the shipped kernel's bound is in firmware/reference/kernel_bounds.h.
-POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "exact int64": 0.002, "shipped": 1.5}
+# up to 4.6; exact rounds to nm; the shipped kernel's bound is in firmware/reference/kernel_bounds.h. The quick one
+# takes the root in the middle of a step of 2^-7, so it is off by 2^-9 of 7 mm, and cuts components of 14 bits.
+POC_BOUNDS_UM = {"double": 1e-8, "float": 0.17, "exact int64": 0.002, "shipped": 1.5, "quick": 7000 / 2**9 + 3}
 
 
 @pytest.mark.parametrize("weights", PocWeights)
@@ -26,11 +27,6 @@ def test_a_kernel_is_within_its_bound(name: str, weights: PocWeights) -> None:
     error = kernel_errors.errors(name, weights, kernel_errors.frames(weights, 500))[:, 0]
     assert not np.isinf(error).any()
     assert max(np.nanmax(error), kernel_errors.climbed_um(name, weights, 50)) <= POC_BOUNDS_UM[name]
-
-
-def test_the_quick_kernel_is_worse_and_some_of_its_points_are_missing() -> None:
-    error = kernel_errors.errors("quick", PocWeights.ABS_N2, kernel_errors.frames(PocWeights.ABS_N2, 500))[:, 0]
-    assert np.isinf(error).any() and error[np.isfinite(error)].max() > 10
 
 
 @pytest.mark.parametrize("weights", PocWeights)

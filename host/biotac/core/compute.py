@@ -31,6 +31,9 @@ _TARE = np.dtype(np.float64)
 _ELECTRODES = len(sensor.ELECTRODE_NAMES)
 _ONE = (_ELECTRODES,)
 _ALL_GOOD = -1
+_Q = wire.QuantityFlags
+_RESULTS = _Q.POC | _Q.FORCE | _Q.TORQUE
+_QUANTITY = {"poc_mm": _Q.POC, "force_n": _Q.FORCE, "torque_nmm": _Q.TORQUE, "torsion_nmm": _Q.TORQUE}
 
 # Looked up once: a call with one frame takes less time than a few of these would.
 _buffer = ffi.from_buffer
@@ -46,6 +49,7 @@ def compute(
     *,
     wrench_map: BoardMap | bytes | None = None,
     pdc_above_rest: Any = None,
+    quantities: wire.QuantityFlags = _RESULTS,
 ) -> StructArray:
     """Results of recorded counts, as RESULT_DTYPE: shape (n,) for counts (n, 19), () for counts (19,).
 
@@ -63,26 +67,40 @@ def compute(
     may need, is (n,) or one number, in counts, NaN where missing. Raises InputError for a blob that a board would
     refuse.
 
+    ``quantities`` are those wanted of POC, FORCE and TORQUE; the others are NaN. Without FORCE and TORQUE no map is
+    evaluated.
+
     ``compute(rows)``, with rows of FRAME_DTYPE as from ``load`` and ``Hand.read``, takes counts, tare and pressure
-    from them; an electrode whose tare is unknown has no weight. Rows do not contain the board's settings: to get what
-    the board computed, give its ``Recording.settings``.
+    from them; an electrode whose tare is unknown has no weight. Rows do not contain the board's settings: give
+    ``hand.board.settings()`` or ``Recording.settings`` with them. Without settings, rows whose board plainly had others
+    than the defaults are refused with a ValueError; ``settings={}`` means the defaults whatever the board had.
 
     Values are NaN where there is no answer: poc_mm and torque_nmm x if no electrode has weight. Unlike the board, this
     does not round to wire units and never saturates. Raises ValueError for other shapes, types and ranges, naming the
     first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
+    given = counts
     if tare is None:
         counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
+    if settings is None and wrench_map is None:
+        refuse_results_of_others(given)
     if wrench_map is not None:
         from ..map.float64 import by_map  # here: everybody would wait for it at `import biotac`
 
-        plain = compute(counts, tare, settings)
+        by_lin = {**(settings or {}), wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # the map replaces any force
+        plain = compute(counts, tare, by_lin)
         shape = plain.shape
         out = np.empty(shape, MAPPED_RESULT_DTYPE) if out is None else _checked_out(out, shape, MAPPED_RESULT_DTYPE)
+        out["torsion_nmm"] = np.nan
         for name in RESULT_DTYPE.names or ():
             out[name] = plain[name]
-        return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
-    formulas = _formulas(() if settings is None else tuple(settings.items()))
+        if quantities & (_Q.FORCE | _Q.TORQUE):
+            by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
+        for name, quantity in _QUANTITY.items():
+            if not quantities & quantity:
+                out[name] = np.nan
+        return out
+    formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
     # The fast path for one frame with the types of a live frame: there the checks would take longer than the maths.
     # Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
@@ -123,15 +141,52 @@ def _of_rows(rows: Any, pdc_above_rest: Any) -> tuple[NDArray[np.uint16], NDArra
     return counts, tare, pdc_above_rest
 
 
+#: Beyond all rounding on a board: in mm, N and N mm, besides a hundredth of the value.
+_UNLIKE = {"poc_mm": 0.02, "force_n": 0.01, "torque_nmm": 0.2}
+
+
+def refuse_results_of_others(counts: Any) -> None:
+    """Raise ValueError if ``counts``, rows or their field, come with results that the default settings do not give."""
+    rows = counts if getattr(counts, "dtype", _COUNT).names else _rows_of_field(counts)
+    if rows is None or not {"counts", "tare", "flags", "electrodes_out", *_UNLIKE} <= set(rows.dtype.names or ()):
+        return
+    rows = rows.reshape(-1)
+    rows = rows[(rows["electrodes_out"] == 0) & (rows["counts"] <= sensor.FULL_SCALE_COUNT).all(axis=1)]
+    # The point (0, 0, 0) is on no finger: nobody filled in results.
+    rows = rows[((rows["flags"] & wire.FrameFlags.UNTARED) == 0) & (rows["poc_mm"] != 0).any(axis=1)]
+    own = compute(rows, settings={})
+    for name, within in _UNLIKE.items():
+        seen, ours = rows[name], own[name]  # NaN, what nobody asked for or was invalid, is never off
+        off = np.nan_to_num(np.abs(seen - ours) - within - 0.01 * np.abs(ours))
+        if (off > 0).any():
+            at, axis = np.unravel_index(off.argmax(), off.shape)
+            what = f"{name} {'xyz'[axis]} is {seen[at, axis]:.2f} in row seq {rows['seq'][at]} of finger"
+            raise ValueError(
+                f"{what} {rows['finger'][at]}, but default settings give {ours[at, axis]:.2f}: the board had others. "
+                "Give settings=hand.board.settings() or Recording.settings (finger_settings of a calibrated finger; "
+                "wrench_map, if it has one), or settings={} if you mean the defaults"
+            )
+
+
+def _rows_of_field(counts: Any) -> StructArray | None:
+    """The rows of which ``counts`` (n, 19) is a field, as ``frames["counts"]`` is; None if there are none."""
+    rows = getattr(counts, "base", None)
+    names = getattr(getattr(rows, "dtype", None), "names", None) or ()
+    if rows is None or "counts" not in names or rows.ndim != 1 or counts.ndim != 2 or not len(counts):
+        return None
+    first, size = counts.ctypes.data - rows["counts"].ctypes.data, rows.itemsize
+    return np.asarray(rows[first // size + counts.strides[0] // size * np.arange(len(counts))])
+
+
 def per_frame(
-    tare: Any, settings: Mapping[wire.Setting, int] | None = None
+    tare: Any, settings: Mapping[wire.Setting, int] | None = None, quantities: wire.QuantityFlags = _RESULTS
 ) -> Callable[[NDArray[np.uint16]], StructArray]:
     """compute() for a live stream: a function from one frame's counts, uint16 (19,), to its results.
 
     Tare and settings are checked once, and every call fills and returns the same RESULT_DTYPE array of shape (): copy
     what has to last. This saves half of the time that compute() takes for one frame. Raises ValueError as compute().
     """
-    formulas = _formulas(() if settings is None else tuple(settings.items()))
+    formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
     base = _checked_tare(tare, _ONE)
     out = np.empty((), RESULT_DTYPE)
     compute(np.zeros(_ONE, _COUNT), base, settings, out)  # raises for a tare that is out of range
@@ -155,9 +210,11 @@ _DEFAULTS = default_settings()
 
 
 @lru_cache(maxsize=16)
-def _formulas(items: tuple[tuple[Any, Any], ...]) -> Any:
-    """The bt_formulas for these settings. It is only read, so calls may share it."""
+def _formulas(items: tuple[tuple[Any, Any], ...], wanted: int) -> Any:
+    """The bt_formulas for these settings and quantities. It is only read, so calls may share it."""
     settings = dict(items)
+    if not wanted or wanted & ~_RESULTS:
+        raise ValueError(f"quantities are {_Q(wanted)!r}, expected some of POC, FORCE and TORQUE")
     for key in settings:
         if key not in _DEFAULTS:
             raise ValueError(f"settings contain {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
@@ -165,7 +222,7 @@ def _formulas(items: tuple[tuple[Any, Any], ...]) -> Any:
     board_settings(chosen)  # raises ValueError for a value out of range
     from ..map import population  # here: everybody would wait for it at `import biotac`
 
-    formulas = ffi.new("bt_formulas *", {"lin": formula_settings(chosen)[0]})
+    formulas = ffi.new("bt_formulas *", {"lin": formula_settings(chosen)[0], "wanted": wanted})
     if population.in_force(chosen):
         formulas.population = population.compiled_coefficients()
     return formulas

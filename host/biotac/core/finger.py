@@ -23,6 +23,7 @@ from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.identity import is_foreign
 from ..wire.native import ffi, lib
 from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
+from .compute import refuse_results_of_others
 
 ROUND_US = 10_000
 #: An EVENT message's fields (protocol/MESSAGES.md), as the board sends them.
@@ -75,6 +76,7 @@ class Finger:
     ) -> None:
         if not 0 <= index < sensor.MAX_SENSORS:
             raise ValueError(f"index is {index}, expected 0 to {sensor.MAX_SENSORS - 1}")
+        self._by_default = settings is None and wrench_map is None
         self.settings: Settings = {**default_settings(), **(settings or {})}
         self._settings = board_settings(self.settings)
         self._finger = ffi.new("bt_finger *")
@@ -105,7 +107,8 @@ class Finger:
         valid word came; a channel that is not given is missing throughout. PAC shows only whether words leapt
         (SENSOR_FAULT). ``t_us`` (n,), the rounds' device times in us, wraps at 2^32 like the board's; by default each
         is 10 ms after the one before. A jump of 90 ms or more is a silence, during which drift went on. Raises
-        ValueError for other shapes, types and ranges, before any round is processed.
+        ValueError for other shapes, types and ranges, before any round is processed; also when ``counts`` are a field
+        of rows whose board had other settings, and this finger was given none.
         """
         words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
         rows = np.empty(len(words), FINGER_DTYPE)
@@ -131,6 +134,8 @@ class Finger:
     def _words_of(
         self, counts: Any, pdc: Any, tac: Any, tdc: Any, pac: Any, t_us: Any
     ) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
+        if self._by_default:
+            refuse_results_of_others(counts)
         electrodes = checked_words("counts", counts, None, _ELECTRODES)
         n = len(electrodes)
         words = np.full((n, slots.SLOTS_PER_FRAME), wire.INVALID_COUNT, np.uint16)

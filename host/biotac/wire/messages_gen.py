@@ -184,7 +184,7 @@ class FrameFlags(IntFlag):
     SHED = 1 << 22  # the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
-    POPULATION = 1 << 25  # force comes from the population map, or along the skin's normals where the touch is unlike its training
+    POPULATION = 1 << 25  # force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force
     OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
     TARE_UNSURE = 1 << 27  # the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
@@ -378,7 +378,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4194304: "the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent",
     8388608: "the sensor was away and has not given its serial number since: tare, calibration and map may belong to another",
     16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
-    33554432: "force comes from the population map, or along the skin's normals where the touch is unlike its training",
+    33554432: "force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force",
     67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma",
     134217728: "the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then",
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",

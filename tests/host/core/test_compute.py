@@ -242,3 +242,73 @@ def test_one_frame_per_call() -> None:
     counts[0, 0] = 4096
     with pytest.raises(ValueError, match="E1 = 4096"):
         results(counts[0])
+
+
+def read_from(*changes: tuple[Setting, int]) -> tuple[np.ndarray, dict[Setting, int]]:
+    with biotac.open("sim:press.toml") as hand:
+        for setting, value in changes:
+            hand.board.set_setting(setting, value)
+        return hand.read(seconds=2), hand.board.settings()
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ((Setting.FORCE_MODEL, int(wire.ForceModel.LIN)), "force_n"),
+        ((Setting.FORCE_GAIN_Z_NN, 9_000_000), "force_n"),
+        ((Setting.POC_WEIGHTS, int(PocWeights.ABS_N2)), "poc_mm"),
+        ((Setting.TORQUE_GAIN_Y_NN, 90_000_000), "torque_nmm"),
+    ],
+)
+def test_rows_of_a_board_with_other_settings_are_refused_until_they_are_given(change, field) -> None:
+    rows, board = read_from(change)
+    tare = np.nan_to_num(rows["tare"])
+    for without in (
+        lambda: biotac.compute(rows),
+        lambda: biotac.compute(rows[3::2]["counts"], tare[3::2]),
+        lambda: biotac.Finger().feed(rows["counts"], rows["pdc"]),
+        lambda: biotac.Finger().events(rows["counts"][10:], rows["pdc"][10:]),
+    ):
+        with pytest.raises(ValueError, match=rf"{field} . is .* in row seq \d+ of finger 0, but default settings give"):
+            without()
+    got = biotac.compute(rows, settings=board)
+    for name, within in (("force_n", 0.01), ("poc_mm", 0.01), ("torque_nmm", 0.1)):
+        sent = np.isfinite(rows[name])
+        assert sent.sum() > 300
+        np.testing.assert_allclose(got[name][sent], rows[name][sent], atol=within)
+    biotac.Finger(board).feed(rows["counts"], rows["pdc"])
+    biotac.compute(rows, settings={})  # the defaults, said so
+
+
+def test_rows_of_a_board_with_default_settings_need_none() -> None:
+    rows, board = read_from()
+    assert biotac.compute(rows).tobytes() == biotac.compute(rows, settings=board).tobytes()
+    biotac.Finger().feed(rows["counts"], rows["pdc"])
+
+
+def test_the_rows_behind_a_strided_field_are_the_ones_compared() -> None:
+    """One bad row of three: only who takes that one is refused."""
+    rows, _ = read_from()
+    rows = rows[np.isfinite(rows["force_n"]).all(axis=1)]
+    rows["force_n"][4] += 1.0
+    biotac.Finger().feed(rows["counts"][::3])
+    with pytest.raises(ValueError, match=f"row seq {rows['seq'][4]} "):
+        biotac.Finger().feed(rows["counts"][1::3])
+
+
+@pytest.mark.parametrize("wanted", range(1, 8))
+def test_what_is_not_wanted_is_nan_and_the_rest_is_the_same(wanted) -> None:
+    quantities = biotac.QuantityFlags(wanted)
+    counts = random_counts(50)
+    want, got = biotac.compute(counts, TARE), biotac.compute(counts, TARE, quantities=quantities)
+    live = biotac.per_frame(TARE, quantities=quantities)
+    for name, quantity in zip(RESULT_DTYPE.names, biotac.QuantityFlags(7), strict=True):
+        asked = want[name] if quantities & quantity else np.full((50, 3), np.nan)
+        np.testing.assert_array_equal(got[name], asked)
+        np.testing.assert_array_equal(live(counts[7])[name], asked[7])
+
+
+@pytest.mark.parametrize("wanted", [0, 8, 15])
+def test_quantities_without_a_result_are_refused(wanted) -> None:
+    with pytest.raises(ValueError, match="expected some of POC, FORCE and TORQUE"):
+        biotac.compute(random_counts(2), TARE, quantities=biotac.QuantityFlags(wanted))

@@ -1,8 +1,8 @@
 """The trade-off that matters: a force's cycles on the board against its error on real fingers in newtons.
 
 Every error is on data held out. A finger's own map is judged block by block, as in `biotac calibrate wrench`; a map of
-other fingers is judged on a finger that was not in its training. Cycles are those that `tools/bench/run --keep` counted
-on emulated cores.
+other fingers is judged on a finger that was not in its training. Cycles are those that `tools/bench/run --models`
+counted on emulated cores (tools/make/figures.py).
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
     names = [path.name for path in files]
     if len(set(names)) < len(names):
         raise InputError(f"{', '.join(names)}: two have the same name; rename one")
-    kept = json.loads(resources.files(__package__).joinpath(CYCLES).read_text(encoding="utf-8"))
+    kept = json.loads(resources.files(__package__).joinpath(CYCLES).read_text(encoding="utf-8"))["data"]
     runs = {path.name: load(path).run for path in files}
     with threadpool_limits(limits=1, user_api="blas"):
         others, notes = _of_others(files, list(runs.values()))
