@@ -304,8 +304,7 @@ class Reader:
 
     def applied_n(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """Force (n, 3) in N on simulated fingers (n,) at rows' times (n,), NaN if unknown; None: real or restarted."""
-        source, round0_us = self.link.source, self._round0_us
-        return None if source is None or round0_us is None else source.applied_n(finger, t_us - round0_us)
+        return self.link.applied_n(finger, t_us, self._round0_us)
 
     # ---- its time ------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..recording.labels import of_rows
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
-from ..wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
+from ..wire.fields import AXES, BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
 from ..wire.frames import StructArray
 
 #: Called with the share of the work done, 0 to 1.
@@ -23,6 +23,8 @@ STAMP = Field(
 )
 
 GAP = Field("gap_s", "<f4", "s", "how long the board was away just before this row; 0 where it was there")
+
+APPLIED = Field("applied_n", "<f8", "N", "force on a simulated finger; NaN where it is not known", AXES)
 
 LABEL = Field("label", "U", "1", "texts of the labels that hold at this row, joined by '; '; empty without any")
 
@@ -83,9 +85,19 @@ def in_order(made: list[Table]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return of_table, np.lexsort((of_table, np.concatenate([table.arrays["t_us"] for table in made])))
 
 
+def described(made: list[Table]) -> dict[str, tuple[Field, ...]]:
+    """The columns of each kind in ``made``, and of those that are exported."""
+    return {**EXPORTED, **{table.kind: table.columns for table in made}}
+
+
 def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORTED) -> list[Table]:
-    """Tables of the given ``kinds`` for every finger that has such rows, ordered by finger."""
+    """Tables of the given ``kinds`` for every finger that has such rows, ordered by finger.
+
+    Exported frames of simulated fingers have APPLIED, too.
+    """
     made = []
+    if kinds is EXPORTED and recording.applied_n is not None:
+        kinds = {**EXPORTED, "frames": (*COLUMNS, APPLIED)}
     for finger in recording.fingers:
         for kind, columns in kinds.items():
             rows: StructArray = getattr(recording, kind)
@@ -99,6 +111,7 @@ def _arrays(recording: Recording, columns: Sequence[Field], rows: StructArray) -
     made: dict[str, Callable[[], NDArray[Any]]] = {
         STAMP.name: lambda: recording.stamp_ns(rows["t_us"]),
         GAP.name: lambda: _gap_s(recording, rows["t_us"]),
+        APPLIED.name: lambda: recording.applied_at(rows["finger"], rows["t_us"]),
         LABEL.name: lambda: of_rows(recording.labels, rows["t_us"], rows["finger"]),
     }
     return {column.name: made[column.name]() if column.name in made else rows[column.name] for column in columns}

@@ -8,7 +8,7 @@ from typing import Any
 from scipy.io import savemat
 
 from ..recording.reader import Recording
-from .columns import EXPORTED, Show, Table
+from .columns import Show, Table, described
 
 KINDS_APART = False
 
@@ -22,7 +22,7 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
         fingers.setdefault(f"finger{table.finger}", {"frame_id": table.frame_id})[table.kind] = cells
     columns = {
         kind: {c.name: {"unit": c.unit, "what": c.what, "parts": list(c.parts)} for c in fields}
-        for kind, fields in EXPORTED.items()
+        for kind, fields in described(made).items()
     }
     about = {"metadata": recording.metadata, "columns": columns}
     with path.open("wb") as file:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording.reader import Recording
-from .columns import EXPORTED, Show, Table
+from .columns import Show, Table, described
 
 KINDS_APART = False
 
@@ -22,7 +22,7 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
     """Write the file as numpy.savez_compressed would, but array by array, in order to report progress."""
     about = {
         "metadata": recording.metadata,
-        **{kind: [asdict(column) for column in columns] for kind, columns in EXPORTED.items()},
+        **{kind: [asdict(column) for column in columns] for kind, columns in described(made).items()},
         "frame_id": {f"finger{table.finger}": table.frame_id for table in made},
     }
     arrays: dict[str, NDArray[Any]] = {"columns": np.array(json.dumps(about))}

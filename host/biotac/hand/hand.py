@@ -88,7 +88,7 @@ class Hand:
         #: Converts device time to host time, fed by whatever is read. A simulated board's time is not a real clock: it
         #: waits for the computer, which shows up as ``resets``.
         self.clock: DeviceClock = reader.clock
-        #: What was applied to simulated fingers (n,) in rounds at device times (n,); None on a real board.
+        #: What was applied to simulated fingers (n,) in rounds at device times (n,); None on a real one.
         self.applied_n = reader.applied_n
 
     # ---- what it is ----------------------------------------------------------------------------

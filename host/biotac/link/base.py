@@ -57,6 +57,12 @@ class Link(Protocol):
     #: recordings, nor for a board that several share.
     owns_stream: bool = True
 
+    def applied_n(
+        self, finger: NDArray[np.uint8], t_us: NDArray[np.int64], round0_us: int | None
+    ) -> NDArray[np.float64] | None:
+        """Force (n, 3) in N on fingers (n,) at device times (n,), if round 0 was at ``round0_us``; None if unknown."""
+        return None if self.source is None or round0_us is None else self.source.applied_n(finger, t_us - round0_us)
+
     @property
     def notes(self) -> Sequence[str]:
         """What a user should know of rounds that another driver made, in words, so far."""

@@ -116,6 +116,15 @@ class Recording:
         sent = self._contents.sent[APPLIED]
         return None if (sent == wire.INVALID_I32).all() else to_units(sent, FORCE_LSB_PER_N)
 
+    def applied_at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> NDArray[np.float64]:
+        """``applied_n`` of FRAMEs of fingers (n,) at times (n,), of which 32 bits count; NaN where there is none."""
+        if self.applied_n is None:
+            return np.full((len(finger), 3), np.nan)
+        own, asked = (t % 2**32 * 8 + of for t, of in ((self.frames["t_us"], self.frames["finger"]), (t_us, finger)))
+        order = np.argsort(own)
+        rows = order[np.searchsorted(own, asked, sorter=order).clip(0, len(own) - 1)]
+        return np.where((own[rows] == asked)[:, None], self.applied_n[rows], np.nan)
+
     def applied_in(self, block: int) -> NDArray[np.float64]:
         """``applied_n`` of a block's frames, by its number in ``blocks``."""
         return to_units(self._contents.blocks[block].rows[FRAME][APPLIED], FORCE_LSB_PER_N)

@@ -37,19 +37,18 @@ class LiveFingers:
     def at_rest(self, rounds: int = 1) -> Source:
         """The next rounds, in which nothing touches."""
         serials = tuple(default_serial(finger.seed) for finger in self._fingers)
-        words = np.stack([self.read({}) for _ in range(rounds)])
-        return Source("live", words, serials=serials, emulated=self._fingers)
+        return Source("live", self.read({}, rounds), serials=serials, emulated=self._fingers)
 
-    def read(self, loads: Mapping[str, Load]) -> Words:
-        """The words of the next round, (fingers, 44). A finger that is not named is not touched."""
+    def read(self, loads: Mapping[str, Load], rounds: int = 1) -> Words:
+        """The words of the next rounds, (rounds, fingers, 44). A finger that is not named is not touched."""
         for name in loads:
             self.number(name)
         states = [touch.states(loads.get(name)) for name in self.names]
-        words = np.stack([sampler.step(*state) for sampler, state in zip(self._samplers, states, strict=True)])
+        read = [sampler.steps(rounds, *state) for sampler, state in zip(self._samplers, states, strict=True)]
+        words = np.stack(read, axis=1)
         spoilt: Words = words.copy()
         for (number, _), lay in self._faults.items():
-            beside = words[(number + 1) % len(words)]
-            spoilt[number] = lay(spoilt[None, number], beside[None])[0]
+            spoilt[:, number] = lay(spoilt[:, number], words[:, (number + 1) % len(read)])
         return spoilt
 
     def number(self, name: str) -> int:

@@ -62,8 +62,7 @@ class SimBoard:
             if live:
                 self.sensors = SensorBoard(_loopback(int(self._announced("control"))))
                 self.sensors.listen()
-                for words in source.samples:  # an emulated board samples as it boots
-                    self.sensors.put(words)
+                self.sensors.put(source.samples)  # an emulated board samples as it boots
             self.path = self._announced("pty")
         except BaseException:
             self.close()

@@ -141,11 +141,15 @@ class Sampler:
         Within the round the load goes straight there from where the round before ended; the first one is at its
         end throughout. With m states each, it goes through them in m equal parts.
         """
+        words: Words = self.steps(1, states, *more)[0]
+        return words
+
+    def steps(self, rounds: int, states: States, *more: States) -> Words:
+        """As many steps with the same states, (rounds, 44)."""
         now = Effects.of(self._finger, states, *more, slips=True)
         before = now.at(slice(0, 1)) if self._last is None else self._last
         self._last = now.at(slice(-1, None))
-        words: Words = self.read(before.then(now), len(states))[0]
-        return words
+        return self.read(before.then(now.at(np.tile(np.arange(len(states)), rounds))), len(states))
 
     def read(self, effects: Effects, pieces: int = 1) -> Words:
         """The next n rounds, (n, 44), between n * ``pieces`` + 1 instants; the first is the last of the call before."""

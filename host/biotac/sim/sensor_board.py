@@ -133,9 +133,11 @@ class SensorBoard:
         return status
 
     def put(self, words: npt.NDArray[np.uint16]) -> None:
-        """Send the next round of every finger, uint16 (fingers, 44), without waiting, behind what was sent before."""
-        self._samples, self._before = words.T, self._before + len(self._samples)
-        slots, fingers = self._samples.shape
+        """Send the next rounds, uint16 (rounds, fingers, 44), without waiting, behind what was sent before."""
+        self._before += len(self._samples)
+        fingers = words.shape[1]
+        self._samples = words.transpose(0, 2, 1).reshape(-1, fingers)
+        slots = len(self._samples)
         size = SAMPLES_A_MESSAGE // fingers
         for first in range(0, slots, size):
             self._board.send(self._part(self._before + first, min(size, slots - first)))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
 from ..errors import DeviceLostError, InputError
@@ -37,6 +38,7 @@ BOOT_S = 0.25  # of a board, until it samples again
 WATCHDOG_S = 2.0
 AWAY_S = 0.5  # until a computer has found a port that came back
 AHEAD_ROUNDS = 2
+AT_ONCE_ROUNDS = 50  # while the load stays; their frames fit the link's buffers
 ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
 STREAMS = ("results", "events")
 
@@ -89,7 +91,7 @@ class World:
         for _ in range(_rounds_of(seconds)):
             now = self.step(**loads)
             events += now.events
-        return Round(now.seq, now.t_us, now.missed, now.fingers, events)
+        return replace(now, events=events)
 
     def fault(self, finger: str, kind: str | None, channel: str | None = None) -> None:
         """Lay a fault on a finger from the next round on; None ends all of that finger's.
@@ -118,7 +120,19 @@ class LockStep(World):
         return link if isinstance(link, LiveLink) else None
 
     def step(self, **loads: Load) -> Round:
-        words, link = self._fingers.read(loads), self._link
+        return self._step(1, loads)
+
+    def run(self, seconds: float, **loads: Load) -> Round:
+        left, events = _rounds_of(seconds), tuple[Any, ...]()
+        while left:
+            link, goes_wrong = self._link, self._dead or self._away or self._stalled
+            count = 1 if goes_wrong or (link is not None and link.reopened) else min(left, AT_ONCE_ROUNDS)
+            now, left = self._step(count, loads), left - count
+            events += now.events
+        return replace(now, missed=max(0, now.missed - count + 1), events=events)
+
+    def _step(self, rounds: int, loads: Mapping[str, Load]) -> Round:
+        words, link = self._fingers.read(loads, rounds), self._link
         if link is not None and link.reopened and not link.away:
             self._reconnect()  # the program itself restarted the board
         if self._dead:

@@ -24,7 +24,7 @@ from biotac.board.gap import Gap
 from biotac.cli.main import main
 from biotac.core.bands import pac_bands
 from biotac.export import BANDS_COLUMNS, COLUMNS, FORMATS, PAC_COLUMNS
-from biotac.export.columns import GAP, STAMP
+from biotac.export.columns import APPLIED, GAP, STAMP
 from biotac.recording.mcap_file import RecordingFile
 from biotac.wire.batches import StreamDecoder
 from biotac.wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
@@ -53,7 +53,7 @@ def written_again(whole: biotac.Recording, path: Path, gaps_s: dict[int, float],
         at_ns = whole.arrived_ns[k] + later_ns
         if k in gaps_s:
             file.add_gap(Gap("silence", None, first_us(whole, k), at_ns - round(gaps_s[k] * 1e9), at_ns, 7))
-        file.add(block, at_ns)
+        file.add(block, at_ns, applied_n=lambda *_, k=k: whole.applied_in(k))
     file.close()
     return biotac.Recording(path)
 
@@ -100,6 +100,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "gap_s": np.where(
             np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0
         ),
+        "applied_n": recording.applied_n[recording.frames["finger"] == finger],  # recording/test_applied.py
         "label": np.where((SPAN_S[0] * 1e6 <= since_us) & (since_us <= SPAN_S[1] * 1e6), "held; ü" * (finger == 1), ""),
     }
 
@@ -116,7 +117,11 @@ def expected_bands(recording: biotac.Recording, finger: int) -> dict[str, np.nda
     return {**pac, "good": np.full(len(energy), 22, np.uint8), "energy_count2": energy}
 
 
-KINDS = (("", COLUMNS, expected), (".pac", PAC_COLUMNS, expected_pac), (".bands", BANDS_COLUMNS, expected_bands))
+KINDS = (
+    ("", (*COLUMNS, APPLIED), expected),
+    (".pac", PAC_COLUMNS, expected_pac),
+    (".bands", BANDS_COLUMNS, expected_bands),
+)
 
 
 def same(got: Any, wanted: np.ndarray) -> bool:
@@ -136,7 +141,7 @@ def test_every_column_is_documented_and_has_a_unit() -> None:
     assert re.findall(r"^\| `.*$", page, re.MULTILINE) == [
         f"| `{f.name}` | {f.unit} | {' to '.join(f.parts[:: len(f.parts) - 1]) if f.parts else ''} "
         f"| {np.dtype(f.dtype)} | {f.what} |"
-        for f in (*FRAME_FIELDS, *PAC_FIELDS, *BANDS_FIELDS, *IDLE_FIELDS, STAMP, GAP)
+        for f in (*FRAME_FIELDS, *PAC_FIELDS, *BANDS_FIELDS, *IDLE_FIELDS, STAMP, GAP, APPLIED)
     ]
 
 

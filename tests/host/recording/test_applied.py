@@ -12,6 +12,7 @@ import biotac
 from biotac.cli.main import main
 from biotac.recording.felt import Felt
 from biotac.sim.loading import bundled_scenarios, load_source
+from biotac.wire.slots import ELECTRODE_SLOT
 
 RAMP = """name = "ramp"\nfingers = 2\nfault = [{at_s = 0.5, seconds = 0.2, finger = 1, kind = "stuck_low"}]
 step = [{do = "rest", seconds = 1.5}, {do = "press", at = "E17", force_n = 4.0, seconds = 0.5, fingers = [1]},
@@ -56,7 +57,12 @@ def test_recordings_keep_it_and_record_and_pictures_show_it(tmp_path: Path, caps
     felt_n = biotac.Recording(whole)["middle"]["force_n"][-125:]  # over 2 N: 25 rows of 3 N, 100 of 4 N
     off_n = np.sqrt(((felt_n - biotac.Recording(whole).applied_n[-250:][1::2][-125:]) ** 2).sum(axis=1).mean())
     assert said.startswith("felt (mean") and said.endswith(f", {felt_n[:, 2].mean():.2f} ± {off_n:.2f} of 3.80 N")
-    assert main(["record", f"replay:{whole}", replayed]) == 0  # a board whose fingers nobody knows
+    assert main(["record", f"replay:{whole}", replayed]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == said
+    check_ramp(biotac.Recording(replayed).applied_n, biotac.Recording(replayed).frames)
+    real = tmp_path / "real.npz"
+    np.savez(real, E=load_source("press.toml").samples[:, 0, ELECTRODE_SLOT])
+    assert main(["record", f"sim:{real}", replayed, "--force"]) == 0  # a finger that nobody knows
     assert biotac.Recording(replayed).applied_n is None and "felt (mean" not in capsys.readouterr().out
     assert [main(["export", path, f"{path}.png"]) for path in (whole, replayed)] == [0, 0]
     pictures = (imread(f"{path}.png")[:, :, :3] * 255 for path in (whole, replayed))

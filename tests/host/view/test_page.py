@@ -92,6 +92,7 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     page.wait_for_selector("#fingers .finger")
     until(page, "() => numbers.dataset.seq > 20")
     assert_shows(page.evaluate(SNAPSHOT), recording.frames, electrode_signals(recording.wire))
+    assert page.is_visible("#applied-key") and page.is_visible("td[data-key=appliedN]")
     assert page.is_disabled("#tare") and page.is_disabled("#tare-all") and page.is_disabled("#record")
     page.click("#pause")
     link_is(page, "paused")

@@ -16,26 +16,33 @@ from biotac.map import load_fitted
 from biotac.sim import SimFinger, Touch, fit_gains, world
 
 REST_S, MINUTE_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 60.0, 0.9, 0.3, 0.3
+PAD_MM, ROLL_MM = ((-8.0, -3.0), (1.0, 3.0)), 3.0  # where a hand meets things, and how far a press rolls
+FORCE_N, PULL = (0.5, 10.0), (0.1, 0.6)
 PLATE_N = 1 / 320  # its resolution; its noise is .7 of that
 
 
 def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
     """What touches in each round of a minute, and the force (n, 3) on the finger in N that the plate measures.
 
-    Each press is somewhere on the pad, tip or sides, of .5 to 8 N, drawn to a side by up to .6 of that, and back.
+    Each press is on the pad, of .5 to 10 N, rolls by up to 3 mm and is drawn once around by .1 to .6 of its force: one
+    drawn to a side alone leaves shear unlearnt, which then reads half of what it is.
     """
     rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
     while len(touches) < MINUTE_S * 100:
-        x_mm, y_mm = rng.uniform(-11, 3), rng.uniform(-4, 4)
-        peak_n, pull, turn = 0.5 * 16 ** rng.random(), rng.uniform(-0.6, 0.6, 2), rng.uniform(-1.5, 1.5)
-        normal = surface.normals_at(surface.on_surface(np.array([[x_mm, y_mm]])))
-        tangents = np.concatenate(surface.tangents_at(normal))
+        begin_mm = rng.uniform(*PAD_MM)
+        end_mm = np.clip(begin_mm + rng.uniform(-ROLL_MM, ROLL_MM, 2), *PAD_MM)
+        peak_n, pull = FORCE_N[0] * (FORCE_N[1] / FORCE_N[0]) ** rng.random(), rng.uniform(*PULL)
+        turn_rad, sense = rng.uniform(0, 2 * np.pi), rng.choice([-1, 1])
         for t_s in np.arange(0, PRESS_S + PAUSE_S, 0.01):
-            pressed = np.clip(min(t_s, PRESS_S - t_s) / RAMP_S, 0, 1)
-            normal_n = float(peak_n * pressed * (1 + 0.15 * np.sin(9 * t_s)))
-            way = np.sin(np.pi * t_s / PRESS_S) * np.array([np.cos(turn * t_s), np.sin(turn * t_s)])
-            to_tip, to_side = (float(part) for part in normal_n * pull * way)
+            share = min(t_s / PRESS_S, 1)
+            x_mm, y_mm = (float(part) for part in begin_mm + share * (end_mm - begin_mm))
+            normal = surface.normals_at(surface.on_surface(np.array([[x_mm, y_mm]])))
+            normal_n = float(peak_n * np.clip(min(t_s, PRESS_S - t_s) / RAMP_S, 0, 1))
+            angle = turn_rad + sense * 2 * np.pi * share
+            pulled_n = normal_n * pull * min(1, 6 * share, 6 * (1 - share))
+            to_tip, to_side = float(pulled_n * np.cos(angle)), float(pulled_n * np.sin(angle))
             touches.append(Touch(normal_n, (to_tip, to_side), (x_mm, y_mm)))
+            tangents = np.concatenate(surface.tangents_at(normal))
             forces.append(np.array([to_tip, to_side]) @ tangents - normal_n * normal[0])
     measured = np.array(forces) + rng.normal(0, 0.7 * PLATE_N, (len(forces), 3))
     return touches, np.rint(measured / PLATE_N) * PLATE_N

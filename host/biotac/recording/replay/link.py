@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...clock.host_clock import HostClock, SystemClock
 from ...errors import CommandRefusedError, DeviceLostError, PortError
 from ...link.base import Link
@@ -83,6 +86,11 @@ class ReplayLink(Link):
     @property
     def recording(self) -> Recording:
         return self.pacer.playback.recording
+
+    def applied_n(
+        self, finger: NDArray[np.uint8], t_us: NDArray[np.int64], round0_us: int | None
+    ) -> NDArray[np.float64] | None:
+        return None if self.recording.applied_n is None else self.recording.applied_at(finger, t_us)
 
     def read(self, timeout_s: float) -> bytes:
         with self._answering:
