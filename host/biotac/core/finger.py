@@ -199,6 +199,12 @@ class Finger:
             pdc_tare_q16=tare.base.pdc_q16,
         )
 
+    def tare_machine(self) -> Any:
+        """A copy of the tare machine's state, a ``bt_tare *``: firmware/core/touch/machine.h, of this version."""
+        copy = ffi.new("bt_tare *")
+        copy[0] = self._finger.tare
+        return copy
+
     @property
     def tare_counts(self) -> NDArray[np.float64]:
         """The tare in force (19,), in counts, to the tare machine's 1/65536 count; NaN where unknown."""

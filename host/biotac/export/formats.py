@@ -12,6 +12,7 @@ from ..errors import InputError, imported
 from ..partial_file import whole
 from ..recording.reader import Recording
 from .columns import Show, Table, tables
+from .messages import trace_tables
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,13 @@ def export(
     overwrite: bool = False,
     frames: Mapping[int, str] | None = None,
     beside: Path | None = None,
+    trace: bool = False,
     show: Show = lambda share: None,
 ) -> list[Path]:
     """Write ``recording`` in the format given by ``out``'s suffix; return the paths written.
 
     ``frames``: names of fingers' coordinate frames. ``beside``: a bag whose messages are in the written one, too.
+    ``trace``: the tare machine's course as well, in a flat format.
 
     An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an extra that is
     not installed, a recording without rows, or a path that exists or cannot be written.
@@ -55,6 +58,10 @@ def export(
     made = [replace(table, frame=(frames or {}).get(table.finger or 0)) for table in tables(recording)]
     if beside is not None and not hasattr(module, "BESIDE"):
         raise InputError(f"{out}: only a bag can have another bag's messages; name it .bag or .ros2")
+    if trace and not module.KINDS_APART:
+        raise InputError(f"{out}: a trace is a flat table; name it .csv or .parquet")
+    if trace:
+        made += trace_tables(recording)
     if not any(len(table) for table in made):
         raise InputError(f"{recording.path} holds no frames and no PAC; there is nothing to export")
     written: list[Path] = []

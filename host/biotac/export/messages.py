@@ -1,4 +1,4 @@
-"""Timed messages that are not rows (TARE, STATUS and so on), as tables of the wire's integers."""
+"""Timed messages that are not rows (TARE, STATUS and so on), as tables of the wire's integers; the tare's trace."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..recording.reader import Recording
 from ..recording.stamps import unwrapped_us
+from ..recording.trace import TRACE, trace
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import Field
@@ -36,6 +37,19 @@ def message_tables(recording: Recording) -> list[Table]:
         arrays |= {field.name: rows[field.name] for field in fields}
         made.append(Table(kind, finger, (_T_US, STAMP, *fields), arrays))
     return made
+
+
+def trace_tables(recording: Recording) -> list[Table]:
+    """The tare machine's course: a table of kind ``trace`` by finger. Raises InputError where rounds are missing."""
+    return [
+        Table(
+            "trace",
+            finger,
+            (_T_US, STAMP, *TRACE),
+            {name: rows[name] for name in rows.dtype.names or ()} | {STAMP.name: recording.stamp_ns(rows["t_us"])},
+        )
+        for finger, rows in trace(recording).items()
+    ]
 
 
 @cache

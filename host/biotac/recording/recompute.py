@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -157,17 +157,6 @@ def _through_the_machine(
     show: Show,
 ) -> tuple[StructArray, dict[int, wire.Tare]]:
     """FRAME messages in order of arrival, and TARE messages by the row that each precedes."""
-    if len(recording.idle) or recording.frames_lost or recording.disordered:
-        seen = "heartbeats" if len(recording.idle) else "lost frames" if recording.frames_lost else "a restart"
-        raise InputError(
-            f"{recording.path} has {seen}, but the tare machine needs the counts of every round; add --keep-tare to "
-            "use the recorded tares"
-        )
-    if np.any(recording.wire["flags"] & wire.FrameFlags.SENSOR_OTHER):
-        raise InputError(
-            f"{recording.path} has a sensor that was plugged in during the recording and tared afresh; add "
-            "--keep-tare to use the recorded tares"
-        )
     new = np.empty_like(recording.wire)
     tares: dict[int, wire.Tare] = {}
     ran = 0
@@ -177,14 +166,12 @@ def _through_the_machine(
         ran += rows
         show(min(1.0, ran / (2 * len(new))))
 
-    for finger in np.unique(recording.wire["finger"]):
-        at = np.flatnonzero(recording.wire["finger"] == finger)
-        rounds = with_silence(_rounds(recording, at, maps.get(int(finger)), notes))
-        frames, changes = frames_and_tares(rounds, own.get(int(finger), settings), ran_rows)
+    for at, rounds in machine_rounds(recording, maps, notes):
+        frames, changes = frames_and_tares(rounds, own.get(rounds.finger, settings), ran_rows)
         if len(frames) != len(at):
             raise InputError(
-                f"{recording.path}: finger {finger} has frames without a single valid count; add --keep-tare to use "
-                "the recorded tares"
+                f"{recording.path}: finger {rounds.finger} has frames without a single valid count; add --keep-tare to "
+                "use the recorded tares"
             )
         frames["seq"] = recording.wire["seq"][at]
         frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # not in counts
@@ -193,6 +180,30 @@ def _through_the_machine(
         for row, message in changes.items():
             tares[int(at[row])] = dataclasses.replace(message, seq=int(frames["seq"][row]))
     return new, tares
+
+
+def machine_rounds(
+    recording: Recording, maps: Mapping[int, BoardMap | bytes], notes: list[str]
+) -> Iterator[tuple[NDArray[np.int64], Rounds]]:
+    """By finger, its rows in ``recording.wire`` and its rounds, as the tare machine takes them.
+
+    Raises InputError where rounds are missing, or are of two sensors.
+    """
+    if len(recording.idle) or recording.frames_lost or recording.disordered:
+        seen = "heartbeats" if len(recording.idle) else "lost frames" if recording.frames_lost else "a restart"
+        raise InputError(
+            f"{recording.path} has {seen}, but the tare machine needs the counts of every round; record all of them "
+            "(without --touched), or recompute with --keep-tare"
+        )
+    if np.any(recording.wire["flags"] & wire.FrameFlags.SENSOR_OTHER):
+        raise InputError(
+            f"{recording.path} has a sensor that was plugged in during the recording and tared afresh; cut it "
+            "there, or recompute with --keep-tare"
+        )
+    for finger in np.unique(recording.wire["finger"]).tolist():
+        at = np.flatnonzero(recording.wire["finger"] == finger)
+        own_map = maps.get(finger)
+        yield at, with_silence(_rounds(recording, at, None if own_map is None else opened(own_map), notes))
 
 
 def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | None, notes: list[str]) -> Rounds:

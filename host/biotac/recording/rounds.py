@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -77,7 +77,7 @@ def frames_and_tares(
     """
     own_map, foreign = rounds.wrench_map, rounds.foreign
     finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities, wrench_map=own_map, foreign=foreign)
-    rows = np.concatenate(list(_run(rounds, finger, [], show)))
+    rows = np.concatenate(list(run(rounds, finger, [], show)))
     changed = np.flatnonzero((rows["flags"] & wire.FrameFlags.TARE_CHANGED).astype(bool) & (rows["present"] != 0))
     # Rows do not hold the tare in 1/65536 count: a second run stops at each change to read it.
     finger.reset()
@@ -85,7 +85,7 @@ def frames_and_tares(
     ends = [int(k) + 1 for k in changed]
     row = 0
     order = np.cumsum(rows["present"] != 0) - 1
-    for part in _run(rounds, finger, ends, show) if ends else ():
+    for part in run(rounds, finger, ends, show) if ends else ():
         row += len(part)
         if row in ends:
             messages[int(order[row - 1])] = finger.tare_message()
@@ -96,8 +96,10 @@ def frames_and_tares(
     return frames, messages
 
 
-def _run(rounds: Rounds, finger: Finger, ends: list[int], show: Callable[[int], None]) -> Iterator[StructArray]:
-    """Rows in parts that end at ``ends``, before commands, and every _ROWS rounds."""
+def run(
+    rounds: Rounds, finger: Finger, ends: Iterable[int], show: Callable[[int], None] = lambda rows: None
+) -> Iterator[StructArray]:
+    """FINGER_DTYPE rows in parts that end at ``ends``, before commands, and every _ROWS rounds."""
     n = len(rounds.counts)
     cuts = sorted({0, n, *ends, *rounds.commands, *range(0, n, _ROWS)})
     for begin, end in pairwise(cuts):

@@ -51,6 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--keep-tare", action="store_true", help="recompute with the recorded tares, not with the tare machine's"
     )
     parser.add_argument(
+        "--trace", action="store_true", help="beside a .csv or .parquet: what the tare saw and decided, sweep by sweep"
+    )
+    parser.add_argument(
         "--frame",
         metavar="FINGER=ID",
         action="append",
@@ -81,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
         )
     elif imports and recomputes:
         raise InputError(f"{source} is recomputed as it is read; export it to .mcap first, then recompute that")
+    if args.trace and (imports or recomputes):
+        raise InputError("a trace is of a recording as it is; import or recompute it to .mcap first")
     written: list[Path] = []
     with Progress() as progress:
 
@@ -105,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
             text = f"{made['frames']} frames, {changed},"
         else:
             recording = load(source)
-            how = {"frames": frames_of(args.frame, recording.names), "beside": args.beside}
+            how = {"frames": frames_of(args.frame, recording.names), "beside": args.beside, "trace": args.trace}
             written += export(recording, out, overwrite=args.force, show=show, **how)
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
