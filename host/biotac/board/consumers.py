@@ -66,14 +66,14 @@ class Queue:
     def is_full(self) -> bool:
         return self._has_rows and self._put_rows > self._taken_rows
 
-    def take(self, *, wait: bool = False) -> Batch | None:
-        """Take the oldest batch. None when there is none; with ``wait``, when there is none but a wake."""
+    def take(self, *, wait: bool = False, timeout_s: float | None = None) -> Batch | None:
+        """Take the oldest batch. None when there is none; with ``wait``, when there is none but a wake, or in time."""
         if self._back:
             return self._back.pop()
         batch = None
         while batch is None:
             try:
-                batch = self._waiting.get(wait)
+                batch = self._waiting.get(wait, timeout_s)
             except Empty:
                 return None
             if batch is None and wait and self._waiting.empty():

@@ -45,8 +45,8 @@ class Outlet:
 
     ``BioTac finger0``: one sample per round, 100 per second, of force (N), torque (N*mm), point of contact (mm),
     flags, trust, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports. ``BioTac finger0
-    PAC``: counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind);
-    markers come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold
+    PAC``: counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind
+    (EventKind), which come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold
     labels, units and meanings.
 
     Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each

@@ -22,8 +22,9 @@ Made up are: supply, temperature, ids, the time an erase takes, its USB and this
 margin, and the fingers. Only silicon can tell those, and whether the chip does what its data sheet says."""
 REAL = """\
 Measured by no program: the ripple of V+ at the sensors (less than 20 mV), the shape of SCK and MISO there, and whether
-every select is at the finger you think: press each in `biotac view`. Ten restarts are resets, not losses of power:
-pull the plug ten times, too."""
+every select is at the finger you think: press each in `biotac view`. Ten restarts are resets, not cold starts: pull the
+plug for a minute, twenty times. The order that wastes least: cold starts, a sensor board (`--sensor-port`), one BioTac
+by core at 1 MHz (words, then its serial number, then up), five (host/docs/start/bring_up.md)."""
 
 
 def write(path: Path, seen: Bringup, facts: Facts, findings: Sequence[Finding]) -> None:
@@ -89,15 +90,19 @@ def _fingers(seen: Bringup, facts: Facts) -> list[str]:
 
 
 def _bus(seen: Bringup, facts: Facts) -> list[str]:
-    if not seen.rates or facts.board is None:
+    if not seen.words or facts.board is None:
         return []
     present = facts.board.present
     rows = [
         [f"{khz / 1000:.2f}", *(f"{words[f, 1]} of {words[f].sum()}" for f in present)]
-        for khz, words in seen.rates.items()
+        for khz, words in seen.words.items()
     ]
     head = ["MHz", *(f"finger {finger}" for finger in present)]
-    return ["## The sensors' bus, the usual rate first: words that were not good", "", *table(head, rows)]
+    return [
+        "## The sensors' bus, the usual rate first: words that were not good",
+        "",
+        *table(head, rows),
+    ]
 
 
 def _link(seen: Bringup) -> list[str]:
@@ -124,8 +129,8 @@ def _draw(path: Path, seen: Bringup, facts: Facts) -> None:
             noise.plot(range(1, 20), bringup.noise_counts(rows), "o-", label=f"finger {finger}")
             rise, force_n = rows["pdc"] - rows["pdc_tare"], np.linalg.norm(rows["force_n"], axis=1)
             press.plot(force_n, rise, ".", markersize=2, label=f"finger {finger}")
-            khz = np.array(list(seen.rates))
-            bad = [100 * words[finger, 1] / max(1, words[finger].sum()) for words in seen.rates.values()]
+            khz = np.array(list(seen.words))
+            bad = [100 * words[finger, 1] / max(1, words[finger].sum()) for words in seen.words.values()]
             bus.plot(khz / 1000, bad, "o-", label=f"finger {finger}")
         noise.set(title="Noise at rest", xlabel="electrode", ylabel="counts", ylim=(0, None))
         bus.set(title="Sensors' bus", xlabel="MHz", ylabel="words not good, %", ylim=(-5, 105))

@@ -25,6 +25,7 @@ LIVE_SILENCE_US = 250_000  # on a network, messages may also be late
 AHEAD_US = 3600 * 10**6  # a stamp that is so much later is none
 ANCHOR_AGAIN = 50  # messages with wrong stamps in a row: the clock was set
 POLL_S = 0.01
+STOOD_S = 0.3  # without a look at the bridge, which is polled every few ms
 # Messages that show a source's rate and fingers: what has come of a topic, or the begin of a file.
 PREVIEW, FILE_PREVIEW, PREVIEW_S = 50, 400, 10.0
 
@@ -132,6 +133,10 @@ class MessagesLink(InProcessLink):
 
     def _live(self) -> None:
         message = next(self._messages)
+        if time.monotonic() - self._polled_s > STOOD_S:  # so did the host: let it speak before its time goes on
+            with self._changed:
+                self._changed.wait_for(lambda: self._inbox or self._closing, STOOD_S)
+        self._polled_s = time.monotonic()
         since_us = int((time.monotonic() - self._last_s) * 1e6)
         self._now_us = max(self._now_us, self._last_us + since_us)
         self._take(message)
@@ -165,7 +170,7 @@ class MessagesLink(InProcessLink):
         self._last_us, self._last_s = t_us, time.monotonic()
         self._now_us = max(self._now_us, t_us if self._source.live else t_us + ROUND_US)
 
-    _silent = True
+    _silent, _polled_s = True, float("inf")
 
     def _fall_silent(self) -> None:
         """A round without a word, so that who asks is told that the sensors are away."""

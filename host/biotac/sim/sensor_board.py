@@ -27,6 +27,7 @@ SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
 BURST = 16  # messages sent before the board is asked for its status
 STILL_S = 60.0
+KEPT_SLOTS = 40 * len(sensor.SLOTS)  # of rounds that were put: twice what passes until send_lost()
 REST_S = 0.05  # wait while the board has no room
 NOT_HELD = 0xFFFFFFFF
 KEEP_S = 20.0  # 39 sectors of flash, each at its longest
@@ -134,13 +135,28 @@ class SensorBoard:
 
     def put(self, words: npt.NDArray[np.uint16]) -> None:
         """Send the next rounds, uint16 (rounds, fingers, 44), without waiting, behind what was sent before."""
-        self._before += len(self._samples)
-        fingers = words.shape[1]
-        self._samples = words.transpose(0, 2, 1).reshape(-1, fingers)
-        slots = len(self._samples)
-        size = SAMPLES_A_MESSAGE // fingers
-        for first in range(0, slots, size):
-            self._board.send(self._part(self._before + first, min(size, slots - first)))
+        samples = words.transpose(0, 2, 1).reshape(-1, words.shape[1])
+        sent, kept = self._before + len(self._samples), self._samples[-KEPT_SLOTS:]
+        self._samples, self._before = np.concatenate([kept, samples] if len(kept) else [samples]), sent - len(kept)
+        self._send_from(sent)
+
+    def send_lost(self) -> None:
+        """Send once more what was put and has not arrived; to be called every 20 rounds.
+
+        Raises DeviceLostError when it is too long ago, as after a restart of the board.
+        """
+        taken = self.status().slots_taken
+        if taken < self._before:
+            raise DeviceLostError(
+                f"{self._board.link.port} has {taken} slots of its tape, expected {self._before}: it restarted, "
+                "or its link lost too much; start another world"
+            )
+        self._send_from(taken)
+
+    def _send_from(self, taken: int) -> None:
+        slots, size = self._before + len(self._samples), SAMPLES_A_MESSAGE // self._samples.shape[1]
+        for first in range(taken, slots, size):
+            self._board.send(self._part(first, min(size, slots - first)))
 
     def listen(self) -> None:
         """Keep reports of standstills for wait_still(): each comes once, the first as soon as time is released."""
@@ -153,7 +169,7 @@ class SensorBoard:
         """
         until_s, sent = time.monotonic() + STILL_S, self._before + len(self._samples)
         while time.monotonic() < until_s:
-            batch = self._reports.take(wait=True)
+            batch = self._reports.take(wait=True, timeout_s=until_s - time.monotonic())
             self._board.reader.check()
             for message in batch.messages if batch else ():
                 if isinstance(message, wire.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:

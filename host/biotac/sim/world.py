@@ -39,6 +39,7 @@ WATCHDOG_S = 2.0
 AWAY_S = 0.5  # until a computer has found a port that came back
 AHEAD_ROUNDS = 2
 AT_ONCE_ROUNDS = 50  # while the load stays; their frames fit the link's buffers
+CHECK_ROUNDS = 20  # after which a tape's message that was lost is sent again
 ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
 STREAMS = ("results", "events")
 
@@ -56,6 +57,7 @@ class World:
         self._fingers = fingers
         self._closes = closes
         self._last: Round | None = None
+        self._steps = 0
 
     def __enter__(self) -> World:
         return self
@@ -82,6 +84,9 @@ class World:
         and TimeoutError when on real time nothing comes.
         """
         self.sensors.put(self._fingers.read(loads))
+        self._steps += 1
+        if self._steps % CHECK_ROUNDS == 0:
+            self.sensors.send_lost()
         self._last = self.hand.next_round(self._last)
         return self._last
 

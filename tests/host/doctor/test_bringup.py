@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from doctor_facts import RELEASE, board, healthy, hello, info, message, rounds
 
 from biotac import FrameFlags
+from biotac.cli.main import main
 from biotac.doctor import Facts, Finding, PairFacts, bringup, judge, leads
 from biotac.doctor.bringup import Bringup, Restart
 from biotac.wire import messages_gen as wire
@@ -142,3 +144,14 @@ def test_of_the_first_evening_one_defect_makes_one_finding(
     assert evening() == []
     (found,) = evening(change)
     assert found.code == code and words in found.seen
+
+
+def test_a_scenario_that_ends_ends_the_evening(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(bringup, "PINGS", 50)
+    monkeypatch.setattr("biotac.cli.boards.doctor.PLAYED_PRESS_S", 1.0)
+    words = ["doctor", "sim:press.toml?seconds=3", "--bringup", "--seconds", "1", "--report", str(tmp_path / "b.md")]
+    assert main(words) in (0, 1)
+    said = capsys.readouterr().err
+    assert "restart 1" not in said and "bus_margin" not in said
+    steps = [said.index(text) for text in ("words at 1 MHz", "finger 0: ", "serial numbers", "faster rates")]
+    assert steps == sorted(steps)

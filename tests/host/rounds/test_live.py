@@ -121,6 +121,25 @@ def test_a_topic_that_stops_changes_and_comes_back(bridge) -> None:
         assert (batch.frames["counts"] != wire.INVALID_COUNT).all()
 
 
+STANDS_STILL = """
+import os, subprocess, sys, time, biotac
+with biotac.open(sys.argv[1]) as hand:
+    hand.stream("results")
+    begun_s = time.monotonic()
+    stop = f"sleep 2; kill -STOP {os.getpid()}; sleep 2; kill -CONT {os.getpid()}"
+    subprocess.Popen(["sh", "-c", stop], start_new_session=True)
+    for batch in hand.batches():
+        if time.monotonic() > begun_s + 7.0:
+            break
+    print(hand.stats.gaps)
+"""
+
+
+def test_a_program_that_stands_still_loses_no_message(bridge) -> None:
+    done = subprocess.run([sys.executable, "-c", STANDS_STILL, bridge().port], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("0\n", "")
+
+
 def test_a_bridge_that_is_killed_is_lost_or_found_again(bridge) -> None:
     robot = bridge()
     with biotac.open(robot.port) as lost, biotac.open(robot.port, reconnect=True) as hand:

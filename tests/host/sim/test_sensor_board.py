@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from biotac.cli.main import main
-from biotac.errors import CommandRefusedError, NotAGatewayError, PortError
+from biotac.errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError
 from biotac.hand.opening import open as open_hand
 from biotac.link.serial_port import SerialLink
 from biotac.sim.loading import load_source
@@ -168,4 +168,33 @@ def test_the_tape_can_be_held_and_keep_to_the_clock(scripted_board, hello) -> No
     assert fake.play is not None and (fake.play.hold_slot, fake.play.by_time) == (44, 0)
     board.play(by_time=True)
     assert (fake.play.hold_slot, fake.play.by_time) == (0xFFFFFFFF, 1)
+    board.close()
+
+
+def test_a_lost_part_of_rounds_put_one_by_one_is_sent_again(scripted_board, hello) -> None:
+    fake = FakeSensorBoard(hello, deaf_to=9)
+    source = load_source("press.toml", fingers=5, seconds=0.4)
+    board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
+    board.plug(source)
+    board._samples = board._samples[:0]  # nothing ahead
+    for k, words in enumerate(source.samples, 1):
+        board.put(words)
+        if k % 20 == 0:
+            board.send_lost()
+    assert board.status().slots_taken == len(fake.rows) and fake.rows == rows_of(source)
+    fake.rows.clear()  # a restart
+    for words in source.samples:
+        board.put(words)
+    with pytest.raises(DeviceLostError, match="has 0 slots of its tape"):
+        board.send_lost()
+    board.close()
+
+
+def test_a_simulated_board_that_hangs_is_given_up(scripted_board, hello, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.sim.sensor_board.STILL_S", 0.2)
+    board = SensorBoard(SerialLink(scripted_board(FakeSensorBoard(hello).answer).path))
+    board.listen()
+    board.plug(load_source("press.toml", fingers=1, seconds=0.1))
+    with pytest.raises(DeviceLostError, match="computed nothing for"):
+        board.wait_still()
     board.close()
