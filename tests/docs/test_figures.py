@@ -14,6 +14,8 @@ import figures
 
 ROOT = Path(__file__).parents[2]
 SAFETY, PICO = "host/docs/reference/safety.md", "firmware/boards/pico/README.md"
+MODEL, PHYSICS = "host/docs/reference/sensor_model.md", "host/biotac/sim/physics.py"
+SAMPLING = "host/biotac/sim/sampling.py"
 SPEC, LINK = "protocol/SPEC.md", "protocol/link.toml"
 SYSTEM, CONTROLLER = "firmware/port/rp2040/system.c", "firmware/port/rp2040/usb/controller.c"
 WORDS = {"two": 2.0, "ten": 10.0}
@@ -28,6 +30,15 @@ FIGURES = [
     (SAFETY, r"no start of frame for (\d+) ms", CONTROLLER, r"SUSPENDED_US +(\d+)u", 1e3),
     (PICO, r"hears no frame for (\d+) ms", CONTROLLER, r"HEARS_NOTHING_US (\d+)u", 1e3),
     (SAFETY, r"hold_timeout_ms` \| 1 s; (\d+) s", LINK, r"hold_timeout_ms\](?s:.*?)default = ([\d_]+)", 1e3),
+    (MODEL, r"gap of (\d) mm", PHYSICS, r"GAP_MM = ([\d.]+)", 1),
+    (MODEL, r"at (4\.5) N", PHYSICS, r"PLATE_N, FAINT_N = ([\d.]+)", 1),
+    (MODEL, r"tanh\(C g_i / (.*?)\)", PHYSICS, r"SQUEEZE_MAX = ([\d.]+)", 1),
+    (MODEL, r"L = (\d) per N", PHYSICS, r"SQUEEZE_MAX_PER_N = ([\d.]+)", 1),
+    (MODEL, r"T / (\d+) rad", PHYSICS, r"TORSION_NMM_PER_RAD = ([\d.]+)", 1),
+    (MODEL, r"exp\(-(\.\d+) \(t - 30 C", PHYSICS, r"TEMPERATURE_PER_C = -([\d.]+)", 1),
+    (MODEL, r"by a lag of (\d+) s \| free", SAMPLING, r"\nCREEP_S = ([\d.]+)", 1),
+    (MODEL, r"(\d+) counts/N \* F", SAMPLING, r"PDC_PER_N, PDC_NOISE = ([\d.]+)", 1),
+    (MODEL, r"undershoot (\d+) tanh", SAMPLING, r"PDC_UNDERSHOOT, PDC_UNDERSHOOT_AT, PDC_UNDERSHOOT_S = ([\d.]+)", 1),
     (SPEC, r"\(after (\w+) times", "firmware/core/talk/sensors.c", r"LATE_AFTER +(\d+)", 1),
 ]
 

@@ -103,8 +103,11 @@ class FakeSpi:
 
     def xfer2(self, values: list[int]) -> list[int]:
         bus, emu = self._bus, self._bus.sensors[self.device]
+        if not isinstance(values, list) or not values:
+            raise TypeError("expected a sequence, not empty")
+        if self.closed:
+            raise OSError(9, "Bad file descriptor")
         assert (self.mode, self.max_speed_hz, self.bits_per_word) == (0, SPI_HZ, 8)
-        assert not self.closed
         assert len(values) in (1, 2)
         assert all(type(v) is int and 0 <= v <= 255 for v in values)
         if bus.fault is not None:

@@ -15,7 +15,7 @@ from ..wire import sensor_gen as _sensor
 Floats = npt.NDArray[np.float64]
 
 RADIUS_MM = _sensor.CORE_RADIUS_UM / 1000.0
-PROXIMAL_END_MM = -16.0  # numerics.md 3.1: the mesh, and so the fluid, ends here
+PROXIMAL_END_MM = -16.0  # the mesh, and so the model's fluid, ends here (host/docs/reference/sensor_model.md)
 MESH_STEP_MM = 0.6
 
 ELECTRODE_MM: Floats = np.array(_sensor.ELECTRODE_UM, dtype=np.float64) / 1000.0

@@ -3,7 +3,7 @@
 Lin Eq 3 and 4: F_d = S_d sum e n_d, M_d = T_d sum e (r x n)_d, with e = count - rest. Each gain is a least-squares fit
 without offset from noise-free counts to the scenario's truth, axis by axis. This is the best that these five numbers
 can do on the scenario, so residuals show the error of the method and not a lack of calibration. M_x has no gain: the
-electrodes hardly see it (numerics.md 4).
+electrodes hardly see it: only E8 and E9 have any arm about x.
 """
 
 from __future__ import annotations

@@ -2,10 +2,11 @@
 
 A contact squeezes the fluid gap over the electrodes under it, less with distance; the displaced volume widens the gap
 elsewhere; shear and torsion drag the skin, which narrows the gap ahead of the core and widens it where skin piles up;
-each electrode's resistance follows its gap, and a divider turns it into counts. ``biotac-lab fit-finger`` fits the
+each electrode's resistance follows its gap, and a divider turns it into counts. ``biotac-lab finger`` fits the
 numbers in skin.json to the counts and forces of two real fingers, and never to a map; the file names its source. What
 these recordings cannot say is a free choice that stands here: a probe smaller than a plate squeezes as deep and less
 wide, up to the paper's 10 MOhm at 30 N; and torsion. sampling.py adds what time and noise do.
+host/docs/reference/sensor_model.md has all of it.
 """
 
 from __future__ import annotations
@@ -255,7 +256,7 @@ class Finger:
         alone = R0_ALONE * rng.normal(0.0, 1.0, ELECTRODES)
         self.r0_ohm: Floats = SKIN.r0_ohm * np.exp(WORN_LEVEL * worn + apart * SKIN.r0_apart + alone)
         self.gap_gain: Floats = np.exp(apart * SKIN.gain_apart + rest)
-        # real drift is one-dimensional: one rate a finger, loadings 0.82 to 1.16 (biotac.md finding 6)
+        # real drift is one-dimensional: one rate a finger, loadings 0.82 to 1.16
         self.drift_per_min: Floats = rng.uniform(-15.0, 15.0) * rng.uniform(0.82, 1.16, ELECTRODES)
         self.creep_share = float(rng.uniform(0.02, 0.05))
         self.pdc_rest = float(np.random.default_rng([seed, 6]).integers(*PDC_REST))

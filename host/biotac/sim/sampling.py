@@ -1,6 +1,6 @@
 """From instants to the 44 words of each frame: slot times, noise, drift, creep and the other channels.
 
-numerics.md 3.1 for the electrodes and PDC; biotac.md 2.1 for what PAC, TAC and TDC read at rest.
+host/docs/reference/sensor_model.md has the formulas and where the numbers are from.
 """
 
 from __future__ import annotations
@@ -218,7 +218,7 @@ def _between(boundary: Floats, share: Floats, pieces: int = 1) -> Floats:
 
 
 def spring_load(states: States) -> Floats:
-    """Static pressure above rest (n,), in counts, as if skin were a spring: numerics.md 3.1."""
+    """Static pressure above rest (n,), in counts, as if skin were a spring: host/docs/reference/sensor_model.md."""
     return PDC_PER_N * states.force_n * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
 
 

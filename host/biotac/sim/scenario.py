@@ -38,7 +38,9 @@ from .tables import Table, parse_toml
 from .timeline import Pose, Track
 
 RELEASE_S = 0.1
-FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
+FLAT_MM = (
+    7.0  # a flat surface presses as far as the model goes, 3.5 mm to each side (host/docs/reference/sensor_model.md)
+)
 FORCE_MAX_N = 50.0
 SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0

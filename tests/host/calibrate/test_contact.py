@@ -32,7 +32,7 @@ def test_the_closed_form_undoes_the_forward_computation(torsion: str) -> None:
     torque = np.cross(point, force) + twist[:, None] * normal
     np.testing.assert_allclose(moment(point, force, twist), torque, atol=1e-12)
     found = locate(force, torque)
-    # numerics.md 5.1 measured 8e-12 mm; a slip in a sign or branch is millimetres
+    # rounding is 1e-11 mm; a slip in a sign or branch is millimetres
     assert np.abs(found.point_mm - point).max() < 1e-9
     assert np.abs(found.normal - normal).max() < 1e-9
     assert np.abs(found.normal_force_n + (force * normal).sum(axis=1)).max() < 1e-9

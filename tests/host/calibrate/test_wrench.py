@@ -234,7 +234,7 @@ def test_a_synthetic_finger(validation: Validation) -> None:
     assert facts["lag_rows"] == 3
     assert facts["lag_corrected_rows"] == [3, 3, 3]
     assert facts["rows"] == len(validation.run.truth)
-    # half of Lin's error is what numerics.md 3.2 found the sign-split, PoC-gated map to leave
+    # half of Lin's error is what a sign-split, PoC-gated map left when it was first tried
     assert min(facts["better_than_lin"]) > 2.0
     best = np.min(list(facts["models"].values()), axis=0)
     # choosing costs something; if it cost a fifth, the choice would be no better than a guess
@@ -305,7 +305,7 @@ def test_the_real_finger(shared_data: Path, capsys: pytest.CaptureFixture[str]) 
     assert (error <= [0.211, 0.122, 0.174]).all(), error
     assert (np.abs(np.array(facts["drift_rmse_n"]) - error) <= 0.03).all(), facts["drift_rmse_n"]
     assert min(facts["r2"]) > 0.9
-    assert facts["median_angle_deg"] < 3.7  # biotac.md 5: the affine map's
+    assert facts["median_angle_deg"] < 3.7  # the affine map's
     assert isinstance(facts["model"], str)
 
 

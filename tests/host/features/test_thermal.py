@@ -18,7 +18,7 @@ def rows(tdc: list[float]) -> np.ndarray:
 
 
 def test_counts_of_the_reference_are_its_temperatures() -> None:
-    found = thermal(rows([700, 830, 1000, 1240]))  # biotac.md 2.1
+    found = thermal(rows([700, 830, 1000, 1240]))  # host/docs/reference/sensor_model.md
     np.testing.assert_allclose(found["celsius"], [21.4, 25.3, 29.8, 35.2], atol=0.06)
     there_and_back = thermal(rows(np.rint(tdc_counts(np.array([5.0, 30.0, 60.0]))).tolist()))
     np.testing.assert_allclose(there_and_back["celsius"], [5.0, 30.0, 60.0], atol=0.05)

@@ -1,4 +1,4 @@
-"""The sensor model against closed forms, symmetries and the anchors of numerics.md 3.1."""
+"""The sensor model against closed forms, symmetries and the anchors of host/docs/reference/sensor_model.md."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_rest_counts_are_the_divider_of_the_rest_resistance() -> None:
     finger = Finger(1)
     np.testing.assert_allclose(finger.counts(at_rest(1))[0], 4095 * 10e3 / (finger.r0_ohm + 10e3), rtol=1e-12)
     finger.r0_ohm = np.repeat([3e3, 4e3, 5e3, 10e6], [5, 5, 5, 4])
-    expected = np.repeat([3150.0, 2925.0, 2730.0, 4.0909], [5, 5, 5, 4])  # numerics.md 1.1
+    expected = np.repeat([3150.0, 2925.0, 2730.0, 4.0909], [5, 5, 5, 4])  # host/docs/reference/sensor_model.md
     np.testing.assert_allclose(finger.counts(at_rest(1))[0], expected, atol=1e-4)
 
 

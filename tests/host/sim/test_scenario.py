@@ -93,7 +93,7 @@ def test_a_press_keeps_the_temperature_and_takes_the_width_of_its_tip() -> None:
     (track,) = parse_scenario(text.encode(), file="try.toml").tracks
     states = track.states(np.array([0.5, 1.4, 2.9]))
     np.testing.assert_allclose(states.warm_c, [1.5, 3.0, 3.0])
-    np.testing.assert_allclose(states.tip_radius_mm[1:], [1.0, 3.5])  # 3.5 mm: numerics.md's flat
+    np.testing.assert_allclose(states.tip_radius_mm[1:], [1.0, 3.5])  # 3.5 mm: a flat's
 
 
 def test_an_electrode_beside_the_midline_is_pressed_along_its_radius(tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
     source = load_source("drift.toml", fingers=5)
     assert source.truth is not None and not source.truth.contact.any() and len(source.samples) == 6000
     counts = source.samples[:, :, slots.ELECTRODE_SLOT].astype(float)
-    # 10 s means are 10 s apart; the tare follows 0.5 count/s (numerics.md 1.4)
+    # 10 s means are 10 s apart; the tare follows 0.5 count/s (SPEC.md, Tare)
     means = counts.reshape(6, 1000, -1).mean(axis=1)
     slope = np.abs(np.diff(means, axis=0)).max() / 10.0
     assert 0.1 < slope < 0.5

@@ -19,7 +19,17 @@ from ...wire import messages_gen as wire
 from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units
 from ..reference.samples import Reference
 from . import contact
-from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_electrodes, check_rows, check_units, drift_of
+from .run import (
+    MIN_REST_ROWS,
+    REST_N,
+    Run,
+    check_clipping,
+    check_electrodes,
+    check_loads,
+    check_rows,
+    check_units,
+    drift_of,
+)
 
 Mask = npt.NDArray[np.bool_]
 
@@ -107,6 +117,7 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
     check_units(where, e, truth[:, :3])
+    about_loads = check_loads(where, truth[:, :3])
     on_skin = float("nan")
     about_torque: list[str] = []
     if truth.shape[1] == 6:
@@ -130,6 +141,7 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
         *about_torque[:1],
         drift_note,
         *about_torque[1:],
+        *about_loads,
     )
     run = Run(
         name=where,

@@ -24,6 +24,8 @@ from .splits import BLOCKS, GUARD_ROWS, contacts
 
 MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a shorter block would be nothing but its two guards
 REST_N = 0.1  # a plate's reading below this means that nothing touches
+# Of the centred forces. Presses straight down have what a plate's noise and the hand leave of the other two axes.
+MAX_CONDITION, NOTED_CONDITION = 1000.0, 30.0
 MIN_REST_ROWS = 50
 MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s, a press hundreds
 RAIL_LOW, RAIL_HIGH = 0, lib.BT_THRESHOLD_RAIL_COUNT  # beyond these an electrode is railed
@@ -110,6 +112,7 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
     base = _counts(path, "E_base", fields) if "E_base" in fields else None
     tare, note_of_tare = _tare(path, base, counts, force, rest)
     check_units(path, counts - tare, force)
+    about_loads = check_loads(path, force)
     # only after the check of units: in others a press may look like a rest
     if base is not None and rest.sum() >= MIN_REST_ROWS:
         _check_same_finger(path, tare, np.median(counts[rest], axis=0))
@@ -132,7 +135,7 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
         pdc,
         drift,
         rest,
-        (note_of_tare, note, *about_torsion),
+        (note_of_tare, note, *about_torsion, *about_loads),
         serial=str(serial.reshape(())),
         air=base,
         contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
@@ -234,6 +237,25 @@ def check_units(path: object, signal: Floats, force: Floats) -> None:
             f"{path}: {per_count:.3g} units of F per RMS count (median |F| {np.median(size[touched]):.4g}): expected "
             f"{low:g} to {high:g}, as in newtons on a BioTac; {guess}"
         )
+
+
+def check_loads(where: object, force_n: Floats) -> tuple[str, ...]:
+    """A note where forces (n, 3), in N, hardly vary in some direction.
+
+    The condition number is that of the centred forces: their standard deviation along the direction in which they vary
+    most over that in which they vary least. Raises RecordingError where they determine no map: on a line or in a plane.
+    """
+    _, size, way = np.linalg.svd(force_n - force_n.mean(axis=0), full_matrices=False)
+    condition = float(size[0] / max(size[2], 1e-300))
+    least = "/".join(f"{part:.2f}" for part in way[2])
+    text = f"condition number of the forces {condition:.3g}, they vary least along {least} (x/y/z)"
+    if condition > MAX_CONDITION:
+        lie = "on one line" if size[0] > MAX_CONDITION * size[1] else "in one plane"
+        raise RecordingError(
+            f"{where}: the forces lie {lie}: {text}: expected at most {MAX_CONDITION:g}; shear the finger to the tip, "
+            "to the base and to both sides, too"
+        )
+    return (f"{text}: what the map says of it rests on little",) if condition > NOTED_CONDITION else ()
 
 
 def _check_same_finger(path: Path, base: Floats, resting: Floats) -> None:

@@ -1,7 +1,7 @@
 """SynTouch's .btd text files: header lines, ``Begin File``, then one line per slot.
 
 A line is ``t batch frame channel`` followed by a pair ``value parity`` for each sensor of the adapter. Parity 0 is
-good, 1 is bad; an absent sensor reads bad parity throughout (BioTac QuickStart Guide; biotac.md 1.6). The logger
+good, 1 is bad; an absent sensor reads bad parity throughout (BioTac QuickStart Guide). The logger
 leaves gaps between batches.
 """
 
