@@ -266,9 +266,9 @@ def test_a_table_says_the_same_on_a_page_and_in_json() -> None:
 def test_the_shipped_default_pokes_as_precisely_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["experiment", "poke", "--check", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert [one["limit"] for one in facts["checks"]] == [0.23, 0.23]
-    new = [row[3] for row in facts["tables"][0]["rows"] if row[0] == "new" and row[1].endswith("(default)")]
-    assert [one["seen"] for one in facts["checks"]] == new
+    assert [one["limit"] for one in facts["checks"]] == [0.23, 0.23, 0.36, 0.36]
+    default = [row[3] for row in facts["tables"][0]["rows"] if row[1].endswith("(default)")]
+    assert [one["seen"] for one in facts["checks"]] == default
 
 
 def test_check_fails_with_its_own_code_when_a_figure_is_missed(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:

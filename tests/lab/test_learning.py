@@ -7,7 +7,7 @@ import pytest
 
 from biotac.errors import InputError
 from biotac.sim.physics import Finger
-from biotac_lab.experiments import wettels_more
+from biotac_lab.experiments.wettels import more as wettels_more
 from biotac_lab.learn import edge, force, nets, roc
 from biotac_lab.learn.stimulations import press_bars, stimulate
 

@@ -22,12 +22,14 @@ FINGERS = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
 #: A new one is a line here and a module of that name, with `_` for `-`, beside this one.
 NAMES = {
     "poke": "point of contact under a 2 mm probe on every electrode (Lin 2013, table 2)",
+    "weights": "the default weights of the point of contact, by pokes and by a plate on one page",
     "plate-normal": "normal at the point of contact against a flat plate's",
     "shear": "a weight pushed sideways (Lin 2013, figure 3)",
     "torsion": "a weight turned both ways (Lin 2013, figure 9)",
     "torsion-shear": "a weight turned while it is pushed (Lin 2013, figure 10)",
     "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
     "hold": "light holds spliced into presses, against the residue that presses leave",
+    "tare": "the paper's renormalisation against the board's tare: slow loads, lock-out, drift (Lin 2013, IV.B)",
     "navarro2015": "pressure calibration and its verification press (Navarro et al. 2015)",
     "wettels2011": "every table and figure on learning point of contact, curvature and force (Wettels and Loeb 2011)",
 }

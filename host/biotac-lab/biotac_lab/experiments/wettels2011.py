@@ -21,12 +21,9 @@ from biotac.sim import Finger
 
 from ..learn.probes import PROBES
 from ..report import Facts, Options, Report, check, claim
-from . import wettels_force as force
-from . import wettels_more as more
-from . import wettels_paf as paf
-from . import wettels_roc as roc
 from .trial import Floats
-from .wettels_tables import EQUATION, PAPER_PLACES, details, overview, paf_row, text
+from .wettels import force, more, paf, roc
+from .wettels.tables import EQUATION, PAPER_PLACES, details, overview, paf_row, text
 
 TAKES = ("real", "quick")
 

@@ -7,10 +7,10 @@ from sklearn.metrics import confusion_matrix
 
 from biotac.sim import Finger
 
-from ..learn import roc
-from ..learn.probes import PROBES
-from ..learn.stimulations import LEAST_SHARE, stimulate
-from ..report import Facts, plain
+from ...learn import roc
+from ...learn.probes import PROBES
+from ...learn.stimulations import LEAST_SHARE, stimulate
+from ...report import Facts, plain
 
 FRAMES = 5  # a press; its way up is at 10, 65 and 100 % of the peak
 LEAST_N = 1.0

@@ -11,13 +11,13 @@ from biotac.features.paf import THRESHOLD_N, paf
 from biotac.features.signals import skin
 from biotac.sim import Finger, States
 
-from ..learn import inputs
-from ..learn.probes import PROBES, counts_of, footprints
-from ..learn.smooth import causal, lowess
-from ..learn.stimulations import Stimulations, stimulate
-from ..report import Facts, plain
-from .scores import score
-from .trial import Floats
+from ...learn import inputs
+from ...learn.probes import PROBES, counts_of, footprints
+from ...learn.smooth import causal, lowess
+from ...learn.stimulations import Stimulations, stimulate
+from ...report import Facts, plain
+from ..scores import score
+from ..trial import Floats
 
 LOADS_N = {"30 to 40 N, as the paper": (30.0, 40.0), "6 to 12 N": (6.0, 12.0)}
 EQUATIONS = {"as printed": True, "rest offset removed": False}

@@ -14,11 +14,11 @@ from biotac.features.paf import paf
 from biotac.features.signals import skin
 from biotac.sim import Finger
 
-from ..learn import force, inputs
-from ..learn.stimulations import Stimulations, stimulate
-from ..report import Facts, plain
-from .scores import score
-from .trial import Floats
+from ...learn import force, inputs
+from ...learn.stimulations import Stimulations, stimulate
+from ...report import Facts, plain
+from ..scores import score
+from ..trial import Floats
 
 FRAMES, UP = 5, 3  # of a press; its way up
 FOLDS = 5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..report import Facts, Table
+from ...report import Facts, Table
 
 PAPER_PLACES = (19, 19, 13, 7)  # contacts of five presses: 95, 95, 65 and 35 stimulations
 PAPER_TABLE3 = {
