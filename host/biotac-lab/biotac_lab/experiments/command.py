@@ -39,7 +39,7 @@ def load(name: str) -> ModuleType:
     """The module of the experiment ``name``, with a function run() from Options to a Report.
 
     ``RECORDING`` says what a recording must hold; without it none makes sense. ``TAKES`` are the options among
-    ``maps``, ``real`` and ``quick`` that apply, if any do.
+    ``maps``, ``real``, ``quick`` and ``filter`` that apply, if any do.
     """
     return importlib.import_module(f"{__package__}.{name.replace('-', '_')}")
 
@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--real", **many, help="wettels2011: also try nets on this .npz with its force; may be repeated"
     )
     parser.add_argument("--quick", action="store_true", help="wettels2011: a short run, with worse figures")
+    parser.add_argument("--filter", action="store_true", help="wettels2011: with the paper's 3-pole 5 Hz low-pass")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="NAME.md, NAME.png and NAME.json go here")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses its target")
@@ -76,8 +77,8 @@ def run(args: argparse.Namespace, show: Show) -> int:
     """Return 0, or 1 if --check finds a limit missed."""
     name, experiment = args.name, load(args.name)
     options = Options(
-        finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, recording=args.recording,
-        show=show,
+        finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, filter=args.filter,
+        recording=args.recording, show=show,
     )  # fmt: skip
     takes = getattr(experiment, "TAKES", ())
     _check(name, hasattr(experiment, "RECORDING"), takes, options, args.seed)
@@ -104,6 +105,6 @@ def _check(name: str, has_recordings: bool, takes: Collection[str], options: Opt
         raise InputError("--seed chooses an emulated finger, but a recording is given: drop one of them")
     if seed is not None and not 0 <= seed <= SEED_MAX:
         raise InputError(f"--seed is {seed}: expected 0 to {SEED_MAX}")
-    for what, option in (("maps", "map"), ("real", "real"), ("quick", "quick")):
+    for what, option in (("maps", "map"), ("real", "real"), ("quick", "quick"), ("filter", "filter")):
         if getattr(options, what) and what not in takes:
             raise InputError(f"{name} does not use --{option}: drop it")
