@@ -62,8 +62,9 @@ def networks(rows: Stimulations, steps: int, seed: int) -> dict[str, Floats]:
         cascade[test] = nets(above[test], guessed[test])
         # figure 13 as drawn: which probe is the classifier's answer to the press, learnt from the same contacts
         machine = roc.machine().fit(grown[training[first]], rows.probe[first][training[first]])
-        answer = roc.decide(machine.decision_function(grown))[of_row]
-        chained[test] = nets(above[test], force.classes(placed, answer >= 2)[test])
+        answer = np.zeros(len(press), np.int64)
+        answer[test[first]] = roc.decide(machine.decision_function(grown[test[first]]))
+        chained[test] = nets(above[test], force.classes(placed, answer[of_row] >= 2)[test])
         return nets(above[test], known[test])
 
     return {
