@@ -7,8 +7,9 @@ import pytest
 
 from biotac.errors import InputError
 from biotac.sim.physics import Finger
-from biotac_lab.experiments import wettels_more
-from biotac_lab.learn import edge, force, nets, roc
+from biotac_lab.experiments.wettels import more as wettels_more
+from biotac_lab.experiments.wettels import roc as wettels_roc
+from biotac_lab.learn import edge, force, levenberg, nets, roc
 from biotac_lab.learn.stimulations import press_bars, stimulate
 
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
@@ -29,6 +30,52 @@ def test_a_net_follows_what_can_be_learnt_and_not_the_noise() -> None:
     of_noise = nets.train(x[:300], only_noise[:300], (x[300:], only_noise[300:]), units=10, steps=100)
     assert of_noise(new).std() < 0.5
     assert (nets.train(x, noisy, seed=1, steps=5)(new) == nets.train(x, noisy, seed=1, steps=5)(new)).all()
+
+
+def test_levenberg_s_slopes_are_the_errors_own() -> None:
+    rng = np.random.default_rng(1)
+    problem = levenberg._Problem(rng.normal(size=(30, 3)), rng.normal(size=(30, 2)), 4)
+    problem.alpha, problem.beta = 0.3, 2.0
+    weights, step = rng.normal(size=4 * 4 + 2 * 5), 1e-6
+    around = [(weights + one, weights - one) for one in step * np.eye(len(weights))]
+    slopes = np.array([(problem.at(up)[3] - problem.at(down)[3]).ravel() for up, down in around]).T / (2 * step)
+    np.testing.assert_allclose(problem.gauss_newton(weights), slopes.T @ slopes, atol=1e-6)
+    values = [(problem.value(up) - problem.value(down)) / (2 * step) for up, down in around]
+    np.testing.assert_allclose(problem.gradient(weights), values, atol=1e-5)
+
+
+def test_levenberg_follows_what_can_be_learnt_and_stops_for_noise() -> None:
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(400, 4))
+    curve = np.column_stack([np.sin(x[:, 0]) + x[:, 1], 3.0 * x[:, 2]])
+    noisy = curve + rng.normal(0.0, 0.1, curve.shape)
+    net = levenberg.train(x[:300], noisy[:300], (x[300:], noisy[300:]), units=10, steps=60)
+    new = rng.normal(size=(500, 4)) * 0.7
+    wanted = np.column_stack([np.sin(new[:, 0]) + new[:, 1], 3.0 * new[:, 2]])
+    assert np.sqrt(((net(new) - wanted) ** 2).mean()) < 0.1, "less than the noise that it saw"
+    noise = rng.normal(size=(400, 1))
+    of_noise = levenberg.train(x[:300], noise[:300], (x[300:], noise[300:]), units=10, steps=60)
+    assert of_noise(new).std() < 0.5
+
+
+@pytest.mark.parametrize("train", [nets.train, levenberg.train])
+def test_dividing_by_the_variance_first_changes_nothing(train) -> None:
+    """Wettels and Loeb, II.B: the nets scale their inputs themselves."""
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(200, 3)) * [1.0, 30.0, 0.01] + 5.0
+    t = np.sin(x[:, :1])
+    by_variance = (x - x.mean(axis=0)) / x.var(axis=0)
+    one, other = (train(v[:150], t[:150], (v[150:], t[150:]), steps=10) for v in (x, by_variance))
+    np.testing.assert_allclose(one(x), other(by_variance), atol=1e-4)
+
+
+def test_the_method_is_chosen_without_the_test_contacts() -> None:
+    rows = [
+        {"what": "a", "split": wettels_roc.BY_CONTACT, "validated": 0.8, "correct": 0.99},
+        {"what": "b", "split": wettels_roc.BY_CONTACT, "validated": 0.9, "correct": 0.5},
+        {"what": "c", "split": wettels_roc.BY_ROW, "validated": 1.0, "correct": 1.0},
+    ]
+    assert wettels_roc.chosen(rows)["what"] == "b"
 
 
 def test_splits_keep_groups_whole_and_the_paper_s_shares() -> None:

@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.calibrate.press import CALIBRATION_FORCES_N
+from biotac.calibrate.press import CALIBRATION_FORCES_N, drive
 from biotac.core import geometry
+from biotac.errors import InputError
+from biotac.sim import SimFinger, world
 from biotac.wire import sensor
 from biotac_lab.experiments import navarro2015 as navarro
+from biotac_lab.experiments import navarro_active
 from biotac_lab.report import Options, write
 
 # What two lags of the emulated pressure do to K: see tests/host/calibrate.
@@ -36,7 +39,7 @@ def played(hands: list[navarro.Hands], monkeypatch: pytest.MonkeyPatch) -> navar
 @pytest.mark.nightly
 def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, monkeypatch, tmp_path: Path) -> None:
     report = played(hands, monkeypatch)
-    assert len(report.checks) == 4 and all(check["met"] for check in report.checks)
+    assert len(report.checks) == 6 and all(check["met"] for check in report.checks)
     assert [one.seed for hand in hands for one in hand.fingers] == list(range(21, 31))
     page, picture, _ = write(report, tmp_path, "navarro", "", overwrite=False)
     assert "| thumb | 10." in page.read_text() and "5.91 %" in page.read_text()
@@ -47,7 +50,7 @@ def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, 
 def test_a_board_that_is_off_is_seen(hands, monkeypatch) -> None:
     first, second = hands
     report = played([replace(first, frames_checked=0), replace(second, violations=1)], monkeypatch)
-    assert [check["met"] for check in report.checks] == [True, False, True, False]
+    assert [check["met"] for check in report.checks] == [True, False, True, False, True, True]
 
 
 def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
@@ -62,3 +65,36 @@ def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
     # K of the one place and what pressure says at the other are each off by the lags
     assert (np.abs(errors - wanted) <= (K_HIGH + K_LOW) * (1 + wanted)).all()
     assert np.diag(errors).max() < 0.01 < 0.2 < errors.max()
+
+
+# ---- active: the procedure drives the hand ------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("fingers", "newtons"), [(("index", "thumb"), False), (navarro.NAMES, True)])
+def test_a_hand_calibrates_itself_finger_by_finger(fingers: tuple[str, ...], newtons: bool) -> None:
+    found = navarro_active.calibrate(3, fingers, newtons=newtons)
+    assert [one.finger for one in found] == list(fingers)
+    forces = (2.0, 3.5, 5.0, 4.0) if newtons else tuple((deg - 15.0) * 0.7 for deg in (18.0, 20.0, 22.0, 21.0))
+    for one in found:
+        assert (*one.fit.press_forces_n, one.verified.force_n) == pytest.approx(forces)
+        law = 100 * (1 + 0.15 * np.tanh(geometry.ELECTRODE_MM[16, 0] / 8))  # the sensor's own, counts per N
+        assert -K_LOW <= one.fit.gain_n * law - 1 <= K_HIGH
+        assert one.verified.board_error < 0.01 and one.verified.board_n != one.verified.force_n
+
+
+def test_a_hand_is_driven_in_the_paper_s_order_and_taken_back_when_it_fails() -> None:
+    with world({"index": SimFinger(1), "thumb": SimFinger(2)}) as w:
+        w.run(2.0)
+        hand = navarro_active.PlateHand(w, ("index", "thumb"))
+        drive(w.hand, hand.to_deg, hand.plate_n, (18, 20, 22, 21), next_round=hand.step, fingers=["thumb", "index"])
+        targets = [move for move in hand.moves if move[1] is not None]
+        three = [(name, deg) for name in ("thumb", "index") for deg in (18, 20, 22)]
+        assert targets == [*three, ("thumb", 21), ("index", 21)]
+        assert hand.moves[-1] == ("index", None)
+        hand.moves.clear()
+        with pytest.raises(InputError, match="never came: pressure rose by at most"):  # 14 degrees touch nothing
+            drive(w.hand, hand.to_deg, hand.plate_n, (14, 14, 14, 14), next_round=hand.step)
+        assert hand.moves[-1] == ("index", None)
+        for touches, fingers, words in (((1, 2, 3), (), "expected four"), ((1, 2, 3, 4), ("toe",), "expected some of")):
+            with pytest.raises(InputError, match=words):
+                drive(w.hand, hand.to_deg, hand.plate_n, touches, fingers=fingers)

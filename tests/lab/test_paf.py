@@ -10,7 +10,7 @@ from biotac.features.paf import paf
 from biotac.features.signals import skin
 from biotac.sim.physics import Finger
 from biotac_lab.experiments.scores import score
-from biotac_lab.learn.smooth import causal, causal_taps, lowess
+from biotac_lab.learn.smooth import causal, causal_taps, low_pass, lowess
 from biotac_lab.learn.stimulations import stimulate
 
 
@@ -40,6 +40,34 @@ def test_lowess_keeps_a_line_and_drops_an_outlier() -> None:
         lowess(np.arange(5.0))
 
 
+@pytest.mark.parametrize("sigmas", [30.0, 1e3, 1e6])
+@pytest.mark.parametrize("row", [0, 3, 30, 59])
+def test_lowess_gives_a_spike_no_weight_whatever_its_size(sigmas: float, row: int) -> None:
+    noisy = 0.3 * np.arange(60.0) - 2.0 + np.random.default_rng(1).normal(0.0, 0.1, 60)
+    spoilt = noisy.copy()
+    spoilt[row] += 0.1 * sigmas
+    assert np.abs(lowess(spoilt) - lowess(noisy)).max() < 0.05, "a spike moves nothing by more than half a deviation"
+    level = np.full(40, 7.0)
+    level[20] += sigmas
+    np.testing.assert_allclose(lowess(level), 7.0)
+    curve = np.sin(np.arange(200) / 20.0)
+    assert np.abs(lowess(curve) - curve).max() < 0.01, "nor does a bend pass for outliers"
+
+
+def test_the_low_pass_is_the_paper_s() -> None:
+    at = np.arange(1000) / 100.0
+    for hz in (0.5, 5.0, 20.0):  # a third-order Butterworth's gain, warped as bilinear filters are
+        ratio = np.tan(np.pi * hz / 100.0) / np.tan(np.pi * 5.0 / 100.0)
+        passed = low_pass(np.sin(2.0 * np.pi * hz * at), 100.0)[600:]
+        assert np.sqrt(2.0 * (passed**2).mean()) == pytest.approx((1.0 + ratio**6) ** -0.5, rel=1e-3)
+    lag_s = 2.0 / (2.0 * 100.0 * np.tan(np.pi * 5.0 / 100.0))  # of three such poles, for what is slow
+    np.testing.assert_allclose(
+        low_pass(np.column_stack([at, at - 3.0]), 100.0)[-1], [at[-1] - lag_s, at[-1] - 3 - lag_s]
+    )
+    with pytest.raises(InputError, match="8 rows a second: expected more than 10"):
+        low_pass(at, 8.0)
+
+
 def test_the_causal_taps_are_the_reference_s_and_follow_a_slope_without_lag() -> None:
     printed = [-0.006, -0.031, -0.058, -0.068, -0.049, 0.0, 0.071, 0.155, 0.243, 0.329, 0.413]
     np.testing.assert_allclose(causal_taps(), printed, atol=6e-4)
@@ -56,5 +84,6 @@ def test_scores_by_hand() -> None:
     assert found["smse"] == pytest.approx((2 / 3) / (8 / 3), abs=1e-4)
     assert found["r2"] == pytest.approx(np.corrcoef([1, 2, 4], [1, 3, 5])[0, 1] ** 2, abs=1e-4)
     assert found["percent"] == pytest.approx(100.0 * (0.5 + 1.0) / (2.0 + 4.0))
+    assert found["printed"] == pytest.approx(100.0 * (1 / 3 + (1 / 3 + 1 / 5)) / 4, abs=1e-4)
     assert score(np.array([1.0, np.nan]), np.array([1.0, 2.0]))["rmse"] is None
     assert score(np.array([1.0, 2.0]), np.array([0.0, 0.0]))["percent"] is None

@@ -14,6 +14,7 @@ from .calibrate import direction_command as direction
 from .calibrate import finger_command as finger
 from .calibrate import population_command as population
 from .experiments import command as experiments
+from .experiments import seeds
 from .grasp import command as grasp
 
 
@@ -23,6 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     known = {
         "experiment": experiments,
+        "seeds": seeds,
         "population": population,
         "direction": direction,
         "finger": finger,

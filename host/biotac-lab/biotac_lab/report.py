@@ -26,7 +26,7 @@ class Options:
     ``seed`` chooses the emulated finger; with ``recording`` there is none, and ``finger`` chooses one of the
     recording's. ``maps`` are files of fitted wrench maps to try beside the paper's model; ``show`` is called with
     progress. ``real`` are recordings with their force to try beside the emulated finger; ``quick`` asks for a smaller
-    run, with worse figures.
+    run, with worse figures, ``filter`` for the paper's low-pass.
     """
 
     seed: int = 1
@@ -35,6 +35,7 @@ class Options:
     maps: tuple[Path, ...] = ()
     real: tuple[Path, ...] = ()
     quick: bool = False
+    filter: bool = False
     show: Show = field(default=lambda text: None)
 
 

@@ -33,6 +33,23 @@ def project(points_mm: Floats) -> Floats:
     return points
 
 
+def point_of_contact(signals: npt.ArrayLike, exponent: float = 2.0, *, compressed: bool = False) -> Floats:
+    """Lin 2013, Eq 1 and 2, for an exponent of any size: points (n, 3) in mm for signals (n, 19) in counts.
+
+    NaN where no electrode has weight; one that is NaN has none. ``compressed`` counts only electrodes below their tare.
+    An infinite exponent gives the strongest electrode, the mean of several alike. A board has n = 1 and 2
+    (biotac.PocWeights); this is for comparison. Raises ValueError for other shapes, and exponents not above 0.
+    """
+    e = np.nan_to_num(np.asarray(signals, dtype=np.float64), nan=0.0)
+    if e.ndim != 2 or e.shape[1] != len(ELECTRODE_MM) or not exponent > 0.0:
+        raise ValueError(f"signals {e.shape}, exponent {exponent}: expected (n, {len(ELECTRODE_MM)}) and more than 0")
+    size = np.maximum(-e, 0.0) if compressed else np.abs(e)
+    most = size.max(axis=1, initial=0.0, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weight = (size / most) ** exponent  # of the strongest: a large power of a count would overflow
+        return project(weight @ ELECTRODE_MM / weight.sum(axis=1, keepdims=True))
+
+
 def on_surface(xy_mm: Floats) -> Floats:
     """Points (n, 3) of the ventral surface with the given x and y (n, 2)."""
     x, y = xy_mm[:, 0], xy_mm[:, 1]

@@ -22,12 +22,14 @@ FINGERS = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
 #: A new one is a line here and a module of that name, with `_` for `-`, beside this one.
 NAMES = {
     "poke": "point of contact under a 2 mm probe on every electrode (Lin 2013, table 2)",
+    "weights": "the default weights of the point of contact, by pokes and by a plate on one page",
     "plate-normal": "normal at the point of contact against a flat plate's",
     "shear": "a weight pushed sideways (Lin 2013, figure 3)",
     "torsion": "a weight turned both ways (Lin 2013, figure 9)",
     "torsion-shear": "a weight turned while it is pushed (Lin 2013, figure 10)",
     "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
     "hold": "light holds spliced into presses, against the residue that presses leave",
+    "tare": "the paper's renormalisation against the board's tare: slow loads, lock-out, drift (Lin 2013, IV.B)",
     "navarro2015": "pressure calibration and its verification press (Navarro et al. 2015)",
     "wettels2011": "every table and figure on learning point of contact, curvature and force (Wettels and Loeb 2011)",
 }
@@ -37,7 +39,7 @@ def load(name: str) -> ModuleType:
     """The module of the experiment ``name``, with a function run() from Options to a Report.
 
     ``RECORDING`` says what a recording must hold; without it none makes sense. ``TAKES`` are the options among
-    ``maps``, ``real`` and ``quick`` that apply, if any do.
+    ``maps``, ``real``, ``quick`` and ``filter`` that apply, if any do.
     """
     return importlib.import_module(f"{__package__}.{name.replace('-', '_')}")
 
@@ -59,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--real", **many, help="wettels2011: also try nets on this .npz with its force; may be repeated"
     )
     parser.add_argument("--quick", action="store_true", help="wettels2011: a short run, with worse figures")
+    parser.add_argument("--filter", action="store_true", help="wettels2011: with the paper's 3-pole 5 Hz low-pass")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="NAME.md, NAME.png and NAME.json go here")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses its target")
@@ -74,8 +77,8 @@ def run(args: argparse.Namespace, show: Show) -> int:
     """Return 0, or 1 if --check finds a limit missed."""
     name, experiment = args.name, load(args.name)
     options = Options(
-        finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, recording=args.recording,
-        show=show,
+        finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, filter=args.filter,
+        recording=args.recording, show=show,
     )  # fmt: skip
     takes = getattr(experiment, "TAKES", ())
     _check(name, hasattr(experiment, "RECORDING"), takes, options, args.seed)
@@ -102,6 +105,6 @@ def _check(name: str, has_recordings: bool, takes: Collection[str], options: Opt
         raise InputError("--seed chooses an emulated finger, but a recording is given: drop one of them")
     if seed is not None and not 0 <= seed <= SEED_MAX:
         raise InputError(f"--seed is {seed}: expected 0 to {SEED_MAX}")
-    for what, option in (("maps", "map"), ("real", "real"), ("quick", "quick")):
+    for what, option in (("maps", "map"), ("real", "real"), ("quick", "quick"), ("filter", "filter")):
         if getattr(options, what) and what not in takes:
             raise InputError(f"{name} does not use --{option}: drop it")

@@ -43,6 +43,7 @@ from biotac.recording import CrossCheck
 from biotac.sim import PROFILES, Profile
 
 from ..report import Options, Report, Show, Table, check, claim
+from . import navarro_active
 
 NAMES = ("thumb", "fore", "middle", "ring", "little")
 PAPER_GAIN_N = (0.016, 0.010, 0.013, 0.009, 0.009)  # Table I
@@ -203,6 +204,16 @@ def run(options: Options) -> Report:
             check(what, worst * 100, LIMIT_PERCENT, "%"),
             claim(f"board and float64 agree in all {hand.frames_checked} frames, {hand.profile}", right),
         ]
+    options.show("hands of two and of five fingers that press by themselves")
+    active: dict[tuple[tuple[str, ...], str], list[navarro_active.Active]] = {
+        (names, how): navarro_active.calibrate(options.seed, names, newtons=how == "newtons")
+        for names, how in ((NAMES[:2], "joint angles"), (NAMES, "newtons"))
+    }
+    checks += [
+        check(f"relative error of the verifying touch, worst of {len(names)} fingers that were driven by {how}",
+              max(one.verified.board_error for one in found) * 100, LIMIT_PERCENT, "%")
+        for (names, how), found in active.items()
+    ]  # fmt: skip
     notes = [
         f"presses of {', '.join(f'{f:g}' for f in CALIBRATION_FORCES_N)} N, then "
         f"{VERIFICATION_FORCES_N[0]:g} N, with a 7 mm flat at {PLACE}; the force is the scenario's, without error",
@@ -214,9 +225,24 @@ def run(options: Options) -> Report:
         "tare off: the largest difference between a held row's tare and that mean; a tare taken right after a "
         "release still contains some residue of the press",
     ]
-    tables = [*[_fingers(hand) for hand in hands], places(options.seed)]
+    tables = [*[_fingers(hand) for hand in hands], _active(active), places(options.seed)]
     source = f"emulated hands of five fingers, seeds {seeds[0]} to {seeds[-1]}"
     return Report(source, tables, checks, notes, lambda figure: _draw(hands, figure))
+
+
+def _active(found: dict[tuple[tuple[str, ...], str], list[navarro_active.Active]]) -> Table:
+    rows = [
+        [f"{len(names)}, by {how}", one.finger, one.fit.gain_n * 1e3, *one.fit.press_forces_n,
+         one.fit.relative_error * 100, one.verified.force_n, one.verified.board_error * 100]
+        for (names, how), active in found.items() for one in active
+    ]  # fmt: skip
+    head = ["hand of fingers", "finger", "K [mN/count]", "touch 1 [N]", "2", "3", "fit [%]", "touch 4 [N]",
+            "verified, board [%]"]  # fmt: skip
+    text = (
+        "The procedure drives the hand finger by finger, by joint angles (18, 20, 22 and 21 degrees) or newtons; K is "
+        "on the board before the fourth touch."
+    )
+    return Table("Active calibration", head, rows, text)
 
 
 def _fingers(hand: Hands) -> Table:

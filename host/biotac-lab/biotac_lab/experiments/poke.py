@@ -22,7 +22,7 @@ from biotac.sim import PROFILES, Pose, Profile
 from biotac.wire import messages, sensor
 
 from ..report import Options, Report, Table, check
-from . import laboratory
+from . import laboratory, poke_wrench
 from .trial import Bools, Floats, Script, Trial, play
 
 RECORDING = "E and F, or an .mcap with good scales: 19 contacts above 1 N in the order of the electrodes"
@@ -34,7 +34,8 @@ SLOW_PEAK_N = 5.0
 BANDS_N = ((1.0, 1.5), (1.5, 2.0), (2.0, 3.0), (3.0, 5.0))
 MIN_FRAMES = 5  # fewer give no meaningful standard deviation
 GAP_S = 0.1  # a shorter dip of the force does not end the contact
-LIMIT_MM = 0.23  # the paper's average for its first trial is 0.2269
+# the paper's averages for its two trials are 0.2269 and 0.3580; on a worn finger the worse one counts
+LIMIT_MM = {"new": 0.23, "worn": 0.36, "recorded": 0.23}
 SHIPPED = PocWeights(messages.SETTINGS[Setting.POC_WEIGHTS].default)
 WEIGHTS = (SHIPPED, *(weights for weights in PocWeights if weights != SHIPPED))
 WORDS = {
@@ -93,6 +94,7 @@ class Result:
     source: str
     cases: list[Case]
     notes: list[str]
+    trials: dict[str, Trial]
 
 
 def spread(points_mm: Floats, contacts: Sequence[Bools]) -> Spread:
@@ -148,20 +150,24 @@ def measure(options: Options) -> Result:
     """Cases of an emulated finger, new and worn, twice each; or of a recording."""
     if options.recording is not None:
         trial = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
-        return Result(str(options.recording), _cases("recorded", [trial], trial), list(trial.notes))
+        return Result(
+            str(options.recording), _cases("recorded", [trial], trial), list(trial.notes), {"recorded": trial}
+        )
     cases: list[Case] = []
+    first: dict[str, Trial] = {}
     for profile in PROFILES:
         options.show(f"poking the {profile} sensor")
         trials = [emulated(options.seed, profile, take=take) for take in (0, 1)]
         slow = emulated(options.seed, profile, take=2, slow=True)
         cases += _cases(profile, trials, slow)
+        first[profile] = trials[0]
     notes = [
         f"emulated sensor, seed {options.seed}: the probe presses with up to {PEAK_N:g} N for half a second; by force: "
         f"it ramps up to {SLOW_PEAK_N:g} N in four seconds, 24 frames per 0.3 N",
         "probe placed exactly; by hand it is not, which adds to the paper's bias but not to its deviation",
         "new: noise 1.5 counts, 3 to 5 kOhm, as in the paper; worn: noise 5 counts, glitches, as in public recordings",
     ]
-    return Result(f"emulated finger, seed {options.seed}", cases, notes)
+    return Result(f"emulated finger, seed {options.seed}", cases, notes, first)
 
 
 def _cases(profile: str, trials: list[Trial], slow: Trial) -> list[Case]:
@@ -182,13 +188,11 @@ def _cases(profile: str, trials: list[Trial], slow: Trial) -> list[Case]:
 def run(options: Options) -> Report:
     """Means, by force, and table 2; on an emulated finger, new and worn, twice each, or on a recording."""
     result = measure(options)
-    shipped = next(case for case in result.cases if case.weights == SHIPPED)
-    which = "recorded" if options.recording is not None else f"{shipped.profile} sensor"
-    what = f"mean standard deviation above {FLOOR_N:g} N, {which}"
     checks = [
-        check(f"{what}, trial {k}", trial.std_mm.mean(), LIMIT_MM, "mm")
-        for k, trial in enumerate(shipped.trials, start=1)
-    ]
+        check(f"mean standard deviation above {FLOOR_N:g} N, {case.profile} sensor, trial {k}", trial.std_mm.mean(),
+              LIMIT_MM[case.profile], "mm")
+        for case in result.cases if case.weights == SHIPPED for k, trial in enumerate(case.trials, start=1)
+    ]  # fmt: skip
     return Report(result.source, _tables(result), checks, result.notes, lambda figure: _draw(result, figure))
 
 
@@ -221,6 +225,7 @@ def _tables(result: Result) -> list[Table]:
         Table("Point of contact", head, rows, text),
         Table("By force", ["sensor", "weights", "mm", *bands], banded, "Within each band, means over the electrodes."),
         Table("Table 2, with the board's default weights", head2, each, "In mm.", digits=4),
+        poke_wrench.table(result.trials, {name: contacts(trial) for name, trial in result.trials.items()}),
     ]
 
 
@@ -231,13 +236,15 @@ def called(weights: PocWeights) -> str:
 
 def _draw(result: Result, figure: Any) -> None:
     """Figure 7 unrolled for the default and the paper's weights, and table 2 as bars."""
-    figure.set_size_inches(15, 9.5)
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
+    figure.set_size_inches(15, 13)
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.25, 1.0, 0.7))
     first = result.cases[0].profile
     for k, weights in enumerate((SHIPPED, PocWeights.ABS_N2)):
         cases = [case for case in result.cases if case.weights == weights]
         _draw_points(figure.add_subplot(grid[0, k]), next(case for case in cases if case.profile == first))
     _draw_electrodes(figure.add_subplot(grid[1, :]), result)
+    trial = next(iter(result.trials.values()))
+    poke_wrench.draw(trial, contacts(trial), [figure.add_subplot(grid[2, k]) for k in (0, 1)])
     figure.suptitle(f"Electrode poking, 2 mm probe, above {FLOOR_N:g} N: {result.source}")
 
 
@@ -268,7 +275,7 @@ def _draw_electrodes(axes: Any, result: Result) -> None:
     for k, (label, std, color) in enumerate(series):
         at = x + (k - (len(series) - 1) / 2) * width
         axes.bar(at, std, width, color=color, label=f"{label}: {std.mean():.3f}")
-    axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
+    axes.axhline(LIMIT_MM["new"], color="#111111", linewidth=1, linestyle=":")
     axes.set_xticks(x, sensor.ELECTRODE_NAMES)
     axes.set(ylabel="std of the point of contact [mm]", yscale="log", xlim=(-0.6, 18.6))
     axes.set_title("table 2, with the board's default weights; mean of the 19 in the legend", fontsize=10)

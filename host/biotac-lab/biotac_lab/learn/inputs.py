@@ -36,7 +36,11 @@ Reduce = Callable[[Floats], Reduction]
 
 
 def every(columns: Floats) -> Reduction:
-    """All columns, centred and divided by their standard deviation."""
+    """All columns, centred and divided by their standard deviation.
+
+    The paper says "dividing by the variance", which leaves a quiet channel larger than a loud one. Whatever a channel
+    is divided by, its toolbox's own scaling of inputs (mapminmax) undid, as nets.scaled() does here.
+    """
     deviation = columns.std(axis=0)
     return Reduction(columns.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0), np.eye(columns.shape[1]))
 

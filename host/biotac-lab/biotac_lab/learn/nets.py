@@ -1,7 +1,7 @@
 """A perceptron of one tanh layer and linear outputs: Wettels and Loeb 2011, Eq 1-3, by scikit-learn.
 
-The paper trains by Levenberg-Marquardt with Bayesian regularisation and stops by held-out rows; L-BFGS with the weight
-decay that is best on such rows comes to the same errors (host/biotac-lab/docs/learning.md).
+The paper trains by Levenberg-Marquardt with Bayesian regularisation and stops by held-out rows: levenberg.py does, and
+takes longer. Here it is L-BFGS, with the weight decay that is best on such rows.
 """
 
 from __future__ import annotations
@@ -59,10 +59,7 @@ def train(
     ``units`` defaults to twice the number of inputs, as in the paper. Targets are divided by one deviation for all, so
     that the errors of all outputs weigh the same. Raises InputError for other shapes, or values that are not finite.
     """
-    x, t = _pair(inputs, targets)
-    deviation, target_mean = x.std(axis=0), t.mean(axis=0)
-    mean, scale = x.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0)
-    target_scale = float(np.sqrt(((t - target_mean) ** 2).mean())) or 1.0
+    x, t, mean, scale, target_mean, target_scale = scaled(inputs, targets)
     best, least = None, np.inf
     for decay in (DECAY,) if aside is None else DECAYS:
         hidden = (units or 2 * x.shape[1],)
@@ -79,6 +76,14 @@ def train(
         best, least = (net, error) if error < least else (best, least)
     assert best is not None
     return best
+
+
+def scaled(inputs: npt.ArrayLike, targets: npt.ArrayLike) -> tuple[Floats, Floats, Floats, Floats, Floats, float]:
+    """Inputs and targets, and the mean and deviation of each: (d,) and (d,), (k,) and one for all targets."""
+    x, t = _pair(inputs, targets)
+    deviation, target_mean = x.std(axis=0), t.mean(axis=0)
+    target_scale = float(np.sqrt(((t - target_mean) ** 2).mean())) or 1.0
+    return x, t, x.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0), target_mean, target_scale
 
 
 def _pair(inputs: npt.ArrayLike, targets: npt.ArrayLike) -> tuple[Floats, Floats]:

@@ -1,9 +1,11 @@
-"""The 11-point robust LOWESS of Wettels and Loeb 2011, and a causal smoother for a finger that is still touched."""
+"""The 11-point robust LOWESS and the 5 Hz filter of Wettels and Loeb 2011, and a causal smoother for a live finger."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import interp1d
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from biotac import InputError
 
@@ -11,14 +13,19 @@ Floats = npt.NDArray[np.float64]
 
 TAPS = 11
 ROBUST_STEPS = 3  # statsmodels' default; MATLAB's rlowess takes 5
+OUTSIDE_SIGMAS = 6.0  # "zero weight to data points outside six standard deviations in its history"
+SIGMA_PER_MAD = 1.4826
+LOW_PASS_HZ, LOW_PASS_POLES = 5.0, 3  # the paper, II.A
 
 
 def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
-    """Values (n,) or (n, k) smoothed by local lines over ``taps`` rows, without outliers beyond six median residuals.
+    """Values (n,) or (n, k) smoothed by local lines over ``taps`` rows, without outliers.
 
-    Cleveland's robust LOWESS (statsmodels', three robust steps) over the row number, each column by itself. NaN rows
-    are skipped and stay NaN. It needs the rows after a row, too; causal() does not. An outlier of a thousand times the
-    noise distorts its neighbours and is not rejected. Raises InputError where fewer than ``taps`` rows are finite.
+    Cleveland's robust LOWESS (statsmodels', three robust steps) over the row number, each column by itself. Rows
+    outside six standard deviations of those around them have no weight (outliers()): the robust steps alone would let
+    one outlier of a thousand deviations bend all its neighbours, and reject these with it. NaN rows are skipped and
+    stay NaN. It needs the rows after a row, too; causal() does not. Raises InputError where fewer than ``taps`` rows
+    are left.
     """
     from statsmodels.nonparametric.smoothers_lowess import lowess as theirs  # half a second to import
 
@@ -27,10 +34,43 @@ def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
     result = np.full(flat.shape, np.nan)
     for k, column in enumerate(flat.T):
         at = np.flatnonzero(np.isfinite(column))
-        if len(at) < taps:
-            raise InputError(f"{len(at)} rows have a value: expected at least {taps}; smooth a longer stretch")
-        result[at, k] = theirs(column[at], at, frac=taps / len(at), it=ROBUST_STEPS, return_sorted=False)
+        good = at[~outliers(column[at], taps)]
+        if len(good) < taps:
+            raise InputError(f"{len(good)} rows have a value: expected at least {taps}; smooth a longer stretch")
+        smooth = theirs(column[good], good, frac=taps / len(good), it=ROBUST_STEPS, return_sorted=False)
+        result[at, k] = interp1d(good, smooth, fill_value="extrapolate")(at)
     return result.reshape(columns.shape)
+
+
+def outliers(values: Floats, taps: int = TAPS) -> npt.NDArray[np.bool_]:
+    """Mask (n,) of the values (n,) outside six deviations from the median of the ``taps`` around them (Hampel 1974).
+
+    The deviation is the median one of the same rows, so that a slope widens it. Where half of them are equal it is 0,
+    and any other value is outside.
+    """
+    if len(values) < taps:
+        return np.zeros(len(values), np.bool_)
+    begin = np.clip(np.arange(len(values)) - taps // 2, 0, len(values) - taps)
+    around = values[begin[:, None] + np.arange(taps)]
+    middle = np.median(around, axis=1)
+    deviation = SIGMA_PER_MAD * np.median(np.abs(around - middle[:, None]), axis=1)
+    return np.asarray(np.abs(values - middle) > OUTSIDE_SIGMAS * deviation)
+
+
+def low_pass(values: npt.ArrayLike, rate_hz: float) -> Floats:
+    """Values (n,) or (n, k), read ``rate_hz`` times a second, through the paper's 3-pole 5 Hz low-pass, from rest.
+
+    The paper names no kind: this is Butterworth's. Causal; a slope comes out 64 ms late. Raises InputError for a rate
+    that is not above 10 Hz.
+    """
+    if not rate_hz > 2.0 * LOW_PASS_HZ:
+        raise InputError(f"{rate_hz:g} rows a second: expected more than {2 * LOW_PASS_HZ:g} for {LOW_PASS_HZ:g} Hz")
+    columns = np.asarray(values, dtype=np.float64)
+    sections = butter(LOW_PASS_POLES, LOW_PASS_HZ, fs=rate_hz, output="sos")
+    flat = columns.reshape(len(columns), -1)
+    start = sosfilt_zi(sections)[:, :, None] * flat[0]
+    result: Floats = sosfilt(sections, flat, axis=0, zi=start)[0].reshape(columns.shape)
+    return result
 
 
 def causal_taps(taps: int = TAPS) -> Floats:

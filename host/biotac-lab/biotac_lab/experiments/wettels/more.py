@@ -9,11 +9,11 @@ from biotac.features import several
 from biotac.features.signals import skin
 from biotac.sim import Finger, States
 
-from ..learn import edge
-from ..learn.probes import PROBES, counts_of, footprints
-from ..learn.stimulations import press_bars
-from ..report import Facts, plain
-from .trial import Floats
+from ...learn import edge
+from ...learn.probes import PROBES, counts_of, footprints
+from ...learn.stimulations import press_bars
+from ...report import Facts, plain
+from ..trial import Floats
 
 APART_MM = (6.0, 8.0, 10.0, 12.0, 14.0)
 PAD_D_MM, PAD_R_MM = (3.0, 15.0), 5.0

@@ -11,26 +11,32 @@ from biotac.features.paf import THRESHOLD_N, paf
 from biotac.features.signals import skin
 from biotac.sim import Finger, States
 
-from ..learn import inputs
-from ..learn.probes import PROBES, counts_of, footprints
-from ..learn.smooth import causal, lowess
-from ..learn.stimulations import Stimulations, stimulate
-from ..report import Facts, plain
-from .scores import score
-from .trial import Floats
+from ...learn import inputs
+from ...learn.probes import PROBES, counts_of, footprints
+from ...learn.smooth import causal, lowess
+from ...learn.stimulations import Stimulations, stimulate
+from ...report import Facts, plain
+from ..scores import score
+from ..trial import Floats
+from .roc import filtered
 
 LOADS_N = {"30 to 40 N, as the paper": (30.0, 40.0), "6 to 12 N": (6.0, 12.0)}
 EQUATIONS = {"as printed": True, "rest offset removed": False}
 TECHNIQUES = ("none", "11-point LOWESS", "force threshold", "both", "causal 11 taps and threshold")
-FRAMES = 20
+FRAMES, FILTERED_FRAMES = 20, 60  # of a press
 
 
-def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts], Any]:
-    """A row per load, equation and technique; and for the drawing, true and estimated places of the first load."""
+def run(finger: Finger, places: tuple[int, ...], seed: int, low: bool = False) -> tuple[list[Facts], Any]:
+    """A row per load, equation and technique; and for the drawing, true and estimated places of the first load.
+
+    ``low``: through the paper's low-pass, which needs more rows of a press.
+    """
+    frames = FILTERED_FRAMES if low else FRAMES
     rows: list[Facts] = []
     drawn: Any = None
     for load, peak_n in LOADS_N.items():
-        pressed = stimulate(finger, places, seed=seed, frames=FRAMES, peak_n=peak_n)
+        pressed = stimulate(finger, places, seed=seed, frames=frames, peak_n=peak_n)
+        pressed = filtered(pressed, frames) if low else pressed
         truth = skin(pressed.contact_mm)
         firm = np.linalg.norm(pressed.force_n, axis=1) > THRESHOLD_N
         for equation, as_printed in EQUATIONS.items():

@@ -1,0 +1,114 @@
+"""Every method, equation, table and figure of the three papers beside ours: seeds.json, with measured figures.
+
+    biotac-lab seeds                   the table, with the figures kept in figures.json
+    biotac-lab seeds --measure poke    measure an experiment's anew, and keep them
+
+A row has what is theirs and what is ours, the experiment or the command that shows it, and the verdict. A figure,
+{TABLE|ROW|COLUMN:.2f}, is named by how these begin, or by keys of the experiment's JSON. ``less`` names two figures of
+which the first is the smaller one where the verdict is "right", and is not where it "differs".
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from ..report import Facts, Options, Show, Table, claim
+
+ABOUT = "Every method, equation, table and figure of the papers beside ours."
+EXAMPLE = "biotac-lab seeds --measure poke"
+ROWS: dict[str, list[Facts]] = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
+KEPT = Path(__file__).with_name("figures.json")
+FIGURE = re.compile(r"\{([^{}:]+(?:: [^{}:]+)*):([^{}]*)\}")
+NAMES = {"lin2013": "Lin 2013", "navarro2015": "Navarro 2015", "wettels2011": "Wettels 2011"}
+
+
+def names(row: Facts) -> list[str]:
+    """The figures that a row needs."""
+    return [name for name, _ in FIGURE.findall(row["ours"])] + list(row.get("less", ()))
+
+
+def figure(facts: Facts, name: str) -> float:
+    """The figure of that name in an experiment's JSON. Raises KeyError that says what is missing."""
+    first, *keys = name.split("|")
+    now: Any = facts.get(first) or next((one for one in facts["tables"] if one["title"].startswith(first)), None)
+    for key in keys:
+        now = _within(now, key)
+    if not isinstance(now, int | float):
+        raise KeyError(f"no figure {name}: found {now!r}")
+    return now
+
+
+def _within(now: Any, key: str) -> Any:
+    if isinstance(now, list):
+        return now[int(key)] if key.isdigit() else next((one for one in now if key in _texts(one.values())), None)
+    if isinstance(now, dict) and "head" in now:
+        rows = (row for row in now["rows"] if _texts(row).startswith(key))
+        return next((dict(zip(now["head"], row, strict=True)) for row in rows), None)
+    return next((value for name, value in (now or {}).items() if name.startswith(key)), None)
+
+
+def _texts(cells: Any) -> str:
+    return ", ".join(str(cell) for cell in cells if isinstance(cell, str | int))
+
+
+def findings(experiment: str, facts: Facts) -> list[Facts]:
+    """A check for each finding of an experiment that can turn round: it is right where that is said, or differs."""
+    found = []
+    for row in (row for rows in ROWS.values() for row in rows if row.get("experiment") == experiment and "less" in row):
+        less, more = (figure(facts, name) for name in row["less"])
+        ours = _filled(row, {name: figure(facts, name) for name in names(row)})
+        what = f"{row['item']}. Theirs: {row['his']}; ours: {ours}; {row['verdict']}"
+        found.append(claim(what, (less < more) == row["verdict"].startswith("right")))
+    return found
+
+
+def _filled(row: Facts, figures: dict[str, float]) -> str:
+    return FIGURE.sub(lambda one: format(figures[one[1]], one[2]) if one[1] in figures else "-", row["ours"])
+
+
+def table(kept: dict[str, dict[str, float]]) -> Table:
+    """All rows, with the figures by experiment."""
+    rows = []
+    for paper, those in ROWS.items():
+        for row in those:
+            ours = _filled(row, kept.get(row.get("experiment", ""), {}))
+            command = row.get("command") or f"biotac-lab experiment {row['experiment']}"
+            rows.append([NAMES[paper], row["item"], row["his"], ours, command.join("``") if command != "-" else "-",
+                         row["verdict"]])  # fmt: skip
+    head = ["paper", "what", "theirs", "ours", "shown by", "verdict"]
+    return Table("Every method, equation, table and figure", head, rows)
+
+
+def measured(experiment: str, show: Show) -> dict[str, float]:
+    """An experiment's figures, with its usual options."""
+    from .command import load
+
+    facts = load(experiment).run(Options(show=show)).facts(experiment)
+    wanted = [
+        name for rows in ROWS.values() for row in rows if row.get("experiment") == experiment for name in names(row)
+    ]
+    return {name: figure(facts, name) for name in dict.fromkeys(wanted)}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is measured."""
+    known = sorted({row["experiment"] for rows in ROWS.values() for row in rows if "experiment" in row})
+    text = f"run this experiment and keep its figures; may be repeated: {', '.join(known)}"
+    parser.add_argument("--measure", metavar="NAME", action="append", choices=known, default=[], help=text)
+
+
+def run(args: argparse.Namespace, show: Show) -> int:
+    """Return 0."""
+    kept: dict[str, dict[str, float]] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    for experiment in args.measure:
+        kept[experiment] = measured(experiment, show)
+    show("")
+    if args.measure:
+        KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    made = table(kept)
+    print(json.dumps(made.facts()) if args.json else "\n".join(made.page()))
+    return 0

@@ -1,0 +1,1 @@
+"""What Wettels and Loeb 2011 did, part by part; `wettels2011` runs them all."""
