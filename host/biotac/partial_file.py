@@ -6,7 +6,7 @@ import contextlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from .errors import InputError, taken
@@ -15,12 +15,14 @@ ROS2_METADATA = "metadata.yaml"
 
 
 @contextlib.contextmanager
-def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
+def whole(path: Path, *, overwrite: bool, made_of: Iterable[Path] = ()) -> Iterator[Path]:
     """Give a place beside ``path`` to write to, file or folder; it becomes ``path`` when all went well.
 
     Otherwise it is removed, and what was at ``path`` before is untouched. A KeyboardInterrupt goes on with
-    words that say so. Raises InputError when ``path`` exists and may not be overwritten.
+    words that say so. Raises InputError when ``path`` exists and may not be overwritten, or is one of the files that
+    it is ``made_of``.
     """
+    refuse_source(path, made_of)
     if path.exists() and not overwrite:
         raise taken(path)
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
@@ -38,6 +40,14 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
         raise KeyboardInterrupt(f"{path} was not written; the partial file was removed") from None
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
+
+
+def refuse_source(out: Path, made_of: Iterable[Path]) -> None:
+    """Raises InputError if ``out`` is one of those files, by whatever name: what was measured cannot be made again."""
+    for path in made_of:
+        with contextlib.suppress(OSError, ValueError):  # one that is not there
+            if os.path.samefile(out, path):
+                raise InputError(f"{out} is {path} itself, which would be lost; choose another name")
 
 
 def _replace(part: Path, path: Path) -> None:

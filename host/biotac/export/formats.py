@@ -64,11 +64,13 @@ def export(
         made += trace_tables(recording)
     if not any(len(table) for table in made):
         raise InputError(f"{recording.path} holds no frames and no PAC; there is nothing to export")
+    sources = [recording.path] if beside is None else [recording.path, beside]
     written: list[Path] = []
     with ExitStack() as together:  # no file is put in place before all are complete
         for path, part in parts(out, made, apart=module.KINDS_APART):
             more = {} if beside is None else {"beside": beside}
-            module.write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show, **more)
+            target = together.enter_context(whole(path, overwrite=overwrite, made_of=sources))
+            module.write(target, part, recording, show, **more)
             written.append(path)
     return written
 

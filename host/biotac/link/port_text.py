@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Collection
 from urllib.parse import parse_qsl
 
@@ -11,12 +12,23 @@ from ..errors import PortError
 
 def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
     """WHAT, and the options by key. Raises PortError, with the expected ``form``, for an option not in ``known``."""
-    what, _, query = port.partition(":")[2].partition("?")
+    what, query = file_and_query(port.partition(":")[2])
     options = dict(parse_qsl(query))
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise PortError(f"{port}: unknown option {unknown[0]!r}; expected {form}")
     return what, options
+
+
+def file_and_query(text: str) -> tuple[str, str]:
+    """What is before a question mark and behind it; one that belongs to the name of a file is not that."""
+    longest, _, rest = text.rpartition("?")
+    if os.path.exists(text):
+        return text, ""
+    if os.path.exists(longest):
+        return longest, rest
+    what, _, query = text.partition("?")
+    return what, query
 
 
 def parse_pace(text: str) -> float:

@@ -190,7 +190,8 @@ class Contents:
         for block in scanned:
             self.blocks.append(block)
             show(scanned.scan.share)
-        self.problems: list[str] = scanned.scan.problems
+        self.problems: list[str] = []
+        self.damage = scanned.scan.problems
         self.cut_off = scanned.scan.cut_off
         self.damaged_chunks = scanned.scan.damaged_chunks
         self.wrong_checksums = scanned.scan.wrong_checksums
@@ -216,7 +217,7 @@ class Contents:
         self.frames_lost = sum(frames for rest in rests for _, _, frames in rest.lost) + in_damaged
         if self.cut_off and not len(self.seq):
             raise RecordingError(f"{path} was cut off before its first second was complete; record it again")
-        self.problems += labels.read(path, self.arrived_ns[0] if self.arrived_ns else 0)[1]
+        self.damage += labels.read(path, self.arrived_ns[0] if self.arrived_ns else 0)[1]
         self._describe_losses([loss for rest in rests for loss in rest.lost], in_damaged)
 
     def _rows_of(self, kind: int) -> StructArray:
@@ -228,13 +229,13 @@ class Contents:
             self.problems.append(gap.line())
             return gap
         except TypeError as error:
-            self.problems.append(f"a gap is marked in {self._path.name}, but its entry is damaged ({error})")
+            self.damage.append(f"a gap is marked in {self._path.name}, but its entry is damaged ({error})")
             return None
 
     def _without_metadata(self, damaged: bool) -> str:
         if damaged:
             return f"{self._path} has damaged metadata (wrong checksum) and cannot be used; try another copy"
-        if self.problems:
+        if self.damage:
             return (
                 f"{self._path} is cut off or damaged and has no readable metadata; try another copy or record it again"
             )
@@ -246,12 +247,13 @@ class Contents:
         if len(losses) > 10:
             self.problems.append(f"{len(losses) - 10} more losses")
         if in_damaged:
-            self.problems.append(f"{in_damaged} frame(s) of damaged seconds are missing")
+            self.damage.append(f"{in_damaged} frame(s) of damaged seconds are missing")
         numbers = {block.number for block in self.blocks}
-        if not self.problems and len(numbers) != max(numbers, default=-1) + 1:
-            self.problems.append(f"{self._path.name} is damaged: seconds of it are missing")
+        if not self.damage and len(numbers) != max(numbers, default=-1) + 1:
+            self.damage.append(f"{self._path.name} is damaged: seconds of it are missing")
         if (counts := self.counts).bad:
-            self.problems.append(
+            self.damage.append(
                 f"{counts.bad} packet(s) rejected: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
+        self.problems = [*self.damage, *self.problems]

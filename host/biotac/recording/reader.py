@@ -50,9 +50,10 @@ class Recording:
     them) are those in force then, by finger. ``names`` maps names to fingers: ``recording["index"]`` returns that
     finger's frames.
 
-    ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index. ``damaged_chunks``: number of seconds left out. ``wrong_checksums``: number of wrong checksums over the
-    file's records and its index. ``gaps``: times when the board was away.
+    ``problems`` lists in words what is missing or damaged; the rest is good. ``damage``: those of the file, not of the
+    link. ``cut_off``: the file ends without its index. ``damaged_chunks``: number of seconds left out.
+    ``wrong_checksums``: number of wrong checksums over the file's records and its index. ``gaps``: times when the board
+    was away.
 
     ``blocks`` are the wire bytes, about one block per second. ``arrived_ns`` is when each block began,
     ``all_here_ns`` when it was complete (None where unknown), both in ns on the host's clock (Unix).
@@ -63,6 +64,7 @@ class Recording:
     """
 
     problems: list[str] = _of_contents("problems")
+    damage: list[str] = _of_contents("damage")
     cut_off: bool = _of_contents("cut_off")
     damaged_chunks: int = _of_contents("damaged_chunks")
     wrong_checksums: int = _of_contents("wrong_checksums")

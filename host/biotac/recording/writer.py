@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import time
@@ -12,6 +13,8 @@ from typing import BinaryIO
 from ..board.gap import Gap
 from ..errors import InputError, printable, taken
 from ..link.base import AppliedN
+from ..link.port_text import file_and_query
+from ..partial_file import refuse_source
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
@@ -22,6 +25,7 @@ from .mcap_file import RecordingFile
 
 # Less than the one second that may be lost: data keeps arriving between the decision to write and the end of the write.
 FLUSH_S = 0.9
+OWN_BYTES = 512  # the end of its metadata, which no other recording has
 # Of a full stream. A simulated board may run faster than the host's clock; then the byte count closes a block.
 FINGER_BYTES_PER_S = 100 * sum(DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
 
@@ -59,7 +63,7 @@ class Writer:
         self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, facts.info.fingers_present.bit_count()))
         self._skip_to_delimiter = mid_stream
         self._frames_before = self._lost_before = 0  # in earlier files
-        self._file = RecordingFile(create(path, overwrite=overwrite), facts.metadata(port))
+        self._file = self._begin(path, facts.metadata(port))
 
     def go_on(self, facts: Facts) -> None:
         """Close this file and go on in a new one after a restart of the board.
@@ -72,11 +76,21 @@ class Writer:
         first = self.paths[0]
         path = first.with_name(f"{first.stem}.{len(self.paths) + 1}{first.suffix}")
         metadata = facts.metadata(self._port) | {layout.CONTINUES: printable(self.path.name)}
-        self._file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
+        self._file = self._begin(path, metadata)
         self._frames_before, self._lost_before = frames, lost
         self._skip_to_delimiter = False
         self.path = path
         self.paths.append(path)
+
+    def _begin(self, path: Path, metadata: dict[str, str]) -> RecordingFile:
+        refuse_source(path, [Path(file_and_query(self._port.partition(":")[2])[0])])
+        file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
+        self._at = max(0, file.stream.tell() - OWN_BYTES)
+        self._own = self._on_disk(file.stream)
+        return file
+
+    def _on_disk(self, stream: BinaryIO) -> bytes:
+        return os.pread(stream.fileno(), OWN_BYTES, self._at) if hasattr(os, "pread") else b""
 
     def write(self, chunk: bytes) -> None:
         """Record bytes as they came. An empty chunk records nothing, but lets a block be written on time.
@@ -129,11 +143,16 @@ class Writer:
     def flush(self) -> None:
         """Close the current block and hand it to the operating system.
 
-        Raises OSError when that fails, or when the file was deleted: its contents would be lost when it is closed.
+        Raises OSError when that fails, or when the file was deleted, cut or overwritten: what it holds is lost.
         """
-        if os.fstat(self._file.stream.fileno()).st_nlink == 0:
+        stream = self._file.stream
+        state = os.fstat(stream.fileno())
+        if state.st_nlink == 0:
             self._file.close()  # so that this is reported only once
             raise FileNotFoundError(errno.ENOENT, "was deleted during recording", str(self.path))
+        if state.st_size < stream.tell() or self._on_disk(stream) != self._own:
+            stream.close()
+            raise OSError(errno.EIO, "was cut or overwritten by another program during recording", str(self.path))
         self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns(), self._applied_n)
         self._pending.clear()
 
@@ -152,6 +171,21 @@ class Writer:
             self._file.close()
 
 
+def _own(stream: BinaryIO, path: Path) -> None:
+    """Empty the file, unless another recorder, of whatever process, writes it: then raises InputError."""
+    with contextlib.suppress(ImportError):  # Windows has no such lock: there it is not noticed
+        import fcntl
+
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            stream.close()
+            raise InputError(f"{path} is being recorded to; end that recording first, or choose another name") from None
+        except OSError:
+            pass  # a file system without locks
+    stream.truncate()
+
+
 def create(path: Path, *, overwrite: bool) -> BinaryIO:
     """Open ``path`` for writing. Raises InputError when it is a folder, exists, or cannot be written."""
     if path.is_dir():
@@ -161,7 +195,10 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
             f"{path}: a recording is an .mcap file; record to {path.with_suffix('.mcap')}, then use `biotac export`"
         )
     try:
-        return path.open("wb" if overwrite else "xb")
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | (0 if overwrite else os.O_EXCL) | getattr(os, "O_BINARY", 0), 0o666)
+        stream = os.fdopen(fd, "r+b")
+        _own(stream, path)
+        return stream
     except FileExistsError as error:
         raise taken(path) from error
     except OSError as error:

@@ -19,7 +19,7 @@ from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_name, maps_text, serial_text, setting_text, version_text
 from .. import values
 from ..outputs import say
-from ..recordings.loading import load
+from ..recordings.loading import code, load
 
 NO_BUS = "no bus, rounds come as messages"
 EXAMPLE = "biotac info /dev/ttyACM0"
@@ -77,8 +77,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def of_recording(args: argparse.Namespace) -> int:
-    """What is in a recording; stderr says what it lacks."""
+    """What is in a recording; stderr says what it lacks. Return 1 if it is damaged."""
     recording = load(Path(args.port))
     facts = summary(recording, recording.frames[["finger", "flags"]])
     say(args, facts, "\n".join(map(printable, lines(facts))))
-    return 0
+    return code(recording)

@@ -33,8 +33,8 @@ def run(args: argparse.Namespace) -> int:
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck()
     outcome.add(recording.wire, recording.settings, recording.finger_settings, recording.maps)
-    damaged = recording.counts.bad + recording.damaged_chunks + recording.wrong_checksums
-    good = outcome.violations == 0 and damaged == 0 and not recording.cut_off and len(recording.frames) > 0
+    damaged = max(recording.counts.bad + recording.damaged_chunks, len(recording.damage) - recording.cut_off)
+    good = outcome.violations == 0 and not recording.damage and len(recording.frames) > 0
     if not args.json:
         for problem in recording.problems:
             note(printable(problem))

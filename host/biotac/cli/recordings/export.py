@@ -25,7 +25,7 @@ from ...wire.identity import setting_text
 from .. import outputs
 from ..progress import Progress
 from . import lake
-from .loading import load
+from .loading import code, load
 
 EXAMPLE = "biotac export grasp.mcap grasp.parquet, or biotac export trials/*.mcap --lake trials.lake -j 4"
 RECORDING = ".mcap"
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write OUT, or leave nothing behind; stderr says what the recording lacks."""
+    """Write OUT, or leave nothing behind; stderr says what the recording lacks. Return 1 if that is damaged."""
     paths = [*args.recordings, *([args.out] if args.out else [])]
     recomputes = bool(args.recompute or args.poc_weights or args.settings or args.keep_tare)
     if args.lake is not None:
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
             progress.show(f"{out}: {share:.0%}, Ctrl-C stops and leaves nothing behind")
 
         if imports:
-            with _recording_at(out, args.force, written) as target:
+            with _recording_at(out, source, args.force, written) as target:
                 made: dict[str, Any] = import_btd(source, target)
                 text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
             if args.poc_weights:
                 changes[wire.Setting.POC_WEIGHTS] = int(wire.PocWeights[args.poc_weights.upper()])
             recording = load(source)
-            with _recording_at(out, args.force, written) as target:
+            with _recording_at(out, source, args.force, written) as target:
                 notes = recompute(recording, target, changes, keep_tare=args.keep_tare, show=show)
             for note in notes:
                 outputs.note(printable(note))
@@ -116,14 +116,14 @@ def run(args: argparse.Namespace) -> int:
             text = f"{made['frames']} frames"
     names = [str(path) for path in written]
     outputs.say(args, {"written": names} | made, printable(f"{text} to {', '.join(names)}"))
-    return 0
+    return 0 if imports else code(recording)
 
 
 @contextmanager
-def _recording_at(out: Path, force: bool, written: list[Path]) -> Iterator[Path]:
+def _recording_at(out: Path, source: Path, force: bool, written: list[Path]) -> Iterator[Path]:
     """Where to write a recording that becomes ``out``, or is exported there; ``written`` gets the files' paths."""
     if out.suffix.lower() == RECORDING:
-        with whole(out, overwrite=force) as target:
+        with whole(out, overwrite=force, made_of=[source]) as target:
             yield target
         written.append(out)
         return

@@ -10,7 +10,7 @@ from ...partial_file import whole
 from ...recording.rewrite import cut
 from .. import values
 from ..outputs import say
-from .loading import load
+from .loading import code, load
 
 EXAMPLE = "biotac file label grasp.mcap slip --at 12.5 --fact trial=3"
 
@@ -46,11 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_cut(args: argparse.Namespace) -> int:
     recording = load(args.recording)
-    with whole(args.out, overwrite=args.force) as path:
+    with whole(args.out, overwrite=args.force, made_of=[args.recording]) as path:
         begin_s, end_s = cut(recording, path, args.from_s, args.to_s)
     facts = {"written": str(args.out), "begin_s": begin_s, "end_s": end_s}
     say(args, facts, printable(f"{begin_s:.2f} to {end_s:.2f} s of {args.recording} to {args.out}"))
-    return 0
+    return code(recording) if args.what == "cut" else 0
 
 
 def run_label(args: argparse.Namespace) -> int:

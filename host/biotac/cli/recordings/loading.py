@@ -18,3 +18,8 @@ def load(path: Path, *, quiet: bool = False) -> Recording:
         for problem in recording.problems:
             note(printable(problem))
     return recording
+
+
+def code(recording: Recording) -> int:
+    """The exit code of a verb that is done with it: 1 where the file is damaged, as stderr says."""
+    return 1 if recording.damage else 0
