@@ -37,13 +37,13 @@ class Size:
 
     places: tuple[int, ...] = (400, 400, 400, 400)
     paf_places: tuple[int, ...] = PAPER_PLACES
-    frames: int = 6000
+    frames: int = 3000
     steps: int = 1000
     frame_steps: int = 200
     his_frames: int = 60
     his_rows: int = 4000
-    his_steps: int = 50
-    table4_steps: int = 30
+    his_steps: int = 40
+    table4_steps: int = 20
     force_places: tuple[int, ...] = (150, 150, 150, 150)
     force_steps: int = 400
     reduced_places: tuple[int, ...] = (60, 60, 60, 60)
