@@ -66,6 +66,7 @@ def write_labelled(
     sorting = [(name, "ascending") for name in ("t_us", *(["finger"] if fingers is not None else []))]
     how = {
         "compression": "zstd",
+        "write_page_checksum": True,  # for readers that ask
         "use_dictionary": [f.name for f in fields if not pa.types.is_integer(f.type)],
         "column_encoding": {f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
         "sorting_columns": pq.SortingColumn.from_ordering(schema, sorting),

@@ -139,4 +139,4 @@ def _write_facts(path: Path, recording: Recording, name: str, size: int) -> None
     }
     schema = _RECORDINGS.with_metadata({SIZE: str(size).encode()})
     with path.open("wb") as file:  # pyarrow takes no path that is not UTF-8
-        pq.write_table(pa.Table.from_pylist([row], schema=schema), file, compression="zstd")
+        pq.write_table(pa.Table.from_pylist([row], schema=schema), file, compression="zstd", write_page_checksum=True)
