@@ -1,7 +1,8 @@
 """The STM32's boot loader in ROM, over the UART that is the board's link (AN3155), by the package stm32loader.
 
 Its flash is erased in sectors: the first has but where to begin; settings are between it and the image's, and nothing
-here touches them. A board's flash.json says what is where.
+here touches them. A board's flash.json says what is where. The package, GPL-3 and optional, is imported because its
+command line counts pages of 1 KiB from address 0, which are no sectors, or erases everything, settings included.
 """
 
 from __future__ import annotations

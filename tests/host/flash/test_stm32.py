@@ -196,6 +196,14 @@ def test_a_supply_that_fails_leaves_nothing_to_begin_with(rom: Rom, image) -> No
     assert rom.flash[:8] == b"\xff" * 8
 
 
+def test_its_command_line_would_erase_what_is_not_there() -> None:
+    """`stm32loader -e -a 0x0800C000 -l 0x14000`: why the package is imported, though its licence is the GPL."""
+    from stm32loader.bootloader import Stm32Bootloader
+
+    pages = Stm32Bootloader(None, device_family="F4").pages_from_range(IMAGE_AT, IMAGE_AT + 0x1_4000)
+    assert min(pages) > 0xFFFF > len(SECTORS)  # of 1 KiB from address 0 on, where AN3155 has 16 bits for a sector
+
+
 def test_nobody_there_is_not_ready(tmp_path: Path) -> None:
     master, slave = os.openpty()
     loader = Stm32Loader(os.ttyname(slave))
