@@ -11,7 +11,7 @@ from typing import Literal
 class Entry:
     """One kind of finding."""
 
-    severity: Literal["error", "warning"]  # no data to be trusted; or data arrive, but something is not as it should be
+    severity: Literal["error", "warning"]  # data must not be trusted; or something else is not as it should be
     meaning: str
     cure: str
 

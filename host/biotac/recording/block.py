@@ -124,7 +124,7 @@ class Rest:
         return Rest(**{**vars(self), "order": self.order[~gone]})
 
 
-def take_apart(
+def encode_block(
     data: bytes, batch: Batch, applied_n: NDArray[np.float64] | None
 ) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
     """Tables by finger, the order and the packets of ``data``, whole messages whose decoded rows are ``batch``."""

@@ -113,7 +113,7 @@ class Blocks:
 
     def _take_metadata(self, record: Metadata) -> None:
         try:
-            facts = layout.unsigned(record.metadata)
+            facts = layout.verified(record.metadata)
         except ValueError:
             self.damaged_metadata += 1
             self.scan.problems.append(f"{record.name!r} of {self.scan.path.name} is damaged and was skipped")

@@ -22,7 +22,7 @@ TABLE_SCHEMA = "biotac.Table"
 WIRE_SCHEMA = "biotac.link"
 WIRE_SCHEMA_ENCODING = "biotac-schema"
 METADATA_NAME = "biotac"
-METADATA_AGAIN = "biotac again"  # at the end, in case the first one gets damaged; other programs show names once
+METADATA_AGAIN = "biotac copy"  # at the end, in case the first one gets damaged; other programs show names once
 CUT_FROM = "cut_from"  # metadata key: the file that it is a part of
 CONTINUES = "continues"  # metadata key: the file that ended when the board restarted
 
@@ -58,13 +58,13 @@ def finger_of(finger: int | str, names: Mapping[str, int]) -> int:
     return names[finger] if isinstance(finger, str) else int(finger)
 
 
-def signed(facts: Mapping[str, str]) -> dict[str, str]:
+def with_checksum(facts: Mapping[str, str]) -> dict[str, str]:
     """Metadata with its checksum."""
     return {**facts, CHECKSUM: _checksum(facts)}
 
 
-def unsigned(facts: Mapping[str, str]) -> dict[str, str]:
-    """Inverse of ``signed``. Raises ValueError when the checksum is wrong or missing."""
+def verified(facts: Mapping[str, str]) -> dict[str, str]:
+    """Inverse of ``with_checksum``. Raises ValueError when the checksum is wrong or missing."""
     rest = {key: value for key, value in facts.items() if key != CHECKSUM}
     if facts.get(CHECKSUM) != _checksum(rest):
         raise ValueError("wrong checksum")

@@ -20,7 +20,7 @@ from ..wire.batches import StreamDecoder
 from ..wire.counters import nearest
 from ..wire.native import BUILT
 from . import layout
-from .block import Rest, schema, take_apart
+from .block import Rest, encode_block, schema
 from .labels import Label
 from .plots import Plots
 
@@ -43,7 +43,7 @@ class RecordingFile:
         self._last_ns: int | None = None  # when the last block's bytes had all arrived
         self.frames = 0  #: FRAMEs written so far
         self._channels: dict[str, int] = {}
-        self._metadata = layout.signed(metadata)
+        self._metadata = layout.with_checksum(metadata)
         wire_schema = (BUILT / "schema.json").read_bytes()
         writer = self._writer = Writer(
             stream,
@@ -89,7 +89,7 @@ class RecordingFile:
         decoder = self._decoder
         losses, lost_pac, disordered = len(decoder.lost_after), decoder.lost_pac, decoder.disordered
         batch = decoder.feed(data)
-        tables, order, packets = take_apart(data, batch, applied_n(batch.wire["finger"], batch.t_us))
+        tables, order, packets = encode_block(data, batch, applied_n(batch.wire["finger"], batch.t_us))
         rest = Rest(
             order,
             packets,

@@ -223,10 +223,10 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
         elif message.reason in (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET):
             q16 = np.array([*message.tare_q16, message.pdc_tare_q16])
             counts = np.where(q16 == INVALID_U32, np.nan, q16 / 65536)
-            _give(tares, row, counts, message.reason == wire.TareReason.HOST_NOW)
+            _add_tare(tares, row, counts, message.reason == wire.TareReason.HOST_NOW)
     if 0 not in tares and not int(sent["flags"][0]) & wire.FrameFlags.UNTARED:
         q4 = np.append(sent["tare_q4"][0], sent["pdc_tare_q4"][0])
-        _give(tares, 0, np.where(q4 == wire.INVALID_COUNT, np.nan, q4 / 16), False)
+        _add_tare(tares, 0, np.where(q4 == wire.INVALID_COUNT, np.nan, q4 / 16), False)
         notes.append(
             f"finger {finger} was tared before the recording began; its first frame's tare is used at the start"
         )
@@ -238,7 +238,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
     pac = _pac_at(t_us, recording.pac[recording.pac["finger"] == finger])
     if (sent["flags"] & wire.FrameFlags.SENSOR_FAULT).any() and (pac == wire.INVALID_COUNT).all():
         notes.append(f"finger {finger}: PAC was not recorded, by which the board knows another sensor's words")
-    commands = {row: [told[row] for told in (tares, holds) if row in told] for row in {*tares, *holds}}
+    commands = {row: [given[row] for given in (tares, holds) if row in given] for row in {*tares, *holds}}
     pdc, tac, tdc = (sent[name] for name in ("pdc", "tac", "tdc"))
     foreign = _is_foreign(recording, finger)
     return Rounds(finger, sent["counts"], pdc, tac, tdc, pac, t_us, commands, quantities, own_map, foreign)
@@ -260,7 +260,7 @@ def _pac_at(t_us: NDArray[np.int64], rows: StructArray) -> NDArray[np.uint16]:
     return pac
 
 
-def _give(tares: dict[int, Command], row: int, values: NDArray[np.float64], now: bool) -> None:
+def _add_tare(tares: dict[int, Command], row: int, values: NDArray[np.float64], now: bool) -> None:
     """Add a tare of 19 electrodes and pressure to ``tares``; one without all electrodes cannot be set again."""
     if not np.isnan(values[:-1]).any():
         tares[row] = partial(_tare, values, now)

@@ -216,7 +216,7 @@ class Scan:
                 else:
                     record = self._read(opcode, _content(stream, at, length)) if whole and opcode in _READ else None
                     if isinstance(record, (DataEnd, Footer)):
-                        self._prove(stream, record, at, length)
+                        self._verify_checksum(stream, record, at, length)
                     elif record is not None:
                         yield from self._take([record])
                     if not whole or opcode == _FOOTER:
@@ -246,7 +246,7 @@ class Scan:
                 if self._wanted(topic):
                     yield from self._open(stream, at + _HEAD.size, length - _HEAD.size, unwanted=False)
 
-    def _prove(self, stream: BinaryIO, record: DataEnd | Footer, at: int, length: int) -> None:
+    def _verify_checksum(self, stream: BinaryIO, record: DataEnd | Footer, at: int, length: int) -> None:
         """Verify the checksum in ``record``; 0 means that the program that wrote it made none."""
         if isinstance(record, DataEnd):
             self._data_end = at + length
@@ -310,7 +310,7 @@ class Scan:
     ) -> Iterator[Metadata | tuple[str, Message]]:
         try:
             chunk = Chunk.read(_content(stream, at, length))
-            self._weigh(chunk)
+            self._check_size(chunk)
             if unwanted:
                 get_chunk_data_stream(chunk, validate_crc=True)
                 return
@@ -323,7 +323,7 @@ class Scan:
             return
         yield from self._take(records)
 
-    def _weigh(self, chunk: Chunk) -> None:
+    def _check_size(self, chunk: Chunk) -> None:
         size = chunk.uncompressed_size
         if chunk.compression == "zstd" and len(chunk.data) >= 4:
             try:

@@ -187,7 +187,8 @@ def test_a_recording_of_another_wire_major_is_refused(recorded, tmp_path) -> Non
     with path.open("wb") as out:
         other = Writer(out)
         other.start()
-        other.add_metadata("biotac", layout.signed({"format": "1", "wire": "7.0", "hello": "{}", "settings": "{}"}))
+        facts = {"format": "1", "wire": "7.0", "hello": "{}", "settings": "{}"}
+        other.add_metadata("biotac", layout.with_checksum(facts))
         other.finish()
     with pytest.raises(biotac.RecordingError, match=r"wire version 7\.0.*install the version it was recorded with"):
         biotac.Recording(path)

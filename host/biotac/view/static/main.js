@@ -30,9 +30,9 @@ class Page {
     this.turn = false;
     this.themes = new ThemeSwitch(() => (this.theme = readTheme()));
     this.stream = new Stream({
-      about: (facts) => this.meet(facts),
-      update: (news) => this.take(news),
-      gone: () => this.lose(),
+      about: (facts) => this.onAbout(facts),
+      update: (news) => this.onUpdate(news),
+      gone: () => this.onDisconnect(),
     });
     wireControls({
       actions: {
@@ -55,7 +55,7 @@ class Page {
 
   // ---- the stream --------------------------------------------------------------------------
 
-  meet(about) {
+  onAbout(about) {
     if (this.model) tell("Reconnected to the viewer program.");
     this.model = new Model(about);
     this.tip = new Fingertip(byId("fingertip-canvas"), about.electrodes, { large: true });
@@ -68,9 +68,9 @@ class Page {
     byId("spectrum-words").textContent = `${SPECTRUM_SAMPLES} samples, ${number(hz, 1)} Hz apart`;
   }
 
-  take(news) {
+  onUpdate(news) {
     const before = this.model.health;
-    this.model.take(news);
+    this.model.update(news);
     const { health } = this.model;
     if (!news.health) return;
     if (before && before.epoch !== health.epoch) this.hand.clear();
@@ -82,7 +82,7 @@ class Page {
     this.showState();
   }
 
-  lose() {
+  onDisconnect() {
     showLink("gone", "The viewer program does not answer. Retrying; is it still running?");
     if (this.model) this.model.health = null;
     this.showButtons();

@@ -25,7 +25,7 @@ export class Model {
     return this.fingers.get(index);
   }
 
-  take(news) {
+  update(news) {
     const health = news.health;
     if (health) {
       if (this.health && this.health.epoch !== health.epoch) this.fingers.clear(); // another playing has begun
