@@ -1,4 +1,4 @@
-// The tare machine's way through rest and contact, rule by rule (numerics 1.4, SPEC.md Tare), on
+// The tare machine's way through rest and contact, rule by rule (SPEC.md, Tare), on
 // exact counts.
 #include "emulated_finger.h"
 

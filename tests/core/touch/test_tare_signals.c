@@ -1,9 +1,9 @@
 // The tare machine against whole courses of signals: slow loads, noise, drift, hours.
-// The bounds are those of numerics 1.4.
+// The bounds are those of SPEC.md, Tare; host/docs/develop/constants.md has what they rest on.
 #include "emulated_finger.h"
 
 #define HELD_N            5.0
-#define COUNTS_PER_N      80.0 // 5 N is 400 counts over all electrodes (numerics 2.4: sum e^2 162,730)
+#define COUNTS_PER_N      80.0 // 5 N is 400 counts over all electrodes: a sum of squares of 162,730
 #define PDC_PER_N         100.0
 #define SLEW_COUNTS_PER_S 0.5005 // 328 / 65536 a frame
 
