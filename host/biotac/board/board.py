@@ -138,7 +138,7 @@ class Board:
     def _awaiting(self) -> Iterator[None]:
         self.reader.replies.clear()
         self.reader.awaited += 1
-        self.reader.room()
+        self.reader.notify_space()
         try:
             yield
         finally:
@@ -150,7 +150,7 @@ class Board:
         found: list[tuple[Any, float]] = []
         reader = self.reader
 
-        def came() -> bool:
+        def reply_arrived() -> bool:
             while reader.replies and not found:
                 message, arrived_s = reader.replies.popleft()
                 # A command whose length the board does not know is refused without its req_id, which it did not read.
@@ -159,7 +159,7 @@ class Board:
                     found.append((message, arrived_s))
             return bool(found) or reader.lost is not None or reader.failure is not None or reader.closing.is_set()
 
-        reader.wait_for(came, timeout_s)
+        reader.wait_for(reply_arrived, timeout_s)
         if found:
             return found[0]
         self._check_here()
@@ -191,7 +191,7 @@ class Board:
             self._lasting.pop(what, None)
             self._lasting[what] = again
 
-    def tell_again(self) -> None:
+    def restore(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations, maps and subscriptions.
 
         Not tares: after a restart the board takes its own, and an earlier one may be wrong by then. Raises

@@ -80,7 +80,7 @@ class Queue:
                 return None
         self._taken_rows += weight(batch)
         self._has_rows &= self._put_rows > self._taken_rows
-        self._reader.room()
+        self._reader.notify_space()
         if self._slow is not None or self._kept:
             batch = self._with_gaps(batch)
         if len(batch.wire):
@@ -136,7 +136,7 @@ def weight(batch: Batch) -> int:
     return len(batch.wire) + len(batch.pac) + len(batch.idle) or 1
 
 
-class Troubles:
+class DeferredErrors:
     """Errors of callbacks and recordings, until they are raised to the program: the first, and how many more."""
 
     def __init__(self) -> None:
@@ -172,7 +172,7 @@ class Callbacks:
     ``troubles``. A callback that raised stays subscribed.
     """
 
-    def __init__(self, reader: Reader, troubles: Troubles) -> None:
+    def __init__(self, reader: Reader, troubles: DeferredErrors) -> None:
         self._wanted: tuple[tuple[type[Any], Callable[[Any], Any]], ...] = ()
         self._queue = Queue(reader)
         self._reader = reader

@@ -182,12 +182,12 @@ class Reader:
         for consumer in self.consumers:
             consumer.wake()
 
-    def wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
-        """Wait until ``so`` is true, looking whenever ``changed`` is notified."""
+    def wait_for(self, condition: Callable[[], Any], timeout_s: float | None = None) -> bool:
+        """Wait until ``condition`` is true, looking whenever ``changed`` is notified."""
         with self.changed:
-            return bool(self.changed.wait_for(so, timeout_s))
+            return bool(self.changed.wait_for(condition, timeout_s))
 
-    def room(self) -> None:
+    def notify_space(self) -> None:
         """Read on, where reading waits for room: somebody took a batch, or awaits a reply."""
         if self._waits_for_room:
             with self.changed:

@@ -173,7 +173,7 @@ class StreamWatch:
         with board.turn():  # what others ask or tell is about the board as it was
             # Before START, because rows may come with its reply.
             reader.gaps.begin(reason)
-            board.tell_again()
+            board.restore()
             self._stream.resume()
             self._heard_us = None
 

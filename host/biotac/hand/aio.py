@@ -93,7 +93,7 @@ class AsyncHand:
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(news.set)
 
-        queue = hand._reading.also(wake)
+        queue = hand._reading.add_queue(wake)
         try:
             await asyncio.to_thread(hand._go)
             while True:

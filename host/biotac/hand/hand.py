@@ -13,7 +13,7 @@ from typing import Any, Concatenate, NoReturn, ParamSpec, SupportsIndex, TypeVar
 
 from ..board import handshake
 from ..board.board import Board
-from ..board.consumers import Callbacks, Troubles
+from ..board.consumers import Callbacks, DeferredErrors
 from ..board.handshake import HandWarning
 from ..board.reader import THREADS
 from ..board.stream import ALL_FINGERS, Stream
@@ -66,7 +66,7 @@ class Hand:
         names = checked_names(fingers)
         self._board = board = Board(link, host_clock=host_clock)
         self._reader = reader = board.reader
-        self._troubles = Troubles()
+        self._troubles = DeferredErrors()
         self._latest = Latest(reader, names, max_age_s=max_age_s, troubles=self._troubles)
         reader.add(self._latest)  # before every queue: who takes a batch finds its frames here, too
         self._commands = Commands(board, self._latest)
@@ -144,7 +144,7 @@ class Hand:
         Raises KeyError for an unknown finger, and for one whose sensor has never answered.
         """
         number = self._latest.present(finger)
-        self._reading.set_aside()
+        self._reading.stop_buffering()
         return FingerView(self._latest.name(number), number, self._latest, self._go)
 
     def __iter__(self) -> Iterator[str]:
@@ -285,7 +285,7 @@ class Hand:
         time may call this. Raises TimeoutError when no round comes in time, DeviceLostError when the board is lost for
         good.
         """
-        self._reading.set_aside()
+        self._reading.stop_buffering()
         if self._rounds is None:
             self._rounds = Rounds(self._reader, self._latest)
         self._go()

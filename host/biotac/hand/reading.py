@@ -34,15 +34,15 @@ class Reading:
         self._turn = threading.Lock()
         self._reader.add(self._queue)
 
-    def set_aside(self) -> None:
+    def stop_buffering(self) -> None:
         """What arrives is looked at in another way: it need not be kept until somebody reads."""
         if not self._queue.is_taken:
             self._reader.remove(self._queue)
 
-    def also(self, on_news: Callable[[], None]) -> Queue:
+    def add_queue(self, on_news: Callable[[], None]) -> Queue:
         """A queue of one's own for what arrives from now on; ``on_news`` is called on the reading thread."""
         self._latest.report()
-        self.set_aside()
+        self.stop_buffering()
         queue = Queue(self._reader, on_news)
         self._reader.add(queue)
         return queue

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..board.board import Board
-from ..board.consumers import Troubles
+from ..board.consumers import DeferredErrors
 from ..board.gap import Gap
 from ..errors import BiotacError, DeviceLostError, InputError
 from ..wire.batches import Batch
@@ -47,7 +47,7 @@ class Recorder:
     frames_lost: int = _of_writer("frames_lost", "How many frames are missing in the files, by their sequence numbers.")
     closed: bool = _of_writer("closed", "Whether nothing more is written.")
 
-    def __init__(self, board: Board, commands: Commands, kept: Configuration, troubles: Troubles, path: Path, *,
+    def __init__(self, board: Board, commands: Commands, kept: Configuration, troubles: DeferredErrors, path: Path, *,
                  overwrite: bool, mid_stream: bool) -> None:  # fmt: skip
         from ..recording.writer import Writer
 
@@ -176,7 +176,7 @@ class Recorder:
                 self._writer.write(what)
                 self._taken_bytes += len(what)
         self._writer.write(b"")  # so that a block is closed in time
-        self._board.reader.room()
+        self._board.reader.notify_space()
 
     def _facts(self) -> Facts:
         """What a recording says about the board."""

@@ -77,7 +77,7 @@ class Subscriptions:
 
     def _on(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
         self._latest.report()
-        self._reading.set_aside()
+        self._reading.stop_buffering()
         self._stream.imply(kind)
         return self._callbacks.add(kind, fn)
 

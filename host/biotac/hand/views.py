@@ -12,7 +12,7 @@ from typing import Any, NoReturn, SupportsIndex, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..board.consumers import Troubles
+from ..board.consumers import DeferredErrors
 from ..board.gap import FINGERS_IN
 from ..board.reader import Reader
 from ..errors import InputError
@@ -60,7 +60,7 @@ class Latest:
     ``max_age_s`` is the age beyond which values are not shown any more.
     """
 
-    def __init__(self, reader: Reader, names: Mapping[str, int], *, max_age_s: float, troubles: Troubles) -> None:
+    def __init__(self, reader: Reader, names: Mapping[str, int], *, max_age_s: float, troubles: DeferredErrors) -> None:
         self.names = names
         self.max_age_s = max_age_s
         self._troubles = troubles

@@ -11,7 +11,7 @@ from live_board import WAIT_S, Live, frame, gaps_in, packed, until
 
 import biotac
 from biotac.board import consumers
-from biotac.board.consumers import Troubles
+from biotac.board.consumers import DeferredErrors
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
 
@@ -209,7 +209,7 @@ def test_sys_exit_in_a_callback_is_raised_and_ends_no_thread(live: Live) -> None
 
 
 def test_several_errors_are_one_that_counts_the_others() -> None:
-    troubles = Troubles()
+    troubles = DeferredErrors()
     for text in "abc":
         troubles.keep(biotac.CallbackError(text))
     with pytest.raises(biotac.CallbackError, match=r"^a, and 2 more error\(s\) since; fix it$"):

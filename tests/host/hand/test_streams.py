@@ -130,7 +130,7 @@ def test_a_fresh_read_has_nothing_of_before(live: Live, monkeypatch) -> None:
 
 def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
     """When STOP is answered, its rows are there for who pulls; when PING is, for views."""
-    queue = live.hand._reading.also(lambda: None)
+    queue = live.hand._reading.add_queue(lambda: None)
     for round_ in range(1, 100):
         live.hand.stream()
         live.firmware.before[wire.Ping] = frame(10 * round_)
