@@ -25,7 +25,7 @@ target_include_directories(biotac_emu PUBLIC ${fw}/emu)
 target_link_libraries(biotac_emu PUBLIC biotac_core)
 
 foreach(lib biotac_core biotac_reference biotac_sensor biotac_emu)
-  if(NOT CMAKE_CROSSCOMPILING)
+  if(NOT CMAKE_SYSTEM_NAME STREQUAL "Generic") # a board's image
     set_target_properties(${lib} PROPERTIES POSITION_INDEPENDENT_CODE ON) # they go into Python's extension
   endif()
   target_link_libraries(${lib} PUBLIC biotac_options)

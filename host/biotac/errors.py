@@ -36,8 +36,11 @@ def imported(module: str, what: str, extra: str) -> ModuleType:
     """A module that needs the ``extra``, for ``what``. Raises InputError where a package of it is missing."""
     try:
         return import_module(module)
-    except ImportError as error:
+    except (ImportError, AttributeError) as error:
         cure = f"pip install 'biotac-gateway[{extra}]'"
+        if not isinstance(error, ModuleNotFoundError):  # a name is missing in it, or a library that it loads
+            what_is = f"cannot use what is installed ({error}): too old, or not whole"
+            raise InputError(f"{what} {what_is}; {cure.replace('install', 'install --upgrade')}") from error
         raise InputError(f"{what} needs {error.name}, which is not installed; {cure}") from error
 
 

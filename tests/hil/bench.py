@@ -192,11 +192,9 @@ def since(now: Any, before: Any) -> Any:
 
 def open_bench(port: str, sensor_port: str, source: Source) -> BenchHand:
     """Stage the source, and give the gateway what a new one has."""
-    hand = shake_hands(BenchLink(port, sensor_port, replace(source, settings={}, tare_q4=None)))
+    hand = shake_hands(BenchLink(port, sensor_port, replace(source, tare_q4=None)))
     try:
         as_new(hand)
-        for name, value in source.settings.items():
-            hand.board.set_setting(wire.Setting[name.upper()], value)
         if source.tare_q4 is not None:
             for finger, tare_q4 in enumerate(source.tare_q4):
                 hand.set_tare(finger, tare_q4 / 16.0)

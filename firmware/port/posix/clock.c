@@ -42,7 +42,7 @@ void clock_catch_up(void)
 {
     int64_t us;
     while ((us = clock_wait_us(now_ns)) > 0) {
-        struct timespec t = {us / 1000000, us % 1000000 * 1000};
+        struct timespec t = {(time_t)(us / 1000000), (long)(us % 1000000 * 1000)}; // both of 32 bits on some
         (void)nanosleep(&t, NULL);
     }
 }

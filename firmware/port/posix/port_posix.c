@@ -29,6 +29,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -171,6 +172,13 @@ bt_port *port_init(int argc, char **argv)
     }
     bt_emu_bus_init(&bus, stream.fingers, serials, bt_emu_stream_by_clock, &stream);
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
+    struct stat input;
+    if (fstat(STDIN_FILENO, &input) == 0 && S_ISFIFO(input.st_mode)) {
+        // A program's board ends with that pipe: a signal to all of a terminal's or a service's is not for it.
+        (void)signal(SIGINT, SIG_IGN);
+        (void)signal(SIGTERM, SIG_IGN);
+        (void)signal(SIGHUP, SIG_IGN);
+    }
     paced = pace > 0;
     clock_init(pace);
     if (restarted() != NULL) {

@@ -1,5 +1,6 @@
 #define _XOPEN_SOURCE 700
 #define _DEFAULT_SOURCE
+#define _DARWIN_C_SOURCE // cfmakeraw, which XOPEN hides there
 #include "pty.h"
 
 #include <errno.h>

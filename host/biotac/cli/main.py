@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import io
 import os
-import signal
 import sys
-import threading
 from collections.abc import Collection, Sequence
 from typing import Any
 
 from ..errors import BiotacError, InputError, printable
 from ..version import __version__
+from . import ending
 from .outputs import note
 
 #: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
@@ -114,10 +114,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     _make_streams_usable()
     arguments = sys.argv[1:] if argv is None else argv
     args = parser(arguments[:1]).parse_args(arguments)
-    if threading.current_thread() is threading.main_thread():
-        # SIGTERM must not leave a simulator or a temporary file behind either.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        ending.by_interrupt()
         return int(args.run(args))
     except BiotacError as error:
         note(one_line(error))
@@ -125,13 +123,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as interrupt:
         # The message says what became of a file that was being written.
         note(f"interrupted{f'; {interrupt}' if interrupt.args else ''}")
-        return 130
+        return ending.INTERRUPTED
     except BrokenPipeError:
         # The reader of our output closed it; keep Python from complaining while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        note(f"{printable(one_line(error))}; check the path and the free disk space")
+        full = error.errno in (errno.EMFILE, errno.ENFILE)
+        cure = (
+            "close what is open, or raise the limit (ulimit -n)" if full else "check the path and the free disk space"
+        )
+        note(f"{printable(one_line(error))}; {cure}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return InputError.exit_code
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 from collections.abc import Sequence
@@ -23,8 +24,9 @@ def note(text: str) -> None:
 
 
 def step(text: str) -> None:
-    """Print on stderr what is being done, or is to be done."""
-    print(text, file=sys.stderr, flush=True)
+    """Print on stderr what is being done, or is to be done; a terminal that has closed changes nothing."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
 
 
 def check_file(path: Path | None, *, overwrite: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 
@@ -26,9 +27,13 @@ class Progress:
         if not self._enabled or now < self._next:
             return
         self._next = now + 0.2
-        print(f"\r{text:<{self._width}}", end="", file=sys.stderr, flush=True)
+        self._print(f"\r{text:<{self._width}}")
         self._width = max(self._width, len(text))
 
     def done(self) -> None:
         if self._width:
-            print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
+            self._print("\r" + " " * self._width + "\r")
+
+    def _print(self, text: str) -> None:
+        with contextlib.suppress(OSError):  # a terminal that has closed changes nothing
+            print(text, end="", file=sys.stderr, flush=True)

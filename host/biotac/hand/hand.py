@@ -64,6 +64,8 @@ class Hand:
         host_clock: HostClock | None = None,
     ) -> None:
         names = checked_names(fingers)
+        if not max_age_s > 0:
+            raise InputError(f"max_age_s is {max_age_s}, expected more than 0: no value would ever be shown")
         self._board = board = Board(link, host_clock=host_clock)
         self._reader = reader = board.reader
         self._troubles = DeferredErrors()

@@ -62,7 +62,11 @@ def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = 
     A simulated board gets its source's stored tare, as a real one would from its user. Closes the link when any of this
     fails.
     """
-    hand = Hand(link, **options)
+    try:
+        hand = Hand(link, **options)
+    except BaseException:
+        link.close()
+        raise
     source = link.source
     try:
         if hand.info.board == wire.Board.PICO_SENSOR:

@@ -6,7 +6,7 @@ import contextlib
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import Any, TypeVar
 
 from ..errors import BiotacError, InputError
@@ -28,7 +28,8 @@ def each(
             yield k, _tried(work, item)
         return
     with _on_dask(dask) if dask is not None else _in_processes(jobs) as pool:
-        index = {pool.submit(_tried, work, item): k for k, item in enumerate(items)}
+        with _unsignalled():
+            index = {pool.submit(_tried, work, item): k for k, item in enumerate(items)}
         for done in as_completed(index):
             problem = done.exception()
             if isinstance(problem, ImportError):
@@ -52,13 +53,32 @@ def _tried(work: Callable[[Item], Result], item: Item) -> Result | BiotacError:
 
 
 @contextlib.contextmanager
+def _unsignalled() -> Iterator[None]:
+    """Processes that are begun meanwhile get no signal of a terminal's: their parent ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
 def _in_processes(jobs: int) -> Iterator[Executor]:
     # spawn: a fork of a process with threads (pyarrow's) may hang. Ctrl-C reaches all processes of a terminal, and the
     # parent ends its workers.
     ignoring = signal.SIGINT, signal.SIG_IGN
-    with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=signal.signal, initargs=ignoring) as pool:
+    with _unsignalled():  # the semaphores' keeper begins with them
+        made = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=signal.signal, initargs=ignoring)
+    with made as pool:
         try:
             yield pool
+        except BaseException:
+            for worker in active_children():  # what it did not finish is no part of the lake
+                worker.kill()
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 

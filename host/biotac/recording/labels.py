@@ -43,6 +43,10 @@ class Label:
             raise InputError(f"a label is a text with whole times and facts that are texts or numbers, not {self!r}")
         if self.end_us is not None and (self.t_us is None or self.end_us < self.t_us):
             raise InputError(f"label {self.text!r} ends before it begins")
+        try:
+            " ".join(f"{name}={value}" for name, value in self.facts.items()).encode()
+        except UnicodeEncodeError as error:
+            raise InputError(f"the facts {dict(self.facts)!r} are not UTF-8 ({error.reason}); write them so") from None
         object.__setattr__(self, "text", printable(self.text))
 
     def line(self) -> str:

@@ -93,6 +93,9 @@ class Recording:
         self._contents = Contents(self.path, show) if show else Contents(self.path)
         self._take_metadata(self._contents.metadata)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.path,)  # another process opens it again
+
     @cached_property
     def _contents(self) -> Contents:
         if self._index is not None:
@@ -182,11 +185,10 @@ class Recording:
             spans = [(max(start_s, a), b if stop_s is None else min(stop_s, b)) for a, b in times_s]
         rows = np.concatenate([part_of(self.path, self._index, chosen, fingers, *span)[0] for span in spans])
         by_number = {finger: name for name, finger in self.names.items()}
+        return Selection(rows, tuple(chosen), by_number, self._label_of, self.stamp_ns)
 
-        def label_of(rows: StructArray) -> NDArray[np.str_]:
-            return labels_module.of_rows(self.labels, rows["t_us"], rows["finger"])
-
-        return Selection(rows, tuple(chosen), by_number, label_of, self.stamp_ns)
+    def _label_of(self, rows: StructArray) -> NDArray[np.str_]:
+        return labels_module.of_rows(self.labels, rows["t_us"], rows["finger"])
 
     @cached_property
     def labels(self) -> list[Label]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import stat
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -48,7 +49,7 @@ class Writer:
         mid_stream: bool = False,
         applied_n: AppliedN = lambda *rows: None,
         clock_s: Callable[[], float] = time.monotonic,
-        unix_ns: Callable[[], int] = time.time_ns,
+        unix_ns: Callable[[], int] = lambda: max(0, time.time_ns()),  # MCAP's times begin in 1970
     ) -> None:
         self.path = path
         self.paths = [path]
@@ -150,7 +151,8 @@ class Writer:
         if state.st_nlink == 0:
             self._file.close()  # so that this is reported only once
             raise FileNotFoundError(errno.ENOENT, "was deleted during recording", str(self.path))
-        if state.st_size < stream.tell() or self._on_disk(stream) != self._own:
+        cut = stat.S_ISREG(state.st_mode) and state.st_size < stream.tell()
+        if cut or self._on_disk(stream) != self._own:
             stream.close()
             raise OSError(errno.EIO, "was cut or overwritten by another program during recording", str(self.path))
         self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns(), self._applied_n)
@@ -183,16 +185,17 @@ def _own(stream: BinaryIO, path: Path) -> None:
             raise InputError(f"{path} is being recorded to; end that recording first, or choose another name") from None
         except OSError:
             pass  # a file system without locks
-    stream.truncate()
+    if os.fstat(stream.fileno()).st_size:
+        stream.truncate()
 
 
 def create(path: Path, *, overwrite: bool) -> BinaryIO:
     """Open ``path`` for writing. Raises InputError when it is a folder, exists, or cannot be written."""
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a file in it")
-    if path.suffix not in ("", ".mcap"):
+    if path.suffix != ".mcap" and (path.suffix or not path.exists() or path.is_file()):
         raise InputError(
-            f"{path}: a recording is an .mcap file; record to {path.with_suffix('.mcap')}, then use `biotac export`"
+            f"{path}: a recording is an .mcap file; record to {path.name.partition('.')[0]}.mcap, then `biotac export`"
         )
     try:
         fd = os.open(path, os.O_RDWR | os.O_CREAT | (0 if overwrite else os.O_EXCL) | getattr(os, "O_BINARY", 0), 0o666)

@@ -77,7 +77,8 @@ class EmulatedBoard(SimBoard):
                 command += ["--uart-master", str(uart_master)]
                 fds.append(uart_master)
             pipe = subprocess.PIPE
-            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=fds)
+            how: dict[str, Any] = {"pass_fds": fds, "start_new_session": True}
+            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, **how)
 
     def plan(self, seconds: float, verb: str) -> None:
         """Make something happen to the board when its sensors' time reaches ``seconds``; see rig.mjs for verbs."""

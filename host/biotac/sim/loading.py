@@ -25,7 +25,7 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
 
     A bare name such as ``press.toml`` that is not a file is looked up among the bundled scenarios. ``fingers`` (1..5)
     is the number of fingers to play, by default all: a scenario's are cut or repeated, each repeated one with its own
-    sensor seed; a recording's are cut or copied. ``seconds`` (0.01..3600) crops the source; a shorter scenario is
+    sensor seed; a recording's are cut or copied. ``seconds`` (0.01..7200) crops the source; a shorter scenario is
     repeated.
 
     Raises InputError (ScenarioError for a scenario's text), naming what was seen and expected.

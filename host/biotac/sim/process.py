@@ -87,7 +87,8 @@ class SimBoard:
                 f"no simulator at {command[0]}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
             )
         pipe = subprocess.PIPE
-        return subprocess.Popen([*command, *options], stdin=pipe, stdout=pipe, stderr=pipe)
+        # A signal to a terminal's processes is not meant for the board, which ends with its stdin.
+        return subprocess.Popen([*command, *options], stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)
 
     def hear(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""

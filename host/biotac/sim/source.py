@@ -15,7 +15,7 @@ from .physics import Finger
 
 Rows = npt.NDArray[np.int64]
 
-MAX_SECONDS = 3600.0  # 5 fingers for an hour are 160 MB of counts
+MAX_SECONDS = 7200.0  # the wire's 32 bits of us wrap after 4295 s; 5 fingers for so long are 320 MB of counts
 
 
 def _played(part: int) -> Any:

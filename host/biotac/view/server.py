@@ -132,6 +132,11 @@ class Handler(BaseHTTPRequestHandler):
         else:
             self._words(404, f"nothing at {path}")
 
+    def do_HEAD(self) -> None:
+        """Whether the page is served."""
+        if self._known_name():
+            self._head(200, "text/html; charset=utf-8", {})
+
     def do_POST(self) -> None:
         """Commands: ``{"do": "tare", "finger": 0}``, answered with ``{"words": ...}``."""
         self.close_connection = True  # discards the unread body of a refused request
@@ -145,8 +150,8 @@ class Handler(BaseHTTPRequestHandler):
             return
         try:
             self._words(200, self.server.reader.ask(*parse_command(self._body())))
-        except ValueError as error:
-            self._words(400, str(error))
+        except (ValueError, KeyError) as error:  # of a finger that there is not
+            self._words(400, str(error.args[0]))
         except (BiotacError, OSError) as error:
             self._words(409, str(error))
 

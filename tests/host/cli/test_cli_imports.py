@@ -21,12 +21,12 @@ def imported(code: str) -> set[str]:
 
 @pytest.mark.parametrize("verb", ["--help", "--version"])
 def test_help_and_version_import_nothing_heavy(verb: str) -> None:
-    code = f"from biotac.cli import main\ntry: main({verb.split()})\nexcept SystemExit: pass"
+    code = f"from biotac.cli.main import main\ntry: main({verb.split()})\nexcept SystemExit: pass"
     assert imported(code) & HEAVY == set()
 
 
 def test_a_verb_imports_only_itself() -> None:
-    code = "from biotac.cli import main\ntry: main(['list', '--help'])\nexcept SystemExit: pass"
+    code = "from biotac.cli.main import main\ntry: main(['list', '--help'])\nexcept SystemExit: pass"
     verbs = {name for name in imported(code) if name.startswith("biotac.cli.") and name.count(".") == 3}
     assert verbs == {"biotac.cli.boards.list_ports"}
 

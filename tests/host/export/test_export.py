@@ -334,7 +334,7 @@ def test_a_folder_that_is_no_bag_is_never_replaced(recorded, tmp_path, capsys) -
 def test_a_missing_extra_is_named(recorded, tmp_path) -> None:
     program = (
         "import sys; sys.modules['pyarrow'] = None\n"
-        "from biotac.cli import main\n"
+        "from biotac.cli.main import main\n"
         f"sys.exit(main(['export', {str(recorded.path)!r}, {str(tmp_path / 'a.parquet')!r}]))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -52,7 +52,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         "step 1",
         "expected at most 160 s of changing load",
     ),
-    ("too long", step('[[step]]\ndo = "hold"\nseconds = 3600\n'), 10, "step 2", "makes the scenario too long"),
+    ("too long", step('[[step]]\ndo = "hold"\nseconds = 7200\n'), 10, "step 2", "makes the scenario too long"),
     ("no such electrode", 'name = "t"\n' + PRESS.replace("E17", "E20"), 5, "step 1", "'at' is 'E20'"),
     (
         "off the finger",

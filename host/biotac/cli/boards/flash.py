@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 from ...errors import FlashError, InputError, PortError
 from ...flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
 from ...flash.image import find_image, note_text
+from ...flash.interfaces import Show as ShowBlocks
 from ...flash.procedure import flash_every
 from ...wire.identity import serial_text, version_text
-from .. import outputs, values
+from .. import ending, outputs, values
 from ..progress import Progress
 
 EXAMPLE = "biotac flash /dev/ttyACM0"
@@ -55,21 +57,46 @@ def run(args: argparse.Namespace) -> int:
     if args.all:
         return run_all(image, args)
     target, loaders = find_board(EMULATED if args.emulated else port)
-    with closing(target), Progress() as progress:
-        given = how(args, progress)
+    with closing(target), Progress() as progress, whole_blocks(args, progress) as show:
+        given = how(args, show)
         outcome = flash(image, target, loaders, backup_path=args.backup, restore_from=kept, **given)
     outputs.say(args, facts(image, outcome), summary(outcome))
     return 0
 
 
-def how(args: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+@contextmanager
+def whole_blocks(args: argparse.Namespace, progress: Progress) -> Iterator[ShowBlocks]:
+    """What a loader shows its blocks to: a signal ends it after one, and says how to go on."""
+    with ExitStack() as writing:
+        looks: list[Callable[[], None]] = []
+
+        def show(done: int, of: int) -> None:
+            progress.show(f"{done} of {of} blocks")
+            if done < of and not looks:
+                looks.append(writing.enter_context(ending.held()))
+            for look in looks:
+                look()
+            if done >= of:
+                looks.clear()
+                writing.close()
+
+        try:
+            yield show
+        except KeyboardInterrupt:
+            again = "run it again: a board whose image is not whole waits in its loader"
+            if not args.no_backup:
+                again += "; settings that were not saved are in the backup that was named (--restore)"
+            raise KeyboardInterrupt(again) from None
+
+
+def how(args: argparse.Namespace, show: ShowBlocks) -> dict[str, Any]:
     """What one board and every board are flashed with."""
     return {
         "keep": not args.no_backup,
         "downgrade": args.downgrade,
         "take_link": args.take_link,
         "say": outputs.step,
-        "show": lambda done, of: progress.show(f"{done} of {of} blocks"),
+        "show": show,
     }
 
 
@@ -82,13 +109,14 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
         raise PortError("no board is plugged in; `biotac list` shows what is there")
     progress = Progress()
     results = []
-    for result in flash_every(image, targets, usb_loaders(), **how(args, progress)):
-        progress.done()
-        results.append(result)
-        if result.error is not None:
-            outputs.step(f"{result.port}: {result.error}")
-        elif not args.json:
-            print(summary(result.outcome) if result.outcome else f"{result.port} {result.why}")
+    with whole_blocks(args, progress) as show:
+        for result in flash_every(image, targets, usb_loaders(), **how(args, show)):
+            progress.done()
+            results.append(result)
+            if result.error is not None:
+                outputs.step(f"{result.port}: {result.error}")
+            elif not args.json:
+                print(summary(result.outcome) if result.outcome else f"{result.port} {result.why}")
     if args.json:
         rows = []
         for result in results:

@@ -10,7 +10,7 @@ from typing import Any
 import biotac
 
 from ...recording.felt import Felt
-from .. import values
+from .. import ending, values
 from ..outputs import note, say
 from ..progress import Progress
 from .stream import batches
@@ -47,8 +47,9 @@ def run(args: argparse.Namespace) -> int:
                 progress.show(
                     f"{recorded_s:.1f} s, {recorder.frames} frames, {lost} lost, {size_mb:.1f} MB, Ctrl-C stops"
                 )
-        progress.done()
-        recorder.close()
+        with ending.held():
+            progress.done()
+            recorder.close()
         stats = hand.stats
         faults = [line for line in latched_faults(hand) if line not in earlier]
         for warning in hand.warnings:

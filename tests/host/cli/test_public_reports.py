@@ -1,0 +1,84 @@
+"""What public bug reports of comparable projects are about, each tried here."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import pickle
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.cli.main import main
+from biotac.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("reports") / "a.mcap"
+    assert main(["record", "sim:press.toml?seconds=2", str(path), "--fact", "subject=S07"]) == 0
+    return path
+
+
+def test_a_part_of_a_recording_can_be_pickled_and_given_to_another_process(recorded: Path) -> None:
+    part = biotac.Recording(recorded).select(fingers="index")
+    again = pickle.loads(pickle.dumps(part))
+    assert again.rows.tobytes() == part.rows.tobytes()
+    np.testing.assert_array_equal(again.label, part.label)
+    assert again.to_pandas().equals(part.to_pandas())
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map(len, [part]) == [len(part)]
+    assert len(pickle.loads(pickle.dumps(part.resample(50.0)))) > 50
+
+
+@pytest.mark.parametrize("fact", ["subject=Zo\udceb", "s\udcffbject=Zoe"])
+def test_a_fact_that_is_not_utf8_is_refused(recorded: Path, tmp_path: Path, capsys, fact: str) -> None:
+    rec = shutil.copy(recorded, tmp_path)
+    assert main(["file", "label", str(rec), "x", "--at", "1", "--fact", fact]) == 2
+    assert "not UTF-8" in capsys.readouterr().err
+    assert main(["record", "sim:press.toml?seconds=1", str(tmp_path / "b.mcap"), "--fact", fact]) == 2
+
+
+def test_a_clock_before_1970_is_1970(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("time.time_ns", lambda: -5_000_000_000)
+    assert main(["record", "sim:press.toml?seconds=2", str(tmp_path / "a.mcap")]) == 0
+    assert biotac.Recording(tmp_path / "a.mcap").problems == []
+
+
+@pytest.mark.parametrize("name", ["-", "a", "a.csv"])
+def test_a_recording_needs_its_suffix(tmp_path: Path, monkeypatch, capsys, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "sim:press.toml?seconds=1", name, "--force"]) == 2
+    assert "a recording is an .mcap file" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_too_many_open_files_is_no_matter_of_the_disk(recorded: Path) -> None:
+    words = [sys.executable, "-m", "biotac", "record", "sim:press.toml", str(recorded.with_name("e.mcap"))]
+
+    def few() -> None:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (8, 8))
+
+    done = subprocess.run(words, capture_output=True, text=True, preexec_fn=few)
+    assert done.returncode == 2 and "ulimit -n" in done.stderr and "disk" not in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("name", ["a?b.mcap", "a?pace=fast.mcap", "?.mcap"])
+def test_a_question_mark_may_be_part_of_a_name(recorded: Path, tmp_path: Path, capsys, name: str) -> None:
+    rec = shutil.copy(recorded, tmp_path / name)
+    for port in (f"replay:{rec}", f"replay:{rec}?pace=fast"):
+        assert main(["record", port, str(tmp_path / "out.mcap"), "--force"]) == 0
+    with pytest.raises(InputError, match="cannot be read"):
+        biotac.open(f"replay:{tmp_path}/not?there.mcap")
+
+
+@pytest.mark.parametrize("age_s", [-1.0, 0.0, math.nan])
+def test_an_age_that_shows_nothing_is_refused(age_s: float) -> None:
+    with pytest.raises(InputError, match="max_age_s is"):
+        biotac.open("sim:press.toml?seconds=1", max_age_s=age_s)

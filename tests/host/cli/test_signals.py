@@ -1,0 +1,157 @@
+"""Every verb, every signal, at random moments: it ends soon, by a documented code, without a traceback, and what was
+recorded is whole. BIOTAC_SEED chooses the moments; by night there are twenty of each."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import biotac
+from biotac.cli.main import main
+
+LONG = "sim:grasp.toml?seconds=100&pace=1"
+# Each begins by itself, runs for longer than its signal, and may have ended when that comes.
+VERBS: dict[str, list[str]] = {
+    "list": ["list"],
+    "doctor": ["doctor", LONG],
+    "info": ["info", LONG],
+    "info, recorded": ["info", "REC"],
+    "stream": ["stream", LONG],
+    "record": ["record", LONG, "OUT.mcap", "--force"],
+    "record fast": ["record", "sim:grasp.toml?seconds=100", "OUT.mcap", "--force"],
+    "check": ["check", "REC"],
+    "export": ["export", "REC", "OUT.csv", "--force"],
+    "recompute": ["export", "REC", "OUT2.mcap", "--force", "--recompute"],
+    "lake, two jobs": ["export", "--lake", "LAKE", "-j", "2", "REC", "REC2"],
+    "cut": ["file", "cut", "REC", "OUT3.mcap", "--force"],
+    "sim": ["sim", "press.toml"],
+    "view": ["view", LONG, "--no-browser", "--port", "0"],
+    "demo": ["demo", "--json"],
+}
+HOW = {
+    "Ctrl-C": (signal.SIGINT, True),
+    "INT": (signal.SIGINT, False),
+    "TERM to all": (signal.SIGTERM, True),
+    "HUP to all": (signal.SIGHUP, True),
+    "HUP": (signal.SIGHUP, False),
+}
+CODES = {0, 1, 130}  # done; done and found something, or less than asked for; interrupted
+# Before it, Python itself has not come to our first line.
+FIRST_LINE_S, LONGEST_S = 0.0, 3.0
+SOON_S = 1.0
+LATE_S = 20.0  # no verdict: on a busy computer all takes longer
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("signals")
+    assert main(["record", "sim:grasp.toml?seconds=30&fingers=5", str(folder / "a.mcap")]) == 0
+    shutil.copy(folder / "a.mcap", folder / "b.mcap")
+    return folder
+
+
+def begun(words: list[str], folder: Path, *, ignored: bool = False) -> subprocess.Popen[str]:
+    places = {"REC2": "b.mcap", "REC": "a.mcap", "LAKE": "lake"}
+    program = "import sys, biotac.cli.ending as e; e.by_leaving(); print('ready', file=sys.stderr, flush=True); "
+    program += "from biotac.__main__ import program; sys.exit(program())"
+    handler = signal.SIG_IGN if ignored else signal.SIG_DFL
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, *(places.get(word, word) for word in words)],
+        cwd=folder, text=True, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        preexec_fn=lambda: [signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGHUP)],
+    )  # fmt: skip
+    assert process.stderr is not None and process.stderr.readline() == "ready\n"
+    return process
+
+
+def ended(process: subprocess.Popen[str], number: int, to_all: bool) -> tuple[int, str, float]:
+    if process.poll() is None:
+        (os.killpg if to_all else os.kill)(process.pid, number)
+    sent_s = time.monotonic()
+    _, said = process.communicate(timeout=60)
+    return process.returncode, said, time.monotonic() - sent_s
+
+
+def judge(folder: Path, code: int, said: str) -> str:
+    """What is wrong with how it ended; empty if nothing."""
+    if code not in CODES:
+        return f"code {code}"
+    if "Traceback" in said or "died" in said or "Exception" in said or "went away" in said:
+        return "words"
+    for name in ("OUT.mcap", "OUT2.mcap", "OUT3.mcap"):
+        path = folder / name
+        if path.exists() and path.stat().st_size and biotac.Recording(path).damage:
+            return f"{name}: {biotac.Recording(path).damage[0]}"
+        path.unlink(missing_ok=True)
+    if parts := [path.name for path in folder.glob(".*")]:
+        return f"left behind {parts}"
+    return ""
+
+
+def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
+    """Prints the table; returns what was wrong."""
+    rng = random.Random(int(os.environ.get("BIOTAC_SEED", "54")))
+    wrong: list[str] = []
+    for verb, words in verbs.items():
+        cells = []
+        for how, (number, to_all) in HOW.items():
+            slow_s, bad = 0.0, 0
+            for _ in range(moments):
+                process = begun(words, folder)
+                moment_s = rng.uniform(FIRST_LINE_S, LONGEST_S)
+                time.sleep(moment_s)
+                code, said, took_s = ended(process, number, to_all)
+                what = judge(folder, code, said) or ("" if took_s < LATE_S else f"{took_s:.1f} s")
+                slow_s, bad = max(slow_s, took_s), bad + bool(what)
+                if what:
+                    wrong.append(f"{verb}, {how} after {moment_s:.2f} s: {what}; {said[-600:]}")
+            cells.append(f"{moments - bad}/{moments}, {slow_s:.1f} s")
+        print(f"| {verb} | {' | '.join(cells)} |", flush=True)
+    return wrong
+
+
+def test_a_signal_at_any_moment_ends_a_verb_well(folder: Path) -> None:
+    print(f"| verb | {' | '.join(HOW)} |")
+    few = {verb: VERBS[verb] for verb in ("info, recorded", "record", "lake, two jobs", "sim")}
+    assert table(folder, few, 1) == []
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("verb", VERBS)
+def test_twenty_moments_of_each(folder: Path, verb: str) -> None:
+    assert table(folder, {verb: VERBS[verb]}, int(os.environ.get("BIOTAC_MOMENTS", "20"))) == []
+
+
+def recording(folder: Path, *, ignored: bool = False) -> subprocess.Popen[str]:
+    process = begun(VERBS["record"], folder, ignored=ignored)
+    while not (folder / "OUT.mcap").exists() and process.poll() is None:
+        time.sleep(0.1)
+    time.sleep(1.5)
+    return process
+
+
+def test_an_ignored_signal_stays_ignored(folder: Path) -> None:
+    """As by nohup, or behind & in a script; SIGTERM ends it."""
+    process = recording(folder, ignored=True)
+    os.kill(process.pid, signal.SIGINT)
+    os.killpg(process.pid, signal.SIGHUP)
+    time.sleep(1.0)
+    assert process.poll() is None
+    code, said, _ = ended(process, signal.SIGTERM, False)
+    assert (code, judge(folder, code, said)) == (0, "")
+
+
+def test_two_signals_are_one(folder: Path) -> None:
+    process = recording(folder)
+    os.killpg(process.pid, signal.SIGHUP)
+    time.sleep(0.1)
+    code, said, _ = ended(process, signal.SIGINT, True)
+    assert judge(folder, code, said) == ""
