@@ -32,6 +32,7 @@ void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *s
     finger->round.t_us = t_us;
     finger->round.good_words = 0;
     finger->next_slot = 0;
+    finger->events.slip_level = BT_SLIP_LEVEL_NONE; // until all of this round's PAC has come
 }
 
 static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
@@ -305,6 +306,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     tell_results(finger, settings, quantities, shed, msg);
     msg->flags |= health_flags(finger);
     msg->electrodes_out = finger->tare.trigger.without;
+    msg->slip_level = finger->events.slip_level;
     tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     bool valid = msg->force_100un[2] != BT_INVALID_I32;

@@ -19,6 +19,7 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
         msg->poc_um[d] = BT_INVALID_I16;
         msg->force_100un[d] = msg->torque_mnmm[d] = BT_INVALID_I32;
     }
+    msg->slip_level = BT_SLIP_LEVEL_NONE;
     msg->seq = (uint16_t)(finger->seq - 1); // as the last frame: a round without a word has no number
     msg->t_us = finger->round.t_us;
     msg->finger = finger->index;
@@ -41,8 +42,10 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
         bt_msg_frame msg;
         bt_finger_begin(finger, t_us[k], &tare_settings);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
-            if (bt_finger_put(finger, slot, words[slot])) {
-                touch_slot = slot;
+            const bool touched = bt_finger_put(finger, slot, words[slot]);
+            touch_slot = touched ? slot : touch_slot;
+            if (finger->quantities & BT_QUANTITY_FLAG_EVENTS) {
+                (void)bt_finger_events(finger, slot, touched);
             }
         }
         bool present = bt_finger_end(finger, &tare_settings);

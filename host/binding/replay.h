@@ -5,7 +5,7 @@
 #include "finger.h"
 
 // A row of results: a FRAME message as the board packs it, and what the tare machine thought of the round.
-enum { BT_REPLAY_BYTES = 166 }; // compared with the Python side's row when it is imported
+enum { BT_REPLAY_BYTES = 167 }; // compared with the Python side's row when it is imported
 #define BT_REPLAY_NO_TOUCH 255  // in no slot of this round was a resting finger first touched
 
 // words: (n, BT_SLOTS) in the board's slot order, 0..4095 or BT_INVALID_COUNT. t_us: (n,), device time of

@@ -191,3 +191,18 @@ def test_python_and_c_hold_the_same_things(capsys: pytest.CaptureFixture[str]) -
         assert main(["grasp", "--controllers", "true,default", "--objects", "20", "--law", str(path)]) == 0
         pages.append(capsys.readouterr().out)
     assert pages[0] == pages[1]
+
+
+def test_slip_counts_what_a_board_tells(capsys, tmp_path) -> None:
+    pac = np.full((3, 600), 0)
+    pac[1, 100:300] = np.rint(300 * np.sin(np.arange(200) * 2 * np.pi * 160 / 2200))  # as it slides
+    pac[2, 50:300] = np.rint(300 * np.sin(np.arange(250) * 2 * np.pi * 160 / 2200))  # before the tap
+    np.savez(tmp_path / "taps.npz", handover_rod_signals=pac)
+    assert main(["slip", "--fingers", "1", "--seed", "3", "--taps", str(tmp_path / "taps.npz"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    simulated, taps = (table["rows"] for table in told["tables"])
+    assert dict(taps) == {"handovers": 3, "with a SLIP, %": 66.6667, "before the tap, %": 33.3333}
+    percent = {(what, n_s): row for what, n_s, *row in simulated}
+    assert percent["slides at 20 mm/s: told within 50 ms", 0.0] == [100.0] * 3
+    assert percent["at rest and in still holds: level 0", 0] == [100.0] * 3
+    assert len([what for what, _ in percent if what == "squeezed: SLIP"]) == 9

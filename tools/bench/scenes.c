@@ -101,7 +101,7 @@ SCENE(all_words)
 static void swing(bt_finger *finger, int counts)
 {
     for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
-        finger->round.pac[k] = (uint16_t)(2038 + counts * ((k * 5 & 15) - 8) / 8);
+        finger->round.pac[k] = (uint16_t)(2038 + counts * ((k & 15) - 8) / 8);
     }
 }
 
@@ -131,7 +131,7 @@ SCENE(events_in_contact)
 // The dearest: a held finger is shaken, and no event has been told of it so far.
 SCENE(events_shaken)
 {
-    shaken_events.events.risen_count2 = shaken_events.events.fallen_count2 = 1;
+    shaken_events.events.risen_count2 = shaken_events.events.fallen_count2 = 0;
     events(&shaken_events);
 }
 
@@ -270,7 +270,8 @@ void bench_scenes_init(void)
     swing(&press_events, 5);
     shaken_events = press_events;
     shaken_events.events.landing = false;
-    shaken_events.events.level_count2 = 3200; // so that a round of this is not enough for any
+    shaken_events.events.jolt_raised = true;
+    shaken_events.events.level_count2 = 40000; // so that a round of this is not enough for any
     swing(&shaken_events, 70);
 
     swing(&slip_events, 200);

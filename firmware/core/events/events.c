@@ -4,47 +4,66 @@
 
 #include <string.h>
 
-// For noise of five counts, the worst in public recordings; a board's own noise raises it.
-#define LEVEL_MIN_COUNT2      100
-#define LEVEL_MAX_COUNT2      3200 // sigma 28; a noisier finger cannot feel anything by PAC
-// In levels; chosen on 100 real slides, 344 handovers and noise.
-#define SAMPLE_CAP_LEVELS     12  // per sample: a glitch, which is two changes, must be no event
-#define JOLT_LEVELS           25  // no false jolt in ten minutes of noise of sigma 5
-#define SLIP_LEVELS           20  // on each side; likewise
-#define SIDE_CAP_LEVELS       100 // a slip ends once nothing has shaken for some 0.2 s
-// A drag: changes larger or longer than squeezes of up to 6 N/s make
-#define DRAG_CHANGE_COUNT2    (75 * 75)
-#define DRAG_SAMPLES          44 // 20 ms
+// Of changes, which are of sums of four samples: noise of five counts, the worst in public recordings, gives
+// 200.
+#define LEVEL_MIN_COUNT2      800
+#define RATTLE_LEVELS         7 // white noise changes by four times what neighbouring samples differ by
+#define RATTLE_PAIRS_LOG2     5 // pairs that the rattle is averaged over: 30 ms
+// In levels; chosen on 100 real slides, 344 handovers, a real press, and simulated squeezes, slips and noise.
+#define CHANGE_CAP_LEVELS     12 // per change: a glitch, which is four changes, must be no event
+#define JOLT_LEVELS           22
+#define SLIP_LEVELS           17 // on each side
+#define SIDE_CAP_LEVELS       28
+#define SLIP_CAP_LEVELS       100 // a slip ends once nothing has shaken for some 0.1 s
+#define TOLL_LEVELS_Q4        11  // that each side loses per change
+// A glitch may be as large as the range; what a round's noise at rest may be, sigma 109.
+#define UNIT_MAX_COUNT2       (1u << 22)
+#define NOISE_MAX_COUNT2      (1u << 20)
 // Times in samples, except NOISE_ROUNDS_LOG2
 #define ONE_VIBRATION_SAMPLES 18  // between rise and fall; 8 ms
 #define LANDING_MIN_SAMPLES   220 // 0.1 s
 #define LANDING_MAX_SAMPLES   2200
-#define NOISE_ROUNDS_LOG2     6 // rounds that the noise is averaged over
+#define NOISE_ROUNDS_LOG2     6       // rounds that the noise is averaged over
+#define MISSING               0x4000u // in place of a pair's sum; sums of four with it are at least that
 
 #define EVENT(event) (1u << (event))
 
-_Static_assert((uint64_t)LEVEL_MAX_COUNT2 * SAMPLE_CAP_LEVELS * BT_PAC_PER_FRAME * 745 <= UINT32_MAX,
+_Static_assert((uint64_t)NOISE_MAX_COUNT2 * 1490 <= UINT32_MAX,
                "the noise of a round, as a level, must fit its type");
-_Static_assert((uint64_t)LEVEL_MAX_COUNT2 * (2 * SIDE_CAP_LEVELS + SAMPLE_CAP_LEVELS * BT_PAC_PER_FRAME) * 2
-                   <= UINT32_MAX,
+_Static_assert((uint64_t)UNIT_MAX_COUNT2 *(SLIP_CAP_LEVELS + CHANGE_CAP_LEVELS * BT_EVENTS_PAIRS)
+                       <= UINT32_MAX
+                   && (uint64_t)UNIT_MAX_COUNT2 * TOLL_LEVELS_Q4 <= UINT32_MAX,
                "evidence must fit its type");
+_Static_assert((uint64_t)BT_EVENTS_PAIRS * 16 * BT_FULL_SCALE_COUNT * BT_FULL_SCALE_COUNT <= UINT32_MAX,
+               "a round's squared changes must fit their type");
+_Static_assert(RATTLE_LEVELS *((uint64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT >> RATTLE_PAIRS_LOG2)
+                   <= UNIT_MAX_COUNT2,
+               "the largest glitch must raise its own unit");
+_Static_assert(4 * BT_FULL_SCALE_COUNT < MISSING && 2 * MISSING <= UINT16_MAX, "a sum must not look missing");
 _Static_assert((uint64_t)BT_ELECTRODES * BT_TRIGGER_UNREAD * BT_TRIGGER_UNREAD <= UINT32_MAX,
                "energy must fit its type");
-_Static_assert((uint64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT <= INT32_MAX, "a square must fit its type");
-_Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
-                   && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
-               "a bit above full scale must mark a missing word");
-_Static_assert(2 * SAMPLE_CAP_LEVELS < JOLT_LEVELS && SAMPLE_CAP_LEVELS < 2 * SLIP_LEVELS,
+_Static_assert(4 * (1 << RATTLE_PAIRS_LOG2) < JOLT_LEVELS * RATTLE_LEVELS
+                   && 2 * (1 << RATTLE_PAIRS_LOG2) < SLIP_LEVELS * RATTLE_LEVELS,
                "one glitch must not be an event");
-_Static_assert(DRAG_SAMPLES + BT_PAC_PER_FRAME <= UINT8_MAX, "a count must fit its type");
-_Static_assert(BT_PAC_PER_FRAME == 22, "745/8192 is 2/22");
+_Static_assert(BT_EVENTS_PAIRS == 11,
+               "1490/8192 is 2/11, and 5/64 of a root is that of a mean change of one sample");
+
+static void forget_pairs(bt_events *events)
+{
+    events->pair = MISSING;
+    for (int k = 0; k < BT_EVENTS_APART; k++) {
+        events->four[k] = MISSING;
+    }
+}
 
 void bt_events_reset(bt_events *events)
 {
     memset(events, 0, sizeof *events);
     events->watched = BT_EVENTS_NO_SLOT;
     events->level_count2 = LEVEL_MIN_COUNT2;
-    events->noise_count2 = LEVEL_MIN_COUNT2 / 2 * BT_PAC_PER_FRAME;
+    events->noise_count2 = LEVEL_MIN_COUNT2 / 2 * BT_EVENTS_PAIRS;
+    events->slip_level = BT_SLIP_LEVEL_NONE;
+    forget_pairs(events);
 }
 
 // ---- touch and release
@@ -124,105 +143,151 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 
 // ---- dynamic pressure
 
+static uint32_t integer_root(uint32_t square)
+{
+    uint32_t found = 0;
+    for (uint32_t bit = 1u << 15; bit != 0; bit >>= 1) {
+        uint32_t more = found | bit;
+        found = more * more <= square ? more : found;
+    }
+    return found;
+}
+
+// What one change must exceed to be evidence is some of this.
+static uint32_t unit_of(const bt_events *events)
+{
+    const uint32_t rattle = RATTLE_LEVELS * events->rattle_count2;
+    const uint32_t unit = rattle > events->level_count2 ? rattle : events->level_count2;
+    return unit > UNIT_MAX_COUNT2 ? UNIT_MAX_COUNT2 : unit;
+}
+
+static uint8_t slip_level(const bt_events *events)
+{
+    const uint32_t explained = BT_EVENTS_PAIRS * unit_of(events);
+    if (!events->slipping || events->shaken_count2 <= explained) {
+        return 0;
+    }
+    const uint32_t counts = integer_root(events->shaken_count2 - explained) * 5 >> 6;
+    return counts < BT_SLIP_LEVEL_NONE ? (uint8_t)counts : BT_SLIP_LEVEL_NONE - 1;
+}
+
 static void end_round(bt_events *events, const bt_tare *tare)
 {
     if (!events->touched && tare->state == BT_TARE_STATE_REST) {
-        int32_t more = (int32_t)(events->round_sum_count2 - events->noise_count2);
-        events->noise_count2 += (uint32_t)bt_shift_down(more, NOISE_ROUNDS_LOG2);
-        uint32_t level = events->noise_count2 * 745 >> 13;
-        events->level_count2 = level < LEVEL_MIN_COUNT2   ? LEVEL_MIN_COUNT2
-                               : level > LEVEL_MAX_COUNT2 ? LEVEL_MAX_COUNT2
-                                                          : level;
+        const uint32_t seen =
+            events->round_count2 < NOISE_MAX_COUNT2 ? events->round_count2 : NOISE_MAX_COUNT2;
+        events->noise_count2 +=
+            (uint32_t)bt_shift_down((int32_t)(seen - events->noise_count2), NOISE_ROUNDS_LOG2);
+        const uint32_t level = events->noise_count2 * 1490 >> 13;
+        events->level_count2 = level < LEVEL_MIN_COUNT2 ? LEVEL_MIN_COUNT2 : level;
     }
-    events->round_sum_count2 = 0;
-    events->samples_done = 0;
+    events->slip_level = events->heard ? slip_level(events) : BT_SLIP_LEVEL_NONE;
+    events->heard = false;
+    events->round_count2 = events->shaken_count2 = 0;
+    events->pairs_done = 0;
 }
 
-// The difference of two words; 0 where either is missing.
-static inline int32_t change_of(uint32_t count, uint32_t before)
+// Sum up pairs of samples, and follow by how much the two differ.
+static inline void follow(bt_events *events, const uint16_t *pac, unsigned pairs)
 {
-    return (count | before) > BT_FULL_SCALE_COUNT ? 0 : (int32_t)(count - before);
-}
-
-// Skip samples that are mere noise while there is no evidence for it to reduce, which is most of the time.
-// Returns how many.
-static inline unsigned pass_quiet(bt_events *events, const uint16_t *pac, const uint16_t *before,
-                                  unsigned samples)
-{
-    const uint32_t toll = events->level_count2 / 2;
-    uint32_t sum = 0;
-    unsigned k = 0;
-    for (; k < samples; k++) {
-        int32_t change = change_of(pac[k], before[k]);
-        uint32_t square = (uint32_t)(change * change);
-        if (square > toll) {
-            break;
+    uint32_t differ_count2 = 0, missing = 0, before = events->pair;
+    uint16_t *four = events->four + BT_EVENTS_APART;
+    for (const uint16_t *end = pac + 2 * pairs; pac < end; pac += 2) {
+        const uint32_t one = pac[0], two = pac[1];
+        uint32_t pair = MISSING;
+        if ((one | two) <= BT_FULL_SCALE_COUNT) {
+            pair = one + two;
+            differ_count2 += (one - two) * (one - two);
+        } else {
+            missing++;
         }
-        sum += square;
+        *four++ = (uint16_t)(before + pair);
+        before = pair;
     }
-    events->round_sum_count2 += sum;
-    return k;
+    events->pair = (uint16_t)before;
+    events->heard |= missing < pairs;
+    const int32_t more = (int32_t)(differ_count2 - (pairs - missing) * events->rattle_count2);
+    events->rattle_count2 += (uint32_t)bt_shift_down(more, RATTLE_PAIRS_LOG2);
 }
 
-static inline uint32_t take_off(uint32_t evidence, uint32_t by)
+// The change up to a sum of four samples from the one eight samples before; 0 where any word is missing.
+static inline int32_t change_of(const uint16_t *then)
 {
-    return evidence > by ? evidence - by : 0;
+    const uint32_t now = then[BT_EVENTS_APART], before = then[0];
+    return (now | before) >= MISSING ? 0 : (int32_t)(now - before);
 }
 
-// The number of the first sample that rises, or falls.
-static BT_NOINLINE uint32_t first_change(const bt_events *events, const uint16_t *pac, const uint16_t *before,
-                                         bool falls)
+static inline uint32_t squared(const bt_events *events, unsigned pairs)
+{
+    uint32_t all = 0;
+    for (const uint16_t *then = events->four, *end = then + pairs; then < end; then++) {
+        const int32_t change = change_of(then);
+        all += (uint32_t)(change * change);
+    }
+    return all;
+}
+
+typedef struct {
+    uint32_t full, all, rose, peak; // squares' sum; with each of them capped; that of rises; the largest
+} changes;
+
+static inline void add_up(const bt_events *events, unsigned pairs, uint32_t cap, changes *sums)
+{
+    uint32_t full = 0, all = 0, rose = 0, peak = 0;
+    for (const uint16_t *then = events->four, *end = then + pairs; then < end; then++) {
+        const int32_t change = change_of(then);
+        uint32_t square = (uint32_t)(change * change);
+        full += square;
+        peak = square > peak ? square : peak;
+        square = square > cap ? cap : square;
+        all += square;
+        rose += change > 0 ? square : 0;
+    }
+    *sums = (changes){full, all, rose, peak};
+}
+
+static inline uint32_t take_off(uint32_t evidence, uint32_t by, uint32_t most)
+{
+    const uint32_t left = evidence > by ? evidence - by : 0;
+    return left > most ? most : left;
+}
+
+// The number of the first sample of the first pair that rises, or falls, by more than noise.
+static uint32_t first_change(const bt_events *events, uint32_t toll, bool falls)
 {
     unsigned k = 0;
     for (;; k++) {
-        int32_t change = change_of(pac[k], before[k]);
-        if (falls ? change < 0 : change > 0) {
-            return events->now + k;
+        const int32_t change = change_of(events->four + k);
+        if ((falls ? change < 0 : change > 0) && (uint32_t)(change * change) > toll) {
+            return events->now + 2 * k;
         }
     }
 }
 
-// Add samples, at most eight, to the evidence, and subtract the noise once for all of them. For a drag only
-// the last is checked: it stands for all, because a drag changes slowly.
-static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const uint16_t *before,
-                                   unsigned samples)
+static inline bool shakes(const bt_events *events)
 {
-    const uint32_t cap = SAMPLE_CAP_LEVELS * events->level_count2;
-    uint32_t most = events->peak_count2;
-    uint32_t all = 0, rose = 0, last = 0;
-    for (unsigned k = 0; k < samples; k++) {
-        const uint32_t now = pac[k], then = before[k];
-        if ((now | then) > BT_FULL_SCALE_COUNT) {
-            continue;
-        }
-        const int32_t change = (int32_t)(now - then);
-        const uint32_t square = (uint32_t)(change * change);
-        last = square;
-        most = square > most ? square : most;
-        const uint32_t capped = square > cap ? cap : square;
-        all += capped;
-        if (change > 0) {
-            rose += capped;
-        }
+    return (events->risen_count2 | events->fallen_count2) != 0;
+}
+
+// Add changes to the evidence, and subtract what they cost once for all of them.
+static void add_evidence(bt_events *events, unsigned pairs, uint32_t unit, uint32_t rose, uint32_t fell)
+{
+    const uint32_t one = unit * TOLL_LEVELS_Q4 >> 4, toll = one * pairs, most = SIDE_CAP_LEVELS * unit;
+    const uint32_t rises = take_off(events->risen_count2 + rose, toll, most);
+    const uint32_t falls = take_off(events->fallen_count2 + fell, toll, most);
+    if (events->risen_count2 == 0 && rises != 0) {
+        events->rise_began = first_change(events, one, false);
     }
-    events->peak_count2 = most;
-    events->round_sum_count2 += all;
-    if (last >= DRAG_CHANGE_COUNT2 && events->dragged < DRAG_SAMPLES) {
-        events->dragged = (uint8_t)(events->dragged + samples);
+    if (events->fallen_count2 == 0 && falls != 0) {
+        events->fall_began = first_change(events, one, true);
     }
-    const uint32_t fell = all - rose;
-    if (events->risen_count2 == 0 && rose != 0) {
-        events->rise_began = first_change(events, pac, before, false);
+    if (!shakes(events)) {
+        const bool falls_first = (int32_t)(events->fall_began - events->rise_began) < 0;
+        events->shake_began =
+            falls != 0 && (falls_first || rises == 0) ? events->fall_began : events->rise_began;
     }
-    if (events->fallen_count2 == 0 && fell != 0) {
-        events->fall_began = first_change(events, pac, before, true);
-    }
-    const uint32_t top = SIDE_CAP_LEVELS * events->level_count2;
-    const uint32_t toll = events->level_count2 / 2 * samples;
-    const uint32_t rises = take_off(events->risen_count2 + rose, toll);
-    const uint32_t falls = take_off(events->fallen_count2 + fell, toll);
-    events->risen_count2 = rises > top ? top : rises;
-    events->fallen_count2 = falls > top ? top : falls;
+    events->risen_count2 = rises;
+    events->fallen_count2 = falls;
 }
 
 // True while no other event may begin: during a slip, and after a jolt of a finger that is untouched or
@@ -232,43 +297,34 @@ static inline bool event_is_on(const bt_events *events)
     return events->slipping || (events->jolt_raised && (events->landing || !events->touched));
 }
 
-// All that matters now is how long it lasts, so both sides are summed as one.
-static BT_NOINLINE void go_on(bt_events *events, const uint16_t *pac, const uint16_t *before,
-                              unsigned samples)
+static BT_NOINLINE void shake(bt_events *events, unsigned pairs, uint32_t unit)
 {
-    const uint32_t cap = SAMPLE_CAP_LEVELS * events->level_count2;
-    const uint32_t most = 2 * SIDE_CAP_LEVELS * events->level_count2;
-    uint32_t all = 0;
-    for (unsigned k = 0; k < samples; k++) {
-        int32_t change = change_of(pac[k], before[k]);
-        uint32_t square = (uint32_t)(change * change);
-        all += square > cap ? cap : square;
+    changes sums;
+    add_up(events, pairs, CHANGE_CAP_LEVELS * unit, &sums);
+    events->shaken_count2 += sums.full;
+    events->round_count2 += sums.all;
+    if (!shakes(events) || sums.peak > events->peak_count2) {
+        events->peak_count2 = sums.peak;
     }
-    events->round_sum_count2 += all;
-    const uint32_t sum =
-        take_off(events->risen_count2 + events->fallen_count2 + all, samples * events->level_count2);
-    events->risen_count2 = sum > most ? most : sum;
-    events->fallen_count2 = 0;
-}
-
-static inline bool shakes(const bt_events *events)
-{
-    return (events->risen_count2 | events->fallen_count2) != 0;
-}
-
-static inline void shake(bt_events *events, const uint16_t *pac, const uint16_t *before, unsigned samples)
-{
-    if (!shakes(events)) {
-        events->shake_began = events->now;
-        events->peak_count2 = 0;
-        events->dragged = 0;
-    }
-    if (event_is_on(events)) {
-        go_on(events, pac, before, samples);
+    if (event_is_on(events)) { // all that matters now is how long it lasts, so both sides are summed as one
+        const uint32_t sum = events->risen_count2 + events->fallen_count2 + sums.all;
+        events->risen_count2 = take_off(sum, pairs * unit, SLIP_CAP_LEVELS * unit);
+        events->fallen_count2 = 0;
     } else {
-        add_shaken(events, pac, before, samples);
+        add_evidence(events, pairs, unit, sums.rose, sums.all - sums.rose);
     }
-    events->now += samples;
+}
+
+// Evidence changes by nothing if there is none and all changes together are mere noise, as most of the time.
+static inline void look(bt_events *events, unsigned pairs, uint32_t unit)
+{
+    const uint32_t all = shakes(events) ? UINT32_MAX : squared(events, pairs);
+    if (all > pairs * (unit * TOLL_LEVELS_Q4 >> 4)) {
+        shake(events, pairs, unit);
+    } else {
+        events->shaken_count2 += all;
+        events->round_count2 += all;
+    }
 }
 
 static uint32_t end_slip(bt_events *events)
@@ -285,29 +341,24 @@ static uint32_t end_shaking(bt_events *events)
     return end_slip(events);
 }
 
-// Either rises and falls have both shown enough: the slip began with the earlier of the two if they are one
-// vibration, else with the later. Or the skin has been dragged for long enough: the slip begins now.
-static bool begins_to_slip(bt_events *events)
+// Rises and falls have both shown enough. The slip began with the earlier of the two if they are one
+// vibration, else with the later.
+static bool begins_to_slip(bt_events *events, uint32_t unit)
 {
-    const uint32_t each = SLIP_LEVELS * events->level_count2;
-    if (events->risen_count2 > each && events->fallen_count2 > each) {
-        const int32_t apart = (int32_t)(events->fall_began - events->rise_began);
-        const bool one = apart <= ONE_VIBRATION_SAMPLES && apart >= -ONE_VIBRATION_SAMPLES;
-        events->slip_began = (apart > 0) == one ? events->rise_began : events->fall_began;
-        return true;
-    }
-    events->slip_began = events->now - 1;
-    return events->dragged >= DRAG_SAMPLES;
+    const uint32_t each = SLIP_LEVELS * unit;
+    const int32_t apart = (int32_t)(events->fall_began - events->rise_began);
+    const bool one = apart <= ONE_VIBRATION_SAMPLES && apart >= -ONE_VIBRATION_SAMPLES;
+    events->slip_began = (apart > 0) == one ? events->rise_began : events->fall_began;
+    return events->risen_count2 > each && events->fallen_count2 > each;
 }
 
-static inline uint32_t judge(bt_events *events)
+static inline uint32_t judge(bt_events *events, uint32_t unit)
 {
     uint32_t raised = 0;
     if (!shakes(events)) {
         return end_shaking(events);
     }
-    if (!events->jolt_raised
-        && events->risen_count2 + events->fallen_count2 > JOLT_LEVELS * events->level_count2) {
+    if (!events->jolt_raised && events->risen_count2 + events->fallen_count2 > JOLT_LEVELS * unit) {
         events->jolt_raised = true;
         raised = EVENT(BT_EVENT_KIND_JOLT);
     }
@@ -315,7 +366,7 @@ static inline uint32_t judge(bt_events *events)
         return raised | end_slip(events);
     }
     events->landing = events->landing && events->now - events->touch_began < LANDING_MAX_SAMPLES;
-    if (!events->slipping && !events->landing && begins_to_slip(events)) {
+    if (!events->slipping && !events->landing && begins_to_slip(events, unit)) {
         events->slipping = true;
         raised |= EVENT(BT_EVENT_KIND_SLIP);
     }
@@ -325,30 +376,22 @@ static inline uint32_t judge(bt_events *events)
 uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME],
                        unsigned end)
 {
-    uint32_t raised = 0;
-    unsigned k = events->samples_done < end ? events->samples_done : 0;
-    const uint16_t *before;
-    if (k > 0) {
-        before = pac + k - BT_EVENTS_LAG;
-    } else if (end == BT_EVENTS_LAG) {
-        before = pac + BT_PAC_PER_FRAME - BT_EVENTS_LAG; // still the previous round's
-    } else {
-        k = BT_EVENTS_LAG; // the previous round's may be gone
-        before = pac;
-        events->now += BT_EVENTS_LAG;
+    if (events->pairs_done >= end / 2) { // the end of the round before was missed
+        events->pairs_done = 0;
+        forget_pairs(events);
     }
-    const unsigned samples = end - k;
-    const unsigned passed = shakes(events) ? 0 : pass_quiet(events, pac + k, before, samples);
-    const bool shook = passed < samples || shakes(events);
-    events->now += passed;
-    if (passed < samples) {
-        shake(events, pac + k + passed, before + passed, samples - passed);
+    const unsigned pairs = end / 2 - events->pairs_done;
+    follow(events, pac + 2 * events->pairs_done, pairs);
+    const uint32_t unit = unit_of(events);
+    const bool shook = shakes(events);
+    look(events, pairs, unit);
+    for (unsigned k = 0; k < BT_EVENTS_APART; k++) {
+        events->four[k] = events->four[k + pairs];
     }
-    events->samples_done = (uint8_t)end;
+    events->now += 2 * pairs;
+    events->pairs_done = (uint8_t)(events->pairs_done + pairs);
     const bool goes_on = events->slipping && events->touched && shakes(events);
-    if ((shook || events->landing) && !goes_on) {
-        raised = judge(events);
-    }
+    uint32_t raised = (shook || shakes(events) || events->landing) && !goes_on ? judge(events, unit) : 0;
     if (!events->touched && tare->state == BT_TARE_STATE_CONTACT) {
         raised |= touched_again(events, tare);
     }
@@ -365,16 +408,6 @@ static uint32_t since_us(const bt_events *events, uint32_t sample)
     uint32_t samples = events->now - 1 - sample;
     return samples / BT_PAC_PER_FRAME * (BT_FRAME_MS * 1000)
            + samples % BT_PAC_PER_FRAME * (BT_FRAME_MS * 1000) / BT_PAC_PER_FRAME;
-}
-
-static uint16_t integer_root(uint32_t square)
-{
-    uint32_t found = 0;
-    for (uint32_t bit = 1u << 12; bit != 0; bit >>= 1) {
-        uint32_t more = found | bit;
-        found = more * more <= square ? more : found;
-    }
-    return (uint16_t)found;
 }
 
 void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, uint32_t t_us,
@@ -394,6 +427,6 @@ void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, ui
     }
     msg->energy_count2 = shaken ? UINT32_MAX : events->energy_count2;
     msg->peak_count = event == BT_EVENT_KIND_JOLT || event == BT_EVENT_KIND_SLIP
-                          ? integer_root(events->peak_count2)
+                          ? (uint16_t)(integer_root(events->peak_count2) / 4)
                           : BT_INVALID_COUNT;
 }

@@ -10,7 +10,7 @@ static bool streams(const bt_session *session, const bt_finger *finger, uint8_t 
     return (session->streams & what) && (session->fingers >> finger->index & 1);
 }
 
-// A finger that starts sending events starts without a history.
+// A finger that starts sending events starts without a history, and one that stops has no level.
 void bt_streams_begin(bt_session *session)
 {
     static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
@@ -32,7 +32,7 @@ void bt_streams_begin(bt_session *session)
     }
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_events *events = &session->finger[f].events;
-        if (now & ~before & 1 << f) {
+        if ((now ^ before) & 1 << f) {
             bt_events_reset(events);
         } else if (now >> f & 1 && events->watched != BT_EVENTS_NO_SLOT) {
             session->events_due[events->watched] |= (uint8_t)(1u << f);

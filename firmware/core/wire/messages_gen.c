@@ -361,6 +361,7 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     at = put(at, (uint32_t)msg->wrench_age_ms, 2);
     at = put(at, (uint32_t)msg->electrodes_out, 4);
     at = put(at, (uint32_t)msg->trust, 1);
+    at = put(at, (uint32_t)msg->slip_level, 1);
     (void)at;
 }
 
@@ -443,7 +444,7 @@ void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[(BT_FRAME_BYTE
     out[72] = (uint16_t)msg->wrench_age_ms;
     out[73] = (uint16_t)msg->electrodes_out;
     out[74] = (uint16_t)((uint32_t)msg->electrodes_out >> 16);
-    out[75] = msg->trust;
+    out[75] = (uint16_t)(msg->trust | msg->slip_level << 8);
 }
 
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
@@ -506,6 +507,8 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->electrodes_out = (uint32_t)value;
     at = get(at, &value, 1);
     msg->trust = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->slip_level = (uint8_t)value;
     (void)at;
 }
 

@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x0C23BFB6u
+#define BT_SCHEMA_HASH 0x881A943Du
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -406,7 +406,7 @@ void bt_msg_map_data_unpack(bt_msg_map_data *msg, const uint8_t in[BT_MAP_DATA_B
 
 // One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md).
 #define BT_FRAME_ID 0x10
-#define BT_FRAME_BYTES 151
+#define BT_FRAME_BYTES 152
 typedef struct {
     uint16_t seq; // [1] counts this finger's rounds with a good word, sent or not; wraps
     uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later; wraps
@@ -430,6 +430,7 @@ typedef struct {
     uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
     uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its signal
     uint8_t trust; // [enum trust] what the force is good for
+    uint8_t slip_level; // [count] how strongly the finger slips in this round: what dynamic pressure shakes by beyond its noise and the rattle of a squeeze, rms, saturating; 0: it does not slip; 255: not judged, as EVENTS are not subscribed to or PAC did not come
 } bt_msg_frame;
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES]);
 // The same into aligned halfwords, in a third of the time; little-endian cores only.
@@ -561,7 +562,7 @@ typedef struct {
     uint8_t tare_state; // [enum tare_state] state after the previous round
     uint32_t onset_us; // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when dynamic pressure left its noise; else t_us
     uint32_t energy_count2; // [count^2] TOUCH, LIFT: sum of squares of the filtered signals, from the latest word of every electrode; else 0xFFFFFFFF
-    uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began; else 0xFFFF
+    uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began, of means of four samples; else 0xFFFF
     uint8_t trust; // [enum trust] TRUST: the new one; else 255
 } bt_msg_event;
 void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES]);
@@ -1027,7 +1028,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
 #define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1) X(trust, u8, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1) X(trust, u8, 1) X(slip_level, u8, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
 #define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)

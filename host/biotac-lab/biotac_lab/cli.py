@@ -16,6 +16,7 @@ from .calibrate import population_command as population
 from .experiments import command as experiments
 from .experiments import seeds
 from .grasp import command as grasp
+from .grasp import slip_command as slip
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -29,6 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "direction": direction,
         "finger": finger,
         "grasp": grasp,
+        "slip": slip,
         "bench": bench,
     }
     for name, module in known.items():

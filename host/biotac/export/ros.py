@@ -31,6 +31,7 @@ _TOPICS = {
         "poc": "geometry_msgs/msg/PointStamped",
         "flags": "std_msgs/msg/UInt32",
         "trust": "std_msgs/msg/UInt8",
+        "slip": "std_msgs/msg/UInt8",
         "counts": _COUNTS,
     },
     "pac": {"pac": _COUNTS},
@@ -40,7 +41,8 @@ _TOPICS = {
 
 def write(path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None) -> None:
     """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``flags``,
-    ``trust``, ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
+    ``trust``, ``slip`` (its slip_level), ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log``
+    with gaps and labels.
     """
     ros1 = path.suffix == ".bag"
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
@@ -125,9 +127,10 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
         poc_m.tolist(),
         arrays["flags"].tolist(),
         arrays["trust"].tolist(),
+        arrays["slip_level"].tolist(),
         counts,
     )
-    for stamp_ns, force, torque, poc, flags, trust, row in zip(*lists, strict=True):
+    for stamp_ns, force, torque, poc, flags, trust, slip, row in zip(*lists, strict=True):
         header = _header(types, stamp_ns, table.frame_id)
         wrench = types["geometry_msgs/msg/Wrench"](vector(*force), vector(*torque))
         yield (
@@ -137,6 +140,7 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
                 "poc": types[_TOPICS["frames"]["poc"]](header, point(*poc)),
                 "flags": types[_TOPICS["frames"]["flags"]](flags),
                 "trust": types[_TOPICS["frames"]["trust"]](trust),
+                "slip": types[_TOPICS["frames"]["slip"]](slip),
                 "counts": types[_COUNTS](layout, row),
             },
         )

@@ -41,6 +41,10 @@ SQUEEZE_MAX_PER_N = 2.0  # of an electrode that faces the contact: E1 of a third
 TORSION_NMM_PER_RAD = 75.0  # as stiff as skin that is dragged 5 mm from the middle
 TORSION_MAX_RAD = 0.2
 TEMPERATURE_PER_C = -0.02  # of log resistance
+# How much skin vibrates while it is pressed harder or less: white noise of PAC, in counts for each N/s. Nobody has
+# measured it; RATTLE_SPREAD times as much or as little may be right (host/docs/guides/features.md). Skin that is drawn
+# sideways until it slides is as quiet as at rest (slides).
+RATTLE_PER_N_S, RATTLE_SPREAD = 2.5, 2.0
 PDC_REST = (1300, 2700)  # counts of static pressure at rest: real sensors' is 1326, 2412, and 2582 to 2695
 MESH_MM = 1.2
 R0_ALONE = 0.05  # of log resistance: no two mirror images of F1 and F2 rest alike
@@ -243,7 +247,8 @@ class Finger:
     Resistances and sensitivities are drawn about what two real fingers have in common, as far apart as these are
     (skin.json). ``profile``: "new" has a quiet converter, "worn" the low resistances of trial_15330's finger with the
     noise of F1 and F2 and the glitches of btd_biotacsp. ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and
-    30 C, and gap sensitivity. ``pdc_rest`` is in counts.
+    30 C, and gap sensitivity. ``pdc_rest`` is in counts. ``rattle_per_n_s`` is drawn between half and twice the
+    RATTLE_PER_N_S of PAC, log-uniformly; set it to try another.
     """
 
     def __init__(self, seed: int, profile: Profile = "new") -> None:
@@ -260,6 +265,8 @@ class Finger:
         self.drift_per_min: Floats = rng.uniform(-15.0, 15.0) * rng.uniform(0.82, 1.16, ELECTRODES)
         self.creep_share = float(rng.uniform(0.02, 0.05))
         self.pdc_rest = float(np.random.default_rng([seed, 6]).integers(*PDC_REST))
+        spread = float(np.random.default_rng([seed, 7]).uniform(-1.0, 1.0))
+        self.rattle_per_n_s = RATTLE_PER_N_S * RATTLE_SPREAD**spread
         self.noise_counts = 5.0 if worn else 1.5
         self.glitch_share = 0.005 if worn else 0.0
 

@@ -32,11 +32,6 @@ TDC_NOISE = 0.5
 PAC_REST, PAC_NOISE = 2038.0, 4.0
 PAC_HIGH_PASS_HZ = 10.0  # SPM: PAC is PDC's pressure through a 10 to 1040 Hz band
 PAC_PER_PDC = 1000.0 * _sensor.PDC_KPA_PER_COUNT / _sensor.PAC_PA_PER_COUNT
-# Skin vibration while it is pressed harder or less: in a real press (btd_biotacsp) the noise of 4 grew to 7.6 at 1 to 2
-# counts of pressure a round and to 12 at 4 to 8. Skin that is drawn sideways until it slides is as quiet as at rest
-# (slides).
-PAC_RATTLE_PER_N_S = 2.5
-
 _BLOCK = 1000  # frames at a time: they stay in the cache, and an hour of five fingers within 500 MB
 
 
@@ -173,7 +168,7 @@ class Sampler:
         slow = np.column_stack([finger.pdc_rest + pdc, np.full(len(pdc), TAC_REST), effects.tdc])
         words[:, [PDC_SLOT, TAC_SLOT, TDC_SLOT]] = _between(slow, at_slot, pieces) + slow_noise
 
-        rattle = PAC_RATTLE_PER_N_S * np.abs(np.diff(effects.force_n)) * pieces / FRAME_S
+        rattle = finger.rattle_per_n_s * np.abs(np.diff(effects.force_n)) * pieces / FRAME_S
         pac = PAC_REST + self._high_pass(PAC_PER_PDC * pdc, pieces)
         noise = PAC_NOISE + rattle.reshape(frames, pieces)[:, _piece_of(PAC_SLOT, pieces)]
         pac += self._pac_rng.normal(0.0, 1.0, pac.shape) * noise

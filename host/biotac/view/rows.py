@@ -17,13 +17,14 @@ from ..core.unroll import unroll
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
+from ..wire.fields import INVALID_U8
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray, electrode_signals
 
 #: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing or not used. ``map_um``: the point of
 #: contact on the unrolled skin, across and along, in um; null where it is invalid. ``applied_100un``: Reader.applied_n.
 FRAME_ROW = (
     "finger", "seq", "t_us", "flags", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un", "torque_mnmm",
-    "map_um", "applied_100un", "trust",
+    "map_um", "applied_100un", "trust", "slip_level",
 )  # fmt: skip
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
@@ -45,6 +46,7 @@ def frame_rows(batch: Batch, applied_n: NDArray[np.float64] | None = None) -> li
         map_um(frames),
         applied,
         frames["trust"].tolist(),
+        with_null(messages["slip_level"], INVALID_U8),
         strict=True,
     )
     timed = [(row[2], compact(row)) for row in columns]

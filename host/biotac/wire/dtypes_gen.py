@@ -122,6 +122,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("wrench_age_ms", "<u2"),
             ("electrodes_out", "<u4"),
             ("trust", "u1"),
+            ("slip_level", "u1"),
         ]
     ),
     wire.Pac.ID: np.dtype(

@@ -27,8 +27,8 @@ MNMM_PER_NMM = 1_000
 Q4_PER_COUNT = 16
 
 #: The marks for a missing value in the wire's integers, by type.
-INVALID_U32 = 0xFFFFFFFF
-WIRE_INVALID = {"u2": INVALID_COUNT, "u4": INVALID_U32, "i2": INVALID_I16, "i4": INVALID_I32}
+INVALID_U8, INVALID_U32 = 0xFF, 0xFFFFFFFF
+WIRE_INVALID = {"u1": INVALID_U8, "u2": INVALID_COUNT, "u4": INVALID_U32, "i2": INVALID_I16, "i4": INVALID_I32}
 _INVALID_BY_CHAR = {np.dtype(kind).char: mark for kind, mark in WIRE_INVALID.items()}  # quicker to look up
 
 
@@ -84,6 +84,7 @@ _PRESSURE_FORCE = "magnitude of the force from static pressure, negative below r
 _TORSION = "torque about the outward normal at the contact; NaN unless a wrench map gives it"
 _AGE = "how much older force, torque and torsion are than the row; 0 unless REPEATED"
 _OUT = "bit mask, bit i for electrode i + 1: results do without it"
+_SLIP = "rms in which dynamic pressure shakes as skin slips, 0 where it does not; 255 unless EVENTS are subscribed to"
 _TARE_STATE = Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state")
 _TRUST = Field("trust", "u1", "1", "what the force is good for: enum trust in MESSAGES.md", (), "trust")
 
@@ -109,6 +110,7 @@ FRAME_FIELDS = (
     Field("wrench_age_ms", "<u2", "ms", _AGE, (), "wrench_age_ms"),
     Field("electrodes_out", "<u4", "1", _OUT, (), "electrodes_out"),
     _TRUST,
+    Field("slip_level", "u1", "count", _SLIP, (), "slip_level", None, INVALID_U8),
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),
 )
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, INVALID_U8, PAC_FIELDS, Field, dtype_of
 from .fields import FORCE_LSB_PER_N as FORCE_LSB_PER_N
 from .fields import MNMM_PER_NMM as MNMM_PER_NMM
 from .fields import Q4_PER_COUNT as Q4_PER_COUNT
@@ -69,6 +69,7 @@ class Frame:
     wrench_age_ms: int = 0
     electrodes_out: int = 0
     trust: Trust = Trust.NONE
+    slip_level: int = INVALID_U8
 
     @property
     def reasons(self) -> FrameFlags:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x0C23BFB6
+SCHEMA_HASH = 0x881A943D
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -907,12 +907,13 @@ class Frame:
     wrench_age_ms: int
     electrodes_out: int
     trust: int
+    slip_level: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiHIB")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiHIBB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 151 bytes."""
+        """Payload without id and CRC, 152 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -936,6 +937,7 @@ class Frame:
             self.wrench_age_ms,
             self.electrodes_out,
             self.trust,
+            self.slip_level,
         )
 
     @classmethod
@@ -965,6 +967,7 @@ class Frame:
             v[63],
             v[64],
             v[65],
+            v[66],
         )
 
 

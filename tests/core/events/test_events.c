@@ -171,7 +171,7 @@ TEST(pressure_that_stays_is_no_lift)
     assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
 }
 
-// A swing of 120 to 220 Hz: both ways of it take up to 4 ms to be seen.
+// A swing of 120 to 220 Hz: both ways of it take some milliseconds to be seen.
 TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
 {
     int told_late = 0, onset_off = 0;
@@ -183,7 +183,7 @@ TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
         const uint32_t begins_us = its.t_us;
         shaken(30, 60, 120 + k / 2);
         const bt_msg_event *slip = first(BT_EVENT_KIND_SLIP);
-        told_late += slip->t_us - begins_us > 7000;
+        told_late += slip->t_us - begins_us > 10000;
         onset_off += abs((int32_t)(slip->onset_us - begins_us)) > 5000;
         assert_in_range(slip->peak_count, 40, 160);
         assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
@@ -244,7 +244,7 @@ TEST(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip)
 {
     hold();
     for (int i = 6; i < BT_PAC_PER_FRAME; i++) {
-        its.pac[i] = 28 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
+        its.pac[i] = 36 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
     }
     play(1);
     memset(its.pac, 0, sizeof its.pac);
@@ -271,25 +271,31 @@ static void squeezed(int rounds, double counts_per_s)
 TEST(squeezing_harder_is_no_slip)
 {
     hold();
-    for (int n_s = 1; n_s <= 5; n_s++) {
+    for (int n_s = 1; n_s <= 20; n_s++) {
         squeezed(50, 98.6 * 100 * n_s);
         squeezed(50, 0);
     }
     assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
 }
 
-// What skin that is dragged along does before it slides: all of one sign, as a squeeze, and steeper.
-TEST(a_steep_pull_is_a_slip)
+// White noise that grows with the squeeze, as skin may rattle; and skin that slides at 150 Hz meanwhile.
+TEST(a_slip_within_a_rattling_squeeze_is_told_and_the_squeeze_is_not)
 {
-    hold();
-    for (int i = 0; i < 5 * BT_PAC_PER_FRAME; i++) {
-        its.pac[i % BT_PAC_PER_FRAME] = 15 * i;
-        if (i % BT_PAC_PER_FRAME == BT_PAC_PER_FRAME - 1) {
-            play(1);
-        }
+    for (int slides = 0; slides <= 1; slides++) {
+        (void)new_course(NULL);
+        hold();
+        its.pac_sigma = 16;
+        play(30);
+        assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+        assert_int_equal(its.finger.events.slip_level, 0);
+        shaken(5, slides ? 60 : 0, 150);
+        assert_int_equal(told(BT_EVENT_KIND_SLIP), slides);
+        // The mean of four samples changes by 2 x .87 of the amplitude, which has 1 / sqrt(2) of it as rms.
+        assert_in_range(its.finger.events.slip_level, slides ? 50 : 0, slides ? 85 : 0);
+        its.pac_sigma = 4;
+        play(20);
+        assert_int_equal(told(BT_EVENT_KIND_STUCK), slides);
     }
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
-    assert_in_range(first(BT_EVENT_KIND_SLIP)->onset_us, 3500000 + 15000, 3500000 + 30000);
 }
 
 TEST(a_landing_is_no_slip)

@@ -3,8 +3,8 @@
 
 #include "events/events.h"
 
-#define LEVEL       100
-#define TOLL        (8 * LEVEL / 2) // that noise takes of each side in a stretch of eight samples
+#define LEVEL       800
+#define TOLL        (3 * (LEVEL * 11 / 16)) // that noise takes of each side in a stretch of three pairs
 #define TOLD(event) (1u << BT_EVENT_KIND_##event)
 
 static bt_tare tare;
@@ -24,14 +24,18 @@ static int held(void **state)
     assert_int_equal(events.level_count2, LEVEL);
     events.touched = true;
     events.now = 100000;
+    events.pair = 4000;
+    for (int k = 0; k < BT_EVENTS_APART; k++) {
+        events.four[k] = 8000;
+    }
     return 0;
 }
 
-// The second stretch of a round, eight samples that do not change anything; returns what is told.
+// The second stretch of a round, three pairs that do not change anything; returns what is told.
 static uint32_t stretch(void)
 {
-    events.samples_done = 8;
-    return bt_events_pac(&events, &tare, pac, 16);
+    events.pairs_done = 4;
+    return bt_events_pac(&events, &tare, pac, 15);
 }
 
 // The same with this much evidence left after it.
@@ -45,11 +49,11 @@ static uint32_t shaken(uint32_t risen_count2, uint32_t fallen_count2)
     return told;
 }
 
-TEST(a_slip_goes_both_ways_by_more_than_twenty_levels)
+TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
 {
     static const struct {
         uint32_t risen, fallen, told;
-    } cases[] = {{2000, 2001, 0}, {2001, 2000, 0}, {2001, 2001, TOLD(SLIP)}};
+    } cases[] = {{13600, 13601, 0}, {13601, 13600, 0}, {13601, 13601, TOLD(SLIP)}};
     for (int k = 0; k < 3; k++) {
         (void)held(NULL);
         events.jolt_raised = true;
@@ -62,64 +66,115 @@ TEST(a_slip_goes_both_ways_by_more_than_twenty_levels)
     }
 }
 
-TEST(a_jolt_is_more_than_25_levels_and_told_once)
+TEST(a_jolt_is_more_than_22_levels_and_told_once)
 {
-    assert_int_equal(shaken(2500, 0), 0);
-    assert_int_equal(shaken(1250, 1250), 0);
-    assert_int_equal(shaken(2501, 0), TOLD(JOLT));
-    assert_int_equal(shaken(5000, 0), 0);
+    assert_int_equal(shaken(17600, 0), 0);
+    assert_int_equal(shaken(8800, 8800), 0);
+    assert_int_equal(shaken(17601, 0), TOLD(JOLT));
+    assert_int_equal(shaken(20000, 0), 0);
     assert_int_equal(shaken(1, 0), 0);
     events.risen_count2 = TOLL;
     events.fallen_count2 = 0;
     assert_int_equal(stretch(), 0); // over: the next one is another
-    assert_int_equal(shaken(2501, 0), TOLD(JOLT));
+    assert_int_equal(shaken(17601, 0), TOLD(JOLT));
 }
 
-// Where the other side shakes already, nothing was passed over as noise before the first word.
-TEST(a_side_begins_at_the_first_sample_that_moved_its_way)
+// Sums of two samples: 4000, 4100, 3800. The changes are 0, 100 and -100, of at most twelve levels each.
+static void swing(void)
 {
-    static const uint16_t words[8] = {BT_INVALID_COUNT, 2000, 2100, 2000, 1900, 2100, 1900, 2000};
+    static const uint16_t words[6] = {2000, 2000, 2050, 2050, 1900, 1900};
     memcpy(pac + 8, words, sizeof words);
-    events.risen_count2 = 1;
-    (void)stretch();
-    assert_int_equal(events.fall_began, 100000 + 4);
-    (void)held(NULL);
-    memcpy(pac + 8, words, sizeof words);
-    events.fallen_count2 = 1;
-    (void)stretch();
-    assert_int_equal(events.rise_began, 100000 + 2);
 }
 
-// A stretch of changes, none of them below the noise; twelve levels are the most of a sample.
+TEST(a_side_begins_at_the_first_pair_that_moved_its_way)
+{
+    swing();
+    assert_int_equal(stretch(), 0);
+    assert_true(events.risen_count2 == 12 * LEVEL - TOLL && events.fallen_count2 == 12 * LEVEL - TOLL);
+    assert_int_equal(events.rise_began, 100000 + 2);
+    assert_int_equal(events.fall_began, 100000 + 4);
+    assert_int_equal(events.shake_began, 100000 + 2);
+    assert_int_equal(events.peak_count2, 10000);
+    (void)held(NULL);
+    swing();
+    pac[8] = BT_INVALID_COUNT; // and whatever it would be part of
+    assert_int_equal(stretch(), 0);
+    assert_int_equal(events.risen_count2, 0);
+    assert_int_equal(events.fall_began, 100000 + 4);
+    assert_int_equal(events.shake_began, 100000 + 4);
+}
+
 TEST(while_it_slips_both_sides_are_one)
 {
-    static const int change[8] = {30, -34, 35, -100, 10, -20, 0, 5};
-    events.slipping = true;
-    events.risen_count2 = 3000;
-    events.fallen_count2 = 700;
-    for (int k = 0; k < 8; k++) {
-        pac[8 + k] = (uint16_t)(2000 + change[k]);
-    }
-    const uint32_t all = 30 * 30 + 34 * 34 + 1200 + 1200 + 10 * 10 + 20 * 20 + 5 * 5;
+    events.slipping = events.jolt_raised = true;
+    events.risen_count2 = 24000;
+    events.fallen_count2 = 7000;
+    swing();
     assert_int_equal(stretch(), 0);
-    assert_int_equal(events.risen_count2, 3700 + all - 8 * LEVEL);
+    assert_int_equal(events.risen_count2, 31000 + 2 * 12 * LEVEL - 3 * LEVEL);
     assert_int_equal(events.fallen_count2, 0);
-    assert_int_equal(events.round_sum_count2, all);
-    (void)held(NULL);
-    events.slipping = true;
-    events.risen_count2 = 20000 + 800;
-    (void)stretch();
-    assert_int_equal(events.risen_count2, 20000);
-    events.risen_count2 = 20001 + 800;
-    (void)stretch();
-    assert_int_equal(events.risen_count2, 20000);
-    events.risen_count2 = 801;
+    assert_int_equal(events.round_count2, 2 * 12 * LEVEL);
+    assert_int_equal(events.shaken_count2, 20000);
+    for (uint32_t over = 0; over < 2; over++) {
+        (void)held(NULL);
+        events.slipping = events.jolt_raised = true;
+        events.risen_count2 = 100 * LEVEL + 3 * LEVEL + over;
+        (void)stretch();
+        assert_int_equal(events.risen_count2, 100 * LEVEL);
+    }
+    events.risen_count2 = 3 * LEVEL + 1;
     assert_int_equal(stretch(), 0);
     assert_true(events.slipping);
-    events.risen_count2 = 800;
+    events.risen_count2 = 3 * LEVEL;
     assert_int_equal(stretch(), TOLD(STUCK));
     assert_false(events.slipping || events.jolt_raised);
     assert_int_equal(stretch(), 0);
+}
+
+// The level is that of what shook in the round, per sample, beyond eleven times what is explained.
+TEST(a_level_is_told_of_rounds_that_slip)
+{
+    static const struct {
+        uint32_t shaken_count2;
+        uint8_t level;
+    } cases[] = {{11 * LEVEL, 0},
+                 {11 * LEVEL + 12 * 12, 0},
+                 {11 * LEVEL + 13 * 13, 1},
+                 {11 * LEVEL + 164 * 164, 12},
+                 {11 * LEVEL + 3251 * 3251, 253},
+                 {UINT32_MAX - 4000000, 254}};
+    assert_int_equal(events.slip_level, BT_SLIP_LEVEL_NONE);
+    for (int k = 0; k < 12; k++) {
+        (void)held(NULL);
+        events.slipping = k < 6;
+        events.risen_count2 = 90 * LEVEL; // nor does it end
+        events.jolt_raised = events.landing = true;
+        events.shaken_count2 = cases[k % 6].shaken_count2;
+        events.pairs_done = 7;
+        assert_int_equal(bt_events_pac(&events, &tare, pac, BT_PAC_PER_FRAME), 0);
+        assert_int_equal(events.slip_level, k < 6 ? cases[k].level : 0);
+        assert_int_equal(events.shaken_count2, 0);
+    }
+}
+
+// Neighbours that differ by 40 for long: white noise of sigma 28, whose changes have a mean square of 6400.
+TEST(what_rattles_must_shake_more)
+{
+    for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
+        pac[k] = (uint16_t)(2000 + (k & 1 ? 20 : -20));
+    }
+    (void)stretch();
+    assert_int_equal(events.rattle_count2, 3 * 40 * 40 / 32);
+    for (int k = 0; k < 200; k++) {
+        assert_int_equal(stretch(), 0);
+    }
+    assert_in_range(events.rattle_count2, 1580, 1600);
+    const uint32_t unit = 7 * events.rattle_count2, toll = 3 * (unit * 11 / 16);
+    for (uint32_t more = 0; more < 2; more++) {
+        events.jolt_raised = true;
+        events.risen_count2 = events.fallen_count2 = 17 * unit + toll + more;
+        assert_int_equal(stretch(), more ? TOLD(SLIP) : 0);
+    }
 }
 
 TEST(what_was_told_of_shakes_on_until_it_is_over)
@@ -138,10 +193,10 @@ TEST(what_was_told_of_shakes_on_until_it_is_over)
         events.jolt_raised = cases[k].jolt_raised;
         events.landing = cases[k].landing;
         events.touched = cases[k].touched;
-        events.risen_count2 = events.fallen_count2 = 1000;
+        events.risen_count2 = events.fallen_count2 = 10000;
         (void)stretch();
-        assert_int_equal(events.risen_count2, cases[k].one ? 2000 - 8 * LEVEL : 1000 - TOLL);
-        assert_int_equal(events.fallen_count2, cases[k].one ? 0 : 1000 - TOLL);
+        assert_int_equal(events.risen_count2, cases[k].one ? 20000 - 3 * LEVEL : 10000 - TOLL);
+        assert_int_equal(events.fallen_count2, cases[k].one ? 0 : 10000 - TOLL);
     }
 }
 
@@ -151,41 +206,17 @@ TEST(what_has_just_been_touched_lands)
     for (uint32_t since = 219; since <= 220; since++) {
         (void)held(NULL);
         events.landing = true;
-        events.touch_began = events.now + 8 - since;
+        events.touch_began = events.now + 6 - since;
         (void)stretch(); // does not shake
         assert_int_equal(events.landing, since < 220);
     }
     for (uint32_t since = 2199; since <= 2200; since++) {
         (void)held(NULL);
         events.landing = true;
-        events.touch_began = events.now + 8 - since;
-        assert_int_equal(shaken(2001, 2001), since < 2200 ? TOLD(JOLT) : TOLD(JOLT) | TOLD(SLIP));
+        events.touch_began = events.now + 6 - since;
+        assert_int_equal(shaken(13601, 13601), since < 2200 ? TOLD(JOLT) : TOLD(JOLT) | TOLD(SLIP));
         assert_int_equal(events.landing, since < 2200);
     }
-}
-
-// A drag: the last sample of a stretch has changed by 75 counts, for 44 samples.
-TEST(a_drag_is_a_slip_of_one_sign)
-{
-    for (int change = 74; change <= 75; change++) {
-        (void)held(NULL);
-        for (int round = 0; round < 6; round++) {
-            for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
-                pac[k] = (uint16_t)(k < 8 ? 2000 : 2000 + change);
-            }
-            events.dragged = round == 0 ? 0 : events.dragged;
-            const uint32_t told = stretch() & ~TOLD(JOLT);
-            assert_int_equal(events.dragged, change < 75 ? 0 : 8 * (round + 1));
-            assert_int_equal(told, change == 75 && round == 5 ? TOLD(SLIP) : 0);
-        }
-        assert_true(change < 75 || events.slip_began == events.now - 1);
-    }
-    (void)held(NULL);
-    events.jolt_raised = true;
-    events.dragged = 43;
-    assert_int_equal(shaken(100, 0), 0);
-    events.dragged = 44;
-    assert_int_equal(shaken(100, 0), TOLD(SLIP));
 }
 
 // Rise and fall within 18 samples are one vibration, which began with the earlier; else with the later.
@@ -200,68 +231,55 @@ TEST(a_slip_began_with_its_vibration)
         events.jolt_raised = true;
         events.rise_began = 99000;
         events.fall_began = 99000 + (uint32_t)cases[k].fall_after_rise;
-        assert_int_equal(shaken(2001, 2001), TOLD(SLIP));
+        assert_int_equal(shaken(13601, 13601), TOLD(SLIP));
         assert_int_equal(events.slip_began, cases[k].with_rise ? events.rise_began : events.fall_began);
     }
 }
 
-TEST(noise_is_half_a_level_and_no_more)
+// 550 a pair, all three together: two changes of 28 are below it, two of 29 above.
+TEST(noise_is_eleven_sixteenths_of_a_level)
 {
-    events.level_count2 = 98;
-    pac[12] = 2007; // 49
-    (void)stretch();
-    assert_true(events.risen_count2 == 0 && events.round_sum_count2 == 49);
-    pac[14] = 2020; // what is no more than that is before it begins
-    (void)stretch();
-    assert_int_equal(events.risen_count2, 400 - 2 * 49);
-    assert_int_equal(events.shake_began, events.now - 2);
-    (void)held(NULL);
-    events.level_count2 = 98;
-    pac[12] = 2008;
-    (void)stretch();
-    assert_int_equal(events.risen_count2, 0); // four samples of noise take it away again
-    pac[12] = 2020;
-    events.dragged = 9;
-    events.peak_count2 = 1000000;
-    (void)stretch();
-    assert_int_equal(events.risen_count2, 400 - 4 * 49);
-    assert_int_equal(events.peak_count2, 400); // not of what shook before
-    assert_int_equal(events.dragged, 0);
-    assert_int_equal(events.shake_began, events.now - 4);
-    assert_int_equal(events.rise_began, events.now - 4);
+    for (uint16_t change = 28; change <= 29; change++) {
+        (void)held(NULL);
+        pac[10] = (uint16_t)(2000 + change);
+        events.peak_count2 = 1000000; // of what shook before
+        (void)stretch();
+        const uint32_t both = 2u * change * change;
+        assert_int_equal(events.shaken_count2, both);
+        assert_int_equal(events.risen_count2, both > TOLL ? both - TOLL : 0);
+        assert_int_equal(events.peak_count2, both > TOLL ? change * change : 1000000);
+    }
+    assert_int_equal(events.shake_began, 100000 + 2);
 }
 
-// A round that was begun late is compared within itself.
+// The first five pairs of a round that was begun late have nothing to be compared with.
 TEST(a_first_stretch_that_was_missed_is_no_change)
 {
     for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
-        pac[k] = (uint16_t)(k < 8 ? 2000 + k : k < 16 ? 2003 + k - 8 : 3000);
+        pac[k] = (uint16_t)(k < 10 ? 3000 : 3050);
     }
-    events.samples_done = 0;
-    (void)bt_events_pac(&events, &tare, pac, 16);
-    assert_int_equal(events.round_sum_count2, 8 * 3 * 3);
-    assert_int_equal(events.now, 100016);
-    events.samples_done = 16; // of a round whose end was not shown
-    (void)bt_events_pac(&events, &tare, pac, 16);
-    assert_int_equal(events.round_sum_count2, 2 * 8 * 3 * 3);
+    events.pairs_done = 7;
+    (void)bt_events_pac(&events, &tare, pac, 15);
+    assert_int_equal(events.shaken_count2, 100 * 100 + 200 * 200);
+    assert_int_equal(events.now, 100014);
 }
 
-// Two samples' share of a round's noise, as a mean over many rounds at rest, within limits.
+// Two changes' share of a round's noise, as a mean over many rounds at rest, within limits.
 TEST(the_level_is_the_noise_at_rest)
 {
     enum { AT_REST, TOUCHED, UNTARED, STATES };
     static const struct {
-        uint32_t round_sum_count2, level_count2;
-    } cases[] = {{100, 100}, {11000, 1000}, {50000, 3200}};
+        uint32_t round_count2, level_count2;
+    } cases[] = {{1100, LEVEL}, {11000, 2000}, {10000000, (1 << 20) * 2 / 11}};
     for (int k = 0; k < 3 * STATES; k++) {
         (void)held(NULL);
         tare.state = k % STATES == UNTARED ? BT_TARE_STATE_INIT : BT_TARE_STATE_REST;
         events.touched = k % STATES == TOUCHED;
         for (int rounds = 0; rounds < 1000; rounds++) {
-            events.round_sum_count2 = cases[k / STATES].round_sum_count2;
-            events.samples_done = 16;
+            events.round_count2 = cases[k / STATES].round_count2;
+            events.pairs_done = 7;
             (void)bt_events_pac(&events, &tare, pac, BT_PAC_PER_FRAME);
-            assert_true(events.round_sum_count2 == 0 && events.samples_done == 0);
+            assert_true(events.round_count2 == 0 && events.pairs_done == 0);
         }
         const uint32_t level = k % STATES == AT_REST ? cases[k / STATES].level_count2 : LEVEL;
         assert_in_range(events.level_count2, level - level / 100, level + level / 100);
@@ -343,7 +361,7 @@ TEST(an_onset_is_told_in_samples_of_2200_a_second)
         assert_int_equal(message(BT_EVENT_KIND_STUCK).onset_us, slip.onset_us);
         assert_int_equal(jolt.energy_count2, UINT32_MAX);
     }
-    static const uint32_t squares[][2] = {{0, 0}, {1, 1}, {399, 19}, {400, 20}, {4095 * 4095, 4095}};
+    static const uint32_t squares[][2] = {{0, 0}, {16, 1}, {6399, 19}, {6400, 20}, {16380 * 16380, 4095}};
     for (int k = 0; k < 5; k++) {
         events.peak_count2 = squares[k][0];
         assert_int_equal(message(BT_EVENT_KIND_JOLT).peak_count, squares[k][1]);

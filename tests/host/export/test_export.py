@@ -97,6 +97,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "electrodes_out": sent["electrodes_out"],
         "flags": sent["flags"],
         "trust": sent["trust"],
+        "slip_level": sent["slip_level"],
         "gap_s": np.where(
             np.arange(len(frames)) == np.searchsorted(frames["t_us"], recording.gaps[0].next_t_us), GAP_S, 0
         ),
@@ -244,7 +245,7 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
             got.setdefault(connection.topic, []).append((stamp_ns, bag.deserialize(data, connection.msgtype)))
     for finger in range(FINGERS):
         wanted, pac = expected(recorded, finger), expected_pac(recorded, finger)
-        names = ("wrench", "poc", "flags", "trust", "counts", "pac", "bands")
+        names = ("wrench", "poc", "flags", "trust", "slip", "counts", "pac", "bands")
         topics = {name: got[f"/biotac/finger{finger}/{name}"] for name in names}
         for name, vectors in (
             ("force_n", [m.wrench.force for _, m in topics["wrench"]]),
@@ -259,8 +260,8 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
             headers = [m.header for _, m in topics[name]]
             assert [h.stamp.sec * 10**9 + h.stamp.nanosec for h in headers] == stamps
             assert {h.frame_id for h in headers} == {f"biotac_finger{finger}"}
-        for name in ("flags", "trust"):
-            assert [m.data for _, m in topics[name]] == wanted[name].tolist()
+        for name, column in (("flags", "flags"), ("trust", "trust"), ("slip", "slip_level")):
+            assert [m.data for _, m in topics[name]] == wanted[column].tolist()
         slow = np.column_stack([wanted["counts"], wanted["pdc"], wanted["tac"], wanted["tdc"]])
         assert np.array_equal([m.data for _, m in topics["counts"]], slow)
         assert np.array_equal([m.data for _, m in topics["pac"]], pac["pac"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from biotac.core import geometry as surface
 from biotac.sim import sampling
-from biotac.sim.physics import SKIN, Finger, States
+from biotac.sim.physics import RATTLE_PER_N_S, SKIN, Finger, States
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import sensor_gen as _sensor
 from biotac.wire import slots
@@ -307,3 +309,15 @@ def test_words_stay_within_the_converter() -> None:
     words = sampling.sample(Finger(1, "worn"), ramp_states(5, 50.0))
     assert words.max() <= 4095  # PAC would be far beyond
     assert (words[:, slots.PAC_SLOT] == 4095).any()
+
+
+def test_fingers_rattle_half_to_twice_as_much_and_as_their_rate_says() -> None:
+    drawn = np.array([Finger(seed).rattle_per_n_s for seed in range(400)]) / RATTLE_PER_N_S
+    assert 0.5 <= drawn.min() < 0.52 and 1.9 < drawn.max() <= 2.0
+    assert abs(np.median(np.log2(drawn))) < 0.15
+    finger = Finger(1)
+    finger.rattle_per_n_s = 10.0
+    at = np.tile(surface.project(surface.ELECTRODE_MM[16:17]), (301, 1))
+    pushed = replace(touch(at, 0.0), force_n=np.linspace(0.0, 6.0, 301))
+    pac = sampling.sample(finger, pushed)[100:, slots.PAC_SLOT].astype(float)  # 2 N/s: 20 counts besides the noise of 4
+    assert np.std(np.diff(pac)) / np.sqrt(2) == pytest.approx(24.0, rel=0.05)

@@ -57,6 +57,7 @@ export class Model {
       pdc: plain("pdc"),
       tac: plain("tac"),
       tdc: plain("tdc"),
+      slipLevel: plain("slip_level"),
       pocMm: scaled("poc_um") ?? [NaN, NaN, NaN],
       forceN: scaled("force_100un") ?? [NaN, NaN, NaN],
       appliedN: scaled("applied_100un", "force_100un") ?? [NaN, NaN, NaN],

@@ -44,6 +44,7 @@ const SCALARS = [
   { key: "pdc", name: "Pressure, PDC" },
   { key: "tac", name: "Thermal flux, TAC" },
   { key: "tdc", name: "Temperature, TDC" },
+  { key: "slipLevel", name: "Slip, counts" },
 ];
 
 export class Results {

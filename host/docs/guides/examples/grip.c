@@ -14,12 +14,12 @@ static const uint32_t WIDE = BT_FRAME_FLAG_ELECTRODE_OUT | BT_FRAME_FLAG_ELECTRO
 static const uint32_t COARSE = BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_BASE_OLD;
 struct grip {
     float least_n, most_n, friction, stiffness, speed_mm_s, normal_n, shear_n, way_mm, first_n;
-    int deaf_until, round, reflex_until, holds, settled, slips, sure;
+    int round, jerk_until, reflex_until, slipped, holds, settled, slips, sure;
 } grip;
 static struct felt {
     float normal_n, shear_n;
     uint32_t flags, lifted;
-    int frames, slips;
+    int frames, slips, slides;
 } felt; // since the last grip_round
 
 void act_on(const bt_msg_frame *frame)
@@ -31,6 +31,7 @@ void act_on(const bt_msg_frame *frame)
         felt.shear_n = fmaxf(felt.shear_n, hypotf((float)force[0], (float)force[1]) / 1e4f);
         felt.flags |= frame->flags;
         felt.lifted |= ~frame->flags & BT_FRAME_FLAG_CONTACT;
+        felt.slides |= frame->slip_level != 0 && frame->slip_level != 255; // 255: not judged
         felt.frames++;
     }
 }
@@ -57,12 +58,13 @@ static float squeeze(float reserve, int coarse)
     const float wanted_n = fminf(fmaxf(grip.least_n, reserve * grip.shear_n / grip.friction), grip.most_n);
     const float missing_n = wanted_n - grip.normal_n - grip.speed_mm_s * grip.stiffness * 0.03f;
     const int reflex = grip.round < grip.reflex_until;
-    const float rate = fminf(fmaxf((reflex ? 40 : 6) * missing_n, -0.9f), reflex ? 20 : 5);
+    const int near = (coarse && !reflex) || fabsf(missing_n) <= 0.05f * wanted_n;
+    const float wanted = near ? 0 : fminf(fmaxf((reflex ? 40 : 6) * missing_n, -0.9f), reflex ? 20 : 5);
+    const float before = grip.speed_mm_s * grip.stiffness, change = 0.3f * (wanted - before); // N/s, smoothly
     grip.settled = fabsf(missing_n) < 0.15f * wanted_n ? grip.settled + 1 : 0;
-    if ((coarse && !reflex) || fabsf(missing_n) <= 0.05f * wanted_n)
-        return 0;
-    grip.deaf_until = rate > 1 ? grip.round + 10 : grip.deaf_until; // its own squeeze sounds like a slip
-    return rate / grip.stiffness;
+    if (fabsf(change) > 1)
+        grip.jerk_until = grip.round + 4; // it shakes like a slip: for so long, wait for the slip's level
+    return (before + change) / grip.stiffness;
 }
 
 static void learn_from_slip(void)
@@ -70,7 +72,7 @@ static void learn_from_slip(void)
     const float felt_friction = 0.9f * grip.shear_n / fmaxf(grip.normal_n, 0.05f);
     grip.friction = grip.shear_n > 0.1f ? fmaxf(fminf(grip.friction, felt_friction), 0.15f) : grip.friction;
     grip.least_n = fminf(fmaxf(grip.least_n, 1.3f * grip.normal_n), grip.most_n);
-    grip.reflex_until = grip.round + 20;
+    grip.reflex_until = grip.round + 8;
     grip.slips++;
 }
 
@@ -91,8 +93,12 @@ void grip_round(void)
         grip.way_mm += grip.speed_mm_s * 0.01f;
         if (grip.way_mm > 0.3f && grip.normal_n - grip.first_n > 0.3f)
             grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
-        if (felt.slips != 0 && grip.round > grip.deaf_until)
-            learn_from_slip();
+        grip.slipped |= felt.slips != 0;
+        if (grip.round > grip.jerk_until && grip.round > grip.reflex_until) {
+            if (felt.slips != 0 || (grip.slipped && felt.slides))
+                learn_from_slip();
+            grip.slipped = 0;
+        }
         grip.speed_mm_s = squeeze(felt.flags & WIDE ? 1.56f : 1.3f, (felt.flags & COARSE) != 0);
     }
     felt = (struct felt){0};

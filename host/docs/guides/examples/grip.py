@@ -11,12 +11,14 @@ LAG_S = 0.03  # from a command to the motion that the next frame shows: the actu
 RESERVE = 1.3  # press that much harder than friction needs
 FRICTION = 0.6  # until a slip teaches less
 GAIN_PER_S, SQUEEZE_N_PER_S = 6.0, 5.0  # squeeze with so many N/s for each N that is missing, at most
-REFLEX_PER_S, REFLEX_N_PER_S, REFLEX_ROUNDS = 40.0, 20.0, 20  # the same after a slip, and for how long
-RELEASE_N_PER_S = 0.9  # slow enough to hear a slip meanwhile
-DEAF_N_PER_S, DEAF_ROUNDS = 1.0, 10  # a faster squeeze sounds like a slip: SLIP is ignored in it and so long after it
+REFLEX_PER_S, REFLEX_N_PER_S, REFLEX_ROUNDS = 40.0, 20.0, 8  # the same after a slip, and for how long
+RELEASE_N_PER_S = 0.9  # a thing that begins to slip is not let go by much before that is told
 BLIND = F.UNTARED | F.FAULT | F.SENSOR_FAULT | F.SENSOR_OTHER | F.SENSOR_UNSURE
 WIDE = F.ELECTRODE_OUT | F.ELECTRODE_MISSING | F.RAIL | F.ELECTRODE_ALONE | F.OUTSIDE
 COARSE = F.TEMP | F.BASE_OLD
+SMOOTH = 0.3  # of a change of rate made in each round: what jumps to and fro shakes like a slip
+JERK_N_S, JERK_ROUNDS = 1.0, 4  # so does a larger change than this: for so long it waits for the slip's level
+NOT_JUDGED = 255  # a slip_level without EVENTS
 
 
 class Grip:
@@ -32,7 +34,7 @@ class Grip:
         self.friction, self.stiffness = FRICTION, 0.8  # N/mm in front of the fingers, until it is felt
         self.speed_mm_s, self.normal_n, self.shear_n = CLOSING_MM_S, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
-        self._round, self._deaf_until, self._reflex_until = 0, -1, 0
+        self._round, self._jerk_until, self._reflex_until, self._slipped = 0, 0, 0, False
         self._way_mm, self._first_n, self._blind = 0.0, 0.0, BLIND
 
     def step(self, frames, slipped: bool) -> float:
@@ -60,8 +62,11 @@ class Grip:
         if self._way_mm > 0.3 and self.normal_n - self._first_n > 0.3:
             self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
         self.shear_n += 0.5 * (max(shears) - self.shear_n)
-        if slipped and self._round > self._deaf_until:
-            self._learn_from_slip()
+        self._slipped |= slipped
+        if self._round > max(self._jerk_until, self._reflex_until):
+            if slipped or (self._slipped and any(0 < f.slip_level < NOT_JUDGED for f, *_ in felt)):
+                self._learn_from_slip()
+            self._slipped = False
         return self._squeeze(RESERVE * (1.2 if flags & WIDE else 1.0), bool(flags & COARSE))
 
     def _learn_from_slip(self) -> None:
@@ -76,13 +81,13 @@ class Grip:
         coming_n = self.speed_mm_s * self.stiffness * LAG_S
         missing_n, reflex = self.wanted_n - self.normal_n - coming_n, self._round < self._reflex_until
         self.settled = self.settled + 1 if abs(missing_n) < 0.15 * self.wanted_n else 0
-        if (coarse and not reflex) or abs(missing_n) <= 0.05 * self.wanted_n:
-            self.speed_mm_s = 0.0
-            return 0.0
         gain, most = (REFLEX_PER_S, REFLEX_N_PER_S) if reflex else (GAIN_PER_S, SQUEEZE_N_PER_S)
-        rate_n_s = min(max(gain * missing_n, -RELEASE_N_PER_S), most)
-        if rate_n_s > DEAF_N_PER_S:
-            self._deaf_until = self._round + DEAF_ROUNDS
+        near = (coarse and not reflex) or abs(missing_n) <= 0.05 * self.wanted_n
+        wanted_n_s = 0.0 if near else min(max(gain * missing_n, -RELEASE_N_PER_S), most)
+        before_n_s = self.speed_mm_s * self.stiffness
+        rate_n_s = before_n_s + SMOOTH * (wanted_n_s - before_n_s)
+        if abs(rate_n_s - before_n_s) > JERK_N_S:
+            self._jerk_until = self._round + JERK_ROUNDS
         self.speed_mm_s = rate_n_s / self.stiffness
         return self.speed_mm_s
 

@@ -31,6 +31,7 @@ class Fingers(Node):
     ``biotac/finger0/wrench`` WrenchStamped in N and N*m, on the finger, about the origin of ``biotac_finger0``;
     ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md);
     ``biotac/finger0/trust`` UInt8 (enum trust);
+    ``biotac/finger0/slip`` UInt8, its slip_level: 0 where it does not slip, 255 where that is not known;
     ``biotac/finger0/event`` String, an event's kind (EventKind: SLIP, ...) as soon as it is told. What is
     invalid is NaN, never an old value: look at it before a controller does. Stamps are the begin of the round on this
     node's clock. Service ``biotac/tare``, a Trigger: tares every finger now.
@@ -43,7 +44,8 @@ class Fingers(Node):
         self.hand = hand = biotac.open(self.get_parameter("port").value or None, pace=1.0)
         hand.stream("results", "events")
         self._stamps = Stamps(hand, lambda: self.get_clock().now().nanoseconds / 1e9)
-        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32, "trust": UInt8, "event": String}
+        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32, "event": String}
+        kinds |= {"trust": UInt8, "slip": UInt8}
         self._topics = {
             (finger, name): self.create_publisher(kind, f"biotac/finger{finger}/{name}", DEPTH)
             for finger in hand.fingers
@@ -83,6 +85,7 @@ class Fingers(Node):
         self._topics[finger, "poc"].publish(point)
         self._topics[finger, "flags"].publish(UInt32(data=int(row["flags"])))
         self._topics[finger, "trust"].publish(UInt8(data=int(row["trust"])))
+        self._topics[finger, "slip"].publish(UInt8(data=int(row["slip_level"])))
 
     def tare(self, request: Any, response: Any) -> Any:
         """Tare every finger; the message names those that could not be tared, and why."""

@@ -1,0 +1,151 @@
+"""biotac-lab slip"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biotac import EventKind, Finger, InputError
+from biotac.core import geometry as surface
+from biotac.sim import SimFinger, States, sample
+from biotac.wire import messages, slots
+
+from ..report import Report, Show, Table, check, claim
+
+ABOUT = (
+    "Squeeze, poke, hold and slide simulated fingers, play recordings of real ones, and count what is called a slip."
+)
+EXAMPLE = "biotac-lab slip --fingers 10"
+SLOW_N_S, FAST_N_S = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (8.0, 10.0)
+RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of what biotac.sim draws from
+PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
+REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED = 3.0, 0.1, 0.05, 0.002, 95
+SQUEEZED, LET_GO, CALM = ("squeezed: SLIP", 5), ("let go: SLIP", 5), ("at rest and in still holds: level 0", 99)
+Found = dict[tuple[str, float, float], list[bool]]  # by what, N/s and rattle
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add how many fingers, and real recordings."""
+    parser.add_argument("--fingers", type=int, default=10, metavar="N", help="simulated fingers (default 10)")
+    parser.add_argument("--seed", type=int, default=101, metavar="N", help="of the first (default 101)")
+    parser.add_argument("--slides", type=Path, metavar="NPZ", help="real slides: mM_K_frame, _t, _cv, _cv_t")
+    parser.add_argument("--taps", type=Path, metavar="NPZ", help="real handovers: handover_X_signals (n, 600)")
+    parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses its limit")
+
+
+def run(args: argparse.Namespace, show: Show) -> int:
+    """Return 0, or 1 if --check finds a limit missed."""
+    if args.fingers < 1:
+        raise InputError(f"--fingers is {args.fingers}, expected 1 or more")
+    found: Found = defaultdict(list)
+    for seed in range(args.seed, args.seed + args.fingers):
+        show(f"finger {seed}")
+        for rattle, place in ((rattle, place) for rattle in RATTLES for place in PLACES_MM):
+            finger = SimFinger(seed)
+            finger.rattle_per_n_s = rattle
+            _press(found, finger, place)
+    show("")
+    percent = {key: 100 * float(np.mean(hits)) for key, hits in found.items()}
+    kinds = sorted({(what, n_s) for what, n_s, _ in found})
+    rows = [(what, n_s, *[percent[what, n_s, rattle] for rattle in RATTLES]) for what, n_s in kinds]
+    tables = [Table("Simulated", ("% of", "N/s", *[f"rattle {rattle:g}" for rattle in RATTLES]), rows, digits=1)]
+    checks = []
+    for what, most in (SQUEEZED, LET_GO):
+        for rates, limit in ((SLOW_N_S, most), (FAST_N_S, 20)):
+            worst = max(np.mean([percent[what, n_s, rattle] for n_s in rates]) for rattle in RATTLES)
+            checks.append(check(f"{what}, {rates[0]:g} to {rates[-1]:g} N/s", float(worst), limit, "%"))
+    for what, n_s in kinds:
+        if what not in (SQUEEZED[0], LET_GO[0], "poked: SLIP"):
+            seen, least = min(percent[what, n_s, rattle] for rattle in RATTLES), CALM[1] if what == CALM[0] else 80
+            checks.append(claim(f"{what}, {n_s:g} N/s: {seen:.1f} %, at least {least}", seen >= least))
+    for path, play in ((args.slides, _real_slides), (args.taps, _real_taps)):
+        if path is not None:
+            tables.append(Table(path.stem, ("real", ""), play(np.load(path)), digits=1))
+    source = f"{args.fingers} simulated fingers from seed {args.seed}, on the pad and off it"
+    report = Report(source, tables, checks, [], lambda figure: None)
+    print(json.dumps(report.facts("slip")) if args.json else report.page("slip", ABOUT))
+    return 1 if args.check and not all(one["met"] for one in checks) else 0
+
+
+def _felt(finger: SimFinger, at: tuple[float, float], *legs: tuple[float, float], mm_s: float = 0.0) -> Any:
+    """When each of the legs (s, N at their end) ends after rest, and a SLIP was told, in s; and each round's level.
+
+    ``mm_s``: it slides for .3 s from .2 s into the third leg.
+    """
+    force_n, ends_s = np.zeros(round(REST_S * 100) + 1), [REST_S]
+    for seconds, end_n in legs:
+        force_n = np.append(force_n, np.linspace(force_n[-1], end_n, max(round(seconds * 100), 1) + 1)[1:])
+        ends_s.append((len(force_n) - 1) / 100)
+    n, none, slides = len(force_n), np.zeros(len(force_n)), np.zeros(len(force_n))
+    slides[round(ends_s[2] * 100) + 20 :][:30] = mm_s
+    contact = np.tile(surface.on_surface(np.array([at])), (n, 1))
+    words = sample(finger, States(contact, force_n, np.zeros((n, 3)), none, none + 3.5, none, slides))
+    channels = slots.ELECTRODE_SLOT, slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT, slots.PAC_SLOT
+    given = [words[:, slot] for slot in channels]
+    level = Finger(quantities=messages.QuantityFlags.EVENTS).feed(*given)["slip_level"]
+    return ends_s, _times(Finger().events(*given))[0], level
+
+
+def _times(events: Any) -> list[Any]:
+    return [events["t_us"][events["kind"] == kind] / 1e6 for kind in (EventKind.SLIP, EventKind.STUCK)]
+
+
+def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
+    rattle = finger.rattle_per_n_s
+    for n_s in SLOW_N_S + FAST_N_S:
+        high_n = 0.5 + min(3.0, max(n_s, 0.5))
+        up = (high_n - 0.5) / n_s
+        legs = (0.2, 0.5), (1.3, 0.5), (up, high_n), (0.6, high_n), (up, 0.5), (0.6, 0.5), (0.5 / n_s, 0), (0.5, 0)
+        ends_s, slips_s, level = _felt(finger, at, *legs)
+        for what, leg in ((SQUEEZED[0], 2), (LET_GO[0], 4), (LET_GO[0], 6)):
+            during = (slips_s >= ends_s[leg]) & (slips_s < ends_s[leg + 1] + AGAIN_S)
+            found[what, n_s, rattle].append(bool(during.any()))
+        still = [k for leg in (1, 3, 5) for k in range(round(ends_s[leg] * 100) + 20, round(ends_s[leg + 1] * 100))]
+        found[CALM[0], 0, rattle] += (level[[*range(100, round(REST_S * 100)), *still]] == 0).tolist()
+    for n_s, mm_s in ((n_s, mm_s) for n_s in (0.0, *SLOW_N_S[1:-1]) for mm_s in (5.0, 20.0)):
+        high_n = 1.5 + 0.51 * n_s
+        ends_s, slips_s, _ = _felt(finger, at, (0.3, 1.5), (1.3, 1.5), (0.51, high_n), (0.3, high_n), mm_s=mm_s)
+        late_s = slips_s - ends_s[2] - 0.2
+        told = bool(((late_s > 0) & (late_s <= SOON_S)).any())
+        found[f"slides at {mm_s:g} mm/s: told within 50 ms", n_s, rattle].append(told)
+    for n_s in (10.0, 30.0, 100.0):
+        told = len(_felt(finger, at, (2 / n_s, 2.0), (0.15, 2.0), (2 / n_s, 0), (0.5, 0))[1]) > 0
+        found["poked: SLIP", n_s, rattle].append(told)
+
+
+def _held(pac: Any) -> list[Any]:
+    """When, in s, a finger that has long held something tells SLIP and STUCK, of PAC (n, 22) from then on."""
+    counts, pdc = np.full((420 + len(pac), 19), 3000), np.full(420 + len(pac), 1326)
+    counts[300:, :6], pdc[300:] = 2900, 1386
+    quiet = np.full((420, 22), int(np.median(pac[0])))
+    events = Finger().events(counts, pdc, pac=np.concatenate([quiet, pac]).astype(np.uint16))
+    return [times - 4.2 for times in _times(events)]
+
+
+def _real_slides(data: Any) -> list[tuple[str, Any]]:
+    slid, late_ms = list[bool](), list[float]()
+    for trial in sorted(name[: -len("frame")] for name in data.files if name.endswith("_frame")):
+        t_s, at_s = data[f"{trial}t"], data[f"{trial}cv_t"]
+        speed_m_s = np.linalg.norm(data[f"{trial}cv"][:, :3], axis=1)
+        begin_s, end_s = _held(data[f"{trial}frame"][:, 3:25])
+        ends_s = (np.arange(len(t_s)) + 1) / 100
+        slips = np.searchsorted(begin_s, ends_s) > np.searchsorted(end_s, ends_s)
+        slid += slips[np.interp(t_s, at_s, speed_m_s) > SLIDING_M_S].tolist()
+        onset_s = at_s[speed_m_s > SLIDING_M_S][0]
+        if onset_s > 0.03:  # else it slides as the recording begins
+            late_ms.append(1e3 * (t_s[0] + begin_s[0] - onset_s) if len(begin_s) else np.inf)
+    late = np.abs(late_ms)
+    within = [(f"onsets within {ms} ms of {len(late)}", int((late <= ms).sum())) for ms in (30, 50)]
+    return [("sliding told, %", 100 * float(np.mean(slid))), *within, ("latest, ms", max(late_ms))]
+
+
+def _real_taps(data: Any) -> list[tuple[str, Any]]:
+    pac = np.concatenate([data[name] for name in data.files if name.endswith("_signals")])[:, :594].astype(int)
+    first_s = np.array([min(_held(np.clip(2038 + one.reshape(-1, 22), 0, 4095))[0], default=np.inf) for one in pac])
+    shares = [100 * float(np.mean(first_s < before_s)) for before_s in (np.inf, TAPPED / 2200)]
+    return [("handovers", len(pac)), ("with a SLIP, %", shares[0]), ("before the tap, %", shares[1])]
