@@ -8,7 +8,8 @@ add_library(biotac_core STATIC ${core})
 target_include_directories(biotac_core PUBLIC ${fw}/core)
 
 # The same maths in double, from the papers. Never linked into a board image.
-add_library(biotac_reference STATIC ${fw}/reference/lin2013.c ${fw}/reference/exact.c)
+add_library(biotac_reference STATIC ${fw}/reference/lin2013.c ${fw}/reference/exact.c
+  ${fw}/reference/grip_parts.c)
 target_include_directories(biotac_reference PUBLIC ${fw}/reference ${fw}/core)
 target_link_libraries(biotac_reference PUBLIC biotac_core m)
 

@@ -10,7 +10,7 @@
 
 // What follows from where the electrodes lie.
 #define BT_OF_GEOMETRY                                                                                       \
-    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_SIGMA)
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)
 
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
@@ -254,12 +254,20 @@ static void keep_wrench(bt_finger *finger, const bt_msg_frame *msg)
     memcpy(kept->force_100un, msg->force_100un, sizeof kept->force_100un);
     memcpy(kept->torque_mnmm, msg->torque_mnmm, sizeof kept->torque_mnmm);
     kept->torsion_mnmm = msg->torsion_mnmm;
+    kept->grip_mn[0] = msg->normal_mn;
+    kept->grip_mn[1] = msg->normal_half_mn;
+    kept->grip_mn[2] = msg->shear_mn;
+    kept->grip_mn[3] = msg->shear_half_mn;
 }
 
 static void repeat_wrench(const bt_kept_wrench *kept, uint8_t quantities, bt_msg_frame *msg)
 {
     if (quantities & BT_QUANTITY_FLAG_FORCE) {
         memcpy(msg->force_100un, kept->force_100un, sizeof msg->force_100un);
+        msg->normal_mn = kept->grip_mn[0];
+        msg->normal_half_mn = kept->grip_mn[1];
+        msg->shear_mn = kept->grip_mn[2];
+        msg->shear_half_mn = kept->grip_mn[3];
     }
     if (quantities & BT_QUANTITY_FLAG_TORQUE) {
         memcpy(msg->torque_mnmm, kept->torque_mnmm, sizeof msg->torque_mnmm);
@@ -274,8 +282,7 @@ static void tell_results(bt_finger *finger, const bt_solve_settings *settings, u
                          uint32_t shed, bt_msg_frame *msg)
 {
     const uint32_t wrench = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE;
-    uint32_t without = shed & BT_SHED_SIGMA ? BT_QUANTITY_FLAG_SIGMA & quantities : 0;
-    without |= shed & BT_SHED_MAP ? wrench : 0;
+    uint32_t without = shed & BT_SHED_MAP ? wrench : 0;
     bt_results(&finger->round, &finger->tare, settings, quantities & ~without, msg);
     msg->wrench_age_ms = 0;
     if (shed & BT_SHED_MAP) {
@@ -284,7 +291,7 @@ static void tell_results(bt_finger *finger, const bt_solve_settings *settings, u
     } else if (settings->map != NULL) {
         keep_wrench(finger, msg);
     }
-    msg->flags |= finger->shed || without & BT_QUANTITY_FLAG_SIGMA ? BT_FRAME_FLAG_SHED : 0;
+    msg->flags |= finger->shed ? BT_FRAME_FLAG_SHED : 0;
     finger->shed = false;
 }
 

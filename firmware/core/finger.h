@@ -28,10 +28,11 @@ typedef struct {
     int32_t force_100un[3];
     int32_t torque_mnmm[3];
     int32_t torsion_mnmm;
+    uint16_t grip_mn[4]; // normal, its half width, shear, its half width
 } bt_kept_wrench;
 
-// What is left out when time is short: of a FRAME, or all of it; a bit mask.
-enum bt_shed { BT_SHED_SIGMA = 1, BT_SHED_MAP = 2, BT_SHED_FRAME = 4 };
+// What is left out when time is short: the map's wrench, which is repeated, or all of a FRAME; a bit mask.
+enum bt_shed { BT_SHED_MAP = 1, BT_SHED_FRAME = 2 };
 
 // A wrench is repeated for at most a tenth of a second.
 #define BT_REPEAT_MAX_ROUNDS 10

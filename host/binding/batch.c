@@ -8,12 +8,12 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
 {
     for (int64_t k = 0; k < n; k++) {
         int32_t e_q4[BT_ELECTRODES];
-        uint16_t sigma[3];
+        uint32_t guess_mn[2];
         int16_t *poc = poc_um + 3 * k;
         int32_t *force = force_100un + 3 * k, *torque = torque_mnmm + 3 * k;
         bt_signals_q4(counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, e_q4);
         flags[k] = settings->population
-                       ? bt_solve_uncalibrated(e_q4, settings, BT_WANT_ALL, poc, force, torque, sigma)
+                       ? bt_solve_uncalibrated(e_q4, settings, BT_WANT_ALL, poc, force, torque, guess_mn)
                        : bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque);
     }
 }

@@ -21,6 +21,7 @@
 #include "replay.h"
 #include "sbc.h"
 #include "signal/signals.h"
+#include "solve/grip.h"
 #include "solve/solve.h"
 #include "stream.h"
 #include "touch/tare.h"

@@ -1,7 +1,9 @@
 #include "compute.h"
 
+#include "grip_parts.h"
 #include "map/map_gen.h"
 #include "map/population.h"
+#include "solve/grip.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -21,16 +23,18 @@ static bool read_tare(const uint8_t *row, int32_t tare_q4[BT_ELECTRODES])
     return good;
 }
 
-// Signals in 1/16 count, 0 for a missing electrode; false if a count is out of range.
+// Signals in 1/16 count, 0 for a missing electrode; false if a count is out of range. *whole: none is missing.
 static bool read_signals(const uint8_t *row, const int32_t tare_q4[BT_ELECTRODES],
-                         int32_t e_q4[BT_ELECTRODES])
+                         int32_t e_q4[BT_ELECTRODES], bool *whole)
 {
     uint16_t count[BT_ELECTRODES];
     int32_t seen = 0;
+    *whole = true;
     memcpy(count, row, sizeof count);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         bool missing = count[i] == BT_INVALID_COUNT;
         seen |= missing ? 0 : count[i];
+        *whole &= !missing;
         e_q4[i] = missing ? 0 : 16 * count[i] - tare_q4[i];
     }
     return seen <= BT_FULL_SCALE_COUNT;
@@ -53,11 +57,12 @@ static void gates_of(const int32_t e_q4[BT_ELECTRODES], double *x, double *y)
 
 // Lin's force becomes the population map's, and torque x what follows.
 static void replace_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
-                          const double e[BT_ELECTRODES], lin2013_result *result)
+                          const double e[BT_ELECTRODES], lin2013_result *result, uint32_t guess_mn[2])
 {
     double gate_x, gate_y, sum[9] = {0};
     int32_t force_100un[3];
     bt_likeness likeness = bt_population_force(e_q4, force_100un);
+    bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
     double share = likeness.share / (double)BT_POPULATION_ALL;
     double *force = result->force_n;
     gates_of(e_q4, &gate_x, &gate_y);
@@ -81,32 +86,53 @@ static void drop(const uint32_t wanted, const uint32_t quantity, double result[3
     }
 }
 
+static void fill_grip(const bt_margin *margin, const uint32_t guess_mn[2], bool whole, bt_computed *result)
+{
+    double part_n[2], half_n[2];
+    grip_parts(result->lin.poc_mm, result->lin.force_n, part_n);
+    for (int k = 0; k < 2; k++) {
+        double share = margin->share_q8[k] / 256.0;
+        half_n[k] = (margin->base_mn[k] + guess_mn[k]) / 1e3 + share * (part_n[0] + part_n[1]);
+    }
+    result->normal_n = part_n[0];
+    result->shear_n = part_n[1];
+    result->normal_half_n = whole ? half_n[0] : NAN;
+    result->shear_half_n = whole ? half_n[1] : NAN;
+}
+
 int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, int64_t counts_stride,
                    const void *tare, int64_t tare_stride, void *results)
 {
     int32_t tare_q4[BT_ELECTRODES], e_q4[BT_ELECTRODES];
     double e[BT_ELECTRODES];
-    lin2013_result *result = results;
+    bt_computed *result = results;
     const uint32_t wanted = formulas->wanted;
     if (tare_stride == 0 && !read_tare(tare, tare_q4)) {
         return 0;
     }
     for (int64_t k = 0; k < n; k++, result++) {
+        uint32_t guess_mn[2];
+        bool whole;
         if ((tare_stride != 0 && !read_tare((const uint8_t *)tare + k * tare_stride, tare_q4))
-            || !read_signals((const uint8_t *)counts + k * counts_stride, tare_q4, e_q4)) {
+            || !read_signals((const uint8_t *)counts + k * counts_stride, tare_q4, e_q4, &whole)) {
             return k;
         }
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e[i] = e_q4[i] / 16.0;
         }
-        lin2013(e, &formulas->lin, result);
+        const bt_margin *margin = &bt_lin_margin;
+        lin2013(e, &formulas->lin, &result->lin);
         // Torque x is made of the map's force.
         if (formulas->population != NULL && wanted & (BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)) {
-            replace_force(formulas->population, e_q4, e, result);
+            replace_force(formulas->population, e_q4, e, &result->lin, guess_mn);
+            margin = &bt_population.margin;
+        } else {
+            bt_lin_guess(bt_strength_100un(e_q4), guess_mn);
         }
-        drop(wanted, BT_QUANTITY_FLAG_POC, result->poc_mm);
-        drop(wanted, BT_QUANTITY_FLAG_FORCE, result->force_n);
-        drop(wanted, BT_QUANTITY_FLAG_TORQUE, result->torque_nmm);
+        drop(wanted, BT_QUANTITY_FLAG_POC, result->lin.poc_mm);
+        drop(wanted, BT_QUANTITY_FLAG_FORCE, result->lin.force_n);
+        drop(wanted, BT_QUANTITY_FLAG_TORQUE, result->lin.torque_nmm);
+        fill_grip(margin, guess_mn, whole, result); // NaN without a force or a point
     }
     return -1;
 }

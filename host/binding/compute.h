@@ -4,6 +4,7 @@
 #define BIOTAC_COMPUTE_H
 
 #include "lin2013.h"
+#include "map/map.h"
 
 #include <stdint.h>
 
@@ -16,9 +17,16 @@ typedef struct {
     uint32_t wanted;                        // BT_QUANTITY_FLAG_POC, FORCE and TORQUE; the others become NaN
 } bt_formulas;
 
+// A row of biotac.RESULT_DTYPE. The half widths are a board's for a tare that is confirmed and a finger
+// without noise (solve/grip.h); NaN where an electrode is missing, which is not estimated here.
+typedef struct {
+    lin2013_result lin;
+    double normal_n, normal_half_n, shear_n, shear_half_n;
+} bt_computed;
+
 // counts: n rows of 19 uint16, counts_stride bytes apart, of any alignment; 0..4095 or BT_INVALID_COUNT.
 // tare: n rows of 19 doubles in counts, 0..4095, tare_stride bytes apart, or one row for all of them if
-// tare_stride is 0; rounded to 1/16 count as on the board. results: n lin2013_result, NaN where there is no
+// tare_stride is 0; rounded to 1/16 count as on the board. results: n bt_computed, NaN where there is no
 // PoC. Returns -1, or the first row that is out of range; then results are not to be used.
 int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, int64_t counts_stride,
                    const void *tare, int64_t tare_stride, void *results);

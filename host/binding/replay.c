@@ -1,5 +1,7 @@
 #include "replay.h"
 
+#include "solve/grip.h"
+
 #include <string.h>
 
 _Static_assert(BT_REPLAY_BYTES == BT_FRAME_BYTES + 3 + 3 * 4,
@@ -11,9 +13,9 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
     memset(msg, 0, sizeof *msg);
     memset(msg->counts, 0xFF, sizeof msg->counts);
     memset(msg->tare_q4, 0xFF, sizeof msg->tare_q4);
-    memset(msg->force_sigma_100un, 0xFF, sizeof msg->force_sigma_100un);
+    bt_grip_unknown(msg);
     msg->pdc = msg->tac = msg->tdc = msg->pdc_tare_q4 = BT_INVALID_COUNT;
-    msg->poc_sigma_um = msg->pdc_filtered_q4 = BT_INVALID_COUNT;
+    msg->pdc_filtered_q4 = BT_INVALID_COUNT;
     msg->pressure_force_100un = msg->torsion_mnmm = BT_INVALID_I32;
     for (int d = 0; d < 3; d++) {
         msg->poc_um[d] = BT_INVALID_I16;

@@ -12,7 +12,7 @@
 #define FIRST_FINGER  1
 #define SECOND_FINGER 4
 #define BOTH_FINGERS  (1 << FIRST_FINGER | 1 << SECOND_FINGER)
-#define EVERYTHING    0x7F // every quantity there is
+#define EVERYTHING    0x77 // every quantity there is
 
 typedef struct {
     received_message message[MAX_RECEIVED];

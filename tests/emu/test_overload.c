@@ -3,11 +3,10 @@
 #include "map_blob.h"
 #include "rig.h"
 
-#include "solve/uncertainty.h"
 
 #define FINGERS 5
 
-static uint64_t map_ns, sigma_ns, frame_ns; // what each costs
+static uint64_t map_ns, frame_ns; // what each costs
 
 // The core's time passes, and with it interrupts come.
 static void spend(uint64_t ns)
@@ -26,17 +25,6 @@ void __wrap_bt_map_wrench(const bt_map *map, const uint16_t *counts, const uint1
 {
     __real_bt_map_wrench(map, counts, tare_q4, pdc_q4, force_100un, torque_mnmm, torsion_mnmm);
     spend(map_ns);
-}
-
-void __real_bt_sigma(const int32_t *e_q4, const bt_solve_settings *settings, uint32_t noise,
-                     bt_msg_frame *msg);
-void __wrap_bt_sigma(const int32_t *e_q4, const bt_solve_settings *settings, uint32_t noise,
-                     bt_msg_frame *msg);
-void __wrap_bt_sigma(const int32_t *e_q4, const bt_solve_settings *settings, uint32_t noise,
-                     bt_msg_frame *msg)
-{
-    __real_bt_sigma(e_q4, settings, noise, msg);
-    spend(sigma_ns);
 }
 
 static uint8_t answer_id;
@@ -66,7 +54,7 @@ static void send(uint8_t id, const void *payload)
 // Every finger has a map in RAM and is tared, and all is asked for.
 static void start(void)
 {
-    map_ns = sigma_ns = frame_ns = 0;
+    map_ns = frame_ns = 0;
     boot(START_NS);
     fake_host_takes = take_all;
     run_rounds(60);
@@ -104,20 +92,18 @@ TEST(what_there_is_time_for_is_all_done)
 {
     start();
     map_ns = 1240000; // of the largest map on the RP2040; 80 % with all the rest
-    sigma_ns = 120000;
     frame_ns = 200000;
     run_ms(3000);
-    const bt_shed_counts none = {0, 0, 0};
+    const bt_shed_counts none = {0, 0};
     assert_memory_equal(&gateway.session.scheduler.sheds, &none, sizeof none);
     slots_and_commands_are_kept();
 }
 
-TEST(then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age)
+TEST(first_goes_a_maps_rate_whose_last_wrench_is_repeated_with_its_age)
 {
     uint32_t repeated = 0;
     start();
     map_ns = 3000000; // 150 %
-    sigma_ns = 100000;
     run_ms(3000);
     for (int f = 0; f < FINGERS; f++) {
         int fresh = 0;
@@ -145,7 +131,6 @@ TEST(then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age)
         assert_true(fresh > 3 * 10); // at 150 % no finger is starved
     }
     assert_int_equal(repeated, gateway.session.scheduler.sheds.wrench);
-    assert_true(gateway.session.scheduler.sheds.sigma > 0);
     assert_int_equal(gateway.session.scheduler.sheds.frames, 0);
     slots_and_commands_are_kept();
 }
@@ -158,7 +143,7 @@ TEST(whole_frames_go_last)
     map_ns = 500000;
     run_ms(3000);
     const bt_shed_counts *sheds = &gateway.session.scheduler.sheds;
-    assert_true(sheds->frames > 100 && sheds->wrench > 0 && sheds->sigma > 0);
+    assert_true(sheds->frames > 100 && sheds->wrench > 0);
     for (int f = 0; f < FINGERS; f++) {
         for (int k = 1; k < host.frames[f]; k++) {
             const bt_msg_frame *frame = &host.frame[f][k];

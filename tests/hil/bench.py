@@ -38,7 +38,7 @@ LOOK_S = 0.05
 COUNTERS = {
     wire.Status: (
         "messages_dropped", "slots_late", "frames_idle", "poc_skipped", "force_skipped", "torque_skipped",
-        "sigma_skipped", "sigma_shed", "wrench_repeated", "frames_shed",
+        "wrench_repeated", "frames_shed",
     ),
     wire.SensorStatus: ("words_good", "words_stuck", "words_error", "words_parity"),
 }  # fmt: skip

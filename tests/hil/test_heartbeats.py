@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from core_in_units import on_board
 
+from biotac.map import published_parts
 from biotac.wire import messages_gen as wire
 from biotac.wire.sensor_gen import SLOTS
 
@@ -47,7 +48,7 @@ def play(board, tmp_path: Path):
         path = tmp_path / "case.toml"
         path.write_text(TOUCHED_TWICE)
         hand = board(str(path))
-        hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # whose sigma is of the noise
+        hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         hand.stream(*names, rest=rest)
         batch = hand.read_batch(100)
         return batch, hand.stats, hand.status()
@@ -90,11 +91,13 @@ def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
 
 
 @pytest.mark.long
-def test_a_sigma_comes_with_the_noise_that_was_measured(play) -> None:
-    batch, _, _ = play(*EVERYTHING, "sigma", rest=True)
-    touched = batch.wire["tare_state"] == wire.TareState.CONTACT
-    assert np.isfinite(batch.frames["poc_sigma_mm"][touched]).all()
-    assert (batch.frames["force_sigma_n"][touched] > 0).all()
+def test_normal_and_shear_come_with_their_intervals(play) -> None:
+    batch, _, _ = play(*EVERYTHING, rest=True)
+    rows = batch.frames[batch.wire["tare_state"] == wire.TareState.CONTACT]
+    parts = published_parts(rows["force_n"], rows["poc_mm"])
+    np.testing.assert_allclose(rows["normal_n"], parts[:, 0], rtol=0, atol=0.005)
+    np.testing.assert_allclose(rows["shear_n"], parts[:, 1], rtol=0, atol=0.01)
+    assert (rows["normal_half_n"] > 0).all() and (rows["shear_half_n"] > 0).all()
 
 
 def test_a_point_inside_a_round_is_that_of_the_words_that_have_come(board, tmp_path: Path) -> None:

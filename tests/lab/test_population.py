@@ -250,7 +250,7 @@ def test_the_default_force_holds_on_other_rigs(capsys: pytest.CaptureFixture[str
     assert plate["median deg"] <= 12.0 and plate["p90"] <= 22.0
     assert plate["y sign right"] >= 0.95 and plate["y corr."] >= 0.8 and plate["x sign right"] >= 0.95
     assert plate["wrong"] == 0 or plate["wrong flagged"] >= 0.8
-    assert plate["others flagged"] <= 0.15 and 0.55 <= plate["x, y in sigma"] <= 0.8
+    assert plate["others flagged"] <= 0.15
     assert len(pinches) == 2 and all(row["pulls"] == 0.0 for row in (plate, *pinches))
 
 

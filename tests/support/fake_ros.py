@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -20,6 +21,7 @@ USED = (
     "geometry_msgs/msg/WrenchStamped",
     "std_msgs/msg/String",
     "std_msgs/msg/UInt8",
+    "std_msgs/msg/Float64MultiArray",
     "std_msgs/msg/UInt32",
 )
 
@@ -42,7 +44,8 @@ def blank(kind: str) -> Any:
     """A message with ROS' defaults, and no room for other fields."""
     values = {}
     for name, (what, detail) in STORE.fielddefs[kind][1]:
-        values[name] = blank(detail) if what.name == "NAME" else {"string": "", "float64": 0.0}.get(detail[0], 0)
+        one = blank(detail) if what.name == "NAME" else {"string": "", "float64": 0.0}.get(detail[0], 0)
+        values[name] = [] if what.name == "SEQUENCE" else one
     maker = type(kind.rsplit("/", 1)[1], (), {"__slots__": (*values, "_kind")})
     message = maker()
     message._kind = kind
@@ -54,7 +57,7 @@ def blank(kind: str) -> Any:
 def solid(message: Any) -> Any:
     """As rosbags' own message, which it can serialise."""
     if not hasattr(message, "_kind"):
-        return message
+        return np.array(message) if isinstance(message, list) and message else message
     names = [name for name in message.__slots__ if name != "_kind"]
     return STORE.types[message._kind](*(solid(getattr(message, name)) for name in names))
 

@@ -37,7 +37,7 @@ def frame(seq: int, finger: int = 0, force_z_n: float = 0.0, t_us: int | None = 
     t_us = seq * 10_000 if t_us is None else t_us
     values |= {"seq": seq % 65536, "t_us": t_us % 2**32, "finger": finger, "counts": (2000,) * 19}
     values |= {"tare_q4": (32000,) * 19, "poc_um": (0, 0, 5080), "force_100un": (0, 0, round(force_z_n * 1e4))}
-    values |= {"torsion_mnmm": 250 * finger, "torque_mnmm": (0, 0, 0), "force_sigma_100un": (0, 0, 0)}
+    values |= {"torsion_mnmm": 250 * finger, "torque_mnmm": (0, 0, 0)}
     return packed(wire.Frame(**values | fields))
 
 

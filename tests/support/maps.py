@@ -16,7 +16,7 @@ def make_map(number: int, *, serial: str = "", blocks: int = 3, axes: int = AXES
     kinds = [(_map.Kind.OFFSET, _map.Gate.ONE), *((_map.Kind.SIGNAL, gate) for gate in gates[:3])]
     kinds += [(_map.Kind.SIGNAL_PAIRS, gate) for gate in gates] + [(_map.Kind.CONDUCTANCE_PAIRS, g) for g in gates[:2]]
     kinds = kinds[:blocks]
-    head = struct.pack("<BBBB16sI", _map.VERSION, axes, len(kinds), 0, serial.encode(), number)
+    head = struct.pack("<BBBB16sI4H", _map.VERSION, axes, len(kinds), 0, serial.encode(), number, 300, 24, 200, 8)
     exponents = bytes(8 if axis < axes else 0 for axis in range(_map.EXPONENTS))
     rows = b"".join(bytes([kind, gate]) + exponents for kind, gate in kinds)
     numbers = random.Random(number)

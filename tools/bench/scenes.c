@@ -13,7 +13,7 @@
 static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
 static uint16_t rest_lane[LANES], press_lane[LANES];
 static bt_tare_settings tare_settings;
-static bt_finger rest_front, press_front, rest_whole, press_whole, press_sigma, press_lin;
+static bt_finger rest_front, press_front, rest_whole, press_whole, press_lin;
 static bt_finger rest_words, rest_events, press_events, shaken_events, slip_events;
 static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, joined;
 static bt_msg_frame message;
@@ -84,11 +84,6 @@ SCENE(whole_by_lin)
     bt_solve_settings lins = *settings;
     lins.population = false;
     pressed(&press_lin, &lins, BT_WANT_ALL);
-}
-
-SCENE(with_sigma)
-{
-    pressed(&press_sigma, settings, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
 }
 
 SCENE(all_words)
@@ -199,7 +194,6 @@ const bench_scene bench_scenes[] = {
     {"whole frame", "in contact", whole_in_contact},
     {"whole frame", "in contact, Lin's scales", whole_by_lin},
 
-    {"whole frame", "in contact, with sigma", with_sigma},
 
     {"wrench map", "signals and offset, 3 axes", map_affine},
     {"wrench map", "sign-split, 3 axes", map_sign_split},
@@ -261,7 +255,7 @@ void bench_scenes_init(void)
     rest_whole = rest_words = press_front = rest_front;
     run(&press_front, press_count, 50);
     press_front.tare.noise.count2 = 400; // exact counts have none
-    press_whole = press_lin = press_sigma = press_front;
+    press_whole = press_lin = press_front;
     rest_events = rest_front;
     press_events = slip_events = press_front;
     sink = bt_finger_events(&press_events, 0, true);

@@ -12,7 +12,6 @@ from .c_map import BLOCK_BYTES, HEADER_BYTES
 from .schema import c_header
 
 SOURCE = "host/biotac/map/population.json"
-FORCE_PER_N = 1e4
 WORDS_A_LINE = 8
 
 
@@ -22,6 +21,7 @@ def header(root: Path) -> str:
     blob = base64.b64decode(facts["board_map"])
     blocks = blob[2]
     heads = [blob[HEADER_BYTES + k * BLOCK_BYTES :][:2] for k in range(blocks)]
+    normal, normal_q8, shear, shear_q8 = struct.unpack_from("<4H", blob, HEADER_BYTES - 8)
     words = [f"0x{word:08X}" for (word,) in struct.iter_unpack("<I", blob)]
     lines = [", ".join(words[k : k + WORDS_A_LINE]) for k in range(0, len(words), WORDS_A_LINE)]
     return c_header(
@@ -34,7 +34,7 @@ def header(root: Path) -> str:
             f"#define BT_POPULATION_BLOCKS {blocks}",
             f"#define BT_POPULATION_KINDS 0x{sum({1 << kind for kind, _ in heads}):X}",
             f"#define BT_POPULATION_GATES 0x{sum({1 << gate for _, gate in heads}):X}",
-            f"#define BT_POPULATION_SIGMA_100UN {{{', '.join(str(round(s * FORCE_PER_N)) for s in facts['sigma_n'])}}}",
+            f"#define BT_POPULATION_MARGIN {{{{{normal}, {shear}}}, {{{normal_q8}, {shear_q8}}}}}",
             "",
             "static const uint32_t bt_population_blob[BT_POPULATION_BYTES / 4] = {",
             *(f"    {line}," for line in lines),

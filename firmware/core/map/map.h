@@ -15,12 +15,22 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// The 95 % interval about a force on frames that its map had not seen: so much, and a share of its normal and
+// shear part together (solve/grip.h). Of the normal, then of the shear; base_mn 65535: unknown.
+typedef struct {
+    uint16_t base_mn[2];
+    uint16_t share_q8[2];
+} bt_margin;
+
+#define BT_MARGIN_SHARE_MAX_Q8 4096
+
 typedef struct {
     uint8_t axes; // BT_MAP_AXES_FORCE, _TORQUE (force too) or _TORSION (all); 0: there is no map
     uint8_t block_count;
     uint16_t kinds;        // bit mask of the blocks' kinds: what no block needs is not computed
     uint16_t gates;        // likewise
     uint32_t made_s;       // since 1970 UTC; 0: unknown
+    bt_margin margin;
     const uint8_t *serial; // [BT_MAP_SERIAL_BYTES], in the blob like the rest: of the sensor it was made for;
                            // all zero: any sensor
     const uint8_t *blocks;

@@ -6,8 +6,9 @@
 
 #include <string.h>
 
-_Static_assert(BT_MAP_HEADER_BYTES == 8 + BT_MAP_SERIAL_BYTES && BT_MAP_HEADER_BYTES % 4 == 0,
-               "the header is four bytes, the serial number and a u32, and keeps what follows aligned");
+#define MARGIN_AT (8 + BT_MAP_SERIAL_BYTES)
+_Static_assert(BT_MAP_HEADER_BYTES == MARGIN_AT + 8 && BT_MAP_HEADER_BYTES % 4 == 0,
+               "the header is four bytes, the serial number, a u32 and four u16, and keeps what follows aligned");
 _Static_assert(BT_MAP_BLOCK_BYTES == 2 + BT_MAP_EXPONENTS && BT_MAP_BLOCK_BYTES % 4 == 0
                    && BT_MAP_EXPONENTS >= BT_MAP_AXES_MAX,
                "a block is its kind, its gate and an exponent for each axis");
@@ -142,6 +143,13 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
     map->block_count = blob[2];
     map->serial = blob + 4;
     map->made_s = bt_get_u32(blob + 4 + BT_MAP_SERIAL_BYTES);
+    for (int part = 0; part < 2; part++) {
+        map->margin.base_mn[part] = bt_get_u16(blob + MARGIN_AT + 4 * part);
+        map->margin.share_q8[part] = bt_get_u16(blob + MARGIN_AT + 4 * part + 2);
+        if (map->margin.share_q8[part] > BT_MARGIN_SHARE_MAX_Q8) {
+            return BT_ERROR_OUT_OF_RANGE;
+        }
+    }
     map->blocks = blob + BT_MAP_HEADER_BYTES;
     size_t ahead = BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (size_t)map->block_count;
     if (map->block_count == 0 || bytes < ahead) {

@@ -10,6 +10,7 @@ const bt_map bt_population = {
     .block_count = BT_POPULATION_BLOCKS,
     .kinds = BT_POPULATION_KINDS,
     .gates = BT_POPULATION_GATES,
+    .margin = BT_POPULATION_MARGIN,
     .serial = (const uint8_t *)bt_population_blob + 4,
     .blocks = BLOCKS_AT,
     .coefficients = BLOCKS_AT + BT_POPULATION_BLOCKS * BT_MAP_BLOCK_BYTES,
@@ -47,13 +48,17 @@ typedef struct {
     uint32_t sum_q4, pressed_q4, sum;
 } touch;
 
+static inline uint32_t bounded(uint32_t size_q4)
+{
+    uint32_t size = size_q4 > NOISE_Q4 ? size_q4 - NOISE_Q4 : 0;
+    return size > KNEE_Q4 ? KNEE_Q4 + ((size - KNEE_Q4) >> 2) : size;
+}
+
 static touch touch_of(const int32_t e_q4[BT_ELECTRODES])
 {
     touch of = {.sum_q4 = 0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint32_t size = bt_abs32(e_q4[i]);
-        size = size > NOISE_Q4 ? size - NOISE_Q4 : 0;
-        size = size > KNEE_Q4 ? KNEE_Q4 + ((size - KNEE_Q4) >> 2) : size;
+        uint32_t size = bounded(bt_abs32(e_q4[i]));
         of.sum_q4 += size;
         of.pressed_q4 += e_q4[i] < 0 ? size : 0;
         of.x[i] = bt_with_sign(size, e_q4[i]);
@@ -145,15 +150,11 @@ bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force
     return its;
 }
 
-// Away from the training: .15 of the strength across, .3 along z, by which left-out fingers and rigs were
-// off.
-void bt_population_sigma(const bt_likeness *its, uint16_t sigma_100un[3])
+uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES])
 {
-    static const uint16_t trained[3] = BT_POPULATION_SIGMA_100UN;
-    uint32_t across = its->strength_100un * 3 / 20;
-    for (int d = 0; d < 3; d++) {
-        uint32_t away = d < 2 ? across : 2 * across;
-        uint32_t sigma = (trained[d] * its->share + away * (BT_POPULATION_ALL - its->share)) >> 8;
-        sigma_100un[d] = (uint16_t)(sigma < BT_INVALID_COUNT ? sigma : BT_INVALID_COUNT - 1);
+    uint32_t sum_q4 = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        sum_q4 += bounded(bt_abs32(e_q4[i]));
     }
+    return STRENGTH(sum_q4);
 }

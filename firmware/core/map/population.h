@@ -25,7 +25,7 @@ typedef struct {
 // (SPEC.md, Population map). No input overflows.
 bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3]);
 
-// One sigma of the result: in the map's share, the errors on each finger of a map made of the others.
-void bt_population_sigma(const bt_likeness *its, uint16_t sigma_100un[3]);
+// The strength of a touch by the sum of all signals, in 100 uN, at most 303 000.
+uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES]);
 
 #endif

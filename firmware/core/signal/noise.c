@@ -29,6 +29,7 @@ void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count
     uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), noise->sweeps);
     noise->mean_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);
     noise->count2 = (noise->mean_q8 + (1 << 7)) >> 8;
+    noise->sigma_q4 = bt_root_u32(noise->mean_q8 / BT_ELECTRODES);
 }
 
 uint32_t bt_noise_threshold(const bt_noise *noise, uint32_t setting_count2)

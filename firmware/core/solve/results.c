@@ -2,9 +2,10 @@
 
 #include "fixed_point.h"
 #include "map/complete.h"
+#include "map/population.h"
 #include "signal/signals.h"
 #include "solve/flags.h"
-#include "solve/uncertainty.h"
+#include "solve/grip.h"
 
 #include <stddef.h>
 
@@ -104,7 +105,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
                 uint32_t quantities, bt_msg_frame *msg)
 {
     uint32_t flags = bt_channel_flags(round, tare) | bt_not_asked(quantities);
-    bt_sigma_unknown(msg);
+    bt_grip_unknown(msg);
     msg->torsion_mnmm = BT_INVALID_I32; // only a map gives it
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;
@@ -115,21 +116,29 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     int32_t e_q4[BT_ELECTRODES];
     uint16_t completed[BT_ELECTRODES];
     const uint16_t *counts = round->electrode;
+    bt_uncertainty uncertainty = {
+        .margin = &bt_lin_margin,
+        .noise_q4 = tare->noise.sigma_q4,
+        .tare_unconfirmed = tare->unsure,
+    };
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
+        for (uint32_t left = tare->trigger.without; left != 0; left &= left - 1) {
+            uncertainty.out++;
+        }
     }
     signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
+        uncertainty.margin = &settings->map->margin;
         flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg);
     } else if (settings->population) {
-        const uint32_t both = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_SIGMA;
-        uint16_t not_asked[3];
-        flags |=
-            bt_solve_uncalibrated(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm,
-                                  (quantities & both) == both ? msg->force_sigma_100un : not_asked);
+        uncertainty.margin = &bt_population.margin;
+        flags |= bt_solve_uncalibrated(e_q4, settings, quantities, msg->poc_um, msg->force_100un,
+                                       msg->torque_mnmm, uncertainty.guess_mn);
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+        bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
     }
     uint32_t warmed_q8 = bt_abs32(bt_thermal_warmed_q8(&tare->thermal));
     uint32_t limit_q8 = settings->map != NULL ? BT_DEGREE_Q8 : settings->warmed_max_q8;
@@ -141,7 +150,5 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         flags |= BT_FRAME_FLAG_TORSION_OK;
     }
     msg->flags = flags;
-    if (quantities & BT_QUANTITY_FLAG_SIGMA) {
-        bt_sigma(e_q4, settings, tare->noise.count2, msg);
-    }
+    bt_grip(&uncertainty, msg);
 }

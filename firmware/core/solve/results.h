@@ -11,7 +11,7 @@
 #define BT_ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
 #define BT_ACTIVE_FOR_TORSION 4         // electrodes: with fewer there is no torsion
 
-// Fill in flags, poc_um, force_100un, torque_mnmm, torsion_mnmm and sigmas of msg. quantities is a mask of
+// Fill in flags, poc_um, force_100un, torque_mnmm, torsion_mnmm and the grip of msg. quantities is a mask of
 // BT_QUANTITY_FLAG_*; the others are not computed, and marked invalid.
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg);
@@ -20,7 +20,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
 void bt_point_signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES]);
 
 #ifndef BT_CDEF
-// NOT_ASKED or 0. Sigma does not count: few ask for it.
+// NOT_ASKED or 0.
 static inline uint32_t bt_not_asked(uint32_t quantities)
 {
     uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE;

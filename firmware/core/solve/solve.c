@@ -2,18 +2,11 @@
 
 #include "fixed_point.h"
 #include "map/population.h"
+#include "solve/grip.h"
 #include "solve/poc.h"
 #include "touch/thermal.h"
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
-
-// |gain| times the length of all electrodes' normals along one axis, as a vector: nN * 1/1000, and 1e8 of
-// these are 100 uN.
-static uint32_t force_per_count(int32_t gain_nn, int axis)
-{
-    uint64_t product = (uint64_t)bt_abs32(gain_nn) * bt_normal_length_milli[axis];
-    return (uint32_t)((product << 16) / 100000000u);
-}
 
 // Not for a finger or board that was given force gains: they say more about it than other fingers do.
 static bool wants_population(const bt_settings *settings)
@@ -59,9 +52,6 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
         .population = wants_population(settings),
     };
     kernel.warmed_max_q8 = warmed_max_q8(&kernel.gains, kernel.population);
-    for (int d = 0; d < 3; d++) {
-        kernel.force_per_count_100un_q16[d] = force_per_count(force_nn[d], d);
-    }
     return kernel;
 }
 
@@ -92,20 +82,17 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
 }
 
 static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3],
-                                 uint16_t sigma_100un[3])
+                                 uint32_t guess_mn[2])
 {
     bt_likeness likeness = bt_population_force(e_q4, force_100un);
-    if (likeness.outside) {
-        return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
-    }
-    bt_population_sigma(&likeness, sigma_100un);
-    return BT_FRAME_FLAG_POPULATION;
+    bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
+    return BT_FRAME_FLAG_POPULATION | (likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0);
 }
 
-// Force comes from the gains, or from the population map if its sigma is given; all else is the same.
+// Force comes from the gains, or from the population map if guess_mn is given; all else is the same.
 static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
                                          uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
-                                         int32_t torque_mnmm[3], uint16_t sigma_100un[3])
+                                         int32_t torque_mnmm[3], uint32_t guess_mn[2])
 {
     bt_point point;
     uint32_t flags = 0;
@@ -113,8 +100,8 @@ static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], cons
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
-        if (sigma_100un != NULL) {
-            flags = population_force(e_q4, force_100un, sigma_100un);
+        if (guess_mn != NULL) {
+            flags = population_force(e_q4, force_100un, guess_mn);
         } else {
             bt_force(e_q4, &settings->gains, force_100un);
         }
@@ -139,9 +126,9 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
 
 uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
                                uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
-                               int32_t torque_mnmm[3], uint16_t sigma_100un[3])
+                               int32_t torque_mnmm[3], uint32_t guess_mn[2])
 {
-    return solve_without_map(e_q4, settings, wanted, poc_um, force_100un, torque_mnmm, sigma_100un);
+    return solve_without_map(e_q4, settings, wanted, poc_um, force_100un, torque_mnmm, guess_mn);
 }
 
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,

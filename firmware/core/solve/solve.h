@@ -16,7 +16,6 @@
 typedef struct {
     int poc_weights;
     bt_gains gains;
-    uint32_t force_per_count_100un_q16[3]; // force per count of noise on every electrode
     const bt_map *map;                     // used instead of the gains; NULL: none
     bool population;                       // without a map, force comes from the population map
     uint32_t warmed_max_q8;                // change of TDC that may make the force wrong by WARMED_100UN
@@ -51,9 +50,10 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
 
 // The same without a map, for settings->population: force comes from the population map and from what it is
 // mixed with. Torque y and z are Eq 4's, and x is derived from that force. Also returns POPULATION if a force
-// was computed, and OUTSIDE as bt_population_force says. sigma_100un is left as it is where there is none.
+// was computed, and OUTSIDE as bt_population_force says; guess_mn is bt_population_guess's, left as it is
+// without a force.
 uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
                                uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
-                               int32_t torque_mnmm[3], uint16_t sigma_100un[3]);
+                               int32_t torque_mnmm[3], uint32_t guess_mn[2]);
 
 #endif

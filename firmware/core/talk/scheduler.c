@@ -4,17 +4,12 @@
 
 // How long after its round's last slot a finger's FRAME may begin before something is left out. At full load
 // the last of five begins 8 ms late; slots are buffered for 29 ms (BT_SLOT_RING).
-#define SIGMA_LATE_US      9000
-#define MAP_LATE_US        11000
-#define FRAME_LATE_US      22000
-#define SIGMA_PAUSE_ROUNDS 50 // for all fingers, or the first ones' sigmas would cost the last ones even more
+#define MAP_LATE_US   11000
+#define FRAME_LATE_US 22000
 
 void bt_scheduler_begin(bt_scheduler *scheduler)
 {
     scheduler->first_next = BT_MAX_FINGERS;
-    if (scheduler->sigma_pause > 0) {
-        scheduler->sigma_pause--;
-    }
 }
 
 uint8_t bt_scheduler_finger(const bt_scheduler *scheduler, int k)
@@ -31,28 +26,19 @@ static void put_first(bt_scheduler *scheduler, uint8_t finger)
     }
 }
 
-uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, uint8_t quantities,
-                           bool can_repeat)
+uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, bool can_repeat)
 {
-    uint32_t shed = 0;
     if (late_us > FRAME_LATE_US) {
         scheduler->sheds.frames++;
         put_first(scheduler, finger);
         return BT_SHED_FRAME;
     }
-    if (late_us > SIGMA_LATE_US) {
-        scheduler->sigma_pause = SIGMA_PAUSE_ROUNDS;
-    }
-    if (scheduler->sigma_pause > 0 && quantities & BT_QUANTITY_FLAG_SIGMA) {
-        scheduler->sheds.sigma++;
-        shed |= BT_SHED_SIGMA;
-    }
     if (late_us > MAP_LATE_US && can_repeat) {
         scheduler->sheds.wrench++;
         put_first(scheduler, finger);
-        shed |= BT_SHED_MAP;
+        return BT_SHED_MAP;
     }
-    return shed;
+    return 0;
 }
 
 void bt_scheduler_end(bt_scheduler *scheduler)

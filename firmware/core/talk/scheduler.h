@@ -1,5 +1,5 @@
-// Who comes first in a round, and what is left out when time is short: sigmas, then wrenches, which are
-// repeated, then FRAMEs.
+// Who comes first in a round, and what is left out when time is short: wrenches, which are repeated, then
+// FRAMEs.
 #ifndef BIOTAC_SCHEDULER_H
 #define BIOTAC_SCHEDULER_H
 
@@ -8,14 +8,12 @@
 
 // What FRAMEs lacked because time was short, in the order of shedding; wrap at 2^32.
 typedef struct {
-    uint32_t sigma;
     uint32_t wrench; // repeated
     uint32_t frames;
 } bt_shed_counts;
 
 typedef struct {
     bt_shed_counts sheds;
-    uint8_t sigma_pause; // rounds left in which no finger gets a sigma
     uint8_t first; // first finger of a round: 0, or the first that something was left out for in the last
     uint8_t first_next; // the same, as found in this round; BT_MAX_FINGERS: none so far
 } bt_scheduler;
@@ -26,9 +24,8 @@ void bt_scheduler_begin(bt_scheduler *scheduler);
 uint8_t bt_scheduler_finger(const bt_scheduler *scheduler, int k);
 
 // What to leave out of a FRAME that begins late_us after its round's last slot: a mask of enum bt_shed,
-// counted. quantities: BT_QUANTITY_FLAG_* that were asked for. can_repeat: the finger has a wrench to repeat.
-uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, uint8_t quantities,
-                           bool can_repeat);
+// counted. can_repeat: the finger has a wrench to repeat.
+uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, bool can_repeat);
 
 void bt_scheduler_end(bt_scheduler *scheduler);
 

@@ -56,7 +56,6 @@ typedef struct {
     uint32_t poc;
     uint32_t force;
     uint32_t torque;
-    uint32_t sigma;
 } bt_skip_counts;
 
 // What sensors.c knows about which sensor is there.

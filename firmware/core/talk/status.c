@@ -21,8 +21,6 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
         .poc_skipped = session->skips.poc,
         .force_skipped = session->skips.force,
         .torque_skipped = session->skips.torque,
-        .sigma_skipped = session->skips.sigma,
-        .sigma_shed = session->scheduler.sheds.sigma,
         .wrench_repeated = session->scheduler.sheds.wrench,
         .frames_shed = session->scheduler.sheds.frames,
         .faults = session->faults,

@@ -137,7 +137,6 @@ static void count_skips(bt_skip_counts *skips, uint32_t quantities)
     skips->poc += !(torque || quantities & BT_QUANTITY_FLAG_POC);
     skips->force += !(torque || quantities & BT_QUANTITY_FLAG_FORCE);
     skips->torque += !torque;
-    skips->sigma += !(quantities & BT_QUANTITY_FLAG_SIGMA);
 }
 
 // How long ago the round's last slot ended. By a clock that stands still, a round that has not ended is not
@@ -158,9 +157,8 @@ static void send_frame(bt_session *session, bt_finger *finger)
         send_tare(session, finger);
     }
     const bt_solve_settings *solve = &session->solve[finger->index];
-    uint32_t shed =
-        bt_scheduler_shed(&session->scheduler, finger->index, late_us(session, finger), finger->quantities,
-                          bt_finger_wrench_age(finger, solve) <= BT_REPEAT_MAX_ROUNDS);
+    uint32_t shed = bt_scheduler_shed(&session->scheduler, finger->index, late_us(session, finger),
+                                      bt_finger_wrench_age(finger, solve) <= BT_REPEAT_MAX_ROUNDS);
     if (shed & BT_SHED_FRAME) {
         finger->shed = true;
         return;

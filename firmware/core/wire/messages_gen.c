@@ -351,15 +351,15 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
         at = put(at, (uint32_t)msg->tare_q4[k], 2);
     }
     at = put(at, (uint32_t)msg->pdc_tare_q4, 2);
-    at = put(at, (uint32_t)msg->poc_sigma_um, 2);
-    for (int k = 0; k < 3; k++) {
-        at = put(at, (uint32_t)msg->force_sigma_100un[k], 2);
-    }
     at = put(at, (uint32_t)msg->pdc_filtered_q4, 2);
     at = put(at, (uint32_t)msg->pressure_force_100un, 4);
     at = put(at, (uint32_t)msg->torsion_mnmm, 4);
     at = put(at, (uint32_t)msg->wrench_age_ms, 2);
     at = put(at, (uint32_t)msg->electrodes_out, 4);
+    at = put(at, (uint32_t)msg->normal_mn, 2);
+    at = put(at, (uint32_t)msg->normal_half_mn, 2);
+    at = put(at, (uint32_t)msg->shear_mn, 2);
+    at = put(at, (uint32_t)msg->shear_half_mn, 2);
     at = put(at, (uint32_t)msg->trust, 1);
     at = put(at, (uint32_t)msg->slip_level, 1);
     (void)at;
@@ -432,18 +432,18 @@ void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[(BT_FRAME_BYTE
     out[60] = (uint16_t)msg->tare_q4[17];
     out[61] = (uint16_t)msg->tare_q4[18];
     out[62] = (uint16_t)msg->pdc_tare_q4;
-    out[63] = (uint16_t)msg->poc_sigma_um;
-    out[64] = (uint16_t)msg->force_sigma_100un[0];
-    out[65] = (uint16_t)msg->force_sigma_100un[1];
-    out[66] = (uint16_t)msg->force_sigma_100un[2];
-    out[67] = (uint16_t)msg->pdc_filtered_q4;
-    out[68] = (uint16_t)msg->pressure_force_100un;
-    out[69] = (uint16_t)((uint32_t)msg->pressure_force_100un >> 16);
-    out[70] = (uint16_t)msg->torsion_mnmm;
-    out[71] = (uint16_t)((uint32_t)msg->torsion_mnmm >> 16);
-    out[72] = (uint16_t)msg->wrench_age_ms;
-    out[73] = (uint16_t)msg->electrodes_out;
-    out[74] = (uint16_t)((uint32_t)msg->electrodes_out >> 16);
+    out[63] = (uint16_t)msg->pdc_filtered_q4;
+    out[64] = (uint16_t)msg->pressure_force_100un;
+    out[65] = (uint16_t)((uint32_t)msg->pressure_force_100un >> 16);
+    out[66] = (uint16_t)msg->torsion_mnmm;
+    out[67] = (uint16_t)((uint32_t)msg->torsion_mnmm >> 16);
+    out[68] = (uint16_t)msg->wrench_age_ms;
+    out[69] = (uint16_t)msg->electrodes_out;
+    out[70] = (uint16_t)((uint32_t)msg->electrodes_out >> 16);
+    out[71] = (uint16_t)msg->normal_mn;
+    out[72] = (uint16_t)msg->normal_half_mn;
+    out[73] = (uint16_t)msg->shear_mn;
+    out[74] = (uint16_t)msg->shear_half_mn;
     out[75] = (uint16_t)(msg->trust | msg->slip_level << 8);
 }
 
@@ -490,12 +490,6 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     at = get(at, &value, 2);
     msg->pdc_tare_q4 = (uint16_t)value;
     at = get(at, &value, 2);
-    msg->poc_sigma_um = (uint16_t)value;
-    for (int k = 0; k < 3; k++) {
-        at = get(at, &value, 2);
-        msg->force_sigma_100un[k] = (uint16_t)value;
-    }
-    at = get(at, &value, 2);
     msg->pdc_filtered_q4 = (uint16_t)value;
     at = get(at, &value, 4);
     msg->pressure_force_100un = (int32_t)value;
@@ -505,6 +499,14 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->wrench_age_ms = (uint16_t)value;
     at = get(at, &value, 4);
     msg->electrodes_out = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->normal_mn = (uint16_t)value;
+    at = get(at, &value, 2);
+    msg->normal_half_mn = (uint16_t)value;
+    at = get(at, &value, 2);
+    msg->shear_mn = (uint16_t)value;
+    at = get(at, &value, 2);
+    msg->shear_half_mn = (uint16_t)value;
     at = get(at, &value, 1);
     msg->trust = (uint8_t)value;
     at = get(at, &value, 1);
@@ -600,8 +602,6 @@ void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES])
     at = put(at, (uint32_t)msg->poc_skipped, 4);
     at = put(at, (uint32_t)msg->force_skipped, 4);
     at = put(at, (uint32_t)msg->torque_skipped, 4);
-    at = put(at, (uint32_t)msg->sigma_skipped, 4);
-    at = put(at, (uint32_t)msg->sigma_shed, 4);
     at = put(at, (uint32_t)msg->wrench_repeated, 4);
     at = put(at, (uint32_t)msg->frames_shed, 4);
     at = put(at, (uint32_t)msg->faults, 2);
@@ -645,10 +645,6 @@ void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES])
     msg->force_skipped = (uint32_t)value;
     at = get(at, &value, 4);
     msg->torque_skipped = (uint32_t)value;
-    at = get(at, &value, 4);
-    msg->sigma_skipped = (uint32_t)value;
-    at = get(at, &value, 4);
-    msg->sigma_shed = (uint32_t)value;
     at = get(at, &value, 4);
     msg->wrench_repeated = (uint32_t)value;
     at = get(at, &value, 4);

@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x881A943Du
+#define BT_SCHEMA_HASH 0x47862903u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -166,11 +166,11 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_DOUBT (1u << 19) // tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
 #define BT_FRAME_FLAG_HELD (1u << 20) // the host sent HOLD: no new tare is taken
 #define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
-#define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
+#define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: FRAMEs before this one were not sent
 #define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
 #define BT_FRAME_FLAG_POPULATION (1u << 25) // force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force
-#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that half of its interval is as wide as the touch is strong
 #define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
@@ -205,12 +205,11 @@ enum bt_event_kind {
 #define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; TORSION_OK needs it
 #define BT_QUANTITY_FLAG_FORCE (1u << 1) // force
 #define BT_QUANTITY_FLAG_TORQUE (1u << 2) // torque and torsion
-#define BT_QUANTITY_FLAG_SIGMA (1u << 3) // standard deviations of point of contact and force
 #define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it, an untouched finger sends IDLE heartbeats
 #define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
 #define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure and, if calibrated, the force from it
 #define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages; sent while FRAMES or PAC is on
-#define BT_QUANTITY_FLAGS 0xFFu // all there are
+#define BT_QUANTITY_FLAGS 0xF7u // all there are
 
 // Flags of a FRAME or IDLE that hold trust down to this level.
 #define BT_TRUST_FLAGS_NONE 0x40008002u
@@ -422,13 +421,15 @@ typedef struct {
     int32_t torque_mnmm[3]; // [mN*mm] x, y, z of the torque on the finger about the origin; -2147483648: invalid; x is derived from PoC and force unless a wrench map gives it, as electrodes hardly sense it
     uint16_t tare_q4[19]; // [count q4] tare subtracted from counts, in 1/16 count; 0xFFFF: electrode never read
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: never read
-    uint16_t poc_sigma_um; // [um] standard deviation of the PoC due to noise, saturating; 0xFFFF: not computed, or noise not measured yet
-    uint16_t force_sigma_100un[3]; // [100 uN] standard deviation of the force, likewise; 0xFFFF also if MAPPED or OUTSIDE
     uint16_t pdc_filtered_q4; // [count q4] static pressure filtered by pressure_filter_milli, in 1/16 count; 0xFFFF: no good word, or not subscribed to
     int32_t pressure_force_100un; // [100 uN] force magnitude from pdc_filtered_q4 - pdc_tare_q4, negative below rest; -2147483648: either is invalid, or pressure_gain_nn is 0
     int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench map gives it; else -2147483648
     uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
     uint32_t electrodes_out; // [bit mask] bit i is set if results do without electrode i + 1 and estimate its signal
+    uint16_t normal_mn; // [mN] how hard the contact presses in: minus the force along the skin's outward normal at the PoC, 0 where it would pull (SPEC.md, Grip); 65535: invalid, or PoC or force not subscribed to
+    uint16_t normal_half_mn; // [mN] half the width of the 95 % interval about normal_mn, saturating; 65535: unknown
+    uint16_t shear_mn; // [mN] size of the rest of the force, which is across that normal; 65535 as normal_mn
+    uint16_t shear_half_mn; // [mN] half the width of the 95 % interval about shear_mn, saturating; 65535: unknown
     uint8_t trust; // [enum trust] what the force is good for
     uint8_t slip_level; // [count] how strongly the finger slips in this round: what dynamic pressure shakes by beyond its noise and the rattle of a squeeze, rms, saturating; 0: it does not slip; 255: not judged, as EVENTS are not subscribed to or PAC did not come
 } bt_msg_frame;
@@ -467,7 +468,7 @@ void bt_msg_tare_unpack(bt_msg_tare *msg, const uint8_t in[BT_TARE_BYTES]);
 
 // Health of the board and the link. Sent periodically, and as reply to GET_STATUS. Counters start at boot.
 #define BT_STATUS_ID 0x13
-#define BT_STATUS_BYTES 87
+#define BT_STATUS_BYTES 79
 typedef struct {
     uint16_t seq; // [1] counts STATUS messages
     uint32_t t_us; // [us] device time at which the message was made
@@ -484,9 +485,7 @@ typedef struct {
     uint32_t poc_skipped; // [1] rounds of streamed fingers in which no PoC was computed because it was not needed
     uint32_t force_skipped; // [1] the same for force
     uint32_t torque_skipped; // [1] the same for torque
-    uint32_t sigma_skipped; // [1] the same for standard deviations
-    uint32_t sigma_shed; // [1] FRAMEs without subscribed standard deviations, for lack of time; these are shed first
-    uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed second
+    uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed first
     uint32_t frames_shed; // [1] FRAMEs not sent, for lack of time; shed last
     uint16_t faults; // [flags fault] what went wrong since boot or the last CLEAR_FAULTS
     uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that are latched in link.toml; UNTARED only if a tare was lost
@@ -1028,10 +1027,10 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
 #define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1) X(trust, u8, 1) X(slip_level, u8, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1) X(electrodes_out, u32, 1) X(normal_mn, u16, 1) X(normal_half_mn, u16, 1) X(shear_mn, u16, 1) X(shear_half_mn, u16, 1) X(trust, u8, 1) X(slip_level, u8, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
-#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
+#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1) X(electrodes_out, u32, 1) X(electrode_fault, u8, 1) X(sensor_fault, u8, 1)
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1) X(trust, u8, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)

@@ -12,6 +12,7 @@ from biotac import BiotacError, InputError
 from .bench import command as bench
 from .calibrate import direction_command as direction
 from .calibrate import finger_command as finger
+from .calibrate import interval_command as interval
 from .calibrate import population_command as population
 from .experiments import command as experiments
 from .experiments import seeds
@@ -27,6 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "experiment": experiments,
         "seeds": seeds,
         "population": population,
+        "interval": interval,
         "direction": direction,
         "finger": finger,
         "grasp": grasp,

@@ -23,7 +23,6 @@ QUANTITIES = {
     "poc": QuantityFlags.POC,
     "torque": QuantityFlags.TORQUE,
     "pressure": QuantityFlags.PRESSURE,
-    "sigma": QuantityFlags.SIGMA,
     "touch": QuantityFlags.TOUCH,
     "events": QuantityFlags.EVENTS,
 }

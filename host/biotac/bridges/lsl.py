@@ -34,7 +34,8 @@ from ..wire.sensor_gen import SLOTS
 
 TYPE = "Tactile"
 EVENTS = " events"
-_SENT = ("force_n", "torque_nmm", "poc_mm", "flags", "trust", "counts", "pdc", "tac", "tdc")
+_GRIP = ("normal_n", "normal_half_n", "shear_n", "shear_half_n")
+_SENT = ("force_n", "torque_nmm", "poc_mm", *_GRIP, "flags", "trust", "counts", "pdc", "tac", "tdc")
 _FRAME_COLUMNS = tuple(column for name in _SENT for column in COLUMNS if column.name == name)
 _PAC_COLUMN = PAC_COLUMNS[-1]
 _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
@@ -43,11 +44,11 @@ _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
 class Outlet:
     """Three streams for each finger of ``hand``; use as a context manager, and push every batch.
 
-    ``BioTac finger0``: one sample per round, 100 per second, of force (N), torque (N*mm), point of contact (mm), flags,
-    trust, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports. ``BioTac finger0 PAC``:
-    counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind), which
-    come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold labels,
-    units and meanings.
+    ``BioTac finger0``: one sample per round, 100 per second, of force (N), torque (N*mm), point of contact (mm), normal
+    and shear with half their intervals (N), flags, trust, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where
+    invalid, as in exports. ``BioTac finger0 PAC``: counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a
+    marker, the name of its kind (EventKind), which come only if the hand is subscribed to events. The first two streams
+    are double64; their descriptions hold labels, units and meanings.
 
     Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each
     sample's own time for PAC. If the clock cannot convert (a simulated board has no real clock), a batch is stamped

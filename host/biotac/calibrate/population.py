@@ -23,6 +23,7 @@ from ..documents import parse_document, read_document, sealed
 from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, GATED, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
+from ..map.margin import UNKNOWN, Margin
 from ..map.population import SHIPPED, Likeness, board_map, likeness, shipped
 from ..version import __version__
 from ..wire.frames import FORCE_LSB_PER_N
@@ -57,11 +58,12 @@ class Sums:
 class Population:
     """A population map: ``coefficients`` (114, 3) of columns(), in N.
 
-    ``variance`` (114,) is that of the columns in training, with a floor.
+    ``variance`` (114,) is that of the columns in training, with a floor; ``margin`` that of fingers left out of it.
     """
 
     coefficients: Floats
     variance: Floats
+    margin: Margin = UNKNOWN
 
     def published(self, counts: Floats, tare: Floats) -> Floats:
         """Force (n, 3) in N as a board publishes it: along the normals where the map contradicts them."""
@@ -81,7 +83,7 @@ class Population:
         """The same map in the form of a calibrated finger's, for ``tare`` (19,), with an offset of 0."""
         every = np.zeros((map_columns.width(map_columns.blocks(with_pdc=False)) + 1, len(AXES)))
         every[map_columns.index(GATED, len(every) - 1)] = self.coefficients
-        return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every)
+        return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every, self.margin)
 
 
 def columns(e: Floats, tare: Floats) -> Floats:
@@ -143,7 +145,8 @@ def dumps(trained: Trained) -> str:
     """The map as JSON, one line for each column."""
     rounded = np.array([_short(row) for row in trained.population.coefficients])
     # the board's map is made from the rounded coefficients, so that a reader of the file gets the same one
-    on_board = board_map(split(GATED, rounded))
+    margin = trained.population.margin
+    on_board = board_map(split(GATED, rounded), margin)
     rows = np.column_stack([rounded, trained.population.variance])
     document = sealed(
         {
@@ -152,6 +155,7 @@ def dumps(trained: Trained) -> str:
             "axes": list(AXES),
             "sigma_n": _short(trained.sigma_n),
             "sigma_scale5_n": _short(trained.sigma_scale5_n),
+            "margin": [margin.base_mn, margin.share_q8],
             "blocks": _BLOCK_NAMES,
             "board_map": base64.b64encode(on_board.blob).decode("ascii"),
             "coefficients_n_and_variance": [_short(row) for row in rows],
@@ -179,7 +183,9 @@ def _trained(content: dict[str, Any]) -> Trained:
         raise ValueError(f"its coefficients have shape {rows.shape}")
     if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
         raise ValueError("a coefficient is not finite, or a variance is not above 0")
-    return Trained(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(content["provenance"]))
+    (normal_mn, shear_mn), (normal_q8, shear_q8) = content["margin"]
+    margin = Margin((int(normal_mn), int(shear_mn)), (int(normal_q8), int(shear_q8)))
+    return Trained(Population(rows[:, :-1], rows[:, -1], margin), sigmas[0], sigmas[1], dict(content["provenance"]))
 
 
 def _short(values: Floats) -> list[float]:

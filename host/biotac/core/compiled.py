@@ -67,6 +67,18 @@ def pressure_force_100un(
     return out
 
 
+def grip_mn(poc_um: NDArray[np.int16], force_100un: NDArray[np.int32]) -> NDArray[np.uint16]:
+    """The board's normal and shear (n, 2) in mN, 65535 where invalid, from integers of FRAME messages, (n, 3) each."""
+    frame = ffi.new("bt_msg_frame *")
+    margin = ffi.new("bt_margin *")
+    nothing = ffi.new("bt_uncertainty *", {"margin": margin})
+    out = np.empty((len(poc_um), 2), np.uint16)
+    for k, (frame.poc_um, frame.force_100un) in enumerate(zip(poc_um.tolist(), force_100un.tolist(), strict=True)):
+        lib.bt_grip(nothing, frame)
+        out[k] = frame.normal_mn, frame.shear_mn
+    return out
+
+
 def c_pointers(*arrays: NDArray[Any]) -> list[Any]:
     """The memory of contiguous arrays for C, which must not outlive them; that of structured ones as bytes."""
     kinds = {"V": "uint8_t", "f": "double"}

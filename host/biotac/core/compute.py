@@ -21,8 +21,10 @@ from ..wire.identity import columns_text
 from ..wire.native import ffi, lib
 from .compiled import FORCE_GAINS, TORQUE_GAINS, board_settings, default_settings, formula_settings
 
-#: poc_mm, force_n and torque_nmm of one frame; names, units and axes are as in FRAME_DTYPE.
-RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
+_VECTORS = ("poc_mm", "force_n", "torque_nmm")
+_NUMBERS = ("normal_n", "normal_half_n", "shear_n", "shear_half_n")
+#: poc_mm, force_n, torque_nmm, and normal and shear of one frame; names, units and axes are as in FRAME_DTYPE.
+RESULT_DTYPE = np.dtype([*((name, "<f8", (3,)) for name in _VECTORS), *((name, "<f8") for name in _NUMBERS)])
 #: RESULT_DTYPE and ``torsion_nmm``, which a wrench map may have.
 MAPPED_RESULT_DTYPE = np.dtype([*RESULT_DTYPE.descr, ("torsion_nmm", "<f8")])
 
@@ -75,7 +77,10 @@ def compute(
     ``hand.board.settings()`` or ``Recording.settings`` with them. Without settings, rows whose board plainly had others
     than the defaults are refused with a ValueError; ``settings={}`` means the defaults whatever the board had.
 
-    Values are NaN where there is no answer: poc_mm and torque_nmm x if no electrode has weight. Unlike the board, this
+    Half widths are those of a finger without noise whose tare is confirmed.
+
+    Values are NaN where there is no answer: what needs a point of contact if no electrode has weight, and half widths
+    if a count is missing, for which a board would use an estimate. Unlike the board, this
     does not round to wire units and never saturates. Raises ValueError for other shapes, types and ranges, naming the
     first bad row, what was seen and what was expected; ``out`` then holds no results.
     """

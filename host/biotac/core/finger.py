@@ -52,11 +52,11 @@ class Finger:
     """One finger of a board: its tare machine and its kernels, in the state after all rounds so far.
 
     ``settings`` are the board's; what they leave out has its default. ``index`` (0..4) is the finger's number in the
-    rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds standard deviations,
-    EVENTS the slip_level of rounds that have PAC. ``wrench_map``, a map or its blob, replaces the gains. ``serial``,
-    ASCII, is the sensor's serial number, b"" where unknown: a BioTac SP (BTSP, BTTB), as any sensor said to be
-    ``foreign``, is flagged SENSOR_FAULT and has no point, force or torque. Raises ValueError for a setting or an index
-    out of range or a longer serial number than a sensor has, InputError for a blob that a board would refuse.
+    rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.EVENTS adds the slip_level of
+    rounds that have PAC. ``wrench_map``, a map or its blob, replaces the gains. ``serial``, ASCII, is the sensor's
+    serial number, b"" where unknown: a BioTac SP (BTSP, BTTB), as any sensor said to be ``foreign``, is flagged
+    SENSOR_FAULT and has no point, force or torque. Raises ValueError for a setting or an index out of range or a longer
+    serial number than a sensor has, InputError for a blob that a board would refuse.
 
     >>> finger = Finger()
     >>> rows = finger.feed(np.full((30, 19), 3000))

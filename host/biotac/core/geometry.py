@@ -71,6 +71,16 @@ def normals_at(points_mm: Floats) -> Floats:
     return unit
 
 
+def grip_parts(force_n: Floats, poc_mm: Floats) -> Floats:
+    """Normal and shear part (n, 2) in N of forces (n, 3) on the finger at points of contact (n, 3).
+
+    Normal is along the skin's inward normal; it is negative where the force would pull. NaN where a point is NaN.
+    """
+    outward = normals_at(poc_mm)
+    along = (force_n * outward).sum(axis=1)
+    return np.column_stack([-along, np.linalg.norm(force_n - along[:, None] * outward, axis=1)])
+
+
 def tangents_at(normals: Floats) -> tuple[Floats, Floats]:
     """Tangent unit vectors (n, 3) "towards the tip" and "towards E11's side" at outward normals.
 

@@ -24,25 +24,28 @@ LOG_1 = "rosgraph_msgs/msg/Log"
 LEVELS_1 = {INFO: 2, WARN: 4}  # of a ROS 1 log
 _SHOW_ROWS = 1000
 _COUNTS = "std_msgs/msg/UInt16MultiArray"
+_NUMBERS = "std_msgs/msg/Float64MultiArray"
+_GRIP = ("normal_n", "normal_half_n", "shear_n", "shear_half_n")
 #: By kind of table: its topics, with their types.
 _TOPICS = {
     "frames": {
         "wrench": "geometry_msgs/msg/WrenchStamped",
         "poc": "geometry_msgs/msg/PointStamped",
+        "grip": _NUMBERS,
         "flags": "std_msgs/msg/UInt32",
         "trust": "std_msgs/msg/UInt8",
         "slip": "std_msgs/msg/UInt8",
         "counts": _COUNTS,
     },
     "pac": {"pac": _COUNTS},
-    "bands": {"bands": "std_msgs/msg/Float64MultiArray"},
+    "bands": {"bands": _NUMBERS},
 }
 
 
 def write(path: Path, made: list[Table], recording: Recording, show: Show, *, beside: Path | None = None) -> None:
-    """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``flags``,
-    ``trust``, ``slip`` (its slip_level), ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log``
-    with gaps and labels.
+    """Write a bag, with ``beside``'s messages if it is given: topics ``/biotac/finger0/wrench``, ``poc``, ``grip``
+    (normal, half its interval, shear, half its interval, in N), ``flags``, ``trust``, ``slip`` (its slip_level),
+    ``counts`` (with PDC, TAC, TDC), ``pac`` and ``bands``, and ``/biotac/log`` with gaps and labels.
     """
     ros1 = path.suffix == ".bag"
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
@@ -120,17 +123,10 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
         return
     force_n, torque_nm, poc_m = arrays["force_n"], arrays["torque_nmm"] / 1000, arrays["poc_mm"] / 1000  # REP 103
     counts = np.column_stack([arrays[name] for name in ("counts", "pdc", "tac", "tdc")])
-    lists = (
-        stamps_ns,
-        force_n.tolist(),
-        torque_nm.tolist(),
-        poc_m.tolist(),
-        arrays["flags"].tolist(),
-        arrays["trust"].tolist(),
-        arrays["slip_level"].tolist(),
-        counts,
-    )
-    for stamp_ns, force, torque, poc, flags, trust, slip, row in zip(*lists, strict=True):
+    grips = np.column_stack([arrays[name] for name in _GRIP])
+    bits = (arrays[name].tolist() for name in ("flags", "trust", "slip_level"))
+    lists = stamps_ns, force_n.tolist(), torque_nm.tolist(), poc_m.tolist(), grips, *bits, counts
+    for stamp_ns, force, torque, poc, grip, flags, trust, slip, row in zip(*lists, strict=True):
         header = _header(types, stamp_ns, table.frame_id)
         wrench = types["geometry_msgs/msg/Wrench"](vector(*force), vector(*torque))
         yield (
@@ -138,6 +134,7 @@ def _messages(table: Table, types: Any) -> Iterator[tuple[int, dict[str, Any]]]:
             {
                 "wrench": types[_TOPICS["frames"]["wrench"]](header, wrench),
                 "poc": types[_TOPICS["frames"]["poc"]](header, point(*poc)),
+                "grip": types[_NUMBERS](layout, grip),
                 "flags": types[_TOPICS["frames"]["flags"]](flags),
                 "trust": types[_TOPICS["frames"]["trust"]](trust),
                 "slip": types[_TOPICS["frames"]["slip"]](slip),

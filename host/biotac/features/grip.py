@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats, normals_at
+from ..core.geometry import Floats, grip_parts
 from ..errors import InputError
 from ..wire.messages_gen import INVALID_COUNT
 
@@ -41,9 +41,8 @@ def load_ratio(force_n: npt.ArrayLike, poc_mm: npt.ArrayLike) -> Floats:
     """
     force, poc = np.asarray(force_n, dtype=np.float64), np.asarray(poc_mm, dtype=np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
-        normal = -(force * normals_at(poc)).sum(axis=1)
-        tangential = np.sqrt(np.maximum((force**2).sum(axis=1) - normal**2, 0.0))
-        ratio: Floats = np.where(normal > 0.0, tangential / normal, np.nan)
+        normal, shear = grip_parts(force, poc).T
+        ratio: Floats = np.where(normal > 0.0, shear / normal, np.nan)
     return ratio
 
 

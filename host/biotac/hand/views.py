@@ -182,9 +182,11 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
     out = np.zeros(1, FRAME_DTYPE)
     for name in ("counts", "pdc", "tac", "tdc"):
         out[name] = INVALID_COUNT
-    for name in ("poc_mm", "force_n", "torque_nmm", "poc_sigma_mm", "force_sigma_n"):
+    for name in (
+        *("poc_mm", "force_n", "torque_nmm", "normal_n", "normal_half_n", "shear_n", "shear_half_n"),
+        *("pdc_filtered", "pressure_force_n", "torsion_nmm"),
+    ):
         out[name] = np.nan
-    out["pdc_filtered"] = out["pressure_force_n"] = out["torsion_nmm"] = np.nan
     out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
     return out
 
@@ -259,8 +261,10 @@ class FingerView:
     force_n = _vector("force_n", "Force on the finger, (3,) in N.")
     torque_nmm = _vector("torque_nmm", "Torque on the finger, (3,) in N*mm.")
     poc_mm = _vector("poc_mm", "Point of contact, (3,) in mm.")
-    force_sigma_n = _vector("force_sigma_n", "One standard deviation of the force, (3,) in N; NaN unless wanted.")
-    poc_sigma_mm = _value("poc_sigma_mm", float, "One standard deviation of poc_mm, in mm; NaN unless wanted.")
+    normal_n = _value("normal_n", float, "How hard the contact presses into the skin, in N.")
+    normal_half_n = _value("normal_half_n", float, "Half the width of the 95 % interval about normal_n, in N.")
+    shear_n = _value("shear_n", float, "The rest of the force, along the skin, in N.")
+    shear_half_n = _value("shear_half_n", float, "Half the width of the 95 % interval about shear_n, in N.")
     pressure_force_n = _value("pressure_force_n", float, "Force by static pressure, in N; NaN unless calibrated.")
     torsion_nmm = _value("torsion_nmm", float, "Torque about the contact's normal, in N*mm; NaN without a map of it.")
     counts = _value("counts", _counts, "Electrodes E1..E19, (19,) in counts 0..4095, 65535 where missing.")

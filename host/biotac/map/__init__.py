@@ -4,6 +4,7 @@
 - ``fitted``: the map as fitted, in float64, and from there to ``board_map``: as a board stores and runs it
 - ``float64``, ``bound``: a board's map without its rounding, and how much that can be
 - ``file``: the JSON file, with either or both
+- ``margin``: how far a map's normal and shear part may be off
 - ``population``: the map of other fingers that every board has
 """
 
@@ -11,5 +12,6 @@ from __future__ import annotations
 
 from .file import dumps_fitted, load_fitted
 from .fitted import WrenchMap
+from .margin import Margin, bands, fit_margin, published_parts
 
-__all__ = ["WrenchMap", "dumps_fitted", "load_fitted"]
+__all__ = ["Margin", "WrenchMap", "bands", "dumps_fitted", "fit_margin", "load_fitted", "published_parts"]

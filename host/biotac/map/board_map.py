@@ -22,11 +22,12 @@ from ..wire.frames import StructArray
 from ..wire.identity import ascii_text
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
+from .margin import UNKNOWN, Margin
 
 Integers = NDArray[np.int64]
 BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
-_HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
+_HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI4H")
 _BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
 _SERIAL = slice(4, 4 + _map.SERIAL_BYTES)
 PART_BYTES = len(wire.MapData.unpack(bytes(wire.MapData.STRUCT.size)).data)
@@ -62,12 +63,14 @@ class BoardMap:
     """A wrench map. ``axes`` is 3 (force), 6 (and torque) or 7 (and torsion).
 
     ``serial`` is that of the sensor it was made for, "" for any. ``made_s`` counts from 1970 UTC, 0: unknown.
+    ``margin`` is that of its force.
     """
 
     axes: int
     blocks: tuple[BoardBlock, ...]
     serial: str = ""
     made_s: int = 0
+    margin: Margin = UNKNOWN
 
     @cached_property
     def blob(self) -> bytes:
@@ -84,7 +87,8 @@ class BoardMap:
         serial = self.serial.encode("ascii")
         if len(serial) > _map.SERIAL_BYTES:
             raise ValueError(f"the serial number {self.serial!r} has more than {_map.SERIAL_BYTES} characters")
-        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
+        margin = [value for pair in zip(self.margin.base_mn, self.margin.share_q8, strict=True) for value in pair]
+        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s, *margin)
         blocks, coefficients = b"", b""
         for block in self.blocks:
             unused = (0,) * (_map.EXPONENTS - self.axes)
@@ -128,7 +132,7 @@ class BoardMap:
 def from_blob(blob: bytes) -> BoardMap:
     """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
     _opened(blob)
-    _, axes, count, _, serial, made_s = _HEADER.unpack_from(blob)
+    _, axes, count, _, serial, made_s, normal_mn, normal_q8, shear_mn, shear_q8 = _HEADER.unpack_from(blob)
     heads = [_BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
     at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
     blocks = []
@@ -140,7 +144,8 @@ def from_blob(blob: bytes) -> BoardMap:
             at += 2 * halves
         values = np.concatenate(groups if axes > 3 else groups[:1], axis=1)
         blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
-    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
+    margin = Margin((normal_mn, shear_mn), (normal_q8, shear_q8))
+    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s, margin)
 
 
 def opened(board_map: BoardMap | bytes) -> BoardMap:

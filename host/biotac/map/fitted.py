@@ -15,6 +15,7 @@ from . import columns
 from .board_map import BoardBlock, BoardMap, is_accepted
 from .columns import AXES, ELECTRODES, Signals, with_one
 from .float64 import Unrounded, result_units, unit
+from .margin import UNKNOWN, Margin
 
 _COEFFICIENT_MAX = 2**15 - 1
 
@@ -25,6 +26,7 @@ class WrenchMap:
 
     ``coefficients`` (p + 1, axes) are for columns.columns(), block by block, the offset last; ``tare`` (19,) is in
     counts. The map was trained on mean counts of ``window_rows`` frames, which lag the force by ``lag_rows`` (axes,).
+    ``margin`` is that of its force on rows left out of it.
     """
 
     model: str
@@ -33,6 +35,7 @@ class WrenchMap:
     window_rows: int
     lag_rows: tuple[int, ...]
     coefficients: Floats
+    margin: Margin = UNKNOWN
 
     @property
     def with_pdc(self) -> bool:
@@ -66,7 +69,7 @@ class WrenchMap:
 
     def on_board(self, *, serial: str = "", made_s: int = 0) -> BoardMap:
         """The map for a board. Raises InputError, as quantise(), for one that no board can hold."""
-        return quantise(self.blocks(), serial, made_s)
+        return quantise(self.blocks(), serial, made_s, self.margin)
 
     def to_dict(self) -> dict[str, Any]:
         """The map as JSON types; from_dict() gives exactly the same numbers."""
@@ -78,6 +81,7 @@ class WrenchMap:
             "lag_rows": list(self.lag_rows),
             "blocks": _block_names(with_pdc=self.with_pdc),
             "coefficients": self.coefficients.tolist(),
+            "margin": {"base_mn": list(self.margin.base_mn), "share_q8": list(self.margin.share_q8)},
         }
 
     @classmethod
@@ -90,6 +94,9 @@ class WrenchMap:
             int(facts["window_rows"]),
             tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
+            Margin(
+                *((int(pair[0]), int(pair[1])) for pair in (facts["margin"][name] for name in ("base_mn", "share_q8")))
+            ),
         )
         shapes = [(columns.width(columns.blocks(with_pdc=pdc)) + 1, len(fitted.axes)) for pdc in (False, True)]
         if fitted.coefficients.shape not in shapes or fitted.tare.shape != (ELECTRODES,):
@@ -107,7 +114,7 @@ def _block_names(*, with_pdc: bool) -> list[list[str]]:
     return [[kind.name, gate.name] for kind, gate in columns.blocks(with_pdc=with_pdc)]
 
 
-def quantise(blocks: Unrounded, serial: str = "", made_s: int = 0) -> BoardMap:
+def quantise(blocks: Unrounded, serial: str = "", made_s: int = 0, margin: Margin = UNKNOWN) -> BoardMap:
     """The board's map of the ``blocks`` that are not all 0, with the largest exponents at which no sum can overflow.
 
     Whether one can is decided by firmware/core/map/open.c, which is asked.
@@ -115,7 +122,7 @@ def quantise(blocks: Unrounded, serial: str = "", made_s: int = 0) -> BoardMap:
     kept = tuple(_block(kind, gate, values) for (kind, gate), values in blocks.items() if np.any(values != 0.0))
     if not kept:
         raise InputError("every coefficient of the map is 0: expected a fitted map; calibrate again")
-    return BoardMap(kept[0].coefficients.shape[1], kept, serial, made_s)
+    return BoardMap(kept[0].coefficients.shape[1], kept, serial, made_s, margin)
 
 
 def _block(kind: Kind, gate: Gate, values: Floats) -> BoardBlock:

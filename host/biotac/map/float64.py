@@ -15,6 +15,7 @@ from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArr
 from ..wire.map_gen import Gate, Kind
 from .board_map import BoardMap
 from .columns import PRESSURE_COUNTS, SIGNAL_COUNTS, Signals, summed, tared
+from .margin import published_parts
 
 _CHUNK_ROWS = 4096
 #: Real coefficients (columns, axes) of each block, in the results' units.
@@ -59,6 +60,11 @@ def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pd
     pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
     wrench = exact(board_map, raw, tare_q4, pdc_q4)
     replace_gains(board_map, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
+    parts = published_parts(rows["force_n"], rows["poc_mm"])
+    half = board_map.margin.half_n(parts)
+    half[np.isnan(rows["normal_half_n"])] = np.nan  # a count is missing
+    rows["normal_n"], rows["shear_n"] = parts.T
+    rows["normal_half_n"], rows["shear_half_n"] = half.T
     return results
 
 

@@ -20,14 +20,16 @@ import numpy.typing as npt
 from ..core.compiled import FORCE_GAINS
 from ..core.geometry import ELECTRODE_MM, Floats
 from ..wire import messages_gen as wire
+from ..wire.fields import MN_PER_N
 from ..wire.frames import FORCE_LSB_PER_N
 from ..wire.map_gen import Gate, Kind
-from ..wire.native import ffi
+from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
 from .columns import GATED, SIGNAL_COUNTS, split, summed, tared
 from .fitted import quantise
 from .float64 import derived_torque_x
+from .margin import UNKNOWN, Margin
 
 SHIPPED = "population.json"
 Integers = npt.NDArray[np.int64]
@@ -64,21 +66,41 @@ def blocks() -> dict[tuple[Kind, Gate], Floats]:
     return split(named, coefficients)
 
 
-def board_map(newtons: Mapping[tuple[Kind, Gate], Floats]) -> BoardMap:
+@cache
+def margin() -> Margin:
+    """The package's map's margin on fingers left out of it."""
+    return Margin(*map(tuple, json.loads(shipped())["margin"]))
+
+
+def board_map(newtons: Mapping[tuple[Kind, Gate], Floats], margin: Margin = UNKNOWN) -> BoardMap:
     """Such blocks as a board's map. Raises InputError when they do not fit the board's formats."""
-    return quantise({block: values * FORCE_LSB_PER_N for block, values in newtons.items()})
+    return quantise({block: values * FORCE_LSB_PER_N for block, values in newtons.items()}, margin=margin)
 
 
 @dataclass(frozen=True)
 class Likeness:
     """How like the training n frames are; defined in integers, so that all boards agree (SPEC.md, Population map).
 
-    ``share`` (n,) of the force that comes from the map, in 1/256; ``outside`` (n,); ``otherwise_n`` (n, 3), the rest.
+    ``share`` (n,) of the force that comes from the map, in 1/256; ``outside`` (n,); ``otherwise_n`` (n, 3), the rest;
+    ``strength_100un`` (n,) by the sum of all signals.
     """
 
     share: Integers
     outside: npt.NDArray[np.bool_]
     otherwise_n: Floats
+    strength_100un: Integers
+
+    @property
+    def guess_n(self) -> Floats:
+        """What a board adds to the half widths (n, 2) of normal and shear where it is not sure, in N."""
+        guess = ffi.new("uint32_t[2]")
+        found = np.empty((len(self.share), 2))
+        for k, row in enumerate(
+            zip(self.share.tolist(), self.outside.tolist(), self.strength_100un.tolist(), strict=True)
+        ):
+            lib.bt_population_guess(*row, guess)
+            found[k] = guess[0], guess[1]
+        return found / MN_PER_N
 
     def mixed(self, force_n: Floats) -> Floats:
         """The map's force (n, 3) in N, mixed with the rest."""
@@ -101,7 +123,7 @@ def likeness(e: Floats, force_100un: Integers) -> Likeness:
     share = np.clip(np.minimum(share, total - _LIGHT_Q4 >> 6), 0, ALL)
     pressed = -np.minimum(q4, 0).sum(axis=1)
     outside = (total < _LEAST_Q4) | (off > _OUTSIDE * strength) | ((share < ALL) & (8 * pressed < total))
-    return Likeness(share, outside, otherwise / FORCE_LSB_PER_N)
+    return Likeness(share, outside, otherwise / FORCE_LSB_PER_N, strength)
 
 
 def board_force_100un(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Integers:
@@ -113,7 +135,7 @@ def board_force_100un(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.ui
 @cache
 def on_board() -> BoardMap:
     """The package's map in a board's 16 bits."""
-    return board_map(blocks())
+    return board_map(blocks(), margin())
 
 
 def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> Integers:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
-from ..core.compiled import completed, on_board_q4, pressure_force_100un, trust_of
+from ..core.compiled import completed, grip_mn, on_board_q4, pressure_force_100un, trust_of
 from ..core.finger import ROUND_US, Finger
 from ..errors import CommandRefusedError, InputError
 from ..keep.calibration import own_settings
@@ -109,9 +109,6 @@ def _with_kept_tares(
         known = (new["flags"] & wire.FrameFlags.UNTARED == 0) & (new["flags"] & refused != refused)
         at = np.flatnonzero((new["finger"] == finger) & known & ~_is_foreign(recording, int(finger)))
         new[at] = _recomputed(new[at], own.get(int(finger), settings), maps.get(int(finger)))
-    # The standard deviations depend on the gains and on the noise, which a frame does not hold.
-    for name in ("poc_sigma_um", "force_sigma_100un"):
-        new[name] = wire.INVALID_COUNT
     return new
 
 
@@ -123,7 +120,12 @@ def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | Non
     else:
         poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(used, settings, own_map)
         frames["torsion_mnmm"] = torsion_mnmm
+    # The half widths depend on the noise, too, which a frame does not hold: they stay with what they were made for.
+    changed = ((frames["poc_um"] != poc_um) | (frames["force_100un"] != force_100un)).any(axis=1)
+    for name in ("normal_half_mn", "shear_half_mn"):
+        frames[name][changed] = wire.INVALID_COUNT
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
+    frames["normal_mn"], frames["shear_mn"] = grip_mn(poc_um, force_100un).T
     frames["pressure_force_100un"] = pressure_force_100un(
         frames["pdc_filtered_q4"], frames["pdc_tare_q4"], settings[wire.Setting.PRESSURE_GAIN_NN]
     )
@@ -232,8 +234,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
         )
     if int(sent["flags"][0]) & (wire.FrameFlags.SENSOR_FAULT | wire.FrameFlags.ELECTRODE_OUT):
         notes.append(f"finger {finger} was broken before the recording began, by what the recording does not show")
-    sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
-    quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
+    quantities = RESULTS | wire.QuantityFlags.REST_FRAMES
     t_us = recording.frames["t_us"][at]
     pac = _pac_at(t_us, recording.pac[recording.pac["finger"] == finger])
     if (sent["flags"] & wire.FrameFlags.SENSOR_FAULT).any() and (pac == wire.INVALID_COUNT).all():

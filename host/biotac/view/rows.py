@@ -17,18 +17,21 @@ from ..core.unroll import unroll
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
-from ..wire.fields import INVALID_U8
+from ..wire.fields import INVALID_U8, MN_PER_N
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray, electrode_signals
 
 #: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing or not used. ``map_um``: the point of
 #: contact on the unrolled skin, across and along, in um; null where it is invalid. ``applied_100un``: Reader.applied_n.
+#: ``grip_mn``: normal, its half width, shear, its half width.
 FRAME_ROW = (
     "finger", "seq", "t_us", "flags", "signal_q4", "pdc", "tac", "tdc", "poc_um", "force_100un", "torque_mnmm",
-    "map_um", "applied_100un", "trust", "slip_level",
+    "map_um", "applied_100un", "trust", "slip_level", "grip_mn",
 )  # fmt: skip
+_GRIP = ("normal_mn", "normal_half_mn", "shear_mn", "shear_half_mn")
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
-SCALES = {"signal_q4": Q4_PER_COUNT, "poc_um": UM_PER_MM, "force_100un": FORCE_LSB_PER_N, "torque_mnmm": MNMM_PER_NMM}
+SCALES = {"signal_q4": Q4_PER_COUNT, "poc_um": UM_PER_MM, "force_100un": FORCE_LSB_PER_N, "torque_mnmm": MNMM_PER_NMM,
+          "grip_mn": MN_PER_N}  # fmt: skip
 
 
 def frame_rows(batch: Batch, applied_n: NDArray[np.float64] | None = None) -> list[str]:
@@ -47,6 +50,7 @@ def frame_rows(batch: Batch, applied_n: NDArray[np.float64] | None = None) -> li
         applied,
         frames["trust"].tolist(),
         with_null(messages["slip_level"], INVALID_U8),
+        with_null(np.column_stack([messages[name] for name in _GRIP]), wire.INVALID_COUNT),
         strict=True,
     )
     timed = [(row[2], compact(row)) for row in columns]

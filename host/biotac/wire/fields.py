@@ -22,6 +22,7 @@ _ELECTRODES = tuple(ELECTRODE_NAMES)
 
 #: Steps of the wire's integers per unit of a column.
 UM_PER_MM = 1_000
+MN_PER_N = 1_000
 FORCE_LSB_PER_N = 10_000  # force_100un
 MNMM_PER_NMM = 1_000
 Q4_PER_COUNT = 16
@@ -85,6 +86,7 @@ _TORSION = "torque about the outward normal at the contact; NaN unless a wrench 
 _AGE = "how much older force, torque and torsion are than the row; 0 unless REPEATED"
 _OUT = "bit mask, bit i for electrode i + 1: results do without it"
 _SLIP = "rms in which dynamic pressure shakes as skin slips, 0 where it does not; 255 unless EVENTS are subscribed to"
+_HALF = "half the width of the 95 % interval about"
 _TARE_STATE = Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state")
 _TRUST = Field("trust", "u1", "1", "what the force is good for: enum trust in MESSAGES.md", (), "trust")
 
@@ -102,13 +104,15 @@ FRAME_FIELDS = (
     _real("poc_mm", "point of contact on the core's surface; NaN where invalid", "poc_um", UM_PER_MM, AXES),
     _real("force_n", "force on the finger; NaN where invalid", "force_100un", FORCE_LSB_PER_N, AXES),
     _real("torque_nmm", "torque on the finger about the origin; NaN where invalid", "torque_mnmm", MNMM_PER_NMM, AXES),
-    _real("poc_sigma_mm", "one standard deviation; NaN unless enabled", "poc_sigma_um", UM_PER_MM),
-    _real("force_sigma_n", "one standard deviation; NaN unless enabled", "force_sigma_100un", FORCE_LSB_PER_N, AXES),
     _real("pdc_filtered", "pressure, filtered by the board; NaN where missing", "pdc_filtered_q4", Q4_PER_COUNT),
     _real("pressure_force_n", _PRESSURE_FORCE, "pressure_force_100un", FORCE_LSB_PER_N),
     _real("torsion_nmm", _TORSION, "torsion_mnmm", MNMM_PER_NMM),
     Field("wrench_age_ms", "<u2", "ms", _AGE, (), "wrench_age_ms"),
     Field("electrodes_out", "<u4", "1", _OUT, (), "electrodes_out"),
+    _real("normal_n", "how hard the contact presses into the skin; NaN where invalid", "normal_mn", MN_PER_N),
+    _real("normal_half_n", f"{_HALF} normal_n; NaN where unknown", "normal_half_mn", MN_PER_N),
+    _real("shear_n", "the rest of the force, along the skin; NaN where invalid", "shear_mn", MN_PER_N),
+    _real("shear_half_n", f"{_HALF} shear_n; NaN where unknown", "shear_half_mn", MN_PER_N),
     _TRUST,
     Field("slip_level", "u1", "count", _SLIP, (), "slip_level", None, INVALID_U8),
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),

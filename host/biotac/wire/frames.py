@@ -42,7 +42,7 @@ IDLE_DTYPE = dtype_of(IDLE_FIELDS)
 class Frame:
     """One round of slots (10 ms) of one finger. Two are equal when all values are equal, where NaN equals NaN.
 
-    Shapes: counts (19,) uint16; tare (19,) float32; poc_mm, force_n, torque_nmm, force_sigma_n (3,) float64; the others
+    Shapes: counts (19,) uint16; tare (19,) float32; poc_mm, force_n, torque_nmm (3,) float64; the others
     are numbers. Names, units and invalid marks are as in FRAME_DTYPE. Force and torque act on the finger; x points to
     the tip, y to E11's side, z is dorsal.
     """
@@ -61,13 +61,15 @@ class Frame:
     tare: NDArray[np.float32] = field(default_factory=lambda: np.full(19, np.nan, np.float32))
     pdc_tare: float = math.nan
     tare_state: int = TareState.INIT
-    poc_sigma_mm: float = math.nan
-    force_sigma_n: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.nan))
     pdc_filtered: float = math.nan
     pressure_force_n: float = math.nan
     torsion_nmm: float = math.nan
     wrench_age_ms: int = 0
     electrodes_out: int = 0
+    normal_n: float = math.nan
+    normal_half_n: float = math.nan
+    shear_n: float = math.nan
+    shear_half_n: float = math.nan
     trust: Trust = Trust.NONE
     slip_level: int = INVALID_U8
 

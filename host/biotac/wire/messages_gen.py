@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x881A943D
+SCHEMA_HASH = 0x47862903
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -181,11 +181,11 @@ class FrameFlags(IntFlag):
     DOUBT = 1 << 19  # tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
     HELD = 1 << 20  # the host sent HOLD: no new tare is taken
     REPEATED = 1 << 21  # the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
-    SHED = 1 << 22  # the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
+    SHED = 1 << 22  # the board was short of time: FRAMEs before this one were not sent
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
     POPULATION = 1 << 25  # force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force
-    OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma
+    OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that half of its interval is as wide as the touch is strong
     TARE_UNSURE = 1 << 27  # the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
     ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
@@ -226,7 +226,6 @@ class QuantityFlags(IntFlag):
     POC = 1 << 0  # point of contact; TORSION_OK needs it
     FORCE = 1 << 1  # force
     TORQUE = 1 << 2  # torque and torsion
-    SIGMA = 1 << 3  # standard deviations of point of contact and force
     REST_FRAMES = 1 << 4  # a FRAME in every round; without it, an untouched finger sends IDLE heartbeats
     TOUCH = 1 << 5  # TOUCH messages
     PRESSURE = 1 << 6  # filtered static pressure and, if calibrated, the force from it
@@ -375,11 +374,11 @@ FRAME_FLAG_DOC: dict[int, str] = {
     524288: "tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays",
     1048576: "the host sent HOLD: no new tare is taken",
     2097152: "the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before",
-    4194304: "the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent",
+    4194304: "the board was short of time: FRAMEs before this one were not sent",
     8388608: "the sensor was away and has not given its serial number since: tare, calibration and map may belong to another",
     16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
     33554432: "force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force",
-    67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that its force has no sigma",
+    67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that half of its interval is as wide as the touch is strong",
     134217728: "the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then",
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
     536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",
@@ -417,7 +416,6 @@ QUANTITY_FLAG_DOC: dict[int, str] = {
     1: "point of contact; TORSION_OK needs it",
     2: "force",
     4: "torque and torsion",
-    8: "standard deviations of point of contact and force",
     16: "a FRAME in every round; without it, an untouched finger sends IDLE heartbeats",
     32: "TOUCH messages",
     64: "filtered static pressure and, if calibrated, the force from it",
@@ -899,18 +897,20 @@ class Frame:
     torque_mnmm: tuple[int, ...]
     tare_q4: tuple[int, ...]
     pdc_tare_q4: int
-    poc_sigma_um: int
-    force_sigma_100un: tuple[int, ...]
     pdc_filtered_q4: int
     pressure_force_100un: int
     torsion_mnmm: int
     wrench_age_ms: int
     electrodes_out: int
+    normal_mn: int
+    normal_half_mn: int
+    shear_mn: int
+    shear_half_mn: int
     trust: int
     slip_level: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiHIBB")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHHiiHIHHHHBB")
 
     def pack(self) -> bytes:
         """Payload without id and CRC, 152 bytes."""
@@ -929,13 +929,15 @@ class Frame:
             *self.torque_mnmm,
             *self.tare_q4,
             self.pdc_tare_q4,
-            self.poc_sigma_um,
-            *self.force_sigma_100un,
             self.pdc_filtered_q4,
             self.pressure_force_100un,
             self.torsion_mnmm,
             self.wrench_age_ms,
             self.electrodes_out,
+            self.normal_mn,
+            self.normal_half_mn,
+            self.shear_mn,
+            self.shear_half_mn,
             self.trust,
             self.slip_level,
         )
@@ -960,7 +962,9 @@ class Frame:
             v[36 : 55],
             v[55],
             v[56],
-            v[57 : 60],
+            v[57],
+            v[58],
+            v[59],
             v[60],
             v[61],
             v[62],
@@ -1068,18 +1072,16 @@ class Status:
     poc_skipped: int
     force_skipped: int
     torque_skipped: int
-    sigma_skipped: int
-    sigma_shed: int
     wrench_repeated: int
     frames_shed: int
     faults: int
     finger_faults: tuple[int, ...]
 
     ID: ClassVar[int] = 0x13
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIIIH5I")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIH5I")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 87 bytes."""
+        """Payload without id and CRC, 79 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -1096,8 +1098,6 @@ class Status:
             self.poc_skipped,
             self.force_skipped,
             self.torque_skipped,
-            self.sigma_skipped,
-            self.sigma_shed,
             self.wrench_repeated,
             self.frames_shed,
             self.faults,
@@ -1127,9 +1127,7 @@ class Status:
             v[15],
             v[16],
             v[17],
-            v[18],
-            v[19],
-            v[20 : 25],
+            v[18 : 23],
         )
 
 

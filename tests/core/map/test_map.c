@@ -8,10 +8,14 @@ TEST(a_blob_is_read_where_it_lies)
     one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_X, 2, -7);
     memcpy(bytes_of(&its) + 4, "BTEMU00000000042", 16);
     its.word[5] = 1763731310;
+    its.word[6] = 300 | 24u << 16;
+    its.word[7] = 200 | (uint32_t)BT_MARGIN_SHARE_MAX_Q8 << 16;
     assert_int_equal(opened(&its, &map), BT_ERROR_OK);
     assert_true(map.axes == 3 && map.block_count == 1 && map.made_s == 1763731310);
     assert_ptr_equal(map.serial, bytes_of(&its) + 4);
-    assert_ptr_equal(map.coefficients, bytes_of(&its) + 36);
+    const bt_margin margin = {{300, 200}, {24, BT_MARGIN_SHARE_MAX_Q8}};
+    assert_memory_equal(&map.margin, &margin, sizeof margin);
+    assert_ptr_equal(map.coefficients, bytes_of(&its) + 44);
     assert_false(bt_map_needs_pdc(&map));
 }
 
@@ -41,18 +45,20 @@ TEST(every_byte_of_the_head_is_judged)
         {2, 2, BT_ERROR_OUT_OF_RANGE}, // coefficients for a block: no such kind
         {2, 255, BT_ERROR_BAD_LENGTH},
         {3, 1, BT_ERROR_OUT_OF_RANGE},
-        {24, BT_MAP_KINDS, BT_ERROR_OUT_OF_RANGE},
-        {24, 255, BT_ERROR_OUT_OF_RANGE},
-        {24, BT_MAP_KIND_OFFSET, BT_ERROR_BAD_LENGTH},
-        {25, BT_MAP_GATES, BT_ERROR_OUT_OF_RANGE},
-        {26, BT_MAP_EXPONENT_MAX + 1, BT_ERROR_OUT_OF_RANGE},
-        {28, 255, BT_ERROR_OUT_OF_RANGE},
-        {27, 0, BT_ERROR_OUT_OF_RANGE},
-        {36 + 2 * 3 * 19, 1, BT_ERROR_OUT_OF_RANGE}, // a twentieth column
-        {36 + 2 * 3 * 19 + 5, 128, BT_ERROR_OUT_OF_RANGE},
-        {29, 1, BT_ERROR_OUT_OF_RANGE}, // of an axis that is not there
-        {32, 1, BT_ERROR_OUT_OF_RANGE},
-        {35, 1, BT_ERROR_OUT_OF_RANGE}, // and of none that may be
+        {27, 17, BT_ERROR_OUT_OF_RANGE}, // a share whose product might not fit
+        {31, 255, BT_ERROR_OUT_OF_RANGE},
+        {32, BT_MAP_KINDS, BT_ERROR_OUT_OF_RANGE},
+        {32, 255, BT_ERROR_OUT_OF_RANGE},
+        {32, BT_MAP_KIND_OFFSET, BT_ERROR_BAD_LENGTH},
+        {33, BT_MAP_GATES, BT_ERROR_OUT_OF_RANGE},
+        {34, BT_MAP_EXPONENT_MAX + 1, BT_ERROR_OUT_OF_RANGE},
+        {36, 255, BT_ERROR_OUT_OF_RANGE},
+        {35, 0, BT_ERROR_OUT_OF_RANGE},
+        {44 + 2 * 3 * 19, 1, BT_ERROR_OUT_OF_RANGE}, // a twentieth column
+        {44 + 2 * 3 * 19 + 5, 128, BT_ERROR_OUT_OF_RANGE},
+        {37, 1, BT_ERROR_OUT_OF_RANGE}, // of an axis that is not there
+        {40, 1, BT_ERROR_OUT_OF_RANGE},
+        {43, 1, BT_ERROR_OUT_OF_RANGE}, // and of none that may be
     };
     static blob its;
     bt_map map;
@@ -74,7 +80,7 @@ TEST(every_length_but_one_is_refused)
     assert_int_equal(bt_map_open(&map, bytes_of(&its), BT_MAP_MAX_BYTES + 1), BT_ERROR_BAD_LENGTH);
     for (size_t k = 0; k < SOME_AXES; k++) {
         one_block(&its, axes_of[k], BT_MAP_KIND_BULGE, BT_MAP_GATE_YY, 1, 5);
-        assert_int_equal(4 * its.words, 24 + 12 + 2 * 20 * axes_of[k]);
+        assert_int_equal(4 * its.words, 32 + 12 + 2 * 20 * axes_of[k]);
         for (size_t bytes = 0; bytes <= sizeof its.word; bytes++) {
             uint8_t error = bt_map_open(&map, bytes_of(&its), bytes);
             assert_int_equal(error, bytes == 4 * its.words ? BT_ERROR_OK : BT_ERROR_BAD_LENGTH);

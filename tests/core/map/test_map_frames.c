@@ -7,7 +7,7 @@ static bt_msg_frame published(emulated_finger *finger, const bt_map *map, uint16
 {
     bt_settings all;
     bt_settings_reset(&all);
-    if (map == NULL) { // a map stands before the population map, with the flags and sigmas of Lin's scales
+    if (map == NULL) { // a map stands before the population map, with the flags of Lin's scales
         (void)bt_settings_set(&all, BT_SETTING_FORCE_MODEL, BT_FORCE_MODEL_LIN);
     }
     bt_solve_settings settings = bt_solve_settings_from(&all);
@@ -61,12 +61,15 @@ TEST(a_mapped_frame_has_the_maps_force_and_says_so)
     for (size_t k = 0; k < SOME_AXES; k++) {
         uint32_t axes = axes_of[k];
         mixed_map(&its, &map, axes);
-        bt_msg_frame plain = published(&finger, NULL, 1400, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
-        bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
+        map.margin.base_mn[0] = BT_INVALID_COUNT;
+        bt_msg_frame plain = published(&finger, NULL, 1400, BT_WANT_ALL);
+        bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL);
         assert_memory_equal(plain.counts, msg.counts, sizeof msg.counts);
         assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED);
         assert_memory_equal(msg.poc_um, plain.poc_um, sizeof msg.poc_um);
-        assert_true(msg.poc_sigma_um == plain.poc_sigma_um && msg.poc_sigma_um != 0xFFFF);
+        assert_int_equal(msg.normal_half_mn, 0xFFFF); // the map does not know
+        assert_int_not_equal(plain.normal_half_mn, 0xFFFF);
+        assert_int_not_equal(msg.normal_mn, plain.normal_mn);
         int32_t force[3], torque[3], torsion = BT_INVALID_I32;
         bt_map_wrench(&map, msg.counts, finger.tare.electrode_q4, 16 * 1400 - (int32_t)rest_q4, force, torque,
                       &torsion);
@@ -76,8 +79,6 @@ TEST(a_mapped_frame_has_the_maps_force_and_says_so)
         assert_memory_equal(msg.force_100un, force, sizeof force);
         for (int d = 0; d < 3; d++) {
             assert_int_not_equal(force[d], plain.force_100un[d]);
-            assert_int_equal(msg.force_sigma_100un[d], 0xFFFF);
-            assert_int_not_equal(plain.force_sigma_100un[d], 0xFFFF);
         }
         if (axes > 3) {
             assert_memory_equal(msg.torque_mnmm, torque, sizeof torque);
@@ -100,6 +101,7 @@ TEST(without_pressure_a_map_that_needs_it_gives_nothing)
     for (size_t k = 0; k < SOME_AXES; k++) {
         uint32_t axes = axes_of[k];
         mixed_map(&its, &map, axes);
+        map.margin.base_mn[0] = BT_INVALID_COUNT;
         bt_msg_frame plain = published(&finger, NULL, BT_INVALID_COUNT, BT_WANT_ALL);
         bt_msg_frame msg = published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL);
         assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED);

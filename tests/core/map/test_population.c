@@ -4,6 +4,7 @@
 #include "map/complete.h"
 #include "map/population.h"
 #include "map/population_gen.h"
+#include "solve/grip.h"
 #include "solve/solve.h"
 #include "solve/wrench.h"
 #include "support.h"
@@ -22,6 +23,7 @@ TEST(the_map_is_as_it_is_opened)
     assert_true(map.axes == its->axes && map.block_count == its->block_count && map.kinds == its->kinds
                 && map.gates == its->gates && map.serial == its->serial && map.blocks == its->blocks
                 && map.coefficients == its->coefficients);
+    assert_memory_equal(&map.margin, &its->margin, sizeof map.margin);
     assert_false(bt_map_needs_pdc(its));
 }
 
@@ -150,8 +152,8 @@ static uint32_t published(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un
     const bt_solve_settings settings = bt_solve_settings_from(&all);
     int16_t poc[3];
     int32_t torque[3];
-    uint16_t sigma[3];
-    return bt_solve_uncalibrated(e_q4, &settings, BT_WANT_FORCE, poc, force_100un, torque, sigma);
+    uint32_t guess_mn[2];
+    return bt_solve_uncalibrated(e_q4, &settings, BT_WANT_FORCE, poc, force_100un, torque, guess_mn);
 }
 
 // Nothing in the training is like a point that presses on one electrode or between two; the skin's normal
@@ -201,27 +203,22 @@ TEST(any_gain_of_ones_own_takes_the_population_away)
 }
 
 // A plate that touches, one between, and one that presses: along the normals, some of both, the map's.
-TEST(sigma_is_mixed_as_force_is)
+TEST(what_is_guessed_goes_as_the_maps_share_grows)
 {
     static const int eighths[] = {3, 5, 8};
-    uint16_t sigma[3][3];
     for (int k = 0; k < 3; k++) {
         int32_t e_q4[BT_ELECTRODES], force[3];
+        uint32_t guess_mn[2];
         signals_of(plate, eighths[k], e_q4);
         bt_likeness its = bt_population_force(e_q4, force);
         assert_int_equal((its.share > 0) + (its.share == BT_POPULATION_ALL), k);
         assert_int_equal(published(e_q4, force), BT_FRAME_FLAG_POPULATION);
         assert_true(force[2] > 0);
-        bt_population_sigma(&its, sigma[k]);
+        bt_population_guess(its.share, its.outside, its.strength_100un, guess_mn);
+        double away = (256.0 - its.share) / 256 * its.strength_100un / 10;
+        assert_true(fabs(guess_mn[0] - .4 * away) < 2 + .003 * away && fabs(guess_mn[1] - .3 * away) < 2 + .003 * away);
+        assert_int_equal(bt_strength_100un(e_q4), its.strength_100un);
     }
-    static const uint16_t trained[3] = BT_POPULATION_SIGMA_100UN;
-    for (int d = 0; d < 3; d++) {
-        assert_int_equal(sigma[2][d], trained[d]);
-        assert_true(sigma[0][d] > 0);
-    }
-    const bt_likeness strong = {.strength_100un = 303000}; // every electrode at the end of its range
-    bt_population_sigma(&strong, sigma[0]);
-    assert_true(sigma[0][0] == 45450 && sigma[0][2] == BT_INVALID_COUNT - 1); // not wrapped
 }
 
 // Where nothing is compressed, no direction is known: the contact is beyond the electrodes.

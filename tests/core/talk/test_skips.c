@@ -14,16 +14,15 @@ static const uint8_t subscriptions[] = {
     BT_QUANTITY_FLAG_POC,
     BT_QUANTITY_FLAG_FORCE,
     BT_QUANTITY_FLAG_TORQUE,
-    BT_QUANTITY_FLAG_SIGMA,
     BT_QUANTITY_FLAG_TOUCH,
     BT_QUANTITY_FLAG_PRESSURE,
-    BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_SIGMA,
-    BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_SIGMA,
+    BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE,
+    BT_QUANTITY_FLAG_FORCE,
     BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE,
     BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_TORQUE,
     BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_TOUCH,
     WANTED_AT_ALL,
-    WANTED_AT_ALL | BT_QUANTITY_FLAG_SIGMA | BT_QUANTITY_FLAG_TOUCH,
+    WANTED_AT_ALL | BT_QUANTITY_FLAG_TOUCH,
 };
 
 static int the_full_course(void **state)
@@ -37,7 +36,7 @@ static int the_full_course(void **state)
 static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
 {
     bool poc = quantities & BT_QUANTITY_FLAG_POC, force = quantities & BT_QUANTITY_FLAG_FORCE;
-    bool torque = quantities & BT_QUANTITY_FLAG_TORQUE, sigma = quantities & BT_QUANTITY_FLAG_SIGMA;
+    bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
     bool pressure = quantities & BT_QUANTITY_FLAG_PRESSURE;
     frame->trust = force ? frame->trust : BT_TRUST_NONE;
     frame->flags |= poc && force && torque && pressure ? 0 : BT_FRAME_FLAG_NOT_ASKED;
@@ -49,12 +48,13 @@ static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
     frame->pdc_filtered_q4 = pressure ? frame->pdc_filtered_q4 : 0xFFFF;
     frame->pressure_force_100un = pressure ? frame->pressure_force_100un : INT32_MIN;
     frame->torsion_mnmm = torque ? frame->torsion_mnmm : INT32_MIN;
-    frame->poc_sigma_um = sigma && poc ? frame->poc_sigma_um : 0xFFFF;
+    if (!poc || !force) {
+        frame->normal_mn = frame->normal_half_mn = frame->shear_mn = frame->shear_half_mn = 0xFFFF;
+    }
     for (int d = 0; d < 3; d++) {
         frame->poc_um[d] = poc ? frame->poc_um[d] : INT16_MIN;
         frame->force_100un[d] = force ? frame->force_100un[d] : INT32_MIN;
         frame->torque_mnmm[d] = torque ? frame->torque_mnmm[d] : INT32_MIN;
-        frame->force_sigma_100un[d] = sigma && force ? frame->force_sigma_100un[d] : 0xFFFF;
     }
 }
 
@@ -92,7 +92,7 @@ static void assert_frames_are_those_of_the_full_session(uint8_t quantities)
 TEST(the_course_has_everything_in_it)
 {
     uint32_t seen = 0;
-    int states[4] = {0}, sigmas = 0, pressures = 0;
+    int states[4] = {0}, grips = 0, pressures = 0;
     for (int k = 0; k < full.count; k++) {
         bt_msg_frame frame;
         if (full.message[k].id != BT_FRAME_ID) {
@@ -102,7 +102,7 @@ TEST(the_course_has_everything_in_it)
         seen |= frame.flags;
         states[frame.tare_state]++;
         pressures += frame.pressure_force_100un != INT32_MIN;
-        sigmas += frame.poc_sigma_um != 0xFFFF;
+        grips += frame.normal_half_mn != 0xFFFF;
     }
     // All but a railed electrode, a minute of contact and a degree; and nobody asks who came back.
     uint32_t all = ((1u << 18) - 1 - (3u << 9)) | BT_FRAME_FLAG_SENSOR_UNSURE | BT_FRAME_FLAG_TARE_UNSURE | BY_POPULATION
@@ -113,7 +113,7 @@ TEST(the_course_has_everything_in_it)
     for (int s = 0; s < 4; s++) {
         assert_true(states[s] > 10);
     }
-    assert_true(sigmas > 100);
+    assert_true(grips > 100);
     assert_true(pressures > 100);
     assert_true(messages_of(&full, BT_TOUCH_ID, FIRST_FINGER) >= 4);
     assert_true(messages_of(&full, BT_TARE_ID, FIRST_FINGER) >= 8);
@@ -196,7 +196,6 @@ static void assert_rounds_are_tiled(uint8_t quantities)
     assert_int_equal(lean.status.force_skipped,
                      torque || quantities & BT_QUANTITY_FLAG_FORCE ? idle : rounds);
     assert_int_equal(lean.status.torque_skipped, torque ? idle : rounds);
-    assert_int_equal(lean.status.sigma_skipped, quantities & BT_QUANTITY_FLAG_SIGMA ? idle : rounds);
     assert_int_equal(lean.status.messages_dropped, 0);
 }
 
@@ -255,7 +254,7 @@ static void assert_touches_come_in_their_slot(uint8_t quantities)
 TEST(what_is_left_out_leaves_no_trace_in_what_is_not)
 {
     assert_int_equal(full.status.frames_idle + full.status.poc_skipped + full.status.force_skipped
-                         + full.status.torque_skipped + full.status.sigma_skipped,
+                         + full.status.torque_skipped,
                      0);
     for (size_t k = 0; k < sizeof subscriptions; k++) {
         for (int rest = 0; rest < 2; rest++) {

@@ -97,9 +97,10 @@ def test_the_description_names_channels_units_and_rate(inlet) -> None:
 def test_columns_are_the_rows() -> None:
     row = np.zeros(1, biotac.FRAME_DTYPE)
     row["force_n"], row["torque_nmm"], row["poc_mm"] = (1, 2, 3), (4, 5, 6), (7, 8, 9)
-    row["flags"], row["trust"], row["counts"] = 10, 11, np.arange(12, 31)
-    row["pdc"], row["tac"], row["tdc"] = 31, 32, 33
-    np.testing.assert_array_equal(samples(row), [np.arange(1, 34)])
+    row["normal_n"], row["normal_half_n"], row["shear_n"], row["shear_half_n"] = 10, 11, 12, 13
+    row["flags"], row["trust"], row["counts"] = 14, 15, np.arange(16, 35)
+    row["pdc"], row["tac"], row["tdc"] = 35, 36, 37
+    np.testing.assert_array_equal(samples(row), [np.arange(1, 38)])
 
 
 def test_events_are_markers_by_name(inlet) -> None:

@@ -62,7 +62,8 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
     events = [(topic, message.data) for topic, message in ros.published if topic.endswith("event")]
     assert {("biotac/finger0/event", "TOUCH"), ("biotac/finger1/event", "TOUCH")} <= {*events}
     topics = {topic for topic, _ in ros.published if not topic.endswith("event")}
-    assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in ("wrench", "poc", "flags", "trust")}
+    names = ("wrench", "poc", "grip", "flags", "trust")
+    assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in names}
     for topic in topics:
         sent = [values(message) for name, message in ros.published if name == topic]
         assert len(sent) == 300
@@ -81,7 +82,7 @@ def values(message: object) -> list[float]:
         return [getattr(v, axis) for v in (message.wrench.force, message.wrench.torque) for axis in "xyz"]
     if hasattr(message, "point"):
         return [getattr(message.point, axis) for axis in "xyz"]
-    return [float(message.data)]
+    return np.atleast_1d(message.data).astype(float).tolist()
 
 
 def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> None:

@@ -13,6 +13,7 @@ import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
 from biotac.core.compiled import default_settings
 from biotac.core.compute import per_frame
+from biotac.map import published_parts
 from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.wire import messages_gen as wire
 
@@ -34,8 +35,11 @@ def agrees(counts, tare, chosen=None, **given) -> np.ndarray:
     want = reference(counts, tare, chosen)
     assert got.dtype == RESULT_DTYPE
     assert got.shape == np.shape(counts)[:-1]
-    for name in RESULT_DTYPE.names:
+    for name in want._fields:
         np.testing.assert_array_equal(got[name], getattr(want, name).reshape(got[name].shape))
+    parts = published_parts(want.force_n, want.poc_mm).reshape(*got.shape, 2)
+    for name, part in zip(("normal_n", "shear_n"), np.moveaxis(parts, -1, 0), strict=True):
+        np.testing.assert_allclose(got[name], part, rtol=1e-9, atol=1e-9 * (1 + np.abs(want.force_n).max(initial=0)))
     return got
 
 
@@ -108,7 +112,7 @@ def test_no_frames_and_no_tare() -> None:
 
 
 def test_memory_in_any_order() -> None:
-    counts = random_counts(50, missing=0.01)
+    counts = random_counts(50)
     want = biotac.compute(counts, TARE)
     frames = np.zeros(50, FRAME_DTYPE)  # rows at odd addresses
     frames["counts"] = counts

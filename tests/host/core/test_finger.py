@@ -16,7 +16,7 @@ from biotac.wire import slots
 from biotac.wire.dtypes_gen import DTYPES
 
 WIRE_FIELDS = DTYPES[wire.Frame.ID].names
-EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.SIGMA
+EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE
 ALL_ROUNDS = EVERYTHING | QuantityFlags.REST_FRAMES
 
 
@@ -37,7 +37,7 @@ def words_of(name: str, finger: int) -> dict[str, np.ndarray]:
 def test_every_bit_is_the_one_that_the_simulated_board_sends(name: str) -> None:
     with biotac.open(f"sim:{name}") as hand:
         settings = hand.board.settings()
-        hand.stream("poc", "force", "torque", "sigma", "pac")
+        hand.stream("poc", "force", "torque", "pac")
         sent = hand.read_batch(60.0)
     tares = [m for m in sent.messages if isinstance(m, wire.Tare)]
     for index in np.unique(sent.wire["finger"]):

@@ -51,7 +51,7 @@ def test_the_header_is_read_as_the_boards_own_code_reads_it() -> None:
 @pytest.mark.parametrize("size", [0, _map.HEADER_BYTES - 1, _map.MAX_BYTES + 1])
 def test_what_cannot_be_a_map_by_its_size_is_not_sent(size: int) -> None:
     with biotac.open("sim:press.toml") as hand:
-        with pytest.raises(biotac.InputError, match=f"has {size} bytes, expected 24 to 20480"):
+        with pytest.raises(biotac.InputError, match=f"has {size} bytes, expected 32 to 20480"):
             hand.board.set_map(0, bytes(size))
         assert hand.status().rx_frames < 10
 
@@ -321,7 +321,7 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, recorded: Path, tmp_path
     own.write_text(map_file.dumps(blob))
     assert main(["calibration", "put", port, str(own), "--finger", "1", "--save"]) == 0
     output = capsys.readouterr().out
-    assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in output
+    assert "finger 1: wrench map in force, saved; force and torque, 3 block(s), 572 bytes, for any sensor" in output
     assert main(["calibration", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "finger 0: none, the board's settings apply"
@@ -353,7 +353,7 @@ def test_torsion_goes_wherever_results_go(tmp_path: Path) -> None:
         hand.board.set_map(0, blob)
         hand.record(path)
         hand.read_batch(100)
-    assert map_file.title(blob).startswith("force, torque and torsion, 1 block(s), 316 bytes")
+    assert map_file.title(blob).startswith("force, torque and torsion, 1 block(s), 324 bytes")
     recording = Recording(path)
     sent = recording.wire["torsion_mnmm"]
     mapped = (recording.wire["flags"] & biotac.FrameFlags.MAPPED) != 0

@@ -188,7 +188,7 @@ def test_readers_may_take_turns(live: Live) -> None:
         (("force",), False, 0b000010, 0b101),
         (("raw",), True, 0b010000, 0b101),
         (("pdc", "temperature"), False, 0, 0b101),
-        (("torque", "sigma", "touch", "status"), False, 0b101100, 0b101),
+        (("torque", "touch", "status"), False, 0b100100, 0b101),
         (("pac",), False, 0, 0b110),
     ],
 )

@@ -21,6 +21,7 @@ from biotac.map import board_map, bound, columns, file
 from biotac.map.board_map import BoardBlock, BoardMap, from_blob
 from biotac.map.fitted import WrenchMap
 from biotac.map.float64 import exact, result_units
+from biotac.map.margin import Margin
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.rounds import Rounds, frames_and_tares
 from biotac.wire import map_gen as _map
@@ -29,6 +30,7 @@ from biotac.wire.frames import tare_to_q4
 from biotac.wire.map_gen import Gate, Kind
 from biotac.wire.sensor_gen import ELECTRODE_UM
 
+UNKNOWN_BYTES = bytes([0xFF, 0xFF, 0, 0] * 2)  # a margin
 FORCE_MN, TORQUE_NMM = 10.0, 0.1  # RMS: as the issue asks for, and the same at the finger's 10 mm
 TARE = np.array([2955.0 + 31 * k for k in range(19)])
 
@@ -78,15 +80,25 @@ def test_a_blob_comes_back_to_the_bit() -> None:
         ]
         for one, other in zip(back.blocks, stored.blocks, strict=True):
             np.testing.assert_array_equal(one.coefficients, other.coefficients)
-        assert back.blob == stored.blob
+        assert back.blob == stored.blob and back.margin == stored.margin
 
 
 def test_the_layout_is_what_the_specification_says() -> None:
     coefficients = np.array([[1, -1, 0x7FFF, -0x7FFF, 0x1234, -0x1234]])
-    stored = BoardMap(6, (BoardBlock(Kind.PRESSURE, Gate.YY, (1, 2, 3, 4, 5, 30), coefficients),), "A", 7)
+    stored = BoardMap(
+        6,
+        (BoardBlock(Kind.PRESSURE, Gate.YY, (1, 2, 3, 4, 5, 30), coefficients),),
+        "A",
+        7,
+        Margin((300, 0xFFFF), (24, 0)),
+    )
     halves = [1, -1, 0x7FFF, 0, 0, 0, -0x7FFF, 0x1234, -0x1234, 0, 0, 0]
     assert stored.blob == (
-        bytes([2, 6, 1, 0]) + b"A" + bytes(15) + struct.pack("<I", 7) + bytes([7, 5, 1, 2, 3, 4, 5, 30, 0, 0, 0, 0])
+        bytes([3, 6, 1, 0])
+        + b"A"
+        + bytes(15)
+        + struct.pack("<I4H", 7, 300, 24, 0xFFFF, 0)
+        + bytes([7, 5, 1, 2, 3, 4, 5, 30, 0, 0, 0, 0])
     ) + struct.pack("<12h", *halves)
 
 
@@ -97,7 +109,9 @@ def test_torque_and_torsion_stand_behind_the_force_of_their_block() -> None:
     halves = [*coefficients[:, :3].ravel(), 0, 0, 0, *coefficients[:, 3:].ravel(), 0, 0, 0, 0]
     halves += [200, 201, 202, 0, 0, 0, 203, 204, 205, 206, 0, 0, 0, 0]
     heads = bytes([3, 1, 1, 2, 3, 4, 5, 6, 7, 0, 0, 0]) + bytes([0, 0, *(9,) * 7, 0, 0, 0])
-    assert stored.blob == bytes([2, 7, 2]) + bytes(21) + heads + struct.pack(f"<{len(halves)}h", *halves)
+    assert stored.blob == bytes([3, 7, 2]) + bytes(21) + UNKNOWN_BYTES + heads + struct.pack(
+        f"<{len(halves)}h", *halves
+    )
     np.testing.assert_array_equal(from_blob(stored.blob).blocks[0].coefficients, coefficients)
 
 
@@ -105,7 +119,7 @@ def test_pairs_go_round_a_ring() -> None:
     first, second = np.triu_indices(19)
     coefficients = np.stack([19 * first + second] * 3, axis=1)
     stored = BoardMap(3, (BoardBlock(Kind.SIGNAL_PAIRS, Gate.ONE, (1, 1, 1), coefficients),))
-    laid = np.frombuffer(stored.blob, "<i2", offset=36)[::3].reshape(19, 10)
+    laid = np.frombuffer(stored.blob, "<i2", offset=44)[::3].reshape(19, 10)
     for i, row in enumerate(laid):
         pairs = [sorted((i, (i + k) % 19)) for k in range(10)]
         assert row.tolist() == [19 * a + b for a, b in pairs]
@@ -114,11 +128,11 @@ def test_pairs_go_round_a_ring() -> None:
 
 def test_what_a_board_would_refuse_is_refused_in_words() -> None:
     blob = random_map(2).on_board().blob
-    for bad in (b"", blob[:-1], blob + b"\0", b"\3" + blob[1:], blob[:24] + b"\xff" + blob[25:]):
+    for bad in (b"", blob[:-1], blob + b"\0", b"\2" + blob[1:], blob[:32] + b"\xff" + blob[33:]):
         with pytest.raises(InputError, match=rf"refuse this wrench map of {len(bad)} bytes .* make the map again"):
             from_blob(bad)
     with pytest.raises(InputError, match="OUT_OF_RANGE"):
-        biotac.Finger(wrench_map=b"\3" + blob[1:])
+        biotac.Finger(wrench_map=b"\2" + blob[1:])
 
 
 @pytest.mark.parametrize(
@@ -180,7 +194,7 @@ def test_blocks_that_are_all_zero_are_left_away_and_signals_go_into_the_split() 
     split = (Kind.COMPRESSION, Kind.BULGE, Kind.SIGNAL_PAIRS, Kind.CONDUCTANCE, Kind.CONDUCTANCE_PAIRS)
     affine = random_map(4, pdc=False, unused=split).on_board()
     assert [(b.kind, b.gate) for b in affine.blocks] == [(Kind.SIGNAL, Gate.ONE), (Kind.OFFSET, Gate.ONE)]
-    assert len(affine.blob) == 24 + 2 * 12 + 2 * 3 * (20 + 2)
+    assert len(affine.blob) == 32 + 2 * 12 + 2 * 3 * (20 + 2)
 
 
 @pytest.mark.parametrize("axes", [3, 6, 7])
@@ -426,6 +440,9 @@ def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
     assert results.dtype == biotac.MAPPED_RESULT_DTYPE and np.isnan(results["torsion_nmm"]).all() == (axes < 7)
     if axes == 7:
         np.testing.assert_allclose(results["torsion_nmm"], frames["torsion_mnmm"] / 1e3, atol=3e-2)
+    for name in ("normal_n", "normal_half_n", "shear_n", "shear_half_n"):
+        sent = np.where(frames[name[:-1] + "mn"] == 0xFFFF, np.nan, frames[name[:-1] + "mn"] / 1e3)
+        np.testing.assert_allclose(results[name], sent, atol=5e-2)
     plain = biotac.compute(frames["counts"], tare)
     np.testing.assert_array_equal(results["poc_mm"], plain["poc_mm"])
     if axes == 3:

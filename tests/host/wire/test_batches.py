@@ -21,7 +21,7 @@ def frame(finger: int, seq: int, t_us: int, **fields: object) -> bytes:
 
 
 def status(uptime_s: int) -> bytes:
-    values = [uptime_s * 10**6 % 2**32, 0, uptime_s, *[0] * 16]
+    values = [uptime_s * 10**6 % 2**32, 0, uptime_s, *[0] * 14]
     return encode(wire.Status.ID, wire.Status(0, *values, finger_faults=(0,) * 5).pack())
 
 
@@ -60,11 +60,11 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
                 0,
                 poc_um=(wire.INVALID_I16,) * 3,
                 torque_mnmm=(wire.INVALID_I32, 0, 5),
-                poc_sigma_um=wire.INVALID_COUNT,
-                force_sigma_100un=(20, 30, 40),
                 pdc_filtered_q4=wire.INVALID_COUNT,
                 pressure_force_100un=wire.INVALID_I32,
                 torsion_mnmm=wire.INVALID_I32,
+                normal_mn=2050,
+                normal_half_mn=wire.INVALID_COUNT,
             )
         )
         .frames[0]
@@ -73,9 +73,8 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
     assert np.isnan(row["torque_nmm"][0])
     assert row["torque_nmm"][1:].tolist() == [0.0, 0.005]
     assert not np.isnan(row["force_n"]).any()
-    assert np.isnan(row["poc_sigma_mm"])
     assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"]) and np.isnan(row["torsion_nmm"])
-    assert row["force_sigma_n"].tolist() == [0.002, 0.003, 0.004]
+    assert row["normal_n"] == 2.05 and np.isnan(row["normal_half_n"]) and row["shear_n"] == 0.0
 
 
 @pytest.mark.parametrize("together", [True, False])

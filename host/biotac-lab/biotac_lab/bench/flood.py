@@ -39,7 +39,7 @@ def frames(count: int) -> list[bytes]:
     values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
     noise = np.random.default_rng(1).integers(1900, 3200, (256, 19))
     three: dict[str, Any] = {"poc_um": (-5497, 1667, -4799), "force_100un": (120, -340, 9000)}
-    three |= {"torque_mnmm": (8, 134, 29), "force_sigma_100un": (20, 20, 20)}
+    three |= {"torque_mnmm": (8, 134, 29)}
     out = []
     for k in range(count):
         counts = tuple(noise[k % 256].tolist())

@@ -29,7 +29,7 @@ DATA = "model.ckpt.data-00000-of-00001"
 SIDE, WRONG_DEG, FIRM_N, LIGHT_N = 0.3, 45.0, 0.5, (0.3, 2.0)
 LIGHT = f"{LIGHT_N[0]:g} to {LIGHT_N[1]:g} N"
 HEAD = ["recording", "by", "frames", "median deg", "p90", "y sign right", "y corr.", "x sign right", "pulls", "wrong",
-        "wrong flagged", "others flagged", "x, y in sigma", "RMSE N"]  # fmt: skip
+        "wrong flagged", "others flagged", "RMSE N"]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
             lin = biotac.compute(_counts(case.e), np.full(19, float(REST)), {Setting.FORCE_MODEL: ForceModel.LIN})[
                 "force_n"
             ]
-            rows += [[case.name, "default", *_judged(case, frames["force_n"], outside, frames["force_sigma_n"])]]
+            rows += [[case.name, "default", *_judged(case, frames["force_n"], outside)]]
             rows += [[case.name, "Lin's scales", *_judged(case, lin)]]
             rows += [[case.name, name, *_judged(case, net.force_n(case.e))] for name, net in nets.items()]
     text = (
@@ -117,18 +117,18 @@ def _counts(e: Any) -> Any:
 
 
 def _board(e: Any) -> Any:
-    finger = Finger({}, quantities=QuantityFlags.FORCE | QuantityFlags.SIGMA)
+    finger = Finger({}, quantities=QuantityFlags.FORCE)
     finger.feed(np.full((50, 19), REST))
     finger.set_tare(np.full(19, float(REST)))
     finger.hold()
     return to_frames(finger.feed(_counts(e)))
 
 
-def _judged(case: Case, force_n: Any, outside: Any | None = None, sigma_n: Any | None = None) -> list[Any]:
+def _judged(case: Case, force_n: Any, outside: Any | None = None) -> list[Any]:
     flagged = np.zeros(len(force_n), bool) if outside is None else outside
     pulls = float(((force_n[:, 2] < 0.0) & ~flagged).mean())
     if np.isnan(case.truth).all():
-        return [len(force_n), *[None] * 5, pulls, *[None] * 5]
+        return [len(force_n), *[None] * 5, pulls, *[None] * 4]
     size_n = np.linalg.norm(force_n, axis=1, keepdims=True)
     unit, into = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9) for v in (force_n, case.truth))
     off = angles_deg(unit, into)
@@ -136,11 +136,10 @@ def _judged(case: Case, force_n: Any, outside: Any | None = None, sigma_n: Any |
     right = [_share((force_n * into)[np.abs(into[:, axis]) > SIDE, axis] > 0.0) for axis in (1, 0)]
     flags = [None if outside is None else _share(flagged[rows]) for rows in (wrong, ~wrong)]
     error_n = force_n - (case.truth if case.in_n else into * size_n)
-    within = None if sigma_n is None else _share((np.abs(error_n) <= sigma_n)[~flagged, :2])
     rmse = float(np.sqrt((error_n**2).sum(axis=1).mean())) if case.in_n else None
     corr = float(np.corrcoef(unit[:, 1], into[:, 1])[0, 1])
     return [len(off), *np.percentile(off, (50, 90)).tolist(), right[0], corr, right[1], pulls, int(wrong.sum()), *flags,
-            within, rmse]  # fmt: skip
+            rmse]  # fmt: skip
 
 
 def _share(of: Any) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from biotac.calibrate.wrench import Run, load
 from ..report import Show, Table
 from . import held_out_error, training
 from .direction_command import of_population
+from .interval import Finger, population_margin
 
 ABOUT = "A force map for uncalibrated fingers, trained on other fingers on a force plate."
 EXAMPLE = "biotac-lab population F1.npz F2.npz --out population.json"
@@ -46,9 +48,9 @@ def run(args: argparse.Namespace, show: Show) -> int:
     if args.out is not None and args.out.exists() and not args.force:
         raise InputError(f"{args.out} exists; overwrite it (--force) or name another")
     with threadpool_limits(limits=THREADS, user_api="blas"):
-        runs = [training.aligned(load(path).run) for path in args.files]
+        fingers = [Finger.of(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
-        facts, trained = _calibrated(args, runs, tested)
+        facts, trained = _calibrated(args, fingers, tested)
         tables = _tables(facts)
         if tested is not None:
             tables.append(of_population(args.test.name, trained.population, tested))
@@ -60,16 +62,19 @@ def run(args: argparse.Namespace, show: Show) -> int:
     return 0
 
 
-def _calibrated(args: argparse.Namespace, runs: list[Run], tested: Run | None) -> tuple[dict[str, Any], Trained]:
-    fingers = [training.sums_of(run) for run in runs]
-    population = training.train(fingers, symmetric=args.symmetric)
-    sigma = held_out_error.sigma_of(fingers, runs, symmetric=args.symmetric)
+def _calibrated(args: argparse.Namespace, fingers: list[Finger], tested: Run | None) -> tuple[dict[str, Any], Trained]:
+    sums, runs = [one.sums for one in fingers], [one.aligned for one in fingers]
+    population = training.train(sums, symmetric=args.symmetric)
+    if len(fingers) > 1:
+        population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
+    sigma = held_out_error.sigma_of(sums, runs, symmetric=args.symmetric)
     facts: dict[str, Any] = {
         "files": [path.name for path in args.files],
         "symmetric": args.symmetric,
         "columns": COLUMNS,
         "sigma_n": sigma[0].tolist(),
         "sigma_scale5_n": sigma[1].tolist(),
+        "margin": [list(population.margin.base_mn), list(population.margin.share_q8)],
     }
     if tested is not None:
         facts["test"] = args.test.name

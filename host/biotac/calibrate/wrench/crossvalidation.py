@@ -16,9 +16,12 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
-from ...core.geometry import Floats
+from ...core.compute import compute
+from ...core.geometry import Floats, grip_parts
 from ...map.columns import GATED, PRESSURES, Signals, columns, index, with_one
 from ...map.fitted import WrenchMap
+from ...map.margin import Margin, fit_margin, published_parts
+from ...wire.sensor_gen import FULL_SCALE_COUNT
 from . import models
 from .lag import Lags
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
@@ -90,7 +93,20 @@ class Validation:
     def wrench_map(self) -> WrenchMap:
         """The map trained on the whole run."""
         run, final = self.run, self.final
-        return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best)
+        return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best, self.margin)
+
+    @property
+    def margin(self) -> Margin:
+        """The interval's margin of the force on the held-out blocks."""
+        return fit_margin(*self.parts(), self.run.truth[:, :3])
+
+    def parts(self) -> tuple[Floats, Floats]:
+        """Normal and shear (n, 2) in N as held out and in truth, at the contacts that a board finds."""
+        run = self.run
+        late = np.clip(np.arange(len(run.counts)) + self.final.lag_rows[2], 0, len(run.counts) - 1)
+        counts = np.clip(np.rint(run.counts[late]), 0, FULL_SCALE_COUNT).astype(np.uint16)
+        poc_mm = compute(counts, np.clip(run.tare, 0, FULL_SCALE_COUNT))["poc_mm"]
+        return published_parts(self.predicted[0, :, :3], poc_mm), grip_parts(run.truth[:, :3], poc_mm)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ class Page {
     this.limit = new Limit();
     this.plots = [
       new TimePlot(byId("force-plot"), ["x", "y", "z"], ["x", "y", "z"], { least: 1, digits: 1, zero: true, wide: ["appliedX", "appliedY", "appliedZ"], trust: true }),
+      new TimePlot(byId("grip-plot"), ["normal", "shear"], ["z", "x"], { least: 1, digits: 1, zero: true, halves: ["normalHalf", "shearHalf"] }),
       new TimePlot(byId("pdc-plot"), ["pdc"], ["text"], { least: 20, digits: 0, zero: false }),
     ];
     this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));

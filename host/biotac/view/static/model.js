@@ -61,6 +61,7 @@ export class Model {
       pocMm: scaled("poc_um") ?? [NaN, NaN, NaN],
       forceN: scaled("force_100un") ?? [NaN, NaN, NaN],
       appliedN: scaled("applied_100un", "force_100un") ?? [NaN, NaN, NaN],
+      gripN: scaled("grip_mn") ?? [NaN, NaN, NaN, NaN],
       torqueNmm: scaled("torque_mnmm") ?? [NaN, NaN, NaN],
       mapMm: row[column.map_um]?.map((um) => um / about.scales.poc_um) ?? null,
     };
@@ -72,7 +73,7 @@ export class Finger {
     this.latest = null;
     this.addedMs = 0; // when the latest came, by the browser's clock
     const ring = () => new Float64Array(HISTORY_ROWS).fill(NaN);
-    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring(), appliedX: ring(), appliedY: ring(), appliedZ: ring(), trust: ring() };
+    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring(), appliedX: ring(), appliedY: ring(), appliedZ: ring(), normal: ring(), normalHalf: ring(), shear: ring(), shearHalf: ring(), trust: ring() };
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
     this.pacSamples = 0;
@@ -87,6 +88,7 @@ export class Finger {
     this.history.t[at] = frame.tUs / 1e6;
     [this.history.x[at], this.history.y[at], this.history.z[at]] = frame.forceN;
     [this.history.appliedX[at], this.history.appliedY[at], this.history.appliedZ[at]] = frame.appliedN;
+    [this.history.normal[at], this.history.normalHalf[at], this.history.shear[at], this.history.shearHalf[at]] = frame.gripN;
     this.history.pdc[at] = frame.pdc;
     this.history.trust[at] = frame.trust;
     this.trail.push(frame.mapMm);

@@ -59,9 +59,10 @@ class Area {
 }
 
 export class TimePlot {
-  // names: columns of Finger.history; wide: those drawn behind them; colours: of both in the theme; least: the smallest span shown
-  constructor(canvas, names, colours, { least, digits, zero, wide = [], trust = false }) {
-    Object.assign(this, { canvas, names, colours, least, digits, zero, wide, trust });
+  // names: columns of Finger.history; wide: those drawn behind them; colours: of both in the theme; least: the smallest span shown;
+  // halves: columns of half widths of the band about each name
+  constructor(canvas, names, colours, { least, digits, zero, wide = [], halves = [], trust = false }) {
+    Object.assign(this, { canvas, names, colours, least, digits, zero, wide, halves, trust });
   }
 
   // marks: events of this finger, { t_us, name }
@@ -81,6 +82,17 @@ export class TimePlot {
     let free = area.right; // the newest comes first; a text that would reach into it is left out
     for (const mark of marks.toReversed()) free = this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / zoom.s, mark.name, free);
     c.lineJoin = "round";
+    this.halves.forEach((name, line) => {
+      [c.strokeStyle, c.lineWidth, c.globalAlpha] = [theme[this.colours[line]], 2, 0.15];
+      c.beginPath();
+      for (const k of shown) {
+        const [v, half] = [finger.history[this.names[line]][k], finger.history[name][k]];
+        if (Number.isNaN(half)) continue;
+        const x = area.x(1 - (endS - finger.history.t[k]) / zoom.s);
+        for (const end of [v - half, v + half]) c[end < v ? "moveTo" : "lineTo"](x, area.y(Math.min(Math.max((end - low) / (high - low), 0), 1)));
+      }
+      c.stroke();
+    });
     [...this.wide, ...this.names].forEach((name, k) => {
       const line = k % this.names.length;
       const wide = k < this.wide.length;

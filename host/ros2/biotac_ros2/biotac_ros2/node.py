@@ -12,7 +12,7 @@ import numpy as np
 import rclpy
 from geometry_msgs.msg import PointStamped, WrenchStamped
 from rclpy.node import Node
-from std_msgs.msg import String, UInt8, UInt32
+from std_msgs.msg import Float64MultiArray, String, UInt8, UInt32
 from std_srvs.srv import Trigger
 
 import biotac
@@ -21,6 +21,7 @@ from biotac.recording.layout import frame_id
 
 #: Reliable, so that every subscriber's quality of service fits; half a second of rounds.
 DEPTH = 50
+GRIP = ("normal_n", "normal_half_n", "shear_n", "shear_half_n")
 
 
 class Fingers(Node):
@@ -29,7 +30,8 @@ class Fingers(Node):
     Names, frames and values are those of `biotac export REC OUT.ros2`.
 
     ``biotac/finger0/wrench`` WrenchStamped in N and N*m, on the finger, about the origin of ``biotac_finger0``;
-    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md);
+    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/grip`` Float64MultiArray: normal, half its 95 % interval,
+    shear, half its interval, in N; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md);
     ``biotac/finger0/trust`` UInt8 (enum trust);
     ``biotac/finger0/slip`` UInt8, its slip_level: 0 where it does not slip, 255 where that is not known;
     ``biotac/finger0/event`` String, an event's kind (EventKind: SLIP, ...) as soon as it is told. What is
@@ -44,8 +46,8 @@ class Fingers(Node):
         self.hand = hand = biotac.open(self.get_parameter("port").value or None, pace=1.0)
         hand.stream("results", "events")
         self._stamps = Stamps(hand, lambda: self.get_clock().now().nanoseconds / 1e9)
-        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32, "event": String}
-        kinds |= {"trust": UInt8, "slip": UInt8}
+        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "grip": Float64MultiArray, "event": String}
+        kinds |= {"flags": UInt32, "trust": UInt8, "slip": UInt8}
         self._topics = {
             (finger, name): self.create_publisher(kind, f"biotac/finger{finger}/{name}", DEPTH)
             for finger in hand.fingers
@@ -83,6 +85,7 @@ class Fingers(Node):
         fill(point.point, row["poc_mm"] / 1000.0)
         self._topics[finger, "wrench"].publish(wrench)
         self._topics[finger, "poc"].publish(point)
+        self._topics[finger, "grip"].publish(Float64MultiArray(data=[float(row[name]) for name in GRIP]))
         self._topics[finger, "flags"].publish(UInt32(data=int(row["flags"])))
         self._topics[finger, "trust"].publish(UInt8(data=int(row["trust"])))
         self._topics[finger, "slip"].publish(UInt8(data=int(row["slip_level"])))

@@ -1,0 +1,176 @@
+"""How often the 95 % intervals of normal and shear hold the true part, on frames that the force's source had not seen.
+
+Three sources, of each of several fingers: its own map, with whole stretches of its recording left out; the population
+map, trained on the other fingers; Lin's gains, fitted to the other fingers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from biotac import Finger as BoardFinger
+from biotac import ForceModel, Setting, compute
+from biotac.calibrate.wrench import Run, validate
+from biotac.core import to_frames
+from biotac.core.geometry import grip_parts
+from biotac.map import Margin, bands, fit_margin, published_parts
+
+from .training import FingerSums, Floats, aligned, sums_of, train
+
+PARTS = ("normal", "shear")
+GAINS = (Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN)
+UNIT_NN = 1_000_000
+LEAST_N = 0.5
+ELECTRODES, MISSING, REST_ROUNDS = 19, 0xFFFF, 50
+Settings = dict[Setting, int]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Frames with their parts in N: ``felt_n``, ``half_n`` and ``truth_n`` (n, 2), and the true ``force_n`` (n, 3)."""
+
+    felt_n: Floats
+    half_n: Floats
+    truth_n: Floats
+    force_n: Floats
+
+    def touched(self) -> Judged:
+        """The frames of at least LEAST_N whose contact is known."""
+        rows = np.isfinite(self.felt_n).all(axis=1) & (np.linalg.norm(self.force_n, axis=1) >= LEAST_N)
+        return Judged(*(value[rows] for value in (self.felt_n, self.half_n, self.truth_n, self.force_n)))
+
+    @property
+    def within(self) -> npt.NDArray[np.bool_]:
+        """Whether each part (n, 2) is in its interval."""
+        return np.abs(self.felt_n - self.truth_n) <= self.half_n
+
+    def lines(self) -> Iterator[tuple[str, str, int, float, float, float]]:
+        """Part, band, rows, share within, median half width in N, and that over the RMS error; first over all."""
+        every = np.ones(len(self.force_n), np.bool_)
+        for part, name in enumerate(PARTS):
+            for band, rows in [("all", every), *bands(self.force_n)]:
+                error = (self.felt_n - self.truth_n)[rows, part]
+                half = float(np.median(self.half_n[rows, part]))
+                share = float(self.within[rows, part].mean())
+                yield name, band, int(rows.sum()), share, half, half / float(np.sqrt((error**2).mean()))
+
+
+def together(parts: Sequence[Judged]) -> Judged:
+    """The frames of several fingers."""
+    each = [(one.felt_n, one.half_n, one.truth_n, one.force_n) for one in parts]
+    return Judged(*(np.concatenate(columns) for columns in zip(*each, strict=True)))
+
+
+@dataclass(frozen=True)
+class Finger:
+    """A recording as loaded, and with its truth at the counts' time; counts (n, 19) of the latter as words."""
+
+    run: Run
+    aligned: Run
+    words: npt.NDArray[np.uint16]
+    sums: FingerSums
+
+    @classmethod
+    def of(cls, run: Run) -> Finger:
+        """From a recording as loaded. Raises RecordingError when force and counts do not belong together."""
+        one = aligned(run)
+        return cls(run, one, np.clip(np.rint(one.counts), 0, 4095).astype(np.uint16), sums_of(one))
+
+
+def population_rows(finger: Finger, others: Sequence[Finger], *, symmetric: bool = True) -> tuple[Judged, Floats]:
+    """A finger by the population map of the ``others``, with only the map's guess (n, 2) for a half width, which is
+    given again.
+    """
+    run = finger.aligned
+    population = train([other.sums for other in others], symmetric=symmetric)
+    poc_mm = compute(finger.words, run.tare)["poc_mm"]
+    felt = published_parts(population.published(run.counts, run.tare), poc_mm)
+    guess = population.judged(run.counts, run.tare).guess_n
+    return Judged(felt, guess, grip_parts(run.truth, poc_mm), run.truth), guess
+
+
+def population_margin(fingers: Sequence[Finger], *, symmetric: bool = True) -> tuple[Margin, list[Judged]]:
+    """The population map's margin, fitted to each finger by the map of the others, and these frames with it."""
+    each = [
+        population_rows(one, [other for other in fingers if other is not one], symmetric=symmetric) for one in fingers
+    ]
+    rows, guess = together([one for one, _ in each]), np.concatenate([one for _, one in each])
+    margin = fit_margin(rows.felt_n, rows.truth_n, rows.force_n, guess)
+    return margin, [replace(one, half_n=guess + margin.half_n(one.felt_n)) for one, guess in each]
+
+
+def lin_settings(others: Sequence[Finger]) -> Settings:
+    """Lin's gains as fitted to other fingers, axis by axis."""
+    unit = {Setting.FORCE_MODEL: ForceModel.LIN, **dict.fromkeys(GAINS, UNIT_NN)}
+    felt = np.concatenate([compute(one.words, one.aligned.tare, unit)["force_n"] for one in others])
+    truth = np.concatenate([one.aligned.truth for one in others])
+    gain = (felt * truth).sum(axis=0) / (felt**2).sum(axis=0)
+    return {
+        Setting.FORCE_MODEL: ForceModel.LIN,
+        **{one: round(UNIT_NN * value) for one, value in zip(GAINS, gain, strict=True)},
+    }
+
+
+def lin_rows(finger: Finger, others: Sequence[Finger]) -> Judged:
+    """A finger by gains fitted to the ``others``, as a board publishes it."""
+    found = _on_board(finger.words, finger.aligned.tare, lin_settings(others), None)
+    truth = finger.aligned.truth
+    return Judged(_parts(found), _halves(found), grip_parts(truth, found["poc_mm"]), truth)
+
+
+def own_rows(finger: Finger) -> tuple[Judged, Judged, bytes]:
+    """A finger by its own map, each block of it by the map of the others; and its map's blob for a board.
+
+    First with the margin that is fitted to all blocks, then with one that is fitted to every other block and judged on
+    the rest.
+    """
+    found = validate(finger.run)
+    felt, truth = found.parts()
+    force_n = finger.run.truth[:, :3]
+    whole = Judged(felt, found.margin.half_n(felt), truth, force_n)
+    half = np.full(felt.shape, np.nan)
+    odd = np.zeros(len(felt), np.bool_)
+    for block in range(1, len(found.folds), 2):
+        odd[found.blocks.rows(block)] = True
+    for fitted in (odd, ~odd):
+        half[~fitted] = fit_margin(felt[fitted], truth[fitted], force_n[fitted]).half_n(felt[~fitted])
+    return whole, replace(whole, half_n=half), found.wrench_map.on_board().blob
+
+
+def share_with_one_out(finger: Finger, settings: Settings, own_map: bytes | None) -> list[float]:
+    """Of frames whose force is known as a healthy finger's, how many hold it with one electrode out: normal and shear.
+
+    Of each electrode in turn, on a board where it is silent.
+    """
+    words, tare = finger.words, finger.aligned.tare
+    healthy = _parts(_on_board(words, tare, settings, own_map))
+    within = []
+    for electrode in range(ELECTRODES):
+        silent = words.copy()
+        silent[:, electrode] = MISSING
+        found = _on_board(silent, tare, settings, own_map)
+        within.append(np.abs(_parts(found) - healthy) <= _halves(found))
+    return [float(share) for share in np.concatenate(within).mean(axis=0)]
+
+
+def _on_board(
+    words: npt.NDArray[np.uint16], tare: Floats, settings: Settings, own_map: bytes | None
+) -> npt.NDArray[np.void]:
+    """Rows of FRAME_DTYPE as a board publishes them that was told the tare, and that the finger holds something."""
+    board = BoardFinger(settings, wrench_map=own_map)
+    board.feed(np.tile(np.rint(tare).astype(np.uint16), (REST_ROUNDS, 1)))
+    board.set_tare(tare)
+    board.hold()
+    return to_frames(board.feed(words))
+
+
+def _parts(rows: npt.NDArray[np.void]) -> Floats:
+    return np.column_stack([rows["normal_n"], rows["shear_n"]])
+
+
+def _halves(rows: npt.NDArray[np.void]) -> Floats:
+    return np.column_stack([rows["normal_half_n"], rows["shear_half_n"]])

@@ -1,0 +1,147 @@
+// Normal, shear and their half widths: against the formulas in double, at random and at the ends of what a
+// FRAME holds, and cause by cause.
+#include "support.h"
+
+#include "grip_parts.h"
+#include "solve/grip.h"
+#include "solve/solve.h"
+
+#include <math.h>
+
+static const bt_margin none = {{0, 0}, {0, 0}};
+static const bt_margin some = {{100, 200}, {16, 32}};
+
+static bt_msg_frame grip_of(const int16_t poc_um[3], const int32_t force_100un[3], bt_uncertainty uncertainty)
+{
+    bt_msg_frame msg;
+    for (int d = 0; d < 3; d++) {
+        msg.poc_um[d] = poc_um[d];
+        msg.force_100un[d] = force_100un[d];
+    }
+    bt_grip(&uncertainty, &msg);
+    return msg;
+}
+
+// A point of the core's surface as a board publishes it, in whole um.
+static void random_point(uint64_t *seed, int16_t poc_um[3])
+{
+    double tilt = (double)random_range(seed, -1500, 1500) / 1000, radius = BT_CORE_RADIUS_UM;
+    double up = random_range(seed, 0, 1) ? (double)random_range(seed, 0, 1500) / 1000 : 0;
+    poc_um[0] = (int16_t)(up > 0 ? lround(radius * sin(up)) : random_range(seed, -16000, 0));
+    poc_um[1] = (int16_t)lround(radius * cos(up) * sin(tilt));
+    poc_um[2] = (int16_t)lround(-radius * cos(up) * cos(tilt));
+}
+
+static double capped_n(int32_t force_100un)
+{
+    return fmax(-BT_GRIP_MAX_MN / 1e3, fmin(BT_GRIP_MAX_MN / 1e3, force_100un / 1e4));
+}
+
+// What rounding leaves of normal (times 1) and shear (times 2): half a mN of each component, root 3 / 2, and of the
+// part itself; in shear also of the normal and of its components. A unit normal is off by .17 / 1000, as its
+// point is rounded to whole um, and by root 3 / 2 in 2^14.
+static double bound_mn(double size_n, int times)
+{
+    return (.87 + .5) * times + .23 * size_n * times;
+}
+
+TEST(both_parts_are_the_formulas)
+{
+    uint64_t seed = 3;
+    double worst = 0;
+    for (int k = 0; k < 300000; k++) {
+        int16_t poc_um[3];
+        int32_t force_100un[3];
+        double poc_mm[3], force_n[3], part_n[2], size_n = 0;
+        random_point(&seed, poc_um);
+        int32_t top = k % 3 == 0 ? INT32_MAX : k % 3 == 1 ? 100000 : 3000;
+        for (int d = 0; d < 3; d++) {
+            force_100un[d] = (int32_t)random_range(&seed, -top, top);
+            poc_mm[d] = poc_um[d] / 1e3;
+            force_n[d] = capped_n(force_100un[d]);
+            size_n += force_n[d] * force_n[d];
+        }
+        size_n = sqrt(size_n);
+        grip_parts(poc_mm, force_n, part_n);
+        bt_msg_frame msg = grip_of(poc_um, force_100un, (bt_uncertainty){.margin = &some});
+        worst = fmax(worst, fabs(msg.normal_mn - 1e3 * part_n[0]) / bound_mn(size_n, 1));
+        worst = fmax(worst, fabs(msg.shear_mn - 1e3 * part_n[1]) / bound_mn(size_n, 2));
+        uint32_t size_mn = (uint32_t)msg.normal_mn + msg.shear_mn;
+        assert_int_equal(msg.normal_half_mn, 100 + (16 * size_mn + 128) / 256);
+        assert_int_equal(msg.shear_half_mn, 200 + (32 * size_mn + 128) / 256);
+    }
+    print_message("at worst %.2f of what rounding may leave\n", worst);
+    assert_true(worst <= 1);
+}
+
+// A push of 3 N into the pad with 1 N to the tip; the same as a pull.
+TEST(a_press_is_positive_and_a_pull_is_none)
+{
+    const int16_t pad_um[3] = {-4000, 0, -BT_CORE_RADIUS_UM};
+    const int32_t press[3] = {10000, 0, 30000}, pull[3] = {10000, 0, -30000};
+    bt_msg_frame msg = grip_of(pad_um, press, (bt_uncertainty){.margin = &none});
+    assert_true(msg.normal_mn == 3000 && msg.shear_mn == 1000);
+    msg = grip_of(pad_um, pull, (bt_uncertainty){.margin = &none});
+    assert_true(msg.normal_mn == 0 && msg.shear_mn == 1000);
+}
+
+TEST(each_cause_widens_both_by_what_it_says)
+{
+    const int16_t pad_um[3] = {-4000, 0, -BT_CORE_RADIUS_UM};
+    const int32_t press[3] = {10000, 0, 30000};
+    const struct {
+        bt_uncertainty cause;
+        int normal_mn, shear_mn;
+    } cases[] = {
+        {{.margin = &none}, 0, 0},
+        {{.margin = &some}, 100 + 250, 200 + 500},
+        {{.margin = &none, .guess_mn = {70, 30}}, 70, 30},
+        {{.margin = &none, .noise_q4 = 24}, 24, 24}, // 1.5 counts
+        {{.margin = &none, .out = 2}, 500, 500},     // a sixteenth of 4 N for each
+        {{.margin = &none, .tare_unconfirmed = true}, 2000, 2000},
+        {{.margin = &some, .guess_mn = {70, 30}, .noise_q4 = 24, .out = 1, .tare_unconfirmed = true},
+         350 + 70 + 24 + 250 + 2000,
+         700 + 30 + 24 + 250 + 2000},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        bt_msg_frame msg = grip_of(pad_um, press, cases[k].cause);
+        assert_int_equal(msg.normal_half_mn, cases[k].normal_mn);
+        assert_int_equal(msg.shear_half_mn, cases[k].shear_mn);
+    }
+}
+
+TEST(what_is_too_large_saturates_and_what_is_unknown_says_so)
+{
+    const int16_t pad_um[3] = {-4000, 0, -BT_CORE_RADIUS_UM}, nowhere[3] = {BT_INVALID_I16, 0, 0};
+    const int32_t most[3] = {INT32_MAX, -INT32_MAX, INT32_MAX}, unknown[3] = {BT_INVALID_I32, 0, 0};
+    const bt_margin largest = {{BT_INVALID_COUNT - 1, BT_INVALID_COUNT}, {BT_MARGIN_SHARE_MAX_Q8, 0}};
+    const bt_uncertainty all = {&largest, {30300, 30300}, UINT16_MAX, BT_ELECTRODES, true};
+    bt_msg_frame msg = grip_of(pad_um, most, all);
+    assert_in_range(msg.normal_mn, BT_GRIP_MAX_MN - 10, BT_GRIP_MAX_MN + 10);
+    assert_in_range(msg.shear_mn, 52300, 52350); // root 2 of it
+    assert_int_equal(msg.normal_half_mn, BT_INVALID_COUNT - 1);
+    assert_int_equal(msg.shear_half_mn, BT_INVALID_COUNT);
+    for (int k = 0; k < 2; k++) {
+        msg = grip_of(k ? nowhere : pad_um, k ? most : unknown, all);
+        assert_true(msg.normal_mn == BT_INVALID_COUNT && msg.shear_mn == BT_INVALID_COUNT);
+        assert_true(msg.normal_half_mn == BT_INVALID_COUNT && msg.shear_half_mn == BT_INVALID_COUNT);
+    }
+}
+
+TEST(what_bulges_may_hide_from_lins_gains_ends_at_4_n)
+{
+    uint32_t guess_mn[2];
+    bt_lin_guess(10000, guess_mn);
+    assert_true(guess_mn[0] == 1000 && guess_mn[1] == 398);
+    bt_lin_guess(303000, guess_mn);
+    assert_true(guess_mn[0] == 4000 && guess_mn[1] == 1593);
+    bt_population_guess(0, true, 303000, guess_mn);
+    assert_true(guess_mn[0] == 30300 && guess_mn[1] == 30300);
+    bt_population_guess(256, false, 303000, guess_mn);
+    assert_true(guess_mn[0] == 0 && guess_mn[1] == 0);
+}
+
+int main(void)
+{
+    return run_all(NULL, NULL);
+}
