@@ -17,7 +17,7 @@ from biotac.sim.loading import load_source
 
 spidev = pytest.importorskip("spidev", reason="spidev is not installed: pip install 'biotac-gateway[bus]' (Linux)")
 smbus2 = pytest.importorskip("smbus2", reason="smbus2 is not installed: pip install 'biotac-gateway[bus]' (Linux)")
-SHIM = Path(__file__).resolve().parents[2] / "support/spi_shim.c"
+SHIM = Path(__file__).resolve().parent / "spi_shim.c"
 #: What the library asks of a device, and the type of the answer or the error, as JSON; for the fake and the real one.
 ASK = """
 import json
