@@ -174,7 +174,8 @@ bt_port *port_init(int argc, char **argv)
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     struct stat input;
     if (fstat(STDIN_FILENO, &input) == 0 && S_ISFIFO(input.st_mode)) {
-        // A program's board ends with that pipe: a signal to all of a terminal's or a service's is not for it.
+        // A program's board ends with that pipe: a signal to all of a terminal's or a service's is not for
+        // it.
         (void)signal(SIGINT, SIG_IGN);
         (void)signal(SIGTERM, SIG_IGN);
         (void)signal(SIGHUP, SIG_IGN);

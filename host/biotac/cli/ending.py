@@ -54,11 +54,18 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
         return
     if frame is not None and (frame.f_code.co_name == "__del__" or "importlib" in frame.f_code.co_filename):
         # What is raised there is printed and lost.
-        threading.Timer(AGAIN_S, signal.raise_signal, [number]).start()
+        threading.Timer(AGAIN_S, _again, [number]).start()
         return
     if time.monotonic() - _last_s >= ONCE_S:
         _last_s = time.monotonic()
         raise KeyboardInterrupt
+
+
+def _again(number: int) -> None:
+    if hasattr(signal, "pthread_kill"):  # so that what the main thread waits in is interrupted
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
 
 
 @contextlib.contextmanager

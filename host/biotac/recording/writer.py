@@ -195,7 +195,8 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
         raise InputError(f"{path} is a folder; name a file in it")
     if path.suffix != ".mcap" and (path.suffix or not path.exists() or path.is_file()):
         raise InputError(
-            f"{path}: a recording is an .mcap file; record to {path.name.partition('.')[0]}.mcap, then `biotac export`"
+            f"{path}: a recording is an .mcap file; record to {path.name.partition('.')[0]}.mcap, "
+            "then use `biotac export`"
         )
     try:
         fd = os.open(path, os.O_RDWR | os.O_CREAT | (0 if overwrite else os.O_EXCL) | getattr(os, "O_BINARY", 0), 0o666)

@@ -178,13 +178,13 @@ def test_a_lost_part_of_rounds_put_one_by_one_is_sent_again(scripted_board, hell
     board.plug(source)
     board._samples = board._samples[:0]  # nothing ahead
     for k, words in enumerate(source.samples, 1):
-        board.put(words)
+        board.put(words[None])
         if k % 20 == 0:
             board.send_lost()
     assert board.status().slots_taken == len(fake.rows) and fake.rows == rows_of(source)
     fake.rows.clear()  # a restart
     for words in source.samples:
-        board.put(words)
+        board.put(words[None])
     with pytest.raises(DeviceLostError, match="has 0 slots of its tape"):
         board.send_lost()
     board.close()

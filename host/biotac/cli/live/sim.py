@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import signal
+import time
 from pathlib import Path
 
 from ...documents import write_new
@@ -24,6 +24,7 @@ from ..recordings.loading import load
 from . import sensor_board
 from .board_on_pty import tell, tell_over, until_ctrl_c
 
+LOOK_S = 0.5
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
 SCENARIO_S = 600.0
 
@@ -101,10 +102,11 @@ def run(args: argparse.Namespace) -> int:
         facts = {"source": source.name, "fingers": source.samples.shape[1]}
         tell(board, args, source.name, facts)
         while not board.over:
-            board.hear(None)
+            board.hear(LOOK_S)  # a signal just before an endless wait would not end that
         if args.seconds is None:
             tell_over(source.name)
-            signal.pause()
+            while True:
+                time.sleep(LOOK_S)
     return 0
 
 
