@@ -36,6 +36,7 @@ _ALL_GOOD = -1
 _Q = wire.QuantityFlags
 _RESULTS = _Q.POC | _Q.FORCE | _Q.TORQUE
 _QUANTITY = {"poc_mm": _Q.POC, "force_n": _Q.FORCE, "torque_nmm": _Q.TORQUE, "torsion_nmm": _Q.TORQUE}
+_QUANTITY |= dict.fromkeys(_NUMBERS, _Q.POC | _Q.FORCE)
 
 # Looked up once: a call with one frame takes less time than a few of these would.
 _buffer = ffi.from_buffer
@@ -102,7 +103,7 @@ def compute(
         if quantities & (_Q.FORCE | _Q.TORQUE):
             by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
         for name, quantity in _QUANTITY.items():
-            if not quantities & quantity:
+            if quantity & ~quantities:
                 out[name] = np.nan
         return out
     formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
