@@ -48,6 +48,7 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
     source = "sim:shear.toml?fingers=2&seconds=3"
     with biotac.open(source, pace=0) as hand:
         hand.record(tmp_path / "a.mcap")
+        hand.stream("results", "events")  # as the node does: without events a slip_level is not known
         hand.read(10.0)
     export(biotac.Recording(tmp_path / "a.mcap"), tmp_path / "a.ros2")
     bag: dict[str, list[object]] = {}
@@ -62,7 +63,7 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
     events = [(topic, message.data) for topic, message in ros.published if topic.endswith("event")]
     assert {("biotac/finger0/event", "TOUCH"), ("biotac/finger1/event", "TOUCH")} <= {*events}
     topics = {topic for topic, _ in ros.published if not topic.endswith("event")}
-    names = ("wrench", "poc", "grip", "flags", "trust")
+    names = ("wrench", "poc", "grip", "flags", "trust", "slip")
     assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in names}
     for topic in topics:
         sent = [values(message) for name, message in ros.published if name == topic]

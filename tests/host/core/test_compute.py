@@ -306,10 +306,10 @@ def test_what_is_not_wanted_is_nan_and_the_rest_is_the_same(wanted) -> None:
     counts = random_counts(50)
     want, got = biotac.compute(counts, TARE), biotac.compute(counts, TARE, quantities=quantities)
     live = biotac.per_frame(TARE, quantities=quantities)
-    needs = dict(zip(RESULT_DTYPE.names, biotac.QuantityFlags(7), strict=False))  # what follows is the grip
-    for name in RESULT_DTYPE.names:
-        needed = needs.get(name, biotac.QuantityFlags.POC | biotac.QuantityFlags.FORCE)
-        asked = np.full_like(want[name], np.nan) if needed & ~quantities else want[name]
+    both = biotac.QuantityFlags.POC | biotac.QuantityFlags.FORCE
+    needed = [*biotac.QuantityFlags(7), *[both] * 4]
+    for name, quantity in zip(RESULT_DTYPE.names, needed, strict=True):
+        asked = want[name] if quantities & quantity == quantity else np.full(want[name].shape, np.nan)
         np.testing.assert_array_equal(got[name], asked)
         np.testing.assert_array_equal(live(counts[7])[name], asked[7])
 
