@@ -48,7 +48,7 @@ _Static_assert(4 * (1 << RATTLE_PAIRS_LOG2) < JOLT_LEVELS * RATTLE_LEVELS
 _Static_assert(BT_EVENTS_PAIRS == 11,
                "1490/8192 is 2/11, and 5/64 of a root is that of a mean change of one sample");
 
-static void forget_pairs(bt_events *events)
+static BT_NOINLINE void forget_pairs(bt_events *events)
 {
     events->pair = MISSING;
     for (int k = 0; k < BT_EVENTS_APART; k++) {
@@ -143,7 +143,7 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 
 // ---- dynamic pressure
 
-static uint32_t integer_root(uint32_t square)
+static BT_NOINLINE uint32_t integer_root(uint32_t square)
 {
     uint32_t found = 0;
     for (uint32_t bit = 1u << 15; bit != 0; bit >>= 1) {
@@ -154,7 +154,7 @@ static uint32_t integer_root(uint32_t square)
 }
 
 // What one change must exceed to be evidence is some of this.
-static uint32_t unit_of(const bt_events *events)
+static BT_NOINLINE uint32_t unit_of(const bt_events *events)
 {
     const uint32_t rattle = RATTLE_LEVELS * events->rattle_count2;
     const uint32_t unit = rattle > events->level_count2 ? rattle : events->level_count2;
@@ -246,14 +246,14 @@ static inline void add_up(const bt_events *events, unsigned pairs, uint32_t cap,
     *sums = (changes){full, all, rose, peak};
 }
 
-static inline uint32_t take_off(uint32_t evidence, uint32_t by, uint32_t most)
+static BT_NOINLINE uint32_t take_off(uint32_t evidence, uint32_t by, uint32_t most)
 {
     const uint32_t left = evidence > by ? evidence - by : 0;
     return left > most ? most : left;
 }
 
 // The number of the first sample of the first pair that rises, or falls, by more than noise.
-static uint32_t first_change(const bt_events *events, uint32_t toll, bool falls)
+static BT_NOINLINE uint32_t first_change(const bt_events *events, uint32_t toll, bool falls)
 {
     unsigned k = 0;
     for (;; k++) {
@@ -376,11 +376,13 @@ static inline uint32_t judge(bt_events *events, uint32_t unit)
 uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME],
                        unsigned end)
 {
-    if (events->pairs_done >= end / 2) { // the end of the round before was missed
-        events->pairs_done = 0;
+    const unsigned ended = end / 2, begun = events->pairs_done < ended ? events->pairs_done : 0;
+    if (begun != events->pairs_done || ended - begun > BT_EVENTS_APART) { // some were missed
+        events->pairs_done = (uint8_t)(ended - BT_EVENTS_APART);
+        events->now += 2 * (events->pairs_done - begun);
         forget_pairs(events);
     }
-    const unsigned pairs = end / 2 - events->pairs_done;
+    const unsigned pairs = ended - events->pairs_done;
     follow(events, pac + 2 * events->pairs_done, pairs);
     const uint32_t unit = unit_of(events);
     const bool shook = shakes(events);

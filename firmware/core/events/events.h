@@ -57,7 +57,7 @@ typedef struct {
     uint32_t energy_count2; // at the latest TOUCH or LIFT
     uint16_t pair;          // sum of the latest two samples
     // Of the latest four, at each pair: those before, then those that have just come.
-    uint16_t four[BT_EVENTS_APART + BT_EVENTS_PAIRS];
+    uint16_t four[2 * BT_EVENTS_APART];
 } bt_events;
 
 void bt_events_reset(bt_events *events);

@@ -252,16 +252,24 @@ TEST(noise_is_eleven_sixteenths_of_a_level)
     assert_int_equal(events.shake_began, 100000 + 2);
 }
 
-// The first five pairs of a round that was begun late have nothing to be compared with.
+// Of a round that was begun late only the latest four pairs are looked at, which have nothing to be compared
+// with.
 TEST(a_first_stretch_that_was_missed_is_no_change)
 {
     for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
-        pac[k] = (uint16_t)(k < 10 ? 3000 : 3050);
+        pac[k] = (uint16_t)(k < 14 ? 3000 : 3050);
     }
-    events.pairs_done = 7;
+    events.pairs_done = 7; // of the round before
     (void)bt_events_pac(&events, &tare, pac, 15);
-    assert_int_equal(events.shaken_count2, 100 * 100 + 200 * 200);
-    assert_int_equal(events.now, 100014);
+    assert_true(events.shaken_count2 == 0 && events.now == 100014);
+    (void)bt_events_pac(&events, &tare, pac, BT_PAC_PER_FRAME);
+    assert_int_equal(events.now, 100022);
+    assert_int_equal(events.round_count2, 0); // its end
+    (void)held(NULL);
+    (void)bt_events_pac(&events, &tare, pac, 8);
+    (void)bt_events_pac(&events, &tare, pac, BT_PAC_PER_FRAME); // seven pairs at once
+    assert_int_equal(events.now, 100022);
+    assert_int_equal(events.pairs_done, 0);
 }
 
 // Two changes' share of a round's noise, as a mean over many rounds at rest, within limits.
