@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x47862903u
+#define BT_SCHEMA_HASH 0xEA108B10u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -145,9 +145,10 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
+#define BT_FRAME_FLAG_TARE_LIKELY (1u << 9) // the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since
 #define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
-#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
+#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
 #define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are railed or missing: do not trust the results
 #define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
@@ -161,12 +162,12 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
 #define BT_FRAME_FLAG_POPULATION (1u << 25) // force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force
 #define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on that half of its interval is as wide as the touch is strong
-#define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
+#define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
 #define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
 #define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
-#define BT_FRAME_FLAGS 0xFFFFF9FFu // all there are
+#define BT_FRAME_FLAGS 0xFFFFFBFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
@@ -201,12 +202,11 @@ enum bt_event_kind {
 #define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages; sent while FRAMES or PAC is on
 #define BT_QUANTITY_FLAGS 0xF7u // all there are
 
-// Flags of a FRAME or IDLE that hold trust down to this level.
+// Flags of a FRAME or IDLE that hold trust down to this level; LATCHED: that STATUS keeps.
 #define BT_TRUST_FLAGS_NONE 0x40008002u
 #define BT_TRUST_FLAGS_HOLD 0x09800000u
-#define BT_TRUST_FLAGS_INTERVAL 0xB6292170u
-#define BT_FRAME_FLAGS_LATCHED 0x71E1A1F0u // in STATUS, until CLEAR_FAULTS
-
+#define BT_TRUST_FLAGS_INTERVAL 0xB6292370u
+#define BT_TRUST_FLAGS_LATCHED 0x71E1A1F0u
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]
     BT_SETTING_FORCE_GAIN_X_NN = 2, // [nN/count]
@@ -572,7 +572,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_get_point;
 
-// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL).
+// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE.
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {
@@ -580,14 +580,15 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_tare_now;
 
-// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded.
+// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or it is older than ten minutes and of a press, it stays TARE_UNSURE.
 #define BT_TARE_SET_ID 0x85
-#define BT_TARE_SET_BYTES 42
+#define BT_TARE_SET_BYTES 46
 typedef struct {
     uint8_t req_id; // [1] 1 to 255
     uint8_t finger; // [1] chip select index
     uint16_t tare_q4[19]; // [count q4] tare of E1 to E19, in 1/16 count
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: unknown
+    uint32_t age_ms; // [ms] how long ago the finger read this at rest; 0xFFFFFFFF: unknown
 } bt_msg_tare_set;
 
 // Ask for STATUS.
@@ -874,7 +875,7 @@ static const uint8_t bt_client_layout[] = {
     BT_TAKE_LINK_ID, 2, 0x01, 0x41,
     BT_GET_POINT_ID, 1, 0x02,
     BT_TARE_NOW_ID, 1, 0x02,
-    BT_TARE_SET_ID, 2, 0x02, 0x54,
+    BT_TARE_SET_ID, 3, 0x02, 0x54, 0x81,
     BT_GET_STATUS_ID, 1, 0x01,
     BT_GET_SENSOR_STATUS_ID, 1, 0x02,
     BT_GET_SENSOR_INFO_ID, 1, 0x02,
@@ -933,7 +934,7 @@ typedef char bt_msg_subscribe_lies_so[sizeof(bt_msg_subscribe) == 3 ? 1 : -1];
 typedef char bt_msg_take_link_lies_so[sizeof(bt_msg_take_link) == 4 ? 1 : -1];
 typedef char bt_msg_get_point_lies_so[sizeof(bt_msg_get_point) == 2 ? 1 : -1];
 typedef char bt_msg_tare_now_lies_so[sizeof(bt_msg_tare_now) == 2 ? 1 : -1];
-typedef char bt_msg_tare_set_lies_so[sizeof(bt_msg_tare_set) == 42 ? 1 : -1];
+typedef char bt_msg_tare_set_lies_so[sizeof(bt_msg_tare_set) == 48 ? 1 : -1];
 typedef char bt_msg_get_status_lies_so[sizeof(bt_msg_get_status) == 1 ? 1 : -1];
 typedef char bt_msg_get_sensor_status_lies_so[sizeof(bt_msg_get_sensor_status) == 2 ? 1 : -1];
 typedef char bt_msg_get_sensor_info_lies_so[sizeof(bt_msg_get_sensor_info) == 2 ? 1 : -1];
@@ -992,7 +993,7 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_TAKE_LINK_FIELDS(X) X(req_id, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_GET_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_TARE_NOW_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_TARE_SET_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
+#define BT_TARE_SET_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(age_ms, u32, 1)
 #define BT_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_GET_SENSOR_STATUS_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_GET_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)

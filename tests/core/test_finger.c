@@ -95,8 +95,8 @@ TEST(a_missing_slot_is_marked_and_never_stale)
     rounds(20);
     for (int slot = 0; slot < BT_SLOTS; slot++) {
         assert_true(round_without((uint64_t)1 << slot));
-        uint32_t want = BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE
-                        | BT_FRAME_FLAG_TARE_UNSURE;
+        uint32_t want = BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_POPULATION
+                        | BT_FRAME_FLAG_OUTSIDE | BT_FRAME_FLAG_TARE_UNSURE;
         if (slot % 2 == 0) {
             assert_int_equal(pac.pac[slot / 2], BT_INVALID_COUNT);
         } else if (slot >= E1_SLOT) {
@@ -217,7 +217,7 @@ TEST(a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on)
                                 << 12; // 5/16 over the counts
     }
     rounds(20);
-    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    assert_int_equal(bt_tare_set(&finger.tare, &base, 0), BT_ERROR_OK);
     assert_false(round_without(UINT64_MAX)); // a silent round is no next frame
     rounds(1);
     assert_true(tare_changed);
@@ -305,7 +305,7 @@ TEST(a_tare_set_before_the_sensor_answers_is_kept)
         base.electrode_q16[i] = (uint32_t)(slot_count(electrode_slot(i)) - 1) << 16;
     }
     base.pdc_q16 = BT_TARE_UNKNOWN;
-    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    assert_int_equal(bt_tare_set(&finger.tare, &base, 0), BT_ERROR_OK);
     for (int k = 0; k < 60; k++) {
         assert_false(round_without(~0ull));
     }

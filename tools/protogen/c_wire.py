@@ -2,19 +2,7 @@
 
 from __future__ import annotations
 
-from .schema import (
-    FINGER_AT,
-    GENERATED,
-    REQ_ID_AT,
-    TYPE_BYTES,
-    Contract,
-    Field,
-    Message,
-    c_header,
-    entries,
-    latched,
-    trust_levels,
-)
+from .schema import FINGER_AT, GENERATED, REQ_ID_AT, TYPE_BYTES, Contract, Field, Message, c_header, entries, flag_masks
 
 PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
@@ -64,9 +52,8 @@ def vocabulary(contract: Contract) -> list[str]:
         ]
         known = sum(1 << entry["bit"] for entry in entries(flags).values())
         out += [f"#define BT_{name.upper()}_FLAGS 0x{known:X}u // all there are", ""]
-    out += ["// Flags of a FRAME or IDLE that hold trust down to this level."]
-    out += [f"#define BT_TRUST_FLAGS_{name} 0x{mask:08X}u" for name, mask in trust_levels(link).items()]
-    out += [f"#define BT_FRAME_FLAGS_LATCHED 0x{latched(link):08X}u // in STATUS, until CLEAR_FAULTS", ""]
+    out += ["// Flags of a FRAME or IDLE that hold trust down to this level; LATCHED: that STATUS keeps."]
+    out += [f"#define BT_TRUST_FLAGS_{name} 0x{mask:08X}u" for name, mask in flag_masks(link).items()]
     out += ["enum bt_setting {"]
     out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
     out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from .c_map import BLOCK_BYTES, EXPONENTS, HEADER_BYTES, columns, gate_max, halves
-from .schema import GENERATED, Contract, Field, Message, entries, latched, trust_levels
+from .schema import GENERATED, Contract, Field, Message, entries, flag_masks
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 NUMPY_CODE = {"u8": "u1", "u16": "<u2", "u32": "<u4", "i16": "<i2", "i32": "<i4"}
@@ -125,10 +125,11 @@ def wire(contract: Contract) -> str:
         out += doc_table(f"{name.upper()}_DOC", ((e["value"], e) for e in entries(enum).values()))
     for name, flags in link["flags"].items():
         out += doc_table(f"{name.upper()}_FLAG_DOC", ((1 << e["bit"], e) for e in entries(flags).values()))
-    levels = (f"Trust.{name}: FrameFlags(0x{mask:08X})," for name, mask in trust_levels(link).items())
-    out += ["", "# Flags that hold trust down to a level."]
+    masks = flag_masks(link)
+    out += ["", "# Flags that STATUS keeps until CLEAR_FAULTS, and those that hold trust down to a level."]
+    out += [f"LATCHED_FLAGS = FrameFlags(0x{masks.pop('LATCHED'):08X})"]
+    levels = (f"Trust.{name}: FrameFlags(0x{mask:08X})," for name, mask in masks.items())
     out += table("TRUST_FLAGS: dict[Trust, FrameFlags]", "{", "}", levels)
-    out += [f"LATCHED_FLAGS = FrameFlags(0x{latched(link):08X})  # in STATUS, until CLEAR_FAULTS", ""]
     out += ["", "class Setting(IntEnum):", '    """Ids of the settings; see SETTINGS for units and ranges."""', ""]
     out += [f"    {name.upper()} = {s['id']}" for name, s in link["setting"].items()]
     out += ["", "", "class SettingSpec(NamedTuple):", '    """Unit, range and default of one setting."""', ""]

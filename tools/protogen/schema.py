@@ -132,19 +132,13 @@ def entries(table: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {name: entry for name, entry in table.items() if name != "doc"}
 
 
-def trust_levels(link: dict[str, Any]) -> dict[str, int]:
-    """Levels below ACT, the lowest first, each with the mask of frame flags that hold a force down to it."""
-    flags = entries(link["flags"]["frame"])
-    return {
-        name: sum(1 << flag["bit"] for flag in flags.values() if flag.get("trust") == name)
-        for name in entries(link["enum"]["trust"])
-        if name != "ACT"
+def flag_masks(link: dict[str, Any]) -> dict[str, int]:
+    """Of the frame flags: those of each level of trust below ACT, and as LATCHED those that STATUS keeps."""
+    flags = entries(link["flags"]["frame"]).values()
+    masks = {
+        level: sum(1 << f["bit"] for f in flags if f.get("trust") == level) for level in ("NONE", "HOLD", "INTERVAL")
     }
-
-
-def latched(link: dict[str, Any]) -> int:
-    """Mask of the frame flags that STATUS keeps."""
-    return sum(1 << flag["bit"] for flag in entries(link["flags"]["frame"]).values() if flag.get("latched"))
+    return masks | {"LATCHED": sum(1 << f["bit"] for f in flags if f.get("latched"))}
 
 
 def per_finger(link: dict[str, Any]) -> list[str]:

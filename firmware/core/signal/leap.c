@@ -5,12 +5,13 @@
 
 #include <string.h>
 
-#define TDC_LEAP 64   // two degrees
-#define HEARD    48   // far above a quiet PAC's noise
-#define ALIKE    608  // in sum, 32 each
-#define FAR      1216 // in sum, with pressure's
-#define PRESSURE 4    // so often pressure counts
-#define SWINGS   16   // so many swings of PAC a blow's sum is less than
+#define TDC_LEAP  64   // two degrees
+#define PDC_ALIKE 12   // another sensor's pressure is hundreds of counts away
+#define HEARD     48   // far above a quiet PAC's noise
+#define ALIKE     608  // in sum, 32 each
+#define FAR       1216 // in sum, with pressure's
+#define PRESSURE  4    // so often pressure counts
+#define SWINGS    16   // so many swings of PAC a blow's sum is less than
 
 static bool pac_swings(const uint16_t *pac, uint32_t swing)
 {
@@ -49,7 +50,7 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth
     }
 }
 
-static bool tdc_leaps(bt_leap *leap, uint16_t tdc)
+static bool tdc_leaps(bt_leap *leap, uint16_t tdc, uint16_t pdc)
 {
     if (!bt_count_usable(tdc)) {
         leap->settled = (uint8_t)(leap->settled - (leap->settled != 0));
@@ -60,6 +61,7 @@ static bool tdc_leaps(bt_leap *leap, uint16_t tdc)
         return false;
     }
     bool leaps = leap->off == BT_LEAP_ROUNDS;
+    leap->pdc = near ? pdc : leap->pdc;
     leap->tdc = tdc;
     leap->off = 0;
     leap->settled = (uint8_t)(near ? leap->settled + (leap->settled < BT_LEAP_ROUNDS) : 0);
@@ -92,8 +94,10 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
     memcpy(leap->pac, round->pac, sizeof leap->pac);
     leap->rounds = (uint8_t)(leap->rounds + (leap->rounds < BT_LEAP_ROUNDS));
     leap->heard = leap->heard || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
-    if (tdc_leaps(leap, round->tdc) || exchanged) {
+    const uint16_t pdc = trigger->smooth.lane[BT_LANE_PDC];
+    bool leaps = tdc_leaps(leap, round->tdc, pdc);
+    if ((leaps && bt_abs32(pdc - leap->pdc) > PDC_ALIKE) || exchanged) {
         return BT_SENSOR_FAULT_EXCHANGED;
     }
-    return together ? BT_SENSOR_FAULT_TOGETHER : BT_SENSOR_FAULT_NONE;
+    return together || leaps ? BT_SENSOR_FAULT_TOGETHER : BT_SENSOR_FAULT_NONE;
 }

@@ -22,6 +22,7 @@ typedef struct {
     bool alike;      // they leapt in it, all alike
     bool heard;      // PAC has swung: it works
     uint16_t tdc;    // of the latest round in which it did not leap
+    uint16_t pdc;    // static pressure with it
     uint8_t settled; // rounds in which it did not, less those without it; at most BT_LEAP_ROUNDS
     uint8_t off;     // rounds since
 } bt_leap;

@@ -36,9 +36,11 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     flags |= tare->held ? BT_FRAME_FLAG_HELD : 0;
     if (bt_tare_touched(tare)) {
         flags |= tare->state == BT_TARE_STATE_DOUBT ? BT_FRAME_FLAG_DOUBT : BT_FRAME_FLAG_CONTACT;
-        flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
+        flags |= tare->contact_rounds > BASE_OLD_FRAMES || tare->drifted ? BT_FRAME_FLAG_BASE_OLD : 0;
     }
-    flags |= tare->unsure && tare->tared ? BT_FRAME_FLAG_TARE_UNSURE : 0;
+    if (tare->tared && (tare->unsure || tare->likely)) {
+        flags |= tare->unsure ? BT_FRAME_FLAG_TARE_UNSURE : BT_FRAME_FLAG_TARE_LIKELY;
+    }
     flags |= tare->witness.flat ? BT_FRAME_FLAG_PDC_FLAT : 0;
     return flags;
 }

@@ -174,7 +174,7 @@ static uint8_t tare_set(bt_session *session, const uint8_t *payload)
         return BT_ERROR_OUT_OF_RANGE;
     }
     base.pdc_q16 = msg.pdc_tare_q4 == BT_INVALID_COUNT ? BT_TARE_UNKNOWN : (uint32_t)msg.pdc_tare_q4 << 12;
-    return bt_tare_set(&session->finger[msg.finger].tare, &base);
+    return bt_tare_set(&session->finger[msg.finger].tare, &base, msg.age_ms);
 }
 
 static uint8_t set_held(bt_session *session, uint8_t fingers, bool held)

@@ -2,7 +2,7 @@
 
 void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags)
 {
-    uint32_t against = BT_FRAME_FLAGS_LATCHED;
+    uint32_t against = BT_TRUST_FLAGS_LATCHED;
     // Before its first tare a finger is untared in any case.
     against |= session->finger[f].tare.reason != BT_TARE_REASON_NONE ? BT_FRAME_FLAG_UNTARED : 0;
     session->finger_faults[f] |= flags & against;

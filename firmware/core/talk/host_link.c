@@ -34,7 +34,13 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
 // If the controller is gone, holds last for a while; then the fingers are judged by their signals again.
 static void lapse_holds(bt_session *session, uint32_t now_us)
 {
-    if (session->hold_timeout_us == 0 || now_us - session->heard_us <= session->hold_timeout_us) {
+    // A host that streams may be as silent as its keep-alive allows: without one, where time waits for it,
+    // for ever.
+    const bool streams = session->streams != 0;
+    const uint32_t allowed_us = streams ? session->keepalive_ms * 1000u : 0;
+    const uint32_t timeout_us = allowed_us > session->hold_timeout_us ? allowed_us : session->hold_timeout_us;
+    if (session->hold_timeout_us == 0 || (streams && allowed_us == 0)
+        || now_us - session->heard_us <= timeout_us) {
         return;
     }
     for (int f = 0; f < BT_MAX_FINGERS; f++) {

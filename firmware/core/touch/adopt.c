@@ -48,6 +48,7 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     bt_adopt_aim_pressure(tare);
     tare->hits = 0;
     tare->contact_rounds = 0;
+    tare->drifted = false;
     tare->let_go = false;
     bt_release_begin(&tare->release);
     bt_thermal_begin(&tare->thermal);

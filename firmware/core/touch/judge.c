@@ -8,7 +8,9 @@
 #include <stddef.h>
 
 #define FAINT_Q16              (1 << 16) // what all electrodes share and may be drift
-#define DRIFT_ROUNDS_PER_COUNT 400       // 15 counts/min, the worst drift measured
+#define PATTERN_SHARE          4         // of a press's energy is not shared by all electrodes, at least
+#define DRIFTED_Q16            (2 << 16)
+#define DRIFT_ROUNDS_PER_COUNT 400 // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
 
 _Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
@@ -72,7 +74,10 @@ static void judge_release(bt_tare *tare)
     // still hold what it was tared with; and if that goes, pressure will be far below, and the tare is lost.
     bool back = sweep.witness && tare->release.pdc_peak >= BT_PDC_PRESSED
                 && (int32_t)bt_abs32(sweep.above) <= bt_pdc_missing_max(tare->release.pdc_peak);
-    tare->unsure = tare->unsure && (verdict == BT_RELEASE_SHIFT || !(back || tare->let_go));
+    bool confirmed = verdict != BT_RELEASE_SHIFT && (back || tare->let_go);
+    bool light = verdict == BT_RELEASE_SHIFT && sweep.above > BT_QUIET_PDC; // may be, of 0.1 or 0.2 N
+    tare->unsure = tare->unsure && !confirmed;
+    tare->likely = (tare->likely && !confirmed) || light;
     if (verdict == BT_RELEASE_SHIFT) {
         bt_adopt_shift(tare);
     } else if (verdict == BT_RELEASE_CLEAN) {
@@ -82,6 +87,31 @@ static void judge_release(bt_tare *tare)
     } else if (tare->state == BT_TARE_STATE_CONTACT) {
         bt_adopt_doubt(tare);
     }
+}
+
+// A tare that the host gave, and what the finger read in a sweep: at rest, or pressed as pressure and a
+// pattern of the electrodes agree, or neither.
+static bool fits(const bt_tare *tare)
+{
+    uint32_t energy = 0;
+    int32_t sum = 0;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        if (tare->base.electrode_q16[i] != BT_TARE_UNKNOWN && !(tare->trigger.unknown >> i & 1)) {
+            int32_t e = (tare->sweep.mean_q3.lane[i] >> 3) - bt_baseline_count(tare->base.electrode_q16[i]);
+            energy += (uint32_t)(e * e);
+            sum += e;
+        }
+    }
+    uint32_t uneven = energy - (uint32_t)((int64_t)sum * sum / BT_ELECTRODES);
+    if (!tare->pressure_seen || tare->base.pdc_q16 == BT_TARE_UNKNOWN) {
+        return energy < BT_CALM_COUNT2;
+    }
+    int32_t above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - bt_baseline_count(tare->base.pdc_q16);
+    uint64_t pressure2 = (uint64_t)((int64_t)above * above);
+    bool rests = energy < BT_SETTLED_COUNT2 && above < BT_PDC_PRESSED && above > -BT_MISSING_PDC;
+    bool pressed = above >= BT_PDC_PRESSED && uneven >= energy / PATTERN_SHARE
+                   && uneven <= pressure2 * BT_FLAT_SHARE && pressure2 <= (uint64_t)uneven * BT_MOVES_SHARE;
+    return rests || (pressed && !tare->aged);
 }
 
 static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
@@ -116,6 +146,9 @@ static void judge_drift(bt_tare *tare)
     bool steady = rests ? watch->level_sweeps >= BT_LEVEL_SWEEPS : bt_watch_level(watch);
     bool level = valid && shown && !tare->partial && steady;
     bool creeps = touched && bt_watch_creeps(watch);
+    bool alike =
+        bt_tare_touched(tare) && valid && watch->one_way && bt_abs32(watch->shared_q16) > DRIFTED_Q16;
+    tare->drifted = tare->drifted || alike;
     watch->follows = level && touched && !(creeps && bt_drift_known(&tare->drift));
     if (level && !creeps) {
         bt_drift_learn(&tare->drift);
@@ -133,11 +166,12 @@ BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
     bt_watch_end(&tare->watch, tare->pressure_seen ? &tare->sweep.mean_q3.lane[BT_LANE_PDC] : NULL);
     judge_drift(tare);
     if (tare->state == BT_TARE_STATE_INIT) {
-        if (tare->sweep.still_sweeps >= BT_TARE_STILL_SWEEPS && !tare->held) {
+        if (tare->sweep.still_sweeps >= BT_TARE_STILL_SWEEPS) {
             // Measured before there is a threshold: a worn sensor's noise must not look like a touch.
             bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
             bt_adopt_present(tare, BT_TARE_REASON_START);
             tare->unsure = true;
+            tare->likely = false;
         }
     } else if (tare->state == BT_TARE_STATE_REST && !tare->partial) {
         bt_rollback_keep(&tare->rollback, &tare->base);
@@ -146,6 +180,11 @@ BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
         }
     } else if (bt_tare_touched(tare)) {
         end_touched_sweep(tare, settings);
+    }
+    if (tare->unchecked && tare->age_rounds >= 2 * BT_SWEEP_ROUNDS && tare->state != BT_TARE_STATE_INIT) {
+        tare->unchecked = false;
+        tare->unsure = !fits(tare);
+        tare->likely = true;
     }
     tare->energy_count2 = 0;
     tare->sum_q4 = 0;

@@ -8,6 +8,7 @@
 
 #include <string.h>
 
+#define FRESH_MS    600000   // of a tare that a host gives back
 #define NOW_SPAN_Q3 (32 * 8) // from a still signal's latest filtered count to its mean: ten sigmas
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
@@ -172,25 +173,32 @@ uint8_t bt_tare_now(bt_tare *tare)
     if (!present_is_still(tare)) {
         return BT_ERROR_NOT_STILL;
     }
+    // Only a release shows that a tare is of rest: without one it is likely, and of what presses it is a
+    // hold's.
+    bool pressed =
+        bt_tare_touched(tare) && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) >= BT_PDC_PRESSED;
+    tare->likely = tare->likely || tare->unsure || tare->state != BT_TARE_STATE_REST;
+    tare->unsure = pressed && !tare->witness.flat;
     bt_adopt_present(tare, BT_TARE_REASON_HOST_NOW);
-    tare->unsure = false;
     return BT_ERROR_OK;
 }
 
-uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base)
+uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base, uint32_t age_ms)
 {
     if (tare->state == BT_TARE_STATE_FAULT) {
         return BT_ERROR_RAILED;
     }
     bt_adopt(tare, base, BT_TARE_STATE_REST, BT_TARE_REASON_HOST_SET);
-    tare->unsure = false;
+    tare->unsure = true; // until bt_judge_told
+    tare->unchecked = true;
+    tare->aged = age_ms > FRESH_MS;
     return BT_ERROR_OK;
 }
 
 void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept)
 {
-    *kept =
-        (bt_tare_kept){tare->base, tare->drift.sure.q20, tare->drift.sure.sweeps, tare->held, tare->unsure};
+    *kept = (bt_tare_kept){tare->base, tare->drift.sure.q20, tare->drift.sure.sweeps,
+                           tare->held, tare->unsure,         tare->likely};
 }
 
 void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept)
@@ -200,6 +208,7 @@ void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept)
     bt_drift_revert(&tare->drift);
     tare->held = kept->held;
     tare->unsure = kept->unsure;
+    tare->likely = kept->likely;
 }
 
 void bt_tare_hold(bt_tare *tare)
@@ -227,7 +236,10 @@ static void let_judge(bt_tare *tare, uint8_t reason)
 void bt_tare_release(bt_tare *tare)
 {
     tare->let_go = true;
-    tare->unsure = tare->unsure && tare->state != BT_TARE_STATE_REST;
+    if (tare->unsure && tare->state == BT_TARE_STATE_REST) {
+        tare->unsure = false;
+        tare->likely = true;
+    }
     let_judge(tare, BT_TARE_REASON_HOST_RELEASE);
 }
 

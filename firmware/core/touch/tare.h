@@ -38,9 +38,11 @@ bool bt_tare_pressure(bt_tare *tare, uint16_t count);
 void bt_tare_temperature(bt_tare *tare, uint16_t tdc);
 void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings);
 
-// Host commands; they return an enum bt_error. NOW needs two still sweeps; both are refused in FAULT.
+// Host commands; they return an enum bt_error. NOW needs two still sweeps; both are refused in FAULT. What
+// SET gives is compared with a sweep: whatever contradicts it leaves it unsure, and nothing but a release
+// makes it sure.
 uint8_t bt_tare_now(bt_tare *tare);
-uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
+uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base, uint32_t age_ms);
 
 // What outlives a reset of the board, so that a grip goes on with the tare from before it: it drifts on as it
 // did, is held if it was, and if it was in doubt it still is.
@@ -48,7 +50,7 @@ typedef struct {
     bt_baseline base;
     int32_t drift_q20;
     uint8_t drift_sweeps;
-    bool held, unsure;
+    bool held, unsure, likely;
 } bt_tare_kept;
 
 void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept);

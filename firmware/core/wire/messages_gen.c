@@ -1114,6 +1114,7 @@ void bt_msg_tare_set_pack(const bt_msg_tare_set *msg, uint8_t out[BT_TARE_SET_BY
         at = put(at, (uint32_t)msg->tare_q4[k], 2);
     }
     at = put(at, (uint32_t)msg->pdc_tare_q4, 2);
+    at = put(at, (uint32_t)msg->age_ms, 4);
     (void)at;
 }
 
@@ -1131,6 +1132,8 @@ void bt_msg_tare_set_unpack(bt_msg_tare_set *msg, const uint8_t in[BT_TARE_SET_B
     }
     at = get(at, &value, 2);
     msg->pdc_tare_q4 = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->age_ms = (uint32_t)value;
     (void)at;
 }
 

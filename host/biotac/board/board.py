@@ -194,7 +194,7 @@ class Board:
     def restore(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations, maps and subscriptions.
 
-        Not tares: after a restart the board takes its own, and an earlier one may be wrong by then. Raises
+        Not tares, which watch.py gives back with their age. Raises
         CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.
         """
         for (what, number), again in list(self._lasting.items()):

@@ -10,6 +10,8 @@ from __future__ import annotations
 import functools
 import operator
 import secrets
+from collections.abc import Callable
+from contextlib import suppress
 
 from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError, StreamTakenError
 from ..wire import messages_gen as wire
@@ -29,7 +31,10 @@ SILENCE_S = 3.0
 class StreamWatch:
     """Watches ``stream`` of ``board``; with ``reconnect``, also brings back a board that was lost."""
 
-    def __init__(self, board: Board, stream: Stream, *, reconnect: bool) -> None:
+    def __init__(
+        self, board: Board, stream: Stream, *, reconnect: bool, tares: Callable[[], list[wire.TareSet]] = list
+    ) -> None:
+        self._tares = tares
         self._board = board
         self._reader = board.reader
         self._stream = stream
@@ -174,6 +179,9 @@ class StreamWatch:
             # Before START, because rows may come with its reply.
             reader.gaps.begin(reason)
             board.restore()
+            for tare in self._tares() if reason == "rebooted" else []:
+                with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
+                    board.tell(tare)
             self._stream.resume()
             self._heard_us = None
 

@@ -19,7 +19,7 @@ from ..wire import sensor_gen as sensor
 from ..wire import slots
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import INVALID_U32
-from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
+from ..wire.frames import StructArray, age_ms, frames_from_wire, tare_to_q4
 from ..wire.identity import is_foreign
 from ..wire.native import ffi, lib
 from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
@@ -157,8 +157,10 @@ class Finger:
         """Do TARE_NOW: the latest means become the tare. Raises CommandRefusedError while the signals move."""
         _accept("TARE_NOW", lib.bt_tare_now(ffi.addressof(self._finger, "tare")))
 
-    def set_tare(self, counts: Any, pdc: float | None = None) -> None:
+    def set_tare(self, counts: Any, pdc: float | None = None, *, age_s: float | None = None) -> None:
         """Do TARE_SET: use ``counts`` (19,), 0..4095 counts, from the next round on; ``pdc`` likewise, None: unknown.
+
+        ``age_s`` is how long ago the finger read this at rest, in s; None: unknown.
 
         Values are rounded to 1/16 count, as in the message. Raises ValueError for other shapes and ranges,
         CommandRefusedError if more than two electrodes are railed.
@@ -171,7 +173,7 @@ class Finger:
         base = ffi.new("bt_baseline *")
         base.electrode_q16 = q16[:_ELECTRODES]
         base.pdc_q16 = INVALID_U32 if pdc is None else q16[_ELECTRODES]
-        _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base))
+        _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base, age_ms(age_s)))
 
     def hold(self) -> None:
         """Do HOLD: no new tare is taken until release() or lapse()."""

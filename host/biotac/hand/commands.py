@@ -13,7 +13,7 @@ from ..board.board import Board
 from ..board.stream import ALL_FINGERS
 from ..errors import DeviceLostError
 from ..wire import messages_gen as wire
-from ..wire.frames import tare_to_q4
+from ..wire.frames import age_ms, tare_to_q4
 from .views import Latest, finger_index
 
 Finger: TypeAlias = str | SupportsIndex
@@ -84,11 +84,19 @@ class Commands:
         return self.ask(wire.GetPoint(0, self.index(finger)), wire.Point)
 
     def tare(self, finger: Finger) -> None:
-        """Tare now. Raises CommandRefusedError while the signals move, KeyError for a finger that is not there."""
+        """Tare now; what pressure shows to be a press is tared, too, but flagged TARE_UNSURE.
+
+        Raises CommandRefusedError while the signals move, KeyError for a finger that is not there.
+        """
         self.tell(wire.TareNow(0, self._latest.present(finger)))
 
-    def set_tare(self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None) -> None:
+    def set_tare(
+        self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None, *, age_s: float | None = None
+    ) -> None:
         """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, rounded to 1/16 count; ``pdc_counts`` likewise.
+
+        ``age_s`` is how long ago the finger read this at rest, in s; None: unknown. The board compares it with what the
+        finger reads, and flags it until a release has confirmed it: TARE_LIKELY if they agree, else TARE_UNSURE.
 
         Raises ValueError for another shape or range.
         """
@@ -97,7 +105,7 @@ class Commands:
             raise ValueError(f"tare_counts has shape {tare.shape}, expected (19,)")
         tare_q4 = tuple(tare_to_q4(tare).tolist())
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else int(tare_to_q4(np.float64(pdc_counts)))
-        self.tell(wire.TareSet(0, self.index(finger), tare_q4, pdc_q4))
+        self.tell(wire.TareSet(0, self.index(finger), tare_q4, pdc_q4, age_ms(age_s)))
 
     def hold(self, *fingers: Finger) -> None:
         """Say that these fingers (names or chip selects; none: all) hold something: no new tare until ``release``.

@@ -80,7 +80,7 @@ class Hand:
         self._subscriptions = Subscriptions(reader, self._stream, self._callbacks, self._reading, self._latest)
         self._recorders: list[Recorder] = []  # the open one last
         self._rounds: Rounds | None = None  # once a program asks for rounds
-        self._watch = StreamWatch(board, self._stream, reconnect=reconnect)
+        self._watch = StreamWatch(board, self._stream, reconnect=reconnect, tares=self._latest.tares)
         self._watch.start()
         # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
         self._parts = board, self._stream, self._watch, self._callbacks, self._recorders

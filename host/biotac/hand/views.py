@@ -17,8 +17,8 @@ from ..board.gap import FINGERS_IN
 from ..board.reader import Reader
 from ..errors import InputError
 from ..wire.batches import Batch
-from ..wire.frames import FRAME_DTYPE, Frame, StructArray, frames_from_wire
-from ..wire.messages_gen import INVALID_COUNT, FrameFlags, Trust
+from ..wire.frames import FRAME_DTYPE, Frame, StructArray, age_ms, frames_from_wire
+from ..wire.messages_gen import INVALID_COUNT, FrameFlags, TareSet, Trust
 from ..wire.sensor_gen import MAX_SENSORS
 
 T = TypeVar("T")
@@ -66,6 +66,7 @@ class Latest:
         self._troubles = troubles
         self._reader = reader
         self._batches: dict[int, Batch] = {}  # by finger: the latest that has it
+        self._framed: dict[int, Batch] = {}  # likewise, of those with FRAMEs
         self._news = threading.Condition()
         self._waiters = 0
 
@@ -98,8 +99,20 @@ class Latest:
     def put(self, batch: Batch) -> None:
         for finger in FINGERS_IN[batch.fingers]:
             self._batches[finger] = batch
+            if len(batch.wire):
+                self._framed[finger] = batch
         if self._waiters:
             self.wake()
+
+    def tares(self) -> list[TareSet]:
+        """What gives a board that restarted the latest tares that were worth something, with their age."""
+        told = []
+        for finger, batch in self._framed.items():
+            rows = batch.wire[(batch.wire["finger"] == finger) & (batch.wire["trust"] >= Trust.INTERVAL)]
+            if len(rows) and (rows["tare_q4"][-1] != INVALID_COUNT).all():
+                tare_q4, pdc_q4 = tuple(rows["tare_q4"][-1].tolist()), int(rows["pdc_tare_q4"][-1])
+                told.append(TareSet(0, finger, tare_q4, pdc_q4, age_ms(time.monotonic() - batch.arrived_s)))
+        return told
 
     def wake(self) -> None:
         with self._news:

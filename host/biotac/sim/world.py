@@ -253,7 +253,6 @@ def world(
         if opened is None:
             live.release()
         else:
-            opened.board.set_setting(Setting.HOLD_TIMEOUT_MS, 0)
             for name, value in (settings or {}).items():
                 opened.board.set_setting(Setting[name.upper()], value)
             for name, board_map in (maps or {}).items():

@@ -316,6 +316,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("finger", "u1"),
             ("tare_q4", "<u2", (19,)),
             ("pdc_tare_q4", "<u2"),
+            ("age_ms", "<u4"),
         ]
     ),
     wire.GetStatus.ID: np.dtype(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, INVALID_U8, PAC_FIELDS, Field, dtype_of
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, INVALID_U8, INVALID_U32, PAC_FIELDS, Field, dtype_of
 from .fields import FORCE_LSB_PER_N as FORCE_LSB_PER_N
 from .fields import MNMM_PER_NMM as MNMM_PER_NMM
 from .fields import Q4_PER_COUNT as Q4_PER_COUNT
@@ -126,6 +126,13 @@ def tare_to_q4(tare_counts: ArrayLike) -> NDArray[np.uint16]:
     if bad.any():
         raise ValueError(f"the tare holds {tare[bad].flat[0]:g}, expected 0..{FULL_SCALE_COUNT} counts")
     return np.floor(tare * Q4_PER_COUNT + 0.5).astype(np.uint16)
+
+
+def age_ms(age_s: float | None) -> int:
+    """The age of a tare in TARE_SET, from seconds; None: unknown. Raises ValueError for a negative one or NaN."""
+    if age_s is not None and not age_s >= 0:
+        raise ValueError(f"age_s is {age_s}, expected 0 or more, or None where it is unknown")
+    return INVALID_U32 if age_s is None else round(min(1000 * age_s, INVALID_U32 - 1))
 
 
 def electrode_signals(messages: StructArray) -> NDArray[np.float64]:

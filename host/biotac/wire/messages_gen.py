@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x47862903
+SCHEMA_HASH = 0xEA108B10
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -170,9 +170,10 @@ class FrameFlags(IntFlag):
     PDC_MISSING = 1 << 6  # no good static pressure word; contact is judged by the electrodes alone
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
+    TARE_LIKELY = 1 << 9  # the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since
     TORSION_OK = 1 << 11  # suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
     SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
-    BASE_OLD = 1 << 13  # in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
+    BASE_OLD = 1 << 13  # in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
     TARE_CHANGED = 1 << 14  # first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
     FAULT = 1 << 15  # more than two electrodes are railed or missing: do not trust the results
     TEMP = 1 << 16  # the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
@@ -186,7 +187,7 @@ class FrameFlags(IntFlag):
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
     POPULATION = 1 << 25  # force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force
     OUTSIDE = 1 << 26  # nothing touches, or the signals are so unlike those that the population map was trained on that half of its interval is as wide as the touch is strong
-    TARE_UNSURE = 1 << 27  # the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then
+    TARE_UNSURE = 1 << 27  # the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
     ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
     SENSOR_FAULT = 1 << 30  # the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
@@ -363,9 +364,10 @@ FRAME_FLAG_DOC: dict[int, str] = {
     64: "no good static pressure word; contact is judged by the electrodes alone",
     128: "no good thermal flux word",
     256: "no good temperature word",
+    512: "the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since",
     2048: "suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing",
     4096: "more than half of the signal energy is bulge: the PoC is probably biased",
-    8192: "in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes",
+    8192: "in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes",
     16384: "first frame with a new tare, or after HOLD or RELEASE (see the TARE message)",
     32768: "more than two electrodes are railed or missing: do not trust the results",
     65536: "the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain",
@@ -379,7 +381,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
     33554432: "force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains in force",
     67108864: "nothing touches, or the signals are so unlike those that the population map was trained on that half of its interval is as wide as the touch is strong",
-    134217728: "the tare was taken when the board started, and nothing has confirmed since that the finger held nothing then",
+    134217728: "the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since",
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
     536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",
     1073741824: "the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results",
@@ -423,14 +425,13 @@ QUANTITY_FLAG_DOC: dict[int, str] = {
 }
 
 
-# Flags that hold trust down to a level.
+# Flags that STATUS keeps until CLEAR_FAULTS, and those that hold trust down to a level.
+LATCHED_FLAGS = FrameFlags(0x71E1A1F0)
 TRUST_FLAGS: dict[Trust, FrameFlags] = {
     Trust.NONE: FrameFlags(0x40008002),
     Trust.HOLD: FrameFlags(0x09800000),
-    Trust.INTERVAL: FrameFlags(0xB6292170),
+    Trust.INTERVAL: FrameFlags(0xB6292370),
 }
-
-LATCHED_FLAGS = FrameFlags(0x71E1A1F0)  # in STATUS, until CLEAR_FAULTS
 
 
 class Setting(IntEnum):
@@ -516,7 +517,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.HOLD_TIMEOUT_MS: SettingSpec(
         "ms", 0, 3600000, 2000,
-        "how long a HOLD lasts after the host's last message; 0: without limit",
+        "how long a HOLD lasts after the host's last message; not before a stream's keep-alive; 0, or while a stream without keep-alive is on: without limit",
     ),
     Setting.FORCE_MODEL: SettingSpec(
         "enum force_model", 0, 1, 1,
@@ -1661,7 +1662,7 @@ class GetPoint:
 
 @dataclass(frozen=True, slots=True)
 class TareNow:
-    """Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL)."""
+    """Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE."""
 
     req_id: int
     finger: int
@@ -1688,23 +1689,25 @@ class TareNow:
 
 @dataclass(frozen=True, slots=True)
 class TareSet:
-    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded."""
+    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or it is older than ten minutes and of a press, it stays TARE_UNSURE."""
 
     req_id: int
     finger: int
     tare_q4: tuple[int, ...]
     pdc_tare_q4: int
+    age_ms: int
 
     ID: ClassVar[int] = 0x85
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB19HH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB19HHI")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 42 bytes."""
+        """Payload without id and CRC, 46 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.finger,
             *self.tare_q4,
             self.pdc_tare_q4,
+            self.age_ms,
         )
 
     @classmethod
@@ -1716,6 +1719,7 @@ class TareSet:
             v[1],
             v[2 : 21],
             v[21],
+            v[22],
         )
 
 

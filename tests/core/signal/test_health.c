@@ -156,7 +156,8 @@ TEST(what_was_exchanged_stays_so_until_a_host_tares)
     sampled.tdc = 2000;
     rounds(200, 0, 0);
     sampled.tdc = 1000;
-    rounds(8, 0, 0);
+    proven = true;
+    rounds(10, 100, 0); // by 25 counts of pressure
     for (int by_host = 0; by_host < 2; by_host++) {
         assert_int_equal(bt_health_sensor_fault(&health), BT_SENSOR_FAULT_EXCHANGED);
         bt_health_tared(&health, by_host);

@@ -82,8 +82,9 @@ static const leap_case cases[] = {
     {"alike, and pressed", -50, 0, NEVER, 25, 0, {LOUD, LOUD, LOUD}, NONE},
     {"one moves twice as far", -50, -60, NEVER, 24, 0, {LOUD, LOUD, LOUD}, NONE},
     {"some the other way", -50, 0, 5, 24, 0, {LOUD, LOUD, LOUD}, NONE},
-    {"TDC leaps down", 0, 0, NEVER, 0, -65, {LOUD, LOUD, LOUD}, EXCHANGED},
-    {"TDC leaps up", 0, 0, NEVER, 0, 65, {LOUD, LOUD, LOUD}, EXCHANGED},
+    {"TDC leaps down, and pressure", 0, 0, NEVER, 13, -65, {LOUD, LOUD, LOUD}, EXCHANGED},
+    {"TDC leaps up, and pressure", 0, 0, NEVER, -13, 65, {LOUD, LOUD, LOUD}, EXCHANGED},
+    {"TDC leaps, pressure is the same finger's", 0, 0, NEVER, 12, 65, {LOUD, LOUD, LOUD}, TOGETHER},
     {"TDC, not far enough", 0, 0, NEVER, 0, 64, {LOUD, LOUD, LOUD}, NONE},
 };
 
@@ -143,7 +144,7 @@ static void expect_temperatures(const char *words, bool leaps)
     memset(&leap, 0, sizeof leap);
     for (; *words; words++) {
         now.tdc = *words == 'W' ? 1300 : *words == '-' ? BT_INVALID_COUNT : 1000;
-        assert_int_equal(end_round(QUIET), words[1] == 0 && leaps ? EXCHANGED : NONE);
+        assert_int_equal(end_round(QUIET), words[1] == 0 && leaps ? TOGETHER : NONE);
     }
 }
 

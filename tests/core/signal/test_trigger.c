@@ -187,7 +187,7 @@ TEST(pressure_without_a_known_rest_opens_nothing)
     emulated_finger finger = resting_finger();
     bt_baseline base = finger.tare.base;
     base.pdc_q16 = BT_TARE_UNKNOWN;
-    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    assert_int_equal(bt_tare_set(&finger.tare, &base, 0), BT_ERROR_OK);
     for (int round = 0; round < 200; round++) {
         finger.pdc_load = 5 * round;
         bt_round frame = next_frame(&finger);

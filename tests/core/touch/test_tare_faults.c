@@ -16,7 +16,7 @@ TEST(railed_electrodes_are_never_tared)
             assert_int_equal(finger.tare.reason, BT_TARE_REASON_NONE);
         }
         assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_RAILED);
-        assert_int_equal(bt_tare_set(&finger.tare, &finger.tare.base), BT_ERROR_RAILED);
+        assert_int_equal(bt_tare_set(&finger.tare, &finger.tare.base, 0), BT_ERROR_RAILED);
         step(&finger); // never tared, so it starts over
         assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
         assert_int_equal(1 + run_until(&finger, BT_TARE_STATE_REST, 20), 2 * BT_SWEEP_ROUNDS);
@@ -214,7 +214,7 @@ TEST(what_the_host_has_set_is_lost_if_it_was_wrong)
         base.electrode_q16[i] += (uint32_t)(int32_t)lround(65536 * 100 * load_shape(i));
     }
     base.pdc_q16 += 60 << 16;
-    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    assert_int_equal(bt_tare_set(&finger.tare, &base, 0), BT_ERROR_OK);
     for (int k = 0; k < 10 && finger.tare.reason == BT_TARE_REASON_HOST_SET; k++) {
         step(&finger);
     }

@@ -139,7 +139,7 @@ TEST(the_ends_of_gain_and_temperature_are_bounded)
                                                     << 16;
             }
             bt_baseline base = finger.tare.base;
-            assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+            assert_int_equal(bt_tare_set(&finger.tare, &base, 0), BT_ERROR_OK);
             warm_rounds(&finger, 3);
             grasp(&finger);
             assert_memory_equal(&finger.tare.base, &base, sizeof base);

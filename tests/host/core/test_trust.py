@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import tomllib
 
 import biotac
-from biotac import EventKind, Trust
+from biotac import EventKind, FrameFlags, Trust
 from biotac.core.compiled import trust_of
+from biotac.sim import physics, sampling
+from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire
+from biotac.wire import slots
 from biotac.wire.native import lib
 
 LINK = tomllib.loads((Path(__file__).resolve().parents[3] / "protocol/link.toml").read_text(encoding="utf-8"))
@@ -68,3 +74,74 @@ def test_a_frame_says_why() -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand:
         frame = biotac.Frame.from_row(hand.read_batch(0.5).frames[-1])
     assert frame.trust == Trust.HOLD and frame.reasons == biotac.FrameFlags.TARE_UNSURE
+
+
+@pytest.fixture(scope="module")
+def gripped() -> tuple[biotac.Finger, np.ndarray, Callable[[biotac.Finger, int, int], np.ndarray]]:
+    """A tare that a release confirmed, and what feeds a finger that then is gripped with 4 N from round 800 on."""
+    track = Track()
+    track.pose = free = Pose(-2.8, 0.0, tip_mm=2.0)
+    for seconds, force_n in ((5, 0), (0.2, 2), (0.3, 2), (0.2, 0), (2, 0), (0.3, 4), (40, 4), (0.3, 0), (4, 0)):
+        track.ramp(seconds, replace(free, force_n=force_n))
+    words = sampling.sample(physics.Finger(3, "new"), track.states(np.arange(5231) * 0.01))
+
+    def feed(finger: biotac.Finger, first: int, end: int) -> np.ndarray:
+        part = words[first:end]
+        return finger.feed(
+            part[:, slots.ELECTRODE_SLOT],
+            part[:, slots.PDC_SLOT],
+            tdc=part[:, slots.TDC_SLOT],
+            pac=part[:, slots.PAC_SLOT],
+        )
+
+    finger = biotac.Finger()
+    rows = feed(finger, 0, 760)
+    assert not rows["flags"][-1] & (FrameFlags.TARE_UNSURE | FrameFlags.TARE_LIKELY)
+    return finger, rows[-1], feed
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_tare_in_a_hold_is_not_acted_on(gripped: Any, held: bool) -> None:
+    _, _, feed = gripped
+    finger = biotac.Finger()
+    feed(finger, 0, 800)
+    if held:
+        finger.hold()
+    feed(finger, 800, 2300)
+    finger.tare_now()
+    assert set(feed(finger, 2300, 4800)["trust"]) == {Trust.HOLD}
+    assert (feed(finger, 4800, 5230)["trust"] <= Trust.HOLD).all()  # let go: the tare is lost, or still unsure
+
+
+NONSENSE = {
+    "all zero": lambda tare, pdc: (0 * tare, pdc),
+    "all zero, pressure too": lambda tare, pdc: (0 * tare, 0.0),
+    "100 counts up at rest": lambda tare, pdc: (tare + 100, pdc),
+    "pressure zero": lambda tare, pdc: (tare, 0.0),
+}
+
+
+@pytest.mark.parametrize("first", [750, 1500])
+@pytest.mark.parametrize("name", [*NONSENSE, "right"])
+def test_a_given_tare_is_worth_what_the_reading_allows(gripped: Any, name: str, first: int) -> None:
+    _, row, feed = gripped
+    finger = biotac.Finger()
+    feed(finger, 0, first)
+    tare, pdc = NONSENSE.get(name, lambda *both: both)(row["tare_q4"] / 16, float(row["pdc_tare_q4"]) / 16)
+    finger.set_tare(tare, pdc, age_s=1.0)
+    rows = feed(finger, first, first + 30)
+    assert rows["trust"][0] == Trust.HOLD  # until a sweep has been compared
+    gripped_with_offset = name in ("100 counts up at rest", "pressure zero") and first == 1500
+    if not gripped_with_offset:  # which reads as a harder press
+        assert rows["trust"][-1] == (Trust.INTERVAL if name == "right" else Trust.HOLD)
+
+
+def test_an_old_tare_of_a_grip_is_not_acted_on(gripped: Any) -> None:
+    _, row, feed = gripped
+    for age_s, wanted in ((600.0, Trust.INTERVAL), (601.0, Trust.HOLD), (None, Trust.HOLD)):
+        finger = biotac.Finger()
+        feed(finger, 1400, 1500)  # it started in the grip
+        finger.set_tare(row["tare_q4"] / 16, float(row["pdc_tare_q4"]) / 16, age_s=age_s)
+        rows = feed(finger, 1500, 1550)
+        assert rows["trust"][-1] == wanted
+        assert np.linalg.norm(rows["force_100un"][-1]) > 5000  # the grip's, not zero

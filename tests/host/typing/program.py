@@ -110,7 +110,7 @@ def computed(counts: NDArray[np.uint16], tare: NDArray[np.float64]) -> NDArray[n
     results = biotac.compute(counts, tare)
     print(results.dtype == biotac.RESULT_DTYPE, biotac.MAPPED_RESULT_DTYPE, biotac.FINGER_DTYPE)
     finger = biotac.Finger(quantities=biotac.QuantityFlags.FORCE)
-    print(finger.tare_counts, biotac.TareState.REST)
+    print(finger.tare_counts, biotac.TareState.REST, biotac.Trust.ACT)
     force_n: NDArray[np.float64] = results["force_n"]
     return force_n
 
