@@ -317,7 +317,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     bool valid = msg->force_100un[2] != BT_INVALID_I32;
-    msg->trust = valid ? bt_trust(msg->flags, 0, BT_INVALID_COUNT) : BT_TRUST_NONE;
+    msg->trust = valid ? bt_trust(msg->flags, msg->normal_mn, msg->normal_half_mn) : BT_TRUST_NONE;
     finger->trust = msg->trust;
     finger->sent = finger->tare.trigger.smooth;
 }
@@ -346,7 +346,7 @@ void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
     msg->flags = bt_finger_flags(finger) | BT_FRAME_FLAG_NOT_ASKED;
-    msg->trust = bt_trust(msg->flags, 0, BT_INVALID_COUNT);
+    msg->trust = bt_trust(msg->flags, 0, 0);
     msg->frames = finger->unsent;
     msg->energy_count2 = bt_trigger_energy(&finger->tare.trigger);
     msg->pdc = finger->round.pdc;

@@ -203,7 +203,7 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
         report_trust(session, finger);
         return;
     }
-    finger->trust = bt_trust(bt_finger_flags(finger), 0, BT_INVALID_COUNT);
+    finger->trust = bt_trust(bt_finger_flags(finger), 0, 0);
     report_trust(session, finger);
     session->skips.frames++;
     count_skips(&session->skips, 0);

@@ -182,10 +182,9 @@ def _shaped(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[An
     return array
 
 
-def trust_of(flags: NDArray[np.uint32], force_100un: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Trust (n,) of FRAMEs with these flags (n,) and forces (n, 3), as the board gives it."""
-    out = np.full(len(flags), wire.Trust.ACT, np.uint8)
-    for level in reversed(wire.TRUST_FLAGS):
-        out[(flags & np.uint32(wire.TRUST_FLAGS[level])) != 0] = level
-    out[force_100un[:, 2] == wire.INVALID_I32] = wire.Trust.NONE
+def trust_of(frames: NDArray[Any]) -> NDArray[np.uint8]:
+    """Trust (n,) of FRAME messages (n,), as the board gives it by their flags, force and normal's interval."""
+    columns = (frames[name].tolist() for name in ("flags", "normal_mn", "normal_half_mn"))
+    out = np.fromiter((lib.bt_trust(*row) for row in zip(*columns, strict=True)), np.uint8, len(frames))
+    out[frames["force_100un"][:, 2] == wire.INVALID_I32] = wire.Trust.NONE
     return out

@@ -134,7 +134,7 @@ def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | Non
     flags |= np.uint32(0 if own_map is None else wire.FrameFlags.MAPPED)
     flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
     frames["flags"] = flags
-    frames["trust"] = trust_of(flags, force_100un)
+    frames["trust"] = trust_of(frames)
     return frames
 
 
@@ -177,7 +177,7 @@ def _through_the_machine(
             )
         frames["seq"] = recording.wire["seq"][at]
         frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # not in counts
-        frames["trust"] = trust_of(frames["flags"], frames["force_100un"])
+        frames["trust"] = trust_of(frames)
         new[at] = frames
         for row, message in changes.items():
             tares[int(at[row])] = dataclasses.replace(message, seq=int(frames["seq"][row]))

@@ -22,7 +22,7 @@ from biotac.wire.native import lib
 
 LINK = tomllib.loads((Path(__file__).resolve().parents[3] / "protocol/link.toml").read_text(encoding="utf-8"))
 FLAGS = {name: flag for name, flag in LINK["flags"]["frame"].items() if name != "doc"}
-UNKNOWN, RISE_ROUNDS = wire.INVALID_COUNT, 10
+RISE_ROUNDS = 10
 
 
 def levels(flags: int) -> set[Trust]:
@@ -36,17 +36,20 @@ def test_trust_is_the_lowest_that_a_flag_allows() -> None:
     flags = np.array([0, *(1 << bits), *some], np.uint32)
     wanted = [min(levels(int(value))) for value in flags]
     assert {*wanted} == {*Trust}
-    assert [lib.bt_trust(int(value), 0, UNKNOWN) for value in flags] == wanted
-    force = np.zeros((len(flags), 3), np.int32)
-    assert trust_of(flags, force).tolist() == wanted
-    force[:, 2] = wire.INVALID_I32
-    assert (trust_of(flags, force) == Trust.NONE).all()
+    assert [lib.bt_trust(int(value), 0, 0) for value in flags] == wanted
+    frames = np.zeros(
+        len(flags), [("flags", "u4"), ("normal_mn", "u2"), ("normal_half_mn", "u2"), ("force_100un", "i4", 3)]
+    )
+    frames["flags"] = flags
+    assert trust_of(frames).tolist() == wanted
+    frames["force_100un"][:, 2] = wire.INVALID_I32
+    assert (trust_of(frames) == Trust.NONE).all()
 
 
 @pytest.mark.parametrize(
     ("force_mn", "half_mn", "wanted"),
     [(0, 400, Trust.ACT), (0, 401, Trust.INTERVAL), (1600, 401, Trust.INTERVAL), (1608, 402, Trust.ACT),
-     (4000, 1000, Trust.ACT), (4000, 1001, Trust.INTERVAL), (65534, 65534, Trust.INTERVAL)],
+     (4000, 1000, Trust.ACT), (4000, 1001, Trust.INTERVAL), (65534, 65534, Trust.INTERVAL), (4000, wire.INVALID_COUNT, Trust.INTERVAL)],
 )  # fmt: skip
 def test_a_wide_interval_is_to_be_kept_in_mind(force_mn: int, half_mn: int, wanted: Trust) -> None:
     assert lib.bt_trust(0, force_mn, half_mn) == wanted
