@@ -49,7 +49,8 @@ def test_trust_is_the_lowest_that_a_flag_allows() -> None:
 @pytest.mark.parametrize(
     ("force_mn", "half_mn", "wanted"),
     [(0, 400, Trust.ACT), (0, 401, Trust.INTERVAL), (1600, 401, Trust.INTERVAL), (1608, 402, Trust.ACT),
-     (4000, 1000, Trust.ACT), (4000, 1001, Trust.INTERVAL), (65534, 65534, Trust.INTERVAL), (4000, wire.INVALID_COUNT, Trust.INTERVAL)],
+     (4000, 1000, Trust.ACT), (4000, 1001, Trust.INTERVAL), (65534, 65534, Trust.INTERVAL),
+     (4000, wire.INVALID_COUNT, Trust.INTERVAL)],
 )  # fmt: skip
 def test_a_wide_interval_is_to_be_kept_in_mind(force_mn: int, half_mn: int, wanted: Trust) -> None:
     assert lib.bt_trust(0, force_mn, half_mn) == wanted
