@@ -101,8 +101,10 @@ def wire(contract: Contract) -> str:
         "",
         "import struct",
         "from dataclasses import dataclass",
-        "from enum import IntEnum, IntFlag",
+        "from enum import IntEnum",
         "from typing import Any, ClassVar, NamedTuple",
+        "",
+        "from .named import NamedFlag",
         "",
         f"WIRE_MAJOR = {link['wire']['major']}",
         f"WIRE_MINOR = {link['wire']['minor']}",
@@ -119,7 +121,7 @@ def wire(contract: Contract) -> str:
     for name, enum in link["enum"].items():
         out += enum_class(camel(name), "IntEnum", enum, "value", "{}")
     for name, flags in link["flags"].items():
-        out += enum_class(camel(name) + "Flags", "IntFlag", flags, "bit", "1 << {}")
+        out += enum_class(camel(name) + "Flags", "NamedFlag", flags, "bit", "1 << {}")
     # The meaning of each value, in the contract's words, for showing it to people.
     for name, enum in link["enum"].items():
         out += doc_table(f"{name.upper()}_DOC", ((e["value"], e) for e in entries(enum).values()))

@@ -26,6 +26,7 @@ from . import labels as labels_module
 from . import layout
 from .block import APPLIED, FRAME, Packet, as_sent
 from .blocks import Block, Blocks, Contents
+from .events import events_of
 from .facts import Facts
 from .labels import Label
 from .layout import finger_of
@@ -198,6 +199,14 @@ class Recording:
             with suppress(TypeError, AttributeError, InputError):  # a damaged one
                 live.append(Label(**facts))
         return labels_module.in_order([*live, *labels_module.read(self.path, self.begin_ns)[0]])
+
+    def events(self) -> StructArray:
+        """Touches, lifts, jolts, slips and changes of trust, EVENT_DTYPE (n,), in order of arrival.
+
+        ``kind`` is the name of an EventKind, ``at_s`` when it began, in device seconds since the first row, as
+        ``select`` takes them. ``pandas.DataFrame(recording.events())`` is a table. Empty where none were recorded.
+        """
+        return events_of(self.messages, self.begin_us)
 
     def mark(
         self,

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from typing import Any, ClassVar, NamedTuple
+
+from .named import NamedFlag
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
@@ -158,7 +160,7 @@ class EventKind(IntEnum):
     TRUST = 6  # trust fell, or has been higher for 100 ms
 
 
-class FrameFlags(IntFlag):
+class FrameFlags(NamedFlag):
     """State of a frame's counts and results."""
 
     CONTACT = 1 << 0  # the finger is touched (tare state CONTACT)
@@ -194,7 +196,7 @@ class FrameFlags(IntFlag):
     ELECTRODE_ALONE = 1 << 31  # in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
 
 
-class FaultFlags(IntFlag):
+class FaultFlags(NamedFlag):
     """What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS."""
 
     STARTED = 1 << 0  # it was switched on, lost power briefly, or was reset externally
@@ -212,7 +214,7 @@ class FaultFlags(IntFlag):
     SLOT_DMA_LATE = 1 << 12  # slots were lost because the DMA was late with a word; after 44 of them in a row the core does its work until the next start
 
 
-class StreamFlags(IntFlag):
+class StreamFlags(NamedFlag):
     """What START turns on."""
 
     FRAMES = 1 << 0  # FRAME and TARE messages; IDLE and TOUCH as subscribed
@@ -221,7 +223,7 @@ class StreamFlags(IntFlag):
     BANDS = 1 << 3  # BANDS messages
 
 
-class QuantityFlags(IntFlag):
+class QuantityFlags(NamedFlag):
     """What a host can SUBSCRIBE to. The board does not compute the rest."""
 
     POC = 1 << 0  # point of contact; TORSION_OK needs it

@@ -13,7 +13,7 @@ from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
-from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags
+from ...wire.messages_gen import INVALID_COUNT, Event
 from ...wire.slots import FRAME_HZ
 from .. import values
 from ..outputs import note
@@ -110,8 +110,7 @@ def as_line(frame: Frame) -> str:
     poc = " ".join(f"{v:7.2f}" for v in frame.poc_mm)
     force = " ".join(f"{v:7.3f}" for v in frame.force_n)
     torque = " ".join(f"{v:8.2f}" for v in frame.torque_nmm)
-    flags = "|".join(flag.name or "" for flag in FrameFlags if flag in frame.flags)
     return (
         f"{frame.t_us / 1e6:9.3f} s finger {frame.finger}  poc {poc} mm  force {force} N  torque {torque} N*mm  "
-        f"{frame.trust.name:8}  {flags}"
+        f"{frame.trust.name:8}  {frame.flags}"
     )

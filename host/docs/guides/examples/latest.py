@@ -15,4 +15,4 @@ with biotac.open(sys.argv[1] if len(sys.argv) > 1 else "sim:press.toml?pace=real
             print(f"no force: {finger.stale}")
             continue
         frame = finger.frame  # of one round: two properties of a finger may come from two
-        print(f"force {frame.force_n} N at {frame.poc_mm} mm, {finger.age_s * 1e3:.0f} ms old, {frame.flags!r}")
+        print(f"force {frame.force_n} N at {frame.poc_mm} mm, {finger.age_s * 1e3:.0f} ms old, {frame.flags}")
