@@ -57,7 +57,7 @@ class RecordingWarning(UserWarning):
 
 
 class ReadWarning(UserWarning):
-    """``Hand.read`` returned less than was asked for: its source ended, or there is a Gap."""
+    """``Hand.read`` returned less than was asked for: there is a Gap."""
 
 
 class PortError(BiotacError):

@@ -96,8 +96,8 @@ class Reading:
 
         They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
         reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
-        discarded. A ReadWarning tells of a Gap among them, and when a simulated source ended first: the array is then
-        shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
+        discarded. A ReadWarning tells of a Gap among them. Where a simulated source or a replay ends first, the array
+        is shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
         ValueError unless seconds is a number above 0.
         """
         batch = self._read(seconds, fresh)
@@ -132,7 +132,4 @@ class Reading:
             now, later = split(batch, end_us)
             self._queue.put_back(later)
             return join([*taken, now])
-        if self._stream.ended:
-            text = f"the source of {self._board.link.port} ended before {seconds:g} s were read"
-            warnings.warn(text, ReadWarning, stacklevel=4)
         return join(taken)
