@@ -440,6 +440,7 @@ def test_calibrate_writes_report_picture_and_map(
 ) -> None:
     _, facts, out = calibrated
     assert sorted(Path(p).name for p in facts["written"]) == ["finger.md", "finger.png", "finger.wrench.json"]
+    assert facts["verdict"].startswith("usable: state " + "/".join(f"{n:.2f}" for n in facts["rmse_n"]))
     page = (out / "finger.md").read_text(encoding="utf-8")
     for number in [*facts["rmse_n"], *facts["drift_rmse_n"][0], facts["worst_region"]["rmse_n"]]:
         assert f"{number:.3f} N" in page
@@ -456,6 +457,6 @@ def test_calibrate_writes_report_picture_and_map(
 def test_calibrate_in_words_and_as_recorded(finger: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(finger), "--as-recorded"]) == 0
     output = capsys.readouterr().out
-    assert "counts lag the force by 3 rows, [0, 0, 0] corrected; mean of 1 rows" in output
+    assert "counts are 3 rows late, [0, 0, 0] corrected; mean of 1 row(s)" in output
     for counts in SHIFTS_COUNTS[1:]:
         assert f"drifted {counts:+.0f} counts" in output

@@ -30,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    if (args.port or "").lower().endswith(".mcap") and not args.port.startswith("replay:"):
+    port = args.port or ""
+    if Path(port).is_file() or (port.lower().endswith(".mcap") and not port.startswith("replay:")):
         return of_recording(args)
     with biotac.open(args.port) as hand:
         hello = hand.info

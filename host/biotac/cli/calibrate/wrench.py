@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -144,6 +145,7 @@ def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | Non
         progress.done()
     origin = loaded.provenance(int(time.time()))
     facts = figures.summary(validation) | loaded.facts() | {key: origin[key] for key in ("serial", "data_sha256")}
+    facts["verdict"] = _verdict(facts["rmse_n"])
     facts["fixed_point"] = summary(validation.wrench_map, run.counts, run.pdc)
     if args.out is not None:
         written = _write(validation, origin, loaded.files[0], args.out, overwrite=args.force)
@@ -263,25 +265,39 @@ def _text(facts: dict[str, Any]) -> str:
         *([f"  torque, x y z:          RMSE {numbers(facts['rmse_nmm'])} N mm"] if "rmse_nmm" in facts else []),
         *(f"  torsion:                RMSE {facts[key]:5.3f} N mm" for key in ("torsion_rmse_nmm",) if key in facts),
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
-        f"  counts lag the force by {facts['lag_rows']} rows, {facts['lag_corrected_rows']} corrected; "
-        f"mean of {facts['window_rows']} rows",
+        f"  counts and force:       {_lag(facts)}; mean of {facts['window_rows']} row(s)",
         f"  untouched:              {numbers(facts['rest_n'][:1])} N",
         f"  {summary_text(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
         *[f"  written: {path}" for path in facts.get("written", [])],
         *(_board_lines(facts["board"]) if "board" in facts else []),
+        f"  {facts['verdict']}",
     ]
     return "\n".join(lines)
+
+
+def _verdict(rmse_n: list[float | None]) -> str:
+    """Whether the map is better than none, and the error to state (x, y, z)."""
+    default_n = population.load(None).sigma_n
+    own, default = ("/".join("-" if v is None else f"{v:.2f}" for v in axes) for axes in (rmse_n, default_n))
+    against = f"{own} N RMS in x/y/z, held out, against {default} N of a finger without calibration"
+    if math.hypot(*(math.inf if v is None else v for v in rmse_n)) < math.hypot(*default_n):
+        return f"usable: state {against}"
+    return f"not worth using: {against}; load it in more places and directions, or leave the finger as it is"
+
+
+def _lag(facts: dict[str, Any]) -> str:
+    if not facts["lag_rows"] and not any(facts["lag_corrected_rows"]):
+        return "in step"
+    return f"counts are {facts['lag_rows']} rows late, {facts['lag_corrected_rows']} corrected"
 
 
 def _board_lines(found: dict[str, Any]) -> list[str]:
     torque = "" if found["torque_nmm_max"] is None else f", {found['torque_nmm_max']:.4f} N mm"
     kept = "survives a restart" if found["saved"] else "until it restarts; --save keeps it"
     sent = f"all {found['frames_bit_for_bit']} frames it then sent match its map bit for bit"
-    if not found["frames_bit_for_bit"]:
-        sent = "it sent no frame to compare: the simulated finger's script had ended"
     return [
         f"  on the board, {kept}: {found['bytes']} bytes, read back identical",
         f"  its code on {found['rows']} recorded rows: within {found['force_mn_max']:.3f} mN{torque} of the fit",
-        f"  {sent}",
+        *([f"  {sent}"] if found["frames_bit_for_bit"] else []),  # a simulated finger's script has ended by then
     ]
