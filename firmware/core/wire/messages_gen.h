@@ -72,7 +72,7 @@ enum bt_tare_reason {
     BT_TARE_REASON_START = 1, // first still frames after power-up or plug-in
     BT_TARE_REASON_RELEASE = 2, // contact ended: the signals returned to the tare
     BT_TARE_REASON_RESIDUE = 3, // contact ended; the residue that it left in the skin is tared out
-    BT_TARE_REASON_ROLL_BACK = 4, // contact began: back to a tare from at least 1.2 s before, plus drift
+    BT_TARE_REASON_ROLL_BACK = 4, // contact began: zero is that of at least 1.2 s before, corrected for drift
     BT_TARE_REASON_HOST_NOW = 5, // TARE_NOW command
     BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
     BT_TARE_REASON_SHIFT = 7, // not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much

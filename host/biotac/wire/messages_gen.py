@@ -80,7 +80,7 @@ class TareReason(IntEnum):
     START = 1  # first still frames after power-up or plug-in
     RELEASE = 2  # contact ended: the signals returned to the tare
     RESIDUE = 3  # contact ended; the residue that it left in the skin is tared out
-    ROLL_BACK = 4  # contact began: back to a tare from at least 1.2 s before, plus drift
+    ROLL_BACK = 4  # contact began: zero is that of at least 1.2 s before, corrected for drift
     HOST_NOW = 5  # TARE_NOW command
     HOST_SET = 6  # TARE_SET command
     SHIFT = 7  # not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
@@ -282,7 +282,7 @@ TARE_REASON_DOC: dict[int, str] = {
     1: "first still frames after power-up or plug-in",
     2: "contact ended: the signals returned to the tare",
     3: "contact ended; the residue that it left in the skin is tared out",
-    4: "contact began: back to a tare from at least 1.2 s before, plus drift",
+    4: "contact began: zero is that of at least 1.2 s before, corrected for drift",
     5: "TARE_NOW command",
     6: "TARE_SET command",
     7: "not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much",

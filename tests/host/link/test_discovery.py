@@ -113,7 +113,7 @@ def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, caps
     plugged([usb_port("/dev/ttyS0", ours=False, description="n/a")])
     assert main(["list"]) == 0
     first, second, third, *_ = capsys.readouterr().out.splitlines()
-    assert first == "/dev/ttyS0  not our USB id"
+    assert first == "/dev/ttyS0  not a gateway's USB id"
     assert second.endswith("or try a simulated one:")
     assert third.startswith("sim:")
 

@@ -123,7 +123,8 @@ def as_line(facts: dict[str, Any]) -> str:
         return f"{facts['port']}  {facts['problem']}"
     if "firmware" not in facts:
         known = [str(facts[key]) for key in ("port", "description", "serial_number") if facts[key]]
-        return "  ".join("not our USB id" if text == "n/a" else text for text in known)  # pyserial's for no description
+        named = (text if text != "n/a" else "not a gateway's USB id" for text in known)  # n/a is pyserial's for nothing
+        return "  ".join(named)
     fingers = ", ".join(map(str, facts["fingers"])) or "none"
     parts = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
     return "  ".join([facts["port"], *parts])

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     felt = [f"  {name:14} {one}" for name, one in demo.felt.items() if str(one)]
     skipped = f"{facts['rows_skipped']} incomplete row(s) of the recording skipped"
     lines = [
-        f"{facts['source']}: {facts['frames']} frames from {facts['fingers']} finger(s), {facts['frames_lost']} lost, "
+        f"{facts['source']}: {facts['frames']} frames, fingers: {facts['fingers']}, {facts['frames_lost']} lost, "
         f"{facts['crc_errors']} CRC errors; host CPU {facts['host_cpu_percent']} % of one core",
         f"on-board against float64: PoC {check['poc_um_max']:.3f} um, force {check['force_mn_max']:.4f} mN, "
         f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)",

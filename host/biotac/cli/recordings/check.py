@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     verdict = "good" if good else f"{outcome.violations} violation(s), {damaged} damaged part(s)"
     verdict += f", {len(recording.gaps)} gap(s)" if recording.gaps else ""
     verdict += ", cut off" if recording.cut_off else ""
-    starts = f"  pressure filter not checked in {outcome.pressure.starts} frames that have no frame before them"
+    starts = f"  {outcome.pressure.starts} frame(s) have no frame before them: their pressure filter was not checked"
     lines = [
         *map(str, outcome.findings),
         f"{printable(str(args.recording))}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; "
