@@ -20,16 +20,10 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 # The source folder is the repository, so that links between pages are those that GitHub follows too.
 root_doc = "host/docs/index"
 FOLDERS = ("host/docs", "host/docs/*", "host/biotac-lab/docs", "protocol", "protocol/*")
-include_patterns = [f"{folder}/*.md" for folder in FOLDERS]
+include_patterns = ["README.md", "CHANGELOG.md", "firmware/**/README.md", *(f"{folder}/*.md" for folder in FOLDERS)]
 myst_heading_anchors = 3
 
-html_theme = "alabaster"
-html_theme_options = {
-    "page_width": "1080px",
-    "sidebar_width": "210px",
-    "font_family": "sans-serif",
-    "show_powered_by": False,
-}
+html_theme = "furo"  # menu and search on a phone, and a dark theme
 html_show_copyright = False
 html_copy_source = False
 html_static_path = ["style"]

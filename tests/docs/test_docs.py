@@ -38,7 +38,10 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if blocks])
+PROGRAMS = "live_reading.md"  # whose blocks are programs, each run by tests/host/hand/test_aio.py
+
+
+@pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if blocks and page != PROGRAMS])
 def test_a_pages_python_runs(page: str, tmp_path: Path, monkeypatch, capsys) -> None:
     """Block after block, as a reader would type them."""
     monkeypatch.chdir(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import subprocess
 import sys
 from collections.abc import Coroutine
@@ -21,15 +22,17 @@ def run(main: Coroutine[Any, Any, Any]) -> Any:
         return pool.submit(asyncio.run, main).result()
 
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "host/docs/guides/examples"
-SAYS = {
-    "pull.py": "300 frames",
-    "latest.py": "FrameFlags.CONTACT",
-    "callbacks.py": "finger 0: possible touch at ",
-    "loop.py": ", 0 lost",
-    "subscription.py": "the thumb was at rest",
-    "grip.py": "holds 1.0 N of weight with ",
-}
+GUIDES = Path(__file__).resolve().parents[3] / "host/docs/guides"
+PROGRAMS = re.findall(r"```python\n(.*?)```", (GUIDES / "live_reading.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+PROGRAMS.append((GUIDES / "examples/grip.py").read_text(encoding="utf-8"))
+SAY = (
+    "the thumb was at rest",
+    "300 frames",
+    " ms old, CONTACT|",
+    "finger 0: possible touch at ",
+    ", 0 lost",
+    "holds 1.0 N of weight with ",
+)
 
 
 def test_all_of_a_simulated_source_arrives_and_the_loop_goes_on() -> None:
@@ -98,11 +101,12 @@ def test_a_lost_board_ends_the_iteration_in_words() -> None:
 
 def test_every_example_is_run_somewhere() -> None:
     """grip_in_c.py in tests/lab; textures.py by hand: it wants recordings that are not ours to ship."""
-    assert {path.name for path in EXAMPLES.glob("*.py")} == {*SAYS, "grip_in_c.py", "textures.py"}
+    assert {path.name for path in (GUIDES / "examples").glob("*.py")} == {"grip.py", "grip_in_c.py", "textures.py"}
 
 
-@pytest.mark.parametrize("name", SAYS)
-def test_an_example_runs_and_says_what_it_should(name: str, tmp_path: Path) -> None:
-    done = subprocess.run([sys.executable, str(EXAMPLES / name)], cwd=tmp_path, capture_output=True, text=True)
+@pytest.mark.parametrize(("program", "says"), list(zip(PROGRAMS, SAY, strict=True)), ids=SAY)
+def test_an_example_runs_and_says_what_it_should(program: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(program, encoding="utf-8")
+    done = subprocess.run([sys.executable, "program.py"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert SAYS[name] in done.stdout
+    assert says in done.stdout
