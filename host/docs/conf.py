@@ -28,6 +28,7 @@ html_show_copyright = False
 html_copy_source = False
 html_static_path = ["style"]
 html_css_files = ["page.css"]
+html_js_files = ["page.js"]
 
 autodoc_mock_imports = ["scipy", "sklearn", "statsmodels"]  # the extra `features`: pages are built without it
 autodoc_member_order = "bysource"
