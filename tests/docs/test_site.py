@@ -1,4 +1,4 @@
-"""The built pages, as a browser shows them: no page scrolls sideways on a phone, and axe finds nothing, dark or light."""
+"""The built pages in a browser: none scrolls sideways on a phone, and axe finds nothing, dark or light."""
 
 from __future__ import annotations
 
