@@ -94,6 +94,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "choose another --out", "demo press.toml --seconds 1 --out @list.json"),
     (2, "add one", "demo @bad.toml --out +out"),
     (3, "`biotac list`", f"info {NO_PORT}"),
+    (2, "expected a file written by `biotac record`", "info list.json.csv"),
     (3, "plug one in", "info serial:FFFF"),
     (3, f"expected {PORTS}", "info telnet:1"),
     (3, "expected BUS.DEVICE", "info spidev:zero"),
