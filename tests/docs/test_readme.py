@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from biotac.calibrate import population
+
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    biotac (\S.*?)(?:\s+#.*)?$", README, flags=re.MULTILINE)
 
@@ -34,3 +36,11 @@ def test_the_commands_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize("link", re.findall(r"\]\(([^)#:]+)\)", README))
 def test_links_lead_somewhere(link: str) -> None:
     assert (Path(__file__).parents[2] / link).exists()
+
+
+def test_the_force_error_to_state_is_the_default_maps() -> None:
+    page = (Path(__file__).parents[2] / "host/docs/reference/accuracy.md").read_text(encoding="utf-8")
+    row = re.search(r"error (\.\d+) N along the finger, (\.\d+) N sideways, (\.\d+) N into the pad", README)
+    said = re.search(r"(0\.\d+) N towards the tip, (0\.\d+) N sideways and (0\.\d+) N normal", page.replace("\n", " "))
+    for told in (row, said):
+        assert told and list(map(float, told.groups())) == population.load(None).sigma_n.round(2).tolist()
