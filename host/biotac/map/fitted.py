@@ -95,7 +95,10 @@ class WrenchMap:
             tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
             Margin(
-                *((int(pair[0]), int(pair[1])) for pair in (facts["margin"][name] for name in ("base_mn", "share_q8")))
+                *(
+                    (int(normal), int(shear))
+                    for normal, shear in (facts["margin"][name] for name in ("base_mn", "share_q8"))
+                )
             ),
         )
         shapes = [(columns.width(columns.blocks(with_pdc=pdc)) + 1, len(fitted.axes)) for pdc in (False, True)]

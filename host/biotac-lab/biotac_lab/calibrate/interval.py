@@ -162,8 +162,10 @@ def _on_board(
 ) -> npt.NDArray[np.void]:
     """Rows of FRAME_DTYPE as a board publishes them that was told the tare, and that the finger holds something."""
     board = BoardFinger(settings, wrench_map=own_map)
-    board.feed(np.tile(np.rint(tare).astype(np.uint16), (REST_ROUNDS, 1)))
+    rest = np.tile(np.rint(tare).astype(np.uint16), (REST_ROUNDS, 1))
+    board.feed(rest)
     board.set_tare(tare)
+    board.feed(rest)  # with which the board compares it
     board.hold()
     return to_frames(board.feed(words))
 
