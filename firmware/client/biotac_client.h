@@ -66,11 +66,13 @@ static inline int bt_valid_count(uint16_t value)
     return value != BT_INVALID_COUNT;
 }
 
-// The ends of a FRAME's 95 % interval, in mN: of normal_mn and normal_half_mn, or of shear_mn and shear_half_mn. Where
-// either is invalid they are the widest: 0 and 65535.
+// The ends of a FRAME's 95 % interval, in mN: of normal_mn and normal_half_mn, or of shear_mn and
+// shear_half_mn. Where either is invalid they are the widest: 0 and 65535.
 static inline uint16_t bt_least_mn(uint16_t part_mn, uint16_t half_mn)
 {
-    return (uint16_t)(bt_valid_count(half_mn) && part_mn != BT_INVALID_COUNT && part_mn > half_mn ? part_mn - half_mn : 0);
+    return (uint16_t)(bt_valid_count(half_mn) && part_mn != BT_INVALID_COUNT && part_mn > half_mn
+                          ? part_mn - half_mn
+                          : 0);
 }
 
 static inline uint16_t bt_most_mn(uint16_t part_mn, uint16_t half_mn)

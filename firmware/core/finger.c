@@ -9,8 +9,7 @@
 #define PDC_FREE 6 // counts above the tare
 
 // What follows from where the electrodes lie.
-#define BT_OF_GEOMETRY                                                                                       \
-    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)
+#define BT_OF_GEOMETRY (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)
 
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {

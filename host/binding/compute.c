@@ -23,7 +23,8 @@ static bool read_tare(const uint8_t *row, int32_t tare_q4[BT_ELECTRODES])
     return good;
 }
 
-// Signals in 1/16 count, 0 for a missing electrode; false if a count is out of range. *whole: none is missing.
+// Signals in 1/16 count, 0 for a missing electrode; false if a count is out of range. *whole: none is
+// missing.
 static bool read_signals(const uint8_t *row, const int32_t tare_q4[BT_ELECTRODES],
                          int32_t e_q4[BT_ELECTRODES], bool *whole)
 {

@@ -1,5 +1,6 @@
 // A finger made of numbers: frames with noise, glitches, drift, a load and a pressure, for the tests
-// of the tare machine. Figures are those measured on real sensors, as host/docs/develop/constants.md has them.
+// of the tare machine. Figures are those measured on real sensors, as host/docs/develop/constants.md has
+// them.
 #ifndef BIOTAC_TEST_EMULATED_FINGER_H
 #define BIOTAC_TEST_EMULATED_FINGER_H
 

@@ -3,7 +3,6 @@
 #include "map_blob.h"
 #include "rig.h"
 
-
 #define FINGERS 5
 
 static uint64_t map_ns, frame_ns; // what each costs

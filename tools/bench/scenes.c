@@ -194,7 +194,6 @@ const bench_scene bench_scenes[] = {
     {"whole frame", "in contact", whole_in_contact},
     {"whole frame", "in contact, Lin's scales", whole_by_lin},
 
-
     {"wrench map", "signals and offset, 3 axes", map_affine},
     {"wrench map", "sign-split, 3 axes", map_sign_split},
     {"wrench map", "gated sign-split, 3 axes", map_gated},

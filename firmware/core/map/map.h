@@ -27,9 +27,9 @@ typedef struct {
 typedef struct {
     uint8_t axes; // BT_MAP_AXES_FORCE, _TORQUE (force too) or _TORSION (all); 0: there is no map
     uint8_t block_count;
-    uint16_t kinds;        // bit mask of the blocks' kinds: what no block needs is not computed
-    uint16_t gates;        // likewise
-    uint32_t made_s;       // since 1970 UTC; 0: unknown
+    uint16_t kinds;  // bit mask of the blocks' kinds: what no block needs is not computed
+    uint16_t gates;  // likewise
+    uint32_t made_s; // since 1970 UTC; 0: unknown
     bt_margin margin;
     const uint8_t *serial; // [BT_MAP_SERIAL_BYTES], in the blob like the rest: of the sensor it was made for;
                            // all zero: any sensor

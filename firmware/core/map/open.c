@@ -7,8 +7,9 @@
 #include <string.h>
 
 #define MARGIN_AT (8 + BT_MAP_SERIAL_BYTES)
-_Static_assert(BT_MAP_HEADER_BYTES == MARGIN_AT + 8 && BT_MAP_HEADER_BYTES % 4 == 0,
-               "the header is four bytes, the serial number, a u32 and four u16, and keeps what follows aligned");
+_Static_assert(
+    BT_MAP_HEADER_BYTES == MARGIN_AT + 8 && BT_MAP_HEADER_BYTES % 4 == 0,
+    "the header is four bytes, the serial number, a u32 and four u16, and keeps what follows aligned");
 _Static_assert(BT_MAP_BLOCK_BYTES == 2 + BT_MAP_EXPONENTS && BT_MAP_BLOCK_BYTES % 4 == 0
                    && BT_MAP_EXPONENTS >= BT_MAP_AXES_MAX,
                "a block is its kind, its gate and an exponent for each axis");

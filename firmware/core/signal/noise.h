@@ -10,7 +10,7 @@ typedef struct {
     uint32_t count2; // 0 until measured
     uint32_t mean_q8;
     uint32_t sigma_q4; // counts: one standard deviation of an electrode, white noise given
-    uint8_t sweeps; // in the mean, at most its length
+    uint8_t sweeps;    // in the mean, at most its length
 } bt_noise;
 
 // Add a sweep at rest. deviation_q6: over all electrodes, the squared distance of a count from the mean of

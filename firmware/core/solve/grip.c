@@ -24,10 +24,12 @@ const bt_margin bt_lin_margin = {.base_mn = {0, 0}, .share_q8 = {0, 64}};
 #define UNITS_PER_UM ((1 << (UNIT_BITS + PER_UM_BITS)) / BT_CORE_RADIUS_UM)
 #define UNIT_MAX     ((1ll << UNIT_BITS) + 8) // of a normal of poc_um, which is rounded to 1 um on each axis
 
-_Static_assert((BT_CORE_RADIUS_UM + 2ll) * UNITS_PER_UM + (1 << (PER_UM_BITS - 1)) <= INT32_MAX, "a unit must fit");
+_Static_assert((BT_CORE_RADIUS_UM + 2ll) * UNITS_PER_UM + (1 << (PER_UM_BITS - 1)) <= INT32_MAX,
+               "a unit must fit");
 _Static_assert(3 * (int64_t)BT_GRIP_MAX_MN * BT_GRIP_MAX_MN <= UINT32_MAX / 1001 * 1000, "a square must fit");
 // The normal's components add up to at most root 3; 1733 / 1000 is a little more.
-_Static_assert(BT_GRIP_MAX_MN *UNIT_MAX * 1733 / 1000 + (1 << (UNIT_BITS - 1)) <= INT32_MAX, "a part must fit");
+_Static_assert(BT_GRIP_MAX_MN * UNIT_MAX * 1733 / 1000 + (1 << (UNIT_BITS - 1)) <= INT32_MAX,
+               "a part must fit");
 _Static_assert((BT_GRIP_MAX_MN * 1733ll / 1000 + 64) * UNIT_MAX + (1 << (UNIT_BITS - 1)) <= INT32_MAX,
                "a part along an axis must fit");
 
@@ -54,7 +56,8 @@ static uint32_t root_of(uint32_t square)
 // guess_mn of a source: the strength of all signals is at most 30.3 N (map/population.c).
 #define GUESS_MAX_MN 40000u
 #define SIZE_MAX_MN  (2 * (BT_GRIP_MAX_MN * 1733ll / 1000 + 64))
-_Static_assert(SIZE_MAX_MN *(BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) + 128 <= INT32_MAX, "a share must fit");
+_Static_assert(SIZE_MAX_MN *(BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) + 128 <= INT32_MAX,
+               "a share must fit");
 _Static_assert((65535ll + 16) * NOISE_MN_PER_COUNT + 65535 + GUESS_MAX_MN + UNCONFIRMED_TARE_MN
                        + (SIZE_MAX_MN * (BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) >> 8)
                    <= UINT32_MAX,

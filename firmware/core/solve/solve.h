@@ -16,9 +16,9 @@
 typedef struct {
     int poc_weights;
     bt_gains gains;
-    const bt_map *map;                     // used instead of the gains; NULL: none
-    bool population;                       // without a map, force comes from the population map
-    uint32_t warmed_max_q8;                // change of TDC that may make the force wrong by WARMED_100UN
+    const bt_map *map;      // used instead of the gains; NULL: none
+    bool population;        // without a map, force comes from the population map
+    uint32_t warmed_max_q8; // change of TDC that may make the force wrong by WARMED_100UN
 } bt_solve_settings;
 
 // Leaves `map` NULL, for the caller to set.

@@ -216,7 +216,8 @@ TEST(what_is_guessed_goes_as_the_maps_share_grows)
         assert_true(force[2] > 0);
         bt_population_guess(its.share, its.outside, its.strength_100un, guess_mn);
         double away = (256.0 - its.share) / 256 * its.strength_100un / 10;
-        assert_true(fabs(guess_mn[0] - .4 * away) < 2 + .003 * away && fabs(guess_mn[1] - .3 * away) < 2 + .003 * away);
+        assert_true(fabs(guess_mn[0] - .4 * away) < 2 + .003 * away
+                    && fabs(guess_mn[1] - .3 * away) < 2 + .003 * away);
         assert_int_equal(bt_strength_100un(e_q4), its.strength_100un);
     }
 }

@@ -37,9 +37,9 @@ static double capped_n(int32_t force_100un)
     return fmax(-BT_GRIP_MAX_MN / 1e3, fmin(BT_GRIP_MAX_MN / 1e3, force_100un / 1e4));
 }
 
-// What rounding leaves of normal (times 1) and shear (times 2): half a mN of each component, root 3 / 2, and of the
-// part itself; in shear also of the normal and of its components. A unit normal is off by .17 / 1000, as its
-// point is rounded to whole um, and by root 3 / 2 in 2^14.
+// What rounding leaves of normal (times 1) and shear (times 2): half a mN of each component, root 3 / 2, and
+// of the part itself; in shear also of the normal and of its components. A unit normal is off by .17 / 1000,
+// as its point is rounded to whole um, and by root 3 / 2 in 2^14.
 static double bound_mn(double size_n, int times)
 {
     return (.87 + .5) * times + .23 * size_n * times;
