@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biotac import FrameFlags
+from biotac import FrameFlags, Trust
 from biotac_lab.cli import main
 from biotac_lab.grasp import law, runs
 from biotac_lab.grasp.felt import Board, TrueForce
@@ -84,7 +84,7 @@ def test_the_law_stays_where_nothing_is_known_and_is_deaf_while_it_squeezes() ->
     sheared = [replace(frame, force_n=np.add(frame.force_n, [0.0, 0.6, 0.0])) for frame in frames]
     assert grip.step(sheared, True) > 0 and grip.slips == 1  # heard, and squeezes
     assert grip.step(sheared, True) > 0 and grip.slips == 1  # its own squeeze
-    blind = [replace(frame, flags=FrameFlags.UNTARED) for frame in frames]
+    blind = [replace(frame, trust=Trust.HOLD) for frame in frames]
     for none in ([None, None], blind, [replace(frame, force_n=np.full(3, math.nan)) for frame in frames]):
         assert grip.step(none, False) == 0.0
 

@@ -48,7 +48,8 @@ static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
     frame->pdc_filtered_q4 = pressure ? frame->pdc_filtered_q4 : 0xFFFF;
     frame->pressure_force_100un = pressure ? frame->pressure_force_100un : INT32_MIN;
     frame->torsion_mnmm = torque ? frame->torsion_mnmm : INT32_MIN;
-    if (!poc || !force) {
+    if (!poc || !force) { // no interval either, so its force is not one to act on
+        frame->trust = frame->trust == BT_TRUST_ACT ? BT_TRUST_INTERVAL : frame->trust;
         frame->normal_mn = frame->normal_half_mn = frame->shear_mn = frame->shear_half_mn = 0xFFFF;
     }
     for (int d = 0; d < 3; d++) {

@@ -5,16 +5,13 @@
 
 void hand_send(uint8_t id, const void *msg); // example_bare.c
 void close_at(float mm_s);                   // the hand's own: both fingers; negative: open
-
-#define FINGERS 0x11u // index and thumb, chip selects 0 and 4, which meet along z
-static const uint32_t BLIND = BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_FAULT | BT_FRAME_FLAG_SENSOR_FAULT
-                              | BT_FRAME_FLAG_SENSOR_OTHER | BT_FRAME_FLAG_SENSOR_UNSURE;
+#define FINGERS 0x11u                        // index and thumb, chip selects 0 and 4, which meet along z
 static const uint32_t WIDE = BT_FRAME_FLAG_ELECTRODE_OUT | BT_FRAME_FLAG_ELECTRODE_MISSING
                              | BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_ELECTRODE_ALONE | BT_FRAME_FLAG_OUTSIDE;
 static const uint32_t COARSE = BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_BASE_OLD;
 struct grip {
     float least_n, most_n, friction, stiffness, speed_mm_s, normal_n, shear_n, way_mm, first_n;
-    int round, jerk_until, reflex_until, slipped, holds, settled, slips, sure;
+    int round, jerk_until, reflex_until, slipped, holds, settled, slips;
 } grip;
 static struct felt {
     float normal_n, shear_n;
@@ -25,8 +22,7 @@ static struct felt {
 void act_on(const bt_msg_frame *frame)
 {
     const int32_t *force = frame->force_100un;
-    const uint32_t restarted = grip.sure ? BT_FRAME_FLAG_TARE_UNSURE : 0; // it takes the grip for rest
-    if (!(frame->flags & (BLIND | restarted)) && bt_valid_i32(force[2])) {
+    if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[2])) {
         felt.normal_n += (float)force[2] / 1e4f;
         felt.shear_n = fmaxf(felt.shear_n, hypotf((float)force[0], (float)force[1]) / 1e4f);
         felt.flags |= frame->flags;
@@ -62,8 +58,7 @@ static float squeeze(float reserve, int coarse)
     const float wanted = near ? 0 : fminf(fmaxf((reflex ? 40 : 6) * missing_n, -0.9f), reflex ? 20 : 5);
     const float before = grip.speed_mm_s * grip.stiffness, change = 0.3f * (wanted - before); // N/s, smoothly
     grip.settled = fabsf(missing_n) < 0.15f * wanted_n ? grip.settled + 1 : 0;
-    if (fabsf(change) > 1)
-        grip.jerk_until = grip.round + 4; // it shakes like a slip: for so long, wait for the slip's level
+    grip.jerk_until = fabsf(change) > 1 ? grip.round + 4 : grip.jerk_until; // until then, go by slip_level
     return (before + change) / grip.stiffness;
 }
 
@@ -85,7 +80,6 @@ void grip_round(void)
     if (!blind && !grip.holds && !felt.lifted) {
         hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});
         grip.holds = 1;
-        grip.sure = !(felt.flags & BT_FRAME_FLAG_TARE_UNSURE);
         grip.first_n = grip.normal_n;
     }
     if (!blind && grip.holds) {

@@ -2,23 +2,20 @@
 
 import numpy as np
 
-from biotac import EventKind
+from biotac import EventKind, Trust
 from biotac import FrameFlags as F
 from biotac.sim import SimFinger, Touch, world
 
 ROUND_S, CLOSING_MM_S = 0.01, 10.0
 LAG_S = 0.03  # from a command to the motion that the next frame shows: the actuator's, and a round
-RESERVE = 1.3  # press that much harder than friction needs
-FRICTION = 0.6  # until a slip teaches less
+RESERVE, FRICTION = 1.3, 0.6  # press that much harder than friction needs, of which a slip teaches less
 GAIN_PER_S, SQUEEZE_N_PER_S = 6.0, 5.0  # squeeze with so many N/s for each N that is missing, at most
 REFLEX_PER_S, REFLEX_N_PER_S, REFLEX_ROUNDS = 40.0, 20.0, 8  # the same after a slip, and for how long
 RELEASE_N_PER_S = 0.9  # a thing that begins to slip is not let go by much before that is told
-BLIND = F.UNTARED | F.FAULT | F.SENSOR_FAULT | F.SENSOR_OTHER | F.SENSOR_UNSURE
 WIDE = F.ELECTRODE_OUT | F.ELECTRODE_MISSING | F.RAIL | F.ELECTRODE_ALONE | F.OUTSIDE
 COARSE = F.TEMP | F.BASE_OLD
 SMOOTH = 0.3  # of a change of rate made in each round: what jumps to and fro shakes like a slip
 JERK_N_S, JERK_ROUNDS = 1.0, 4  # so does a larger change than this: for so long it waits for the slip's level
-NOT_JUDGED = 255  # a slip_level without EVENTS
 
 
 class Grip:
@@ -34,8 +31,7 @@ class Grip:
         self.friction, self.stiffness = FRICTION, 0.8  # N/mm in front of the fingers, until it is felt
         self.speed_mm_s, self.normal_n, self.shear_n = CLOSING_MM_S, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
-        self._round, self._jerk_until, self._reflex_until, self._slipped = 0, 0, 0, False
-        self._way_mm, self._first_n, self._blind = 0.0, 0.0, BLIND
+        self._round = self._jerk_until = self._reflex_until = self._slipped = self._way_mm = self._first_n = 0
 
     def step(self, frames, slipped: bool) -> float:
         """How fast the sides are to close until the next round, in mm/s; negative: open.
@@ -43,8 +39,8 @@ class Grip:
         ``frames`` has each finger's Frame of this round, None where none came; ``slipped``: the board reported a SLIP.
         """
         self._round += 1
-        felt = list(zip(frames, self.towards, self.shares, strict=True))
-        felt = [(f, f.force_n / share, to) for f, to, share in felt if f is not None and not f.flags & self._blind]
+        felt = zip(frames, self.towards, self.shares, strict=True)
+        felt = [(f, f.force_n / share, to) for f, to, share in felt if f is not None and f.trust >= Trust.INTERVAL]
         felt = [one for one in felt if np.isfinite(one[1]).all()]
         if not felt:
             self.speed_mm_s = 0.0  # nothing is known: stay where you are
@@ -57,14 +53,13 @@ class Grip:
             if not all(f.flags & F.CONTACT for f, *_ in felt):
                 return self.speed_mm_s
             self.holds, self._first_n = True, self.normal_n
-            self._blind |= F.TARE_UNSURE & ~F(int(flags))  # a board that restarts takes the grip for rest
         self._way_mm += self.speed_mm_s * ROUND_S
         if self._way_mm > 0.3 and self.normal_n - self._first_n > 0.3:
             self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
         self.shear_n += 0.5 * (max(shears) - self.shear_n)
         self._slipped |= slipped
         if self._round > max(self._jerk_until, self._reflex_until):
-            if slipped or (self._slipped and any(0 < f.slip_level < NOT_JUDGED for f, *_ in felt)):
+            if slipped or (self._slipped and any(0 < f.slip_level < 255 for f, *_ in felt)):
                 self._learn_from_slip()
             self._slipped = False
         return self._squeeze(RESERVE * (1.2 if flags & WIDE else 1.0), bool(flags & COARSE))
@@ -95,7 +90,8 @@ class Grip:
 if __name__ == "__main__":
     grip, closed_mm = Grip(), 0.0
     with world({"index": SimFinger(11), "thumb": SimFinger(12)}) as hand:
-        hand.run(7.0)
+        for seconds, touch_n in (7.0, 0.0), (0.5, 1.0), (0.5, 0.0):  # once they have let go, their tares are sure
+            hand.run(seconds, index=Touch(touch_n), thumb=Touch(touch_n))
         for k in range(300):  # between them a thing of 1 N/mm, whose weight comes in the third second
             closed_mm += grip.speed_mm_s * ROUND_S
             press_n, pull_n = max(closed_mm - 2.0, 0.0), max(k - 200, 0) / 200

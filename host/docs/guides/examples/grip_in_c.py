@@ -71,7 +71,7 @@ class Grip:
         for frame in frames:
             if frame is not None:
                 force = np.where(np.isfinite(frame.force_n), np.rint(frame.force_n * 1e4), -(2.0**31))
-                more = {"flags": int(frame.flags), "slip_level": frame.slip_level}
+                more = {"flags": int(frame.flags), "trust": frame.trust, "slip_level": frame.slip_level}
                 data += sent(messages.Frame, finger=frame.finger, force_100un=force, **more)
         state = LIBRARY.chip_round(data, len(data))
         self.speed_mm_s, self.normal_n, self.holds, self.settled, self.slips = state[:5]
