@@ -192,7 +192,7 @@ class Board:
             self._lasting[what] = again
 
     def restore(self) -> None:
-        """Repeat everything that lasts until the board restarts: settings, calibrations, maps and subscriptions.
+        """Repeat everything that lasts until the board restarts: settings, calibrations and maps.
 
         Not tares, which watch.py gives back with their age. Raises
         CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.

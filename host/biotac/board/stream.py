@@ -83,6 +83,7 @@ class Stream:
         self._board = board
         self._has_room = board.link.bits_per_s is None
         self._wants = Wants.named(has_room=self._has_room)
+        self._quantities = self._wants.quantities  # that the board was told last
         self._implied: dict[str, None] = {}  # by callbacks, in order
 
     @property
@@ -116,19 +117,22 @@ class Stream:
         if link.bits_per_s is not None:
             bandwidth.check(link.port, link.bits_per_s, asked.streams, present.bit_count())
         with board.turn():
-            subscribe = Subscribe(0, ALL_FINGERS, int(asked.quantities))
-            try:
-                board.tell(subscribe, lasting=("subscription", 0))
-            except CommandRefusedError as error:
-                # A recording, and a board that somebody else streams, have the quantities that were chosen there.
-                if link.owns_stream and error.error != Error.NOT_HERE:
-                    raise
+            self._quantities = asked.quantities
+            self._subscribe()
             start = Start(0, int(asked.streams), asked.fingers, self.keepalive_ms())
             board.tell(start)
             self._wants, self.started = wants, start
             board.reader.every = asked.every
         board.reader.wake()
         link.release()
+
+    def _subscribe(self) -> None:
+        try:
+            self._board.tell(Subscribe(0, ALL_FINGERS, int(self._quantities)))
+        except CommandRefusedError as error:
+            # A recording, and a board that somebody else streams, have the quantities that were chosen there.
+            if self._board.link.owns_stream and error.error != Error.NOT_HERE:
+                raise
 
     def keepalive_ms(self) -> int:
         """After how long a silence of this side the board stops; 0: never."""
@@ -137,9 +141,13 @@ class Stream:
         return 0 if pace == 0 else min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, pace)))
 
     def resume(self) -> None:
-        """Make a board that stopped stream again, if it did before."""
+        """Make a board that stopped stream again what it did, if it did before.
+
+        One that does not stream forgets what was subscribed to at a HELLO, also of the watch's look for a restart.
+        """
         with self._board.turn():
             if self.started is not None:
+                self._subscribe()
                 self._board.tell(self.started)
 
     def stop(self) -> None:

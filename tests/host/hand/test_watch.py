@@ -92,6 +92,8 @@ def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, qu
     assert (gap.fingers, gap.frames_missed, gap.holds_lapsed, gap.boot_id) == (0b101, 2 * missed, 0, 1)
     first, again = live.firmware.of(wire.Start)
     assert (first.streams, first.fingers, first.keepalive_ms) == (again.streams, again.fingers, again.keepalive_ms)
+    subscribed, renewed = live.firmware.of(wire.Subscribe)  # the HELLO of the look made the board forget it
+    assert subscribed.quantities == renewed.quantities
     live.firmware.wait_for_looks()  # the fault is latched, and not new any more
     assert live.hand.connected and len(live.firmware.of(wire.Start)) == 2
 

@@ -15,6 +15,7 @@ from record_all import record_all
 import biotac
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
+from biotac.wire.fields import INVALID_U8
 from biotac.wire.frames import electrode_signals
 
 ROOT = Path(__file__).parents[3]
@@ -28,6 +29,9 @@ SNAPSHOT = """() => {
     seq: Number(panel.dataset.seq), finger: Number(panel.dataset.finger), flags: Number(panel.dataset.flags),
     force_n: vector("forceN"), torque_nmm: vector("torqueNmm"), poc_mm: vector("pocMm"),
     pdc: panel.querySelector("[data-key=pdc]").dataset.value,
+    slip: panel.querySelector("[data-key=slipLevel]").dataset.value,
+    trust: [document.getElementById("trust").textContent, document.getElementById("trust-words").textContent],
+    grip_n: [...document.querySelectorAll(".grip")].flatMap(({ dataset }) => [dataset.value, dataset.half]),
     signals: [...panel.querySelectorAll("[data-electrode]")].map((e) => [e.dataset.electrode, e.dataset.value]),
   };
 }"""
@@ -57,6 +61,11 @@ def assert_shows(seen: dict[str, Any], frames: Any, signals: Any) -> None:
     for name in ("force_n", "torque_nmm", "poc_mm"):
         np.testing.assert_array_equal(numbers(seen[name]), frame[name])
     assert float(seen["pdc"]) == frame["pdc"]
+    slip_level = np.nan if frame["slip_level"] == INVALID_U8 else frame["slip_level"]
+    np.testing.assert_array_equal(float(seen["slip"]), slip_level)
+    assert seen["trust"] == [f"trust: {wire.Trust(frame['trust']).name}", wire.TRUST_DOC[frame["trust"]]]
+    grip_n = [frame[name] for name in ("normal_n", "normal_half_n", "shear_n", "shear_half_n")]
+    np.testing.assert_array_equal(numbers(seen["grip_n"]), grip_n)
     assert seen["flags"] == frame["flags"]
     assert [name for name, _ in seen["signals"]] == list(sensor.ELECTRODE_NAMES)
     np.testing.assert_array_equal(numbers([value for _, value in seen["signals"]]), signals[at[0]])
@@ -66,6 +75,7 @@ def test_numbers_are_those_of_the_frame_with_that_number(view, open_page) -> Non
     source = "sim:press.toml?fingers=2&seconds=30"
     page = open_page(view(source))
     with biotac.open(source) as hand:  # the same source gives the same bytes
+        hand.stream("results", "events")  # as the page asks for: without events no slip is judged
         truth = hand.read_batch(60)
     signals = electrode_signals(truth.wire)
     contact = int(wire.FrameFlags.CONTACT)
@@ -186,6 +196,7 @@ def test_a_refused_command_says_why_and_moves_nothing(make_player, view_of, open
     link_is(page, "live")
     page.wait_for_selector(".finger")
     page.keyboard.press("1")
+    until(page, "() => numbers.dataset.finger === '1'")  # whose flags are other words than finger 0's
     before = page.locator("main").bounding_box()
     page.keyboard.press("t")
     await_text(page, "NOT_STILL")
@@ -431,7 +442,8 @@ def test_the_spectrum_is_numpys_and_texts_of_marks_never_overprint(view, open_pa
       const { TimePlot } = await import('./plots.js');
       const { readTheme } = await import('./colours.js');
       const finger = new Finger(), marks = [];
-      for (let k = 0; k < 1000; k++) finger.add({ tUs: 1e4 * k, forceN: [0, 0, 0], appliedN: [], pdc: 0, mapMm: null });
+      const frame = { forceN: [0, 0, 0], appliedN: [], gripN: [], pdc: 0, mapMm: null };
+      for (let k = 0; k < 1000; k++) finger.add({ ...frame, tUs: 1e4 * k });
       for (const s of [1, 3, 3.1, 3.2, 5, 5.4, 9.5, 9.9]) marks.push({ t_us: 1e6 * s, name: 'a slip' });
       const places = [], fill = CanvasRenderingContext2D.prototype.fillText;
       CanvasRenderingContext2D.prototype.fillText = function (text, x) {

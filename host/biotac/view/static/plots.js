@@ -4,9 +4,10 @@ import { fit } from "./fingertip.js";
 import { rgb } from "./colours.js";
 import { COLUMNS, HISTORY_S, zoom } from "./model.js";
 
-const MARGIN = { left: 46, right: 10, top: 8, bottom: 22 };
+const MARGIN = { left: 46, right: 10, top: 16, bottom: 22 }; // the top holds the marks' texts, off the lines
+const TRUST_STEP = 4, TRUST_HEIGHT = 14; // pixels: of the band below the force
 const GAP_S = 0.05; // a line breaks where frames are missing
-const DASHES = [[], [7, 4], [2, 3]]; // of x, y and z, for whoever does not see their colours
+const DASHES = { y: [7, 4], z: [2, 3] }; // by colour, for whoever does not see it; the others are drawn through
 const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 
 // A plot's frame: where it is, and how values become pixels.
@@ -73,12 +74,12 @@ export class TimePlot {
     const endS = finger && order.length ? finger.history.t[order.at(-1)] : 0;
     const shown = order.filter((k) => endS - finger.history.t[k] <= zoom.s);
     const [low, high] = this.span(finger, shown);
+    area.timeTicks(theme);
+    if (this.trust) this.band(area, theme, finger, shown, endS);
     const step = niceStep((high - low) / 4);
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
       area.tick(theme, { y: area.y((v - low) / (high - low)), text: v.toFixed(step < 1 ? this.digits : 0).replace("-", "−") });
     }
-    area.timeTicks(theme);
-    if (this.trust) this.band(area, theme, finger, shown, endS);
     let free = area.right; // the newest comes first; a text that would reach into it is left out
     for (const mark of marks.toReversed()) free = this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / zoom.s, mark.name, free);
     c.lineJoin = "round";
@@ -98,7 +99,7 @@ export class TimePlot {
       const wide = k < this.wide.length;
       c.strokeStyle = theme[this.colours[line]];
       [c.lineWidth, c.globalAlpha] = wide ? [7, 0.3] : [1.75, 1];
-      c.setLineDash(wide ? [] : DASHES[line]);
+      c.setLineDash((!wide && DASHES[this.colours[line]]) || []);
       c.beginPath();
       let before = -Infinity;
       for (const k of shown) {
@@ -119,14 +120,15 @@ export class TimePlot {
     c.setLineDash([]);
   }
 
-  // Below the lines, where the force is not one to act on: NONE the highest, INTERVAL the lowest.
+  // Below the lines, which it leaves less room: where the force is not to be acted on as it is; NONE is the highest.
   band(area, theme, finger, shown, endS) {
     const { c } = area;
     c.fillStyle = theme.warn;
     for (const k of shown) {
-      const height = 4 * (3 - finger.history.trust[k]);
+      const height = TRUST_STEP * (3 - finger.history.trust[k]);
       if (height > 0) c.fillRect(area.x(1 - (endS - finger.history.t[k]) / zoom.s), area.bottom - height, 1.5, height);
     }
+    area.bottom -= TRUST_HEIGHT;
   }
 
   // Returns where it begins, in pixels.
@@ -137,24 +139,26 @@ export class TimePlot {
     c.strokeStyle = c.fillStyle = words === "slip" ? theme.warn : theme.quiet;
     c.lineWidth = words === "slip" ? 2 : 1;
     c.beginPath();
-    c.moveTo(x, area.top);
+    c.moveTo(x, 2);
     c.lineTo(x, area.bottom);
     c.stroke();
     c.textAlign = "left";
     c.textBaseline = "top";
-    if (x + 5 + c.measureText(words).width <= free) c.fillText(words, x + 3, area.top);
+    if (x + 5 + c.measureText(words).width <= free) c.fillText(words, x + 3, 2);
     return x;
   }
 
   span(finger, shown) {
     let low = Infinity, high = -Infinity;
-    for (const name of [...this.names, ...this.wide]) {
+    [...this.names, ...this.wide].forEach((name, line) => {
+      const halves = finger?.history[this.halves[line]];
       for (const k of shown) {
         const v = finger.history[name][k];
+        const top = v + (halves?.[k] || 0);
         if (v < low) low = v;
-        if (v > high) high = v;
+        if (top > high) high = top;
       }
-    }
+    });
     if (low > high) return [-this.least / 2, this.least / 2];
     if (this.zero) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
     const lack = Math.max(0, this.least - (high - low));

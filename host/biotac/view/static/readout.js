@@ -42,13 +42,14 @@ const VECTORS = [
 ];
 const SCALARS = [
   { key: "pdc", name: "Pressure, PDC" },
-  { key: "tac", name: "Thermal flux, TAC" },
+  { key: "tac", name: "Flux, TAC" },
   { key: "tdc", name: "Temperature, TDC" },
   { key: "slipLevel", name: "Slip, counts" },
 ];
 
 export class Results {
   constructor(about) {
+    this.trusts = about.trust;
     const table = byId("results");
     table.replaceChildren();
     this.cells = VECTORS.map(({ key, name, unit }) => {
@@ -78,8 +79,24 @@ export class Results {
     VECTORS.forEach(({ key, digits }, row) => frame[key].forEach((v, k) => put(this.cells[row][k], v, digits)));
     for (const element of [this.cells[1][0].parentNode, byId("applied-key")]) element.hidden = Number.isNaN(frame.appliedN[0]);
     for (const { key } of SCALARS) put(this.scalars[key], frame[key], 0);
+    this.scalars.slipLevel.dataset.kind = frame.slipLevel > 0 ? "warn" : "calm";
     put(this.scalars.seq, frame.seq, 0);
+    this.showTrust(frame.trust);
+    ["normalN", "shearN"].forEach((key, k) => {
+      const [value, half] = frame.gripN.slice(2 * k);
+      const place = document.querySelector(`.grip[data-key=${key}]`);
+      write(place, `${number(value, 2)} ± ${number(half, 2)}`);
+      [place.dataset.value, place.dataset.half] = [value, half];
+    });
     this.electrodes.forEach((cell, k) => put(cell, frame.signal ? frame.signal[k] : NaN, 0));
+  }
+
+  showTrust(trust) {
+    const { name, words } = this.trusts[trust];
+    const chip = byId("trust");
+    write(chip, `trust: ${name}`);
+    chip.dataset.kind = { NONE: "warn", HOLD: "warn", ACT: "on" }[name] ?? "calm";
+    write(byId("trust-words"), words);
   }
 }
 
