@@ -118,7 +118,7 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     against = rounded(against, UNIT_BITS);
     for (int d = 0; d < 3; d++) {
         int32_t across = force_mn[d] - rounded(against * n[d], UNIT_BITS);
-        square += (uint32_t)(across * across);
+        square += (uint32_t)across * (uint32_t)across; // int32_t is too narrow for the square of 47 N
     }
     uint32_t normal = against < 0 ? (uint32_t)-against : 0;
     uint32_t shear = root_of(square);
