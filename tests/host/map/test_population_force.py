@@ -39,8 +39,10 @@ def judged(counts: np.ndarray) -> population.Likeness:
 
 def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
     finger = Finger(settings, quantities=wire.QuantityFlags(0x7F))
-    finger.feed(np.tile(TARE.astype(int), (50, 1)))
+    rest = np.tile(TARE.astype(int), (50, 1))
+    finger.feed(rest)
     finger.set_tare(TARE)
+    finger.feed(rest)  # with which the board compares it
     finger.hold()
     return finger.feed(counts)
 
