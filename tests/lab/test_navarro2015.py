@@ -70,7 +70,9 @@ def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
 # ---- active: the procedure drives the hand ------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("fingers", "newtons"), [(("index", "thumb"), False), (navarro.NAMES, True)])
+@pytest.mark.parametrize(
+    ("fingers", "newtons"), [(("index", "thumb"), False), pytest.param(navarro.NAMES, True, marks=pytest.mark.nightly)]
+)
 def test_a_hand_calibrates_itself_finger_by_finger(fingers: tuple[str, ...], newtons: bool) -> None:
     found = navarro_active.calibrate(3, fingers, newtons=newtons)
     assert [one.finger for one in found] == list(fingers)

@@ -120,7 +120,7 @@ def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
 
 def test_a_signal_at_any_moment_ends_a_verb_well(folder: Path) -> None:
     print(f"| verb | {' | '.join(HOW)} |")
-    few = {verb: VERBS[verb] for verb in ("info, recorded", "record", "lake, two jobs", "sim")}
+    few = {verb: VERBS[verb] for verb in ("record", "sim")}  # the rest by night
     assert table(folder, few, 1) == []
 
 
