@@ -143,14 +143,10 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 
 // ---- dynamic pressure
 
-static BT_NOINLINE uint32_t integer_root(uint32_t square)
+// One copy for both callers: the code runs from RAM, which is short.
+static BT_NOINLINE uint32_t root_of(uint32_t square)
 {
-    uint32_t found = 0;
-    for (uint32_t bit = 1u << 15; bit != 0; bit >>= 1) {
-        uint32_t more = found | bit;
-        found = more * more <= square ? more : found;
-    }
-    return found;
+    return bt_root_u32(square);
 }
 
 // What one change must exceed to be evidence is some of this.
@@ -167,7 +163,7 @@ static uint8_t slip_level(const bt_events *events)
     if (!events->slipping || events->shaken_count2 <= explained) {
         return 0;
     }
-    const uint32_t counts = integer_root(events->shaken_count2 - explained) * 5 >> 6;
+    const uint32_t counts = root_of(events->shaken_count2 - explained) * 5 >> 6;
     return counts < BT_SLIP_LEVEL_NONE ? (uint8_t)counts : BT_SLIP_LEVEL_NONE - 1;
 }
 
@@ -429,6 +425,6 @@ void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, ui
     }
     msg->energy_count2 = shaken ? UINT32_MAX : events->energy_count2;
     msg->peak_count = event == BT_EVENT_KIND_JOLT || event == BT_EVENT_KIND_SLIP
-                          ? (uint16_t)(integer_root(events->peak_count2) / 4)
+                          ? (uint16_t)(root_of(events->peak_count2) / 4)
                           : BT_INVALID_COUNT;
 }

@@ -34,9 +34,14 @@ _Static_assert((BT_GRIP_MAX_MN * 1733ll / 1000 + 64) * UNIT_MAX + (1 << (UNIT_BI
                "a part along an axis must fit");
 
 // A tenth: x * (2^33 / 10) / 2^33.
+static uint32_t tenth(uint32_t strength_100un)
+{
+    return bt_scale(strength_100un, 0x3333, 0x3333, 1);
+}
+
 static int32_t mn_of(int32_t force_100un)
 {
-    uint32_t mn = bt_scale(bt_abs32(force_100un), 0x3333, 0x3333, 1);
+    uint32_t mn = tenth(bt_abs32(force_100un));
     return bt_with_sign(mn < BT_GRIP_MAX_MN ? mn : BT_GRIP_MAX_MN, force_100un);
 }
 
@@ -74,11 +79,6 @@ static uint16_t half_mn(const bt_uncertainty *uncertainty, int part, uint32_t si
                     + ((uncertainty->noise_q4 * NOISE_MN_PER_COUNT) >> 4)
                     + (uncertainty->tare_unconfirmed ? UNCONFIRMED_TARE_MN : 0);
     return (uint16_t)(half < TOP ? half : TOP);
-}
-
-static uint32_t tenth(uint32_t strength_100un)
-{
-    return bt_scale(strength_100un, 0x3333, 0x3333, 1);
 }
 
 void bt_lin_guess(uint32_t strength_100un, uint32_t guess_mn[2])

@@ -7,10 +7,11 @@
 //
 // An interval is made of what its causes add to its half width, in mN:
 //
-//     margin     what the force's source left on frames that it had not seen: so much, and a share of the
-//     force guess      what is not known of this touch: most of all by Lin's gains, and away from the map's
-//     training noise      of the electrodes, at rest out        a share of the force for each electrode whose
-//     signal is estimated tare       a hold that may be in a tare which nothing has confirmed
+// - margin: what the force's source left on frames that it had not seen, so much and a share of the force
+// - guess: what is not known of this touch, most of all by Lin's gains and away from the map's training
+// - noise: of the electrodes, at rest
+// - out: a share of the force for each electrode whose signal is estimated
+// - tare: a hold that may be in a tare which nothing has confirmed
 //
 // Units: mN, rounded to nearest; a component of the force saturates at 37 N, a half width at 65.534 N.
 #ifndef BIOTAC_GRIP_H

@@ -33,9 +33,9 @@ typedef struct {
     bool let_go;          // the host says so: what is in doubt is residue
     bool drifted;         // in this touch all electrodes moved alike by more than drift does
     bool unsure;          // no release has confirmed the tare: START's, or one that the reading contradicts
-    bool likely;    // nor this one, which a host gave or a SHIFT left; what it read does not contradict it
-    bool unchecked; // the host gave it, and no whole sweep has been compared with it
-    bool aged;      // and it was old
+    bool likely;          // nor this one, of a host or a SHIFT; what the finger read does not contradict it
+    bool unchecked;       // the host gave it, and no whole sweep has been compared with it
+    bool aged;            // and it was old
     bt_baseline base;
     uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
     uint32_t threshold_count2;            // energy above which a round counts as touched

@@ -189,7 +189,7 @@ uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base, uint32_t age_ms)
         return BT_ERROR_RAILED;
     }
     bt_adopt(tare, base, BT_TARE_STATE_REST, BT_TARE_REASON_HOST_SET);
-    tare->unsure = true; // until bt_judge_told
+    tare->unsure = true; // until bt_judge_sweep has compared it
     tare->unchecked = true;
     tare->aged = age_ms > FRESH_MS;
     return BT_ERROR_OK;
@@ -197,8 +197,14 @@ uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base, uint32_t age_ms)
 
 void bt_tare_keep(const bt_tare *tare, bt_tare_kept *kept)
 {
-    *kept = (bt_tare_kept){tare->base, tare->drift.sure.q20, tare->drift.sure.sweeps,
-                           tare->held, tare->unsure,         tare->likely};
+    *kept = (bt_tare_kept){
+        .base = tare->base,
+        .drift_q20 = tare->drift.sure.q20,
+        .drift_sweeps = tare->drift.sure.sweeps,
+        .held = tare->held,
+        .unsure = tare->unsure,
+        .likely = tare->likely,
+    };
 }
 
 void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept)
