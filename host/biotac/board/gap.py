@@ -120,12 +120,15 @@ class Gaps:
             gap = self._loss(*self._begun, batch.first_t_us() or last_us, flags)
             self._begun, self._held_back, fingers = None, [], tuple(flags)
             batch.fingers = sum(1 << finger for finger in fingers)
-        elif _is_long(batch, last_us) or any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers):
-            gap = self._jump(_rows(batch), {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
+        is_long = last_us - (batch.first_t_us() or last_us) > LONG_US
+        jumps = gap is None and any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers)
+        rows = _rows(batch) if is_long or jumps else {}
+        if gap is None and rows:
+            gap = self._jump(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
         for finger in fingers:
             seen_us[finger] = last_us
-        if _is_long(batch, last_us):
-            seen_us |= {finger: rows[-1][0] for finger, rows in _rows(batch).items()}
+        if is_long:
+            seen_us |= {finger: own[-1][0] for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
         if gap is not None:
             self.count += 1
@@ -155,10 +158,6 @@ class Gaps:
                     gap = replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)
                 last_us = t_us
         return gap
-
-
-def _is_long(batch: Batch, last_us: int) -> bool:
-    return last_us - (batch.first_t_us() or last_us) > LONG_US
 
 
 def _rows(batch: Batch) -> dict[int, list[tuple[int, int, int, int]]]:

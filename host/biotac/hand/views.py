@@ -105,14 +105,14 @@ class Latest:
             self.wake()
 
     def tares(self) -> list[TareSet]:
-        """What gives a board that restarted the latest tares that were worth something, with their age."""
-        told = []
+        """The commands that give a board that restarted the latest tares with trust, and their age."""
+        commands = []
         for finger, batch in self._framed.items():
             rows = batch.wire[(batch.wire["finger"] == finger) & (batch.wire["trust"] >= Trust.INTERVAL)]
             if len(rows) and (rows["tare_q4"][-1] != INVALID_COUNT).all():
                 tare_q4, pdc_q4 = tuple(rows["tare_q4"][-1].tolist()), int(rows["pdc_tare_q4"][-1])
-                told.append(TareSet(0, finger, tare_q4, pdc_q4, age_ms(time.monotonic() - batch.arrived_s)))
-        return told
+                commands.append(TareSet(0, finger, tare_q4, pdc_q4, age_ms(time.monotonic() - batch.arrived_s)))
+        return commands
 
     def wake(self) -> None:
         with self._news:

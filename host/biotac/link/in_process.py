@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from abc import abstractmethod
 from typing import Any
 
 from ..errors import DeviceLostError
@@ -16,8 +17,7 @@ OUTBOX_BYTES = 262_144
 class InProcessLink(Link):
     """A Link to a gateway that runs in this process, on a thread that ``begin`` starts.
 
-    What differs is ``_run``, which calls the board until ``_closing`` or ``_failure``; ``_us``, the board's time; and,
-    with a bus, ``_delay`` and ``_exchange``.
+    What differs is ``_run``; ``_us``, the board's time; and, with a bus, ``_delay`` and ``_exchange``.
     """
 
     cure = "open it again"  # after a failure
@@ -74,8 +74,9 @@ class InProcessLink(Link):
 
     # ---- the board's thread ----------------------------------------------------------------------
 
+    @abstractmethod
     def _run(self) -> None:
-        raise NotImplementedError
+        """Call the board, until ``_closing`` or ``_failure``."""
 
     def _delay(self, us: int) -> None:
         """Without a bus there is nothing to wait for."""

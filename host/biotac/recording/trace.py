@@ -12,6 +12,7 @@ from ..keep.calibration import own_settings
 from ..wire.fields import INVALID_U32, Field
 from ..wire.frames import StructArray
 from ..wire.messages_gen import INVALID_COUNT
+from ..wire.slots import FRAME_S
 from .reader import Recording
 from .recompute import machine_rounds
 from .rounds import run
@@ -37,7 +38,7 @@ TRACE = (
     Field("drift_count_per_s", "<f8", "count/s", "by which the tare is taken to drift"),
 )
 _DTYPE = np.dtype([("t_us", "<i8"), *((column.name, column.dtype) for column in TRACE)])
-_SWEEP_S = 0.08
+_SWEEP_S = SWEEP_ROUNDS * FRAME_S
 
 
 def trace(recording: Recording, show: Callable[[float], None] = lambda share: None) -> dict[int, StructArray]:

@@ -57,8 +57,8 @@ class Bag:
 
     def __iter__(self) -> Iterator[Message | RefusedError]:
         with self._reader() as bag:
-            mine = [c for c in bag.connections if c.id in self._ids]
-            for connection, logged_ns, raw in bag.messages(connections=mine):
+            chosen = [c for c in bag.connections if c.id in self._ids]
+            for connection, logged_ns, raw in bag.messages(connections=chosen):
                 try:
                     yield self._decode[connection.id](bytes(raw), logged_ns)
                 except RefusedError as error:

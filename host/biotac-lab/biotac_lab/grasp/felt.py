@@ -47,14 +47,14 @@ class TrueForce:
         """Each finger's frame and whether a SLIP was told, of this round; None while the program stands still."""
         normal_n, shear_n, slides = self._last
         self._last = plant.normal_n, float(np.hypot(*plant.touch(0)[1:3])), plant.slip_mm_s > 0
-        told, self._slid, self._seq = slides and not self._slid and not self._deaf, slides, self._seq + 1
+        slipped, self._slid, self._seq = slides and not self._slid and not self._deaf, slides, self._seq + 1
         touched, none, good = normal_n > TOUCHED_N, np.full(3, np.nan), Trust.ACT
         force_n = np.array([0.0, shear_n, max(normal_n + self._off_n, 0.0) if touched else 0.0])
         flags = FrameFlags.CONTACT if touched else FrameFlags(0)
         return [
             Frame(k, self._seq, 0, np.zeros(19, np.uint16), 0, 0, 0, none, force_n * share, none, flags, trust=good)
             for k, share in enumerate(self._shares)
-        ], told
+        ], slipped
 
     def hold(self, held: bool) -> None:
         """The law begins to hold the thing, or lets go."""

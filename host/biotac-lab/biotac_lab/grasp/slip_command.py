@@ -111,11 +111,11 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
         high_n = 1.5 + 0.51 * n_s
         ends_s, slips_s, _ = _felt(finger, at, (0.3, 1.5), (1.3, 1.5), (0.51, high_n), (0.3, high_n), mm_s=mm_s)
         late_s = slips_s - ends_s[2] - 0.2
-        told = bool(((late_s > 0) & (late_s <= SOON_S)).any())
-        found[f"slides at {mm_s:g} mm/s: told within 50 ms", n_s, rattle].append(told)
+        reported = bool(((late_s > 0) & (late_s <= SOON_S)).any())
+        found[f"slides at {mm_s:g} mm/s: told within 50 ms", n_s, rattle].append(reported)
     for n_s in (10.0, 30.0, 100.0):
-        told = len(_felt(finger, at, (2 / n_s, 2.0), (0.15, 2.0), (2 / n_s, 0), (0.5, 0))[1]) > 0
-        found["poked: SLIP", n_s, rattle].append(told)
+        reported = len(_felt(finger, at, (2 / n_s, 2.0), (0.15, 2.0), (2 / n_s, 0), (0.5, 0))[1]) > 0
+        found["poked: SLIP", n_s, rattle].append(reported)
 
 
 def _held(pac: Any) -> list[Any]:
