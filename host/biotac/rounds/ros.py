@@ -10,6 +10,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 
 from ..wire import sensor_gen as sensor
 from ..wire import slots
+from ..wire.identity import SENSOR_SERIAL_BYTES
 from .message import SLOT_US, Message, RefusedError, counts_of
 
 #: By the type's last word: Shadow's sr_robot_msgs/BiotacAll, and biotac_sensors/BioTacHand of Penn and KTH.
@@ -85,7 +86,7 @@ class _Hand:
             f = self._finger_at.setdefault(int(own.bt_position), len(self._finger_at))
             if f >= sensor.MAX_SENSORS or found[f] is not None:
                 raise RefusedError(f"sensor position {own.bt_position} is one too many, or comes twice")
-            serial = own.bt_serial.encode("ascii", "replace")[:16]
+            serial = own.bt_serial.encode("ascii", "replace")[:SENSOR_SERIAL_BYTES]
             channels = own.electrode_data, own.pdc_data, own.tac_data, own.tdc_data, own.pac_data
             found[f] = counts_of(f, *channels, serial)
         return Message(stamp_ns, tuple(found), _slot_us(message.bt_time))

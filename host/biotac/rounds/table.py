@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..documents import parse_toml, read_text
 from ..errors import InputError
+from ..wire.identity import SENSOR_SERIAL_BYTES
 from ..wire.sensor_gen import MAX_SENSORS
 from .message import Message, RefusedError, counts_of
 
@@ -50,7 +51,7 @@ class Table:
             if not isinstance(fingers, list) or not 0 < len(fingers) <= MAX_SENSORS:
                 raise InputError(f"{self._where}: no [[finger]]; expected {EXPECTED}")
             self._fingers = [{name: self._places(own.get(name)) for name in CHANNELS} for own in fingers]
-            self._serials = [str(own.get("serial", "")).encode()[:16] for own in fingers]
+            self._serials = [str(own.get("serial", "")).encode()[:SENSOR_SERIAL_BYTES] for own in fingers]
             self._rows = np.loadtxt(lines[1:], delimiter=",", usecols=self._used(time), ndmin=2, quotechar='"')
         except (OSError, ValueError, IndexError, AttributeError) as error:
             raise InputError(f"{self._where}: cannot be read ({error}); expected numbers, and {EXPECTED}") from error
