@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tomllib
+
+from biotac.documents import tomllib
 
 ROOT = Path(__file__).parents[2]
 RIGS = {name: tomllib.loads((ROOT / f"tests/hil/rigs/{name}.toml").read_text()) for name in ("posix", "pico_emulated")}

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tomllib
 from two_picos import TwoPicos
 
 import biotac
 from bench import BenchPty, open_bench
+from biotac.documents import tomllib
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.ports import parse_sim, start_board

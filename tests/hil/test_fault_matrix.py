@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomllib
 from held_press import fault, held_press, of
 from rig import ROOT, Rig
 
 import biotac
 from biotac import FrameFlags
+from biotac.documents import tomllib
 from biotac.sim.loading import load_source
 from biotac.sim.source import Source
 from biotac.wire import messages_gen as wire

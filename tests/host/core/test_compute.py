@@ -307,7 +307,7 @@ def test_what_is_not_wanted_is_nan_and_the_rest_is_the_same(wanted) -> None:
     want, got = biotac.compute(counts, TARE), biotac.compute(counts, TARE, quantities=quantities)
     live = biotac.per_frame(TARE, quantities=quantities)
     both = biotac.QuantityFlags.POC | biotac.QuantityFlags.FORCE
-    needed = [*biotac.QuantityFlags(7), *[both] * 4]
+    needed = [*(biotac.QuantityFlags(1 << bit) for bit in range(3)), *[both] * 4]
     for name, quantity in zip(RESULT_DTYPE.names, needed, strict=True):
         asked = want[name] if quantities & quantity == quantity else np.full(want[name].shape, np.nan)
         np.testing.assert_array_equal(got[name], asked)

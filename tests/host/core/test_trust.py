@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomllib
 
 import biotac
 from biotac import EventKind, FrameFlags, Trust
 from biotac.core.compiled import trust_of
+from biotac.documents import tomllib
 from biotac.sim import physics, sampling
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire

@@ -39,7 +39,7 @@ def test_a_data_frame_has_every_number(recording) -> None:
             assert (table[name].isna() == missing).all(), name
             assert (table[name].dropna().to_numpy() == rows[~missing, k]).all(), name
     since_us = recording.frames["t_us"] - recording.frames["t_us"].min()
-    assert ((table.index - table.index[0]).total_seconds() * 1e6).round().tolist() == since_us.tolist()
+    assert np.round((table.index - table.index[0]).total_seconds() * 1e6).tolist() == since_us.tolist()
     assert table.index[0].value == recording.begin_ns
     assert table.attrs["units"]["force_x_n"] == "N" and table.attrs["units"]["counts_E7"] == "count"
 

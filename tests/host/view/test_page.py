@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomllib
 from record_all import record_all
 
 import biotac
+from biotac.documents import tomllib
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.fields import INVALID_U8
