@@ -150,7 +150,9 @@ def describe(hand: Hand, finger: int) -> dict[str, str]:
 def _pylsl() -> Any:
     try:
         import pylsl
-    except (ImportError, RuntimeError) as error:  # RuntimeError: pylsl is installed, liblsl is not
-        seen = str(error).splitlines()[0]
-        raise InputError(f"LSL needs pylsl and liblsl ({seen}); pip install 'biotac-gateway[lsl]'") from error
+    except ImportError as error:
+        raise InputError("LSL needs pylsl, which is not installed; pip install 'biotac-gateway[lsl]'") from error
+    except RuntimeError as error:  # the wheel of some systems, and every pylsl before 1.18, has no liblsl in it
+        cure = "pip install --upgrade pylsl, or liblsl from conda-forge or github.com/sccn/liblsl, named by PYLSL_LIB"
+        raise InputError(f"pylsl is installed, and finds no liblsl; {cure}") from error
     return pylsl

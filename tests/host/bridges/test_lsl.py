@@ -150,7 +150,7 @@ def test_without_pylsl_the_extra_is_named(capsys, monkeypatch) -> None:
     assert "pip install 'biotac-gateway[lsl]'" in capsys.readouterr().err
 
 
-def test_without_liblsl_so_too(capsys, monkeypatch) -> None:
+def test_without_liblsl_its_own_cure_is_named(capsys, monkeypatch) -> None:
     class Broken:
         """Finds pylsl, and fails as it does without its library."""
 
@@ -162,4 +162,6 @@ def test_without_liblsl_so_too(capsys, monkeypatch) -> None:
     monkeypatch.delitem(sys.modules, "pylsl")
     monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
     assert main(["share", "--lsl", "sim:press.toml"]) == 2
-    assert "liblsl" in capsys.readouterr().err
+    output = capsys.readouterr().err
+    assert "finds no liblsl" in output and "pip install --upgrade pylsl" in output
+    assert "not installed" not in output
