@@ -81,6 +81,8 @@ class SimBoard:
 
     def _start(self, options: list[str]) -> Any:
         """The board's process, with three pipes; the environment variable BIOTAC_SIM is the command of another one."""
+        if os.name != "posix":
+            raise PortError("the simulated board needs a pty, which Windows has not; run it in WSL")
         command = shlex.split(os.environ.get("BIOTAC_SIM", "")) or [str(BUILT / "bin" / "biotac-sim")]
         if not Path(command[0]).is_file():
             raise PortError(
