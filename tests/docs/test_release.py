@@ -1,0 +1,75 @@
+"""What a release is built from (tools/make/release_tree.py), and what its steps and workflows hold."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import release_tree
+from biotac.documents import tomllib
+
+ROOT = Path(__file__).resolve().parents[2]
+LAB, ROS = "host/biotac-lab", "host/ros2/biotac_ros2/package.xml"
+OWNED = {
+    "version": "0.1.0",
+    "authors": [{"name": "A. Person", "email": "a@person.example"}],
+    "urls": {name: f"https://code.example/{name}" for name in release_tree.ADDRESSES},
+}
+
+
+def test_what_a_person_has_to_fill_in_is_named_until_it_is_there() -> None:
+    gaps = release_tree.missing({"authors": [{"name": "some"}], "urls": {"Issues": "https://code.example"}})
+    assert [gap.partition(" = ")[0] for gap in gaps] == [
+        "authors with an address: authors", "urls: Repository", "urls: Changelog", "urls: Documentation"
+    ]  # fmt: skip
+    assert release_tree.missing(OWNED) == []
+
+
+def test_authors_and_addresses_reach_both_packages_and_every_link(tmp_path: Path) -> None:
+    for name in ("README.md", f"{LAB}/README.md", f"{LAB}/pyproject.toml", ROS, "host/docs/guides/examples/grip.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    (tmp_path / LAB / "biotac_lab/grasp").mkdir(parents=True)
+    release_tree.complete(tmp_path, OWNED)
+    lab = tomllib.loads((tmp_path / LAB / "pyproject.toml").read_text())
+    assert lab["project"]["authors"] == OWNED["authors"] and lab["project"]["urls"] == OWNED["urls"]
+    assert "force-include" not in str(lab["tool"])  # a source distribution has no folder beside it
+    assert (tmp_path / LAB / "biotac_lab/grasp/grip.py").read_bytes() == (
+        ROOT / "host/docs/guides/examples/grip.py"
+    ).read_bytes()
+    assert '<maintainer email="a@person.example">A. Person</maintainer>' in (tmp_path / ROS).read_text()
+    for page in ("README.md", f"{LAB}/README.md"):
+        targets = re.findall(r"\]\((?!http)[^#)]", (tmp_path / page).read_text())
+        assert targets == [], page
+        for kind, path in re.findall(
+            r"\]\(https://code.example/Repository/(\w+)/v0.1.0/([^)#]+)", (tmp_path / page).read_text()
+        ):
+            assert (ROOT / path).is_file() and (kind == "raw") == path.endswith(".png"), path
+
+
+def test_every_action_is_pinned_by_a_hash_with_its_tag_beside_it() -> None:
+    uses = [
+        line.strip()
+        for path in sorted((ROOT / ".github/workflows").glob("*.yml"))
+        for line in path.read_text().splitlines()
+        if "uses:" in line
+    ]
+    assert len(uses) > 10
+    assert [one for one in uses if not re.search(r"@[0-9a-f]{40} # v\d+\.\d+\.\d+$", one)] == []
+
+
+def test_a_workflow_runs_only_steps_that_there_are_and_publishes_to_the_index_first() -> None:
+    release = (ROOT / ".github/workflows/release.yml").read_text()
+    steps = re.search(r"^steps=\((.*)\)", (ROOT / "tools/release").read_text(), re.M)
+    assert steps is not None
+    for called in re.findall(r"tools/release ([\w ]+)$", release, re.M):
+        assert set(called.split()) <= set(steps[1].split())
+    assert release.index("gh-action-pypi-publish") < release.index("gh release create")
+    assert "owner" in steps[1] and "owner" in release
+
+
+def test_the_version_is_one_and_a_tag_of_another_is_refused() -> None:
+    environment = {"PATH": "/usr/bin:/bin", "GITHUB_REF_TYPE": "tag", "GITHUB_REF_NAME": "v9.9.9"}
+    run = subprocess.run([ROOT / "tools/release", "version"], env=environment, capture_output=True, text=True)
+    assert run.returncode == 1 and run.stderr == "release: the tag is v9.9.9, and pyproject.toml says 0.1.0\n"
