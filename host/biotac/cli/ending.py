@@ -52,8 +52,10 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     if _held:
         _pending = True
         return
-    if frame is not None and (frame.f_code.co_name == "__del__" or "importlib" in frame.f_code.co_filename):
-        # What is raised there is printed and lost.
+    while frame and frame.f_code.co_name != "__del__" and "importlib" not in frame.f_code.co_filename:
+        frame = frame.f_back
+    if frame is not None:
+        # What is raised there is lost: of a __del__ it is printed, and C code that is being imported may clear it.
         threading.Timer(AGAIN_S, _again, [number]).start()
         return
     if time.monotonic() - _last_s >= ONCE_S:

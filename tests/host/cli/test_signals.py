@@ -168,3 +168,17 @@ def test_two_signals_are_one(folder: Path) -> None:
     time.sleep(0.1)
     code, said, _ = ended(process, signal.SIGINT, True)
     assert judge(folder, code, said) == ""
+
+
+def test_a_signal_that_an_import_would_swallow_is_put_off(tmp_path: Path) -> None:
+    """As Cython does, whose modules clear what is raised while they register their classes."""
+    (tmp_path / "swallows.py").write_text(
+        "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    [0 for _ in range(1000)]\n"
+        "except KeyboardInterrupt:\n    pass\n"
+    )
+    program = (
+        f"import sys, time; sys.path.insert(0, {str(tmp_path)!r}); import biotac.cli.ending as e; e.by_interrupt()\n"
+    )
+    program += "try: import swallows; time.sleep(60)\nexcept KeyboardInterrupt: print('obeyed')"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300)
+    assert (run.stdout, run.stderr) == ("obeyed\n", "")
