@@ -73,7 +73,7 @@ def test_the_doctor_names_the_lead(boards: Callable[..., Ports], capsys, leads: 
     code = main(["doctor", port, "--sensor-port", sensor_port, "--seconds", "0.5", "--json"])
     found = json.loads(capsys.readouterr().out)["findings"]
     assert tuple(one["code"] for one in found if one["code"].startswith("lead_")) == LEADS[leads], found
-    assert bool(found) == bool(code) == bool(leads)
+    assert bool(found) == bool(code) == bool(leads), found
 
 
 def test_a_source_is_staged_behind_samples_and_a_change_of_sensors() -> None:

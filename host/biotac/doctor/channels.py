@@ -25,7 +25,7 @@ STUCK_TDC_ROUNDS = 280
 # Two electrodes that moved by as much, and never differed by more than an eighth of it, are one: those of the public
 # recordings that came closest differed by half of it. Mirror images pressed on the midline may differ by less, but not
 # two readings of one voltage: over so many rounds their mean differs by no more than 5 sigma, a settling converter's
-# counts, and what the voltage moves within a round.
+# counts, and what the voltage moves within a round. Half a second, as a press begins, does not tell them apart.
 SAME_MOVED_COUNTS = 40.0
 SAME_SHARE = 8.0
 SAME_ROUNDS, SAME_SETTLING_COUNTS = 25, 2.0
@@ -122,7 +122,7 @@ def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
             found["channel_railed"].append(name)
         elif len(good) >= rounds and not np.ptp(good[-rounds:], axis=0).any():
             found["channel_stuck"].append(name)
-        elif name.startswith("E") and len(good) == len(counts) and np.ptp(good) >= SAME_MOVED_COUNTS:
+        elif name.startswith("E") and STUCK_ROUNDS <= len(good) == len(counts) and np.ptp(good) >= SAME_MOVED_COUNTS:
             moved[name] = good[:, 0]
     found["electrodes_shorted"] = [
         f"{one} and {two}"

@@ -214,6 +214,22 @@ CASES: list[tuple[str, Facts, str]] = [
 ]
 
 
+def test_half_a_second_of_mirror_images_is_no_short() -> None:
+    """E4 and E14 as a press on the midline begins: a quarter of a second and its mean cannot tell them apart."""
+
+    def mirrored(rows: np.ndarray) -> None:
+        shorted(rows)
+        rows["counts"][:, 1] -= 8 * np.arange(len(rows)).astype(np.uint16)
+        rows["counts"][:, 8] = rows["counts"][:, 1] + 6
+
+    facts = frames(mirrored)
+    assert facts.board is not None
+    rows = facts.board.frames
+    few = rows[rows["t_us"] < rows["t_us"].min() + 500_000]
+    assert {f.code for f in judge(facts)} == {"electrodes_shorted"}  # of so many that it is one
+    assert judge(dataclasses.replace(facts, board=dataclasses.replace(facts.board, frames=few))) == []
+
+
 def test_pressure_of_a_healthy_finger_is_no_finding() -> None:
     assert not [f for f in judge(pressed(100)) if f.code == "pressure_flat"]
 
