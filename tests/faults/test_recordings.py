@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from record_all import record_all
+from record_all import blocks_of, record_all
 
 import biotac
 
@@ -36,7 +36,7 @@ def content(path: Path) -> tuple[dict[str, Any], list[str]]:
     facts = {name: getattr(found, name) for name in names} | {
         name: getattr(found, name).tobytes() for name in ("frames", "pac", "idle", "wire")
     }
-    return facts | {"blocks": found.blocks, "gaps": found.gaps, "arrivals": found.all_here_ns}, found.problems
+    return facts | {"blocks": blocks_of(found), "gaps": found.gaps, "arrivals": found.all_here_ns}, found.problems
 
 
 def loaded(path: Path) -> tuple[bytes, bool]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import biotac
 from biotac.recording.layout import CHECKSUM
 from biotac.recording.mcap_file import RecordingFile
+from biotac.wire.framing import encode
 
 
 def record_all(source: str, path: Path) -> Path:
@@ -16,6 +17,12 @@ def record_all(source: str, path: Path) -> Path:
         hand.record(path)
         hand.read_batch(100)
     return path
+
+
+def blocks_of(recording: biotac.Recording) -> list[bytes]:
+    """The messages of each block, as a board sends them."""
+    numbers = range(len(recording.arrived_ns))
+    return [b"".join(encode(*message) for message in recording.messages_in(k)) for k in numbers]
 
 
 def written(path: Path, metadata: Mapping[str, str], blocks: Iterable[tuple[bytes, int]]) -> Path:

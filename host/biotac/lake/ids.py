@@ -32,7 +32,7 @@ def recording_id(path: Path) -> tuple[str, str]:
         Recording(path)  # raises an error that says what is wrong
         raise RecordingError(f"{path} holds no data; there is nothing to export")
     begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
-    data = b"".join(packet.data for packet in first.packets())
+    data = b"".join(bytes([message_id]) + payload for message_id, payload in first.messages())
     try:
         info = Facts.read(blocks.metadata).info
     except ValueError as error:

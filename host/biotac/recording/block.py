@@ -1,9 +1,9 @@
-"""One block of a recording, about a second: a table per finger of its FRAMEs, PACs and heartbeats, and the packets.
+"""One block of a recording, about a second: a table per finger of its FRAMEs, PACs and heartbeats, and the rest.
 
 A table has one column per field. A column is stored as the change from row to row (the first row's is from 0),
 zigzag-encoded so that small changes are small numbers, as byte planes, lowest first: zstd compresses this well, and a
-field can be read without the others. ``seq`` and ``t_us`` are unwrapped. The packets are all other messages as they
-came, damaged ones too, with the order of all.
+field can be read without the others. ``seq`` and ``t_us`` are unwrapped. The rest is all other messages as they came,
+the order of all, and what the decoder counted as lost or damaged.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ from numpy.typing import NDArray
 
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
+from ..wire.decoder import pairs
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import FORCE_LSB_PER_N, WIRE_INVALID
 from ..wire.frames import StructArray
-from ..wire.framing import encode, open_frame
 from ..wire.native import ffi, lib
 
 KINDS = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)
 FRAME, PAC, IDLE = range(len(KINDS))
 APPLIED = "applied_100un"  #: a column of FRAMEs that no board sends: the force (3) on a simulated finger
-PACKET = 0xFFFF  #: in an order: the next of the packets. Any other code is kind << 8 | finger: that finger's next row.
+#: In an order: the next of the other messages. Any other code is kind << 8 | finger: that finger's next row.
+OTHER = 0xFFFF
 _COUNTS = struct.Struct(f"<{len(KINDS)}I")  # rows of each kind, at the beginning of a table
 
 
@@ -38,14 +39,6 @@ class Column(NamedTuple):
     name: str
     dtype: np.dtype[Any]
     parts: int
-
-
-class Packet(NamedTuple):
-    """Bytes up to and including a delimiter. ``message_id`` is None where they are not a valid message."""
-
-    data: bytes
-    message_id: int | None
-    payload: bytes
 
 
 def row_dtype(kind: int) -> np.dtype[Any]:
@@ -79,27 +72,33 @@ def _name(message_id: int) -> str:
 class Rest:
     """What a block holds beside its tables.
 
-    ``fingers`` have a table. ``first_us`` and ``last_us`` are the first and last time of FRAMEs and heartbeats, None
-    without any. ``lost`` has (finger, seq before, frames lost) for each loss found by the sequence numbers. ``gaps``
-    are times during which the board was away, before this block's first row. ``labels`` were made during the block.
+    ``others`` are all messages but rows, as (id, length, payload). ``fingers`` have a table. ``first_us`` and
+    ``last_us`` are the first and last time of FRAMEs and heartbeats, None without any. ``lost`` has (finger, seq
+    before, frames lost) for each loss found by the sequence numbers. ``rejected`` counts what came damaged, by the
+    names of FramingCounts. ``frames``, ``frames_lost``, ``pac_lost`` and ``disordered`` count from the beginning of
+    the file to the end of this block. ``gaps`` are times during which the board was away, before this block's first
+    row. ``labels`` were made during the block.
     """
 
     order: NDArray[np.uint16]
-    packets: bytes
+    others: bytes
     fingers: list[int] = field(default_factory=list)
     first_us: int | None = None
     last_us: int | None = None
     lost: list[tuple[int, int, int]] = field(default_factory=list)
-    lost_pac: int = 0
+    rejected: dict[str, int] = field(default_factory=dict)
+    frames: int = 0
+    frames_lost: int = 0
+    pac_lost: int = 0
     disordered: int = 0
     gaps: list[dict[str, Any]] = field(default_factory=list)
     labels: list[dict[str, Any]] = field(default_factory=list)
 
     def pack(self) -> bytes:
-        """A line of JSON, the order, the packets."""
-        head = {name: value for name, value in vars(self).items() if name not in ("order", "packets")}
+        """A line of JSON, the order, the other messages."""
+        head = {name: value for name, value in vars(self).items() if name not in ("order", "others")}
         line = json.dumps(head | {"messages": len(self.order)}, separators=(",", ":"))
-        return line.encode() + b"\n" + self.order.astype("<u2").tobytes() + self.packets
+        return line.encode() + b"\n" + self.order.astype("<u2").tobytes() + self.others
 
     @classmethod
     def unpack(cls, data: bytes) -> Rest:
@@ -111,6 +110,8 @@ class Rest:
         if 2 * len(order) != size:
             raise ValueError(f"the order of {size // 2} messages is cut off")
         head["lost"] = [(int(finger), int(before), int(frames)) for finger, before, frames in head["lost"]]
+        head |= {name: int(head[name]) for name in ("frames", "frames_lost", "pac_lost", "disordered")}
+        head["rejected"] = {str(kind): int(count) for kind, count in head["rejected"].items()}
         return cls(order, body[size:], **head)
 
     def finger_of_row(self, kind: int) -> NDArray[np.uint8]:
@@ -120,36 +121,25 @@ class Rest:
 
     def without(self, fingers: Collection[int]) -> Rest:
         """A copy without the rows of ``fingers``."""
-        gone = np.isin(self.order & 0xFF, list(fingers)) & (self.order != PACKET)
+        gone = np.isin(self.order & 0xFF, list(fingers)) & (self.order != OTHER)
         return Rest(**{**vars(self), "order": self.order[~gone]})
 
 
 def encode_block(
-    data: bytes, batch: Batch, applied_n: NDArray[np.float64] | None
-) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
-    """Tables by finger, the order and the packets of ``data``, whole messages whose decoded rows are ``batch``."""
-    pieces = data.split(b"\0")[:-1]
+    batch: Batch, ids: bytes, applied_n: NDArray[np.float64] | None
+) -> tuple[dict[int, bytes], NDArray[np.uint16]]:
+    """Tables by finger of a batch's rows, and the order of all messages, whose ids are ``ids``."""
     frames = np.empty(len(batch.wire), ROWS[FRAME])
     applied = np.full(3, np.nan) if applied_n is None else np.clip(np.rint(applied_n * FORCE_LSB_PER_N), -2e9, 2e9)
     frames[APPLIED] = np.nan_to_num(applied, nan=wire.INVALID_I32)
     for name in DTYPES[wire.Frame.ID].names or ():
         frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
     tables = [frames, batch.pac, batch.idle]
-    # COBS's first byte precedes the id. A row is at least as long as here; it is longer from a newer board.
-    ids = [piece[1] if len(piece) > 1 else 0 for piece in pieces]
-    order = np.full(len(pieces), PACKET, np.uint16)
+    order = np.full(len(ids), OTHER, np.uint16)
     for kind, rows in enumerate(tables):
-        least = DTYPES[KINDS[kind]].itemsize
-        at = [k for k, message_id in enumerate(ids) if message_id == KINDS[kind]]
-        if len(at) != len(rows):  # some are damaged
-            at = [k for k in at if (whole := open_frame(pieces[k])) is not None and len(whole[1]) >= least]
-        if len(at) == len(rows):
-            order[at] = kind << 8 | rows["finger"].astype(np.uint16)
-        else:
-            tables[kind] = rows[:0]  # kept as packets
-    fingers = np.unique(order[order != PACKET] & 0xFF).tolist()
-    packets = b"".join(pieces[k] + b"\0" for k in np.flatnonzero(order == PACKET).tolist())
-    return {f: _table([rows[rows["finger"] == f] for rows in tables]) for f in fingers}, order, packets
+        order[np.frombuffer(ids, np.uint8) == KINDS[kind]] = kind << 8 | rows["finger"].astype(np.uint16)
+    fingers = np.unique(order[order != OTHER] & 0xFF).tolist()
+    return {f: _table([rows[rows["finger"] == f] for rows in tables]) for f in fingers}, order
 
 
 def as_sent(rows: StructArray, kind: int) -> StructArray:
@@ -163,19 +153,14 @@ def as_sent(rows: StructArray, kind: int) -> StructArray:
     return out
 
 
-def packets_of(rest: Rest, rows: list[StructArray]) -> Iterator[Packet]:
-    """All messages of a block in order of arrival; ``rows`` by kind."""
-    of_kind = [
+def messages_of(rest: Rest, rows: list[StructArray]) -> Iterator[tuple[int, bytes]]:
+    """All messages of a block in order of arrival, as (id, payload); ``rows`` by kind."""
+    payloads = [
         iter(as_sent(table, kind).view(f"V{DTYPES[KINDS[kind]].itemsize}").tolist()) for kind, table in enumerate(rows)
     ]
-    others = iter(rest.packets.split(b"\0"))
+    others = iter(pairs(rest.others))
     for kind in (rest.order >> 8).tolist():
-        if kind < len(KINDS):
-            payload = next(of_kind[kind])
-            yield Packet(encode(KINDS[kind], payload), KINDS[kind], payload)
-        else:
-            data = next(others)
-            yield Packet(data + b"\0", *(open_frame(data) or (None, b"")))
+        yield (KINDS[kind], next(payloads[kind])) if kind < len(KINDS) else next(others)
 
 
 # ---- tables -----------------------------------------------------------------------------------------

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,12 @@ from numpy.typing import NDArray
 
 from ..board.gap import Gap
 from ..errors import InputError, RecordingError
-from ..wire.batches import StreamDecoder
+from ..wire.batches import known
+from ..wire.decoder import pairs
 from ..wire.frames import StructArray
+from ..wire.framing import FramingCounts
 from . import labels, layout
-from .block import FRAME, IDLE, KINDS, PAC, ROWS, Packet, Rest, TableReader, packets_of
+from .block import FRAME, IDLE, KINDS, PAC, ROWS, Rest, TableReader, messages_of
 from .scan import Index, Scan
 
 _NO_FINGER = np.empty(0, np.uint8)
@@ -28,18 +29,17 @@ ALL = {kind: dtype.names or () for kind, dtype in enumerate(ROWS)}
 
 @dataclass(frozen=True)
 class Block:
-    """``rows``: the wanted fingers and fields, by kind, in order of arrival. ``missing``: FRAMEs in damaged tables."""
+    """``rows``: the wanted fingers and fields, by kind, in order of arrival."""
 
     arrived_ns: int
     all_here_ns: int
     number: int
     rows: list[StructArray]
     rest: Rest
-    missing: int = 0
 
-    def packets(self) -> Iterator[Packet]:
-        """All messages in order of arrival; only for a block with all fields and fingers."""
-        return packets_of(self.rest, self.rows)
+    def messages(self) -> Iterator[tuple[int, bytes]]:
+        """All (id, payload) in order of arrival; only for a block with all fields and fingers."""
+        return messages_of(self.rest, self.rows)
 
 
 class Blocks:
@@ -78,7 +78,7 @@ class Blocks:
                 if tables or message.sequence < number:
                     self._report_misplaced()
                 tables, number = {}, message.sequence
-            if topic != layout.PACKETS:
+            if topic != layout.REST:
                 tables[int(topic.removeprefix(layout.TABLE))] = message.data
                 continue
             block = self._block(message, tables)
@@ -109,7 +109,7 @@ class Blocks:
         if topic.startswith(layout.TABLE):
             finger = topic.removeprefix(layout.TABLE)
             return finger.isdecimal() and (self._fingers is None or int(finger) in self._fingers)
-        return topic == layout.PACKETS
+        return topic == layout.REST
 
     def _take_metadata(self, record: Metadata) -> None:
         try:
@@ -133,17 +133,16 @@ class Blocks:
             if tables and self._reader is None:
                 self._reader = TableReader(self.scan.schemas[f"{layout.TABLE}{min(tables)}"], self._wanted)
             wanted = set(rest.fingers) if self._fingers is None else self._fingers.intersection(rest.fingers)
-            damaged, missing = wanted - set(tables), 0
+            damaged = wanted - set(tables)
             if damaged:
                 self._report_misplaced()
-                missing = int(np.isin(rest.finger_of_row(FRAME), list(damaged)).sum())
                 rest = rest.without(damaged)
             rows = self._rows(rest, tables)
         except (KeyError, TypeError, ValueError, struct.error, IndexError, RecursionError) as error:
             self.scan.damaged_chunks += 1
             self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and was skipped ({error})")
             return None
-        return Block(message.publish_time, message.log_time, message.sequence, rows, rest, missing)
+        return Block(message.publish_time, message.log_time, message.sequence, rows, rest)
 
     def _rows(self, rest: Rest, tables: dict[int, bytes]) -> list[StructArray]:
         if self._reader is None:
@@ -155,26 +154,6 @@ class Blocks:
         for finger, data in tables.items():
             self._reader.read(data, finger, rows)
         return rows
-
-
-def lost_between(blocks: list[Block]) -> int:
-    """FRAMEs of missing blocks, by the sequence numbers around them; losses that are known are left out."""
-    lost = 0
-    for before, after in pairwise(blocks):
-        for finger in before.rest.fingers if after.number > before.number + 1 else ():
-            (ends, _), (numbers, rounds) = _numbers(before, finger), _numbers(after, finger)
-            if len(ends) and len(numbers):
-                first = int(np.argmin(numbers))
-                known = sum(n for which, seq, n in after.rest.lost if which == finger and seq < numbers[first])
-                lost += max(0, int(numbers[first] - rounds[first] - ends.max()) - known)
-    return lost
-
-
-def _numbers(block: Block, finger: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Sequence numbers of a finger's FRAMEs and heartbeats, and how many rounds each stands for."""
-    frames, idle = (block.rows[kind][block.rows[kind]["finger"] == finger] for kind in (FRAME, IDLE))
-    numbers = np.concatenate([frames["seq"], idle["seq"]]).astype(np.int64)
-    return numbers, np.concatenate([np.ones(len(frames)), idle["frames"]]).astype(np.int64)
 
 
 class Contents:
@@ -201,20 +180,19 @@ class Contents:
         self.arrived_ns = [block.arrived_ns for block in self.blocks]
         # Imported recordings store the first time for both.
         self.all_here_ns = [b.all_here_ns if b.all_here_ns != b.arrived_ns else None for b in self.blocks]
-        decoder = StreamDecoder()
-        decoder.accept_newer_minor()
-        self.messages: list[Any] = decoder.feed(b"".join(block.rest.packets for block in self.blocks)).messages
+        rests = [block.rest for block in self.blocks]
+        self.messages: list[Any] = [message for rest in rests for message in known(pairs(rest.others))]
         self.sent, self.pac, self.idle = (self._rows_of(kind) for kind in (FRAME, PAC, IDLE))
         self.seq, self.t_us = self.sent["seq"].astype(np.int64), self.sent["t_us"]
-        rows = len(self.sent) + len(self.pac) + len(self.idle)
-        self.counts = replace(decoder.counts, good=decoder.counts.good + rows)
-        rests = [block.rest for block in self.blocks]
-        self.pac_lost = sum(rest.lost_pac for rest in rests)
-        self.disordered = sum(rest.disordered for rest in rests)
+        self.counts = FramingCounts(good=sum(len(rest.order) for rest in rests))
+        for kind, count in ((kind, count) for rest in rests for kind, count in rest.rejected.items()):
+            setattr(self.counts, kind, getattr(self.counts, kind) + count)
+        last = max(rests, key=lambda rest: rest.frames, default=Rest(np.empty(0, np.uint16), b""))
+        self.pac_lost, self.disordered = last.pac_lost, last.disordered
         self.gaps_before = [[gap for facts in rest.gaps if (gap := self._gap(facts)) is not None] for rest in rests]
         self.gaps = [gap for before_block in self.gaps_before for gap in before_block]
-        in_damaged = sum(block.missing for block in self.blocks) + lost_between(self.blocks)
-        self.frames_lost = sum(frames for rest in rests for _, _, frames in rest.lost) + in_damaged
+        in_damaged = last.frames - len(self.sent)
+        self.frames_lost = last.frames_lost + in_damaged
         if self.cut_off and not len(self.seq):
             raise RecordingError(f"{path} was cut off before its first second was complete; record it again")
         self.damage += labels.read(path, self.arrived_ns[0] if self.arrived_ns else 0)[1]
@@ -252,8 +230,10 @@ class Contents:
         if not self.damage and len(numbers) != max(numbers, default=-1) + 1:
             self.damage.append(f"{self._path.name} is damaged: seconds of it are missing")
         if (counts := self.counts).bad:
+            first_ns = next(block.arrived_ns for block in self.blocks if block.rest.rejected)
             self.damage.append(
-                f"{counts.bad} packet(s) rejected: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
+                f"{counts.bad} packet(s) rejected, the first in the second that began at "
+                f"{(first_ns - self.arrived_ns[0]) / 1e9:.1f} s: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
         self.problems = [*self.damage, *self.problems]

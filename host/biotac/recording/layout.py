@@ -11,11 +11,11 @@ from pathlib import Path
 from ..errors import RecordingError
 
 # Additions that an older reader may ignore (topics, metadata keys, columns) do not change it.
-FORMAT_VERSION = "1"
+FORMAT_VERSION = "2"
 TABLE = "/biotac/table/finger"  # with the finger's number: its rows of one block (block.py)
-PACKETS = "/biotac/packets"  # all else of that block; comes after its tables, with the same sequence number
+REST = "/biotac/rest"  # all else of that block; comes after its tables, with the same sequence number
 TABLE_ENCODING = "biotac-table"
-PACKETS_ENCODING = "biotac-packets"
+REST_ENCODING = "biotac-rest"
 NAMES = "names"  # metadata key: JSON, fingers by name
 CHECKSUM = "crc32"  # metadata key: of all others
 TABLE_SCHEMA = "biotac.Table"

@@ -7,6 +7,8 @@ recovered from elsewhere, and one chunk for plotting. Each chunk is closed and h
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, BinaryIO
 
@@ -16,8 +18,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 from ..board.gap import Gap
 from ..link.base import AppliedN
 from ..version import __version__
-from ..wire.batches import StreamDecoder
+from ..wire.batches import StreamDecoder, join
 from ..wire.counters import nearest
+from ..wire.decoder import ONE_STEP_BYTES
 from ..wire.native import BUILT
 from . import layout
 from .block import Rest, encode_block, schema
@@ -34,7 +37,6 @@ class RecordingFile:
     def __init__(self, stream: BinaryIO, metadata: dict[str, str]) -> None:
         self.stream = stream
         self._sequence = 0
-        self._tail = b""  # of a message whose end has not arrived yet
         self._gaps: list[dict[str, Any]] = []  # to be written with the next block
         self._labels: list[dict[str, Any]] = []
         self._decoder = StreamDecoder()
@@ -56,7 +58,7 @@ class RecordingFile:
         try:
             writer.start(profile="", library=f"biotac-gateway {__version__}")
             names = layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING
-            self._packets_schema = writer.register_schema(*names, wire_schema)
+            self._wire_schema = writer.register_schema(*names, wire_schema)
             self._table_schema = writer.register_schema(layout.TABLE_SCHEMA, layout.TABLE_ENCODING, schema())
             writer.add_metadata(layout.METADATA_NAME, self._metadata)
             writer.flush()  # type: ignore[no-untyped-call]
@@ -71,38 +73,49 @@ class RecordingFile:
         return self._decoder.lost
 
     def add(
-        self, block: bytes, arrived_ns: int, all_here_ns: int | None = None, applied_n: AppliedN = lambda *rows: None
+        self,
+        data: bytes,
+        arrived_ns: int,
+        all_here_ns: int | None = None,
+        applied_n: AppliedN = lambda *rows: None,
+        rejected: Mapping[str, int] | None = None,
     ) -> None:
         """Append wire bytes; ``arrived_ns`` is when their first byte arrived, in ns on the host's clock (Unix).
 
         ``all_here_ns`` is when all of them had arrived; None if unknown. Bytes after the last delimiter wait for the
-        next block. ``applied_n`` is asked about its FRAMEs.
+        next block. ``applied_n`` is asked about its FRAMEs. ``rejected``: what else of this block came damaged.
         """
-        data = self._tail + block
-        end = data.rfind(b"\0") + 1
-        data, self._tail = data[:end], data[end:]
-        if not data:
-            return
-        if all_here_ns is not None and self._last_ns is not None:
-            self._decoder.passed((arrived_ns - self._last_ns) / 1e9)
-        self._last_ns = all_here_ns
         decoder = self._decoder
-        losses, lost_pac, disordered = len(decoder.lost_after), decoder.lost_pac, decoder.disordered
-        batch = decoder.feed(data)
-        tables, order, packets = encode_block(data, batch, applied_n(batch.wire["finger"], batch.t_us))
+        if all_here_ns is not None and self._last_ns is not None:
+            decoder.passed((arrived_ns - self._last_ns) / 1e9)
+        losses, before = len(decoder.lost_after), decoder.counts
+        batches, ids, others = [], b"", b""
+        for at in range(0, len(data), ONE_STEP_BYTES):
+            batches.append(decoder.feed(data[at : at + ONE_STEP_BYTES]))
+            ids, others = (so_far + step for so_far, step in zip((ids, others), decoder.completed(), strict=True))
+        damaged = Counter(rejected or {}) + Counter(vars(decoder.counts)) - Counter(vars(before))
+        del damaged["good"]
+        if not ids and not damaged:
+            return
+        self._last_ns = all_here_ns
+        batch = join(batches)
+        tables, order = encode_block(batch, ids, applied_n(batch.wire["finger"], batch.t_us))
+        self.frames += len(batch.wire)
         rest = Rest(
             order,
-            packets,
+            others,
             sorted(tables),
             batch.first_t_us(),
             batch.last_t_us(),
             decoder.lost_after[losses:],
-            decoder.lost_pac - lost_pac,
-            decoder.disordered - disordered,
+            dict(damaged),
+            self.frames,
+            decoder.lost,
+            decoder.lost_pac,
+            decoder.disordered,
         )
         self._last_us = rest.last_us or self._last_us
         self._put(tables, rest, arrived_ns, all_here_ns)
-        self.frames += len(batch.wire)
         self._plots.add(batch, decoder, arrived_ns, all_here_ns)
         self._writer.flush()  # type: ignore[no-untyped-call]
 
@@ -130,11 +143,11 @@ class RecordingFile:
         self._gaps.clear()
         self._labels.clear()
         parts = {f"{layout.TABLE}{finger}": data for finger, data in sorted(tables.items())}
-        for topic, data in (parts | {layout.PACKETS: rest.pack()}).items():
+        for topic, data in (parts | {layout.REST: rest.pack()}).items():
             if topic not in self._channels:
-                of_packets = layout.PACKETS_ENCODING, self._packets_schema
+                of_rest = layout.REST_ENCODING, self._wire_schema
                 of_table = layout.TABLE_ENCODING, self._table_schema
-                encoding, schema_id = of_packets if topic == layout.PACKETS else of_table
+                encoding, schema_id = of_rest if topic == layout.REST else of_table
                 self._channels[topic] = self._writer.register_channel(topic, encoding, schema_id)
             self._writer.add_message(self._channels[topic], all_here_ns or arrived_ns, data, arrived_ns, self._sequence)
             self._writer.flush()  # type: ignore[no-untyped-call]

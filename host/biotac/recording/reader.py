@@ -24,7 +24,7 @@ from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
-from .block import APPLIED, FRAME, Packet, as_sent
+from .block import APPLIED, FRAME, as_sent
 from .blocks import Block, Blocks, Contents
 from .events import events_of
 from .facts import Facts
@@ -56,8 +56,8 @@ class Recording:
     ``wrong_checksums``: number of wrong checksums over the file's records and its index. ``gaps``: times when the board
     was away.
 
-    ``blocks`` are the wire bytes, about one block per second. ``arrived_ns`` is when each block began,
-    ``all_here_ns`` when it was complete (None where unknown), both in ns on the host's clock (Unix).
+    It consists of blocks of about a second. ``arrived_ns`` is when each block began, ``all_here_ns`` when it was
+    complete (None where unknown), both in ns on the host's clock (Unix).
 
     Of a complete file, opening reads the metadata, and ``select`` only what it returns; the first use of anything else
     reads and checks all of it. With ``show``, which is called with the share of that work done (0 to 1), it is read at
@@ -103,12 +103,12 @@ class Recording:
             self._index.check(self.path)
         return Contents(self.path)
 
-    def packets(self, block: int) -> Iterator[Packet]:
-        """Messages of a block, by its number in ``blocks``, in order of arrival."""
-        return self._contents.blocks[block].packets()
+    def messages_in(self, block: int) -> Iterator[tuple[int, bytes]]:
+        """All messages of a block, by its number, in order of arrival, as (id, payload)."""
+        return self._contents.blocks[block].messages()
 
     def gaps_before(self, block: int) -> list[Gap]:
-        """Those between this block, by its number in ``blocks``, and the one before it."""
+        """Those between this block, by its number, and the one before it."""
         return self._contents.gaps_before[block]
 
     @cached_property
@@ -132,7 +132,7 @@ class Recording:
         return np.where((own[rows] == asked)[:, None], self.applied_n[rows], np.nan)
 
     def applied_in(self, block: int) -> NDArray[np.float64]:
-        """``applied_n`` of a block's frames, by its number in ``blocks``."""
+        """``applied_n`` of a block's frames, by its number."""
         return to_units(self._contents.blocks[block].rows[FRAME][APPLIED], FORCE_LSB_PER_N)
 
     @cached_property
@@ -153,11 +153,6 @@ class Recording:
             else:
                 parts.append(bands_of(self.pac[self.pac["finger"] == finger]))
         return np.concatenate(parts)
-
-    @cached_property
-    def blocks(self) -> list[bytes]:
-        """The wire bytes as they came, about one second per block."""
-        return [b"".join(packet.data for packet in block.packets()) for block in self._contents.blocks]
 
     def select(
         self,

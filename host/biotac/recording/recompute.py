@@ -25,13 +25,11 @@ from ..wire import sensor_gen as sensor
 from ..wire import slots
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
-from ..wire.framing import encode
 from ..wire.identity import is_foreign
 from ..wire.native import lib
-from .block import Packet
 from .facts import in_force
 from .reader import Recording
-from .rewrite import rewrite
+from .rewrite import Messages, rewrite
 from .rounds import Command, Rounds, frames_and_tares, with_silence
 
 Settings = dict[wire.Setting, int]
@@ -276,17 +274,18 @@ def _tare(values: NDArray[np.float64], now: bool, finger: Finger) -> None:
     finger.set_tare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]))
 
 
-def _replaced(new: StructArray, tares: dict[int, wire.Tare] | None) -> Callable[[Packet], bytes]:
-    """The wire's packets as they were, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
+def _replaced(new: StructArray, tares: dict[int, wire.Tare] | None) -> Callable[[Messages], Messages]:
+    """Messages as they were, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
     rows = iter(range(len(new)))
 
-    def change(packet: Packet) -> bytes:
-        if packet.message_id == wire.Tare.ID and tares is not None:
-            return b""
-        if packet.message_id != wire.Frame.ID:
-            return packet.data
-        row = next(rows)
-        tare = encode(wire.Tare.ID, tares[row].pack()) if tares is not None and row in tares else b""
-        return tare + encode(wire.Frame.ID, new[row].tobytes())
+    def change(messages: Messages) -> Messages:
+        for message_id, payload in messages:
+            if message_id == wire.Frame.ID:
+                row = next(rows)
+                if tares is not None and row in tares:
+                    yield wire.Tare.ID, tares[row].pack()
+                yield message_id, new[row].tobytes()
+            elif message_id != wire.Tare.ID or tares is None:
+                yield message_id, payload
 
     return change

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from ..errors import InputError
+from ..wire.framing import encode
 from . import layout
-from .block import Packet
 from .mcap_file import RecordingFile
 from .reader import Recording
+
+Messages = Iterator[tuple[int, bytes]]
 
 
 def rewrite(
     recording: Recording,
     out: Path,
     metadata: Mapping[str, str],
-    change: Callable[[Packet], bytes] = lambda packet: packet.data,
+    change: Callable[[Messages], Messages] = lambda messages: messages,
     *,
     blocks: range | None = None,
     show: Callable[[float], None] = lambda share: None,
 ) -> None:
-    """Write ``blocks`` (default: all), with their gaps and all labels that hold in them; ``change`` makes the bytes."""
+    """Write ``blocks`` (default: all), with gaps and all labels that hold in them; ``change`` makes their messages."""
     numbers = range(len(recording.arrived_ns)) if blocks is None else blocks
     heads = [recording.heads()[k].rest for k in numbers]
     begin_us = next((head.first_us for head in heads if head.first_us is not None), 0)
@@ -34,8 +36,9 @@ def rewrite(
         for done, (k, head) in enumerate(zip(numbers, heads, strict=True), 1):
             for gap in recording.gaps_before(k):
                 file.add_gap(gap)
-            data = b"".join(map(change, recording.packets(k)))
-            file.add(data, recording.arrived_ns[k], recording.all_here_ns[k], lambda *_, k=k: recording.applied_in(k))
+            data = b"".join(encode(*message) for message in change(recording.messages_in(k)))
+            times_ns = recording.arrived_ns[k], recording.all_here_ns[k]
+            file.add(data, *times_ns, lambda *_, k=k: recording.applied_in(k), head.rejected)
             at_us = head.last_us or at_us
             while labels and (labels[0].t_us or 0) <= at_us:
                 file.add_label(labels.pop(0))
@@ -45,7 +48,7 @@ def rewrite(
 
 def cut(recording: Recording, out: Path, start_s: float = 0.0, stop_s: float | None = None) -> tuple[float, float]:
     """Write the blocks, of about a second, that have rows from ``start_s`` to ``stop_s``, device seconds since the
-    first row; returns the first and last row's time in s. Bytes, times and losses stay as they are.
+    first row; returns the first and last row's time in s. Messages, times and losses stay as they are.
 
     Raises InputError when there is no row in that time.
     """

@@ -111,11 +111,11 @@ class Index:
             at += length
         topics = {record.id: record.topic for record in records if isinstance(record, Channel)}
         blocks: list[dict[str, Place]] = [{}]
-        for begin, size, channel in chunks:  # a block's packets come after its tables
+        for begin, size, channel in chunks:  # a block's rest comes after its tables
             topic = topics[channel]
-            if topic == layout.PACKETS or topic.startswith(layout.TABLE):
+            if topic == layout.REST or topic.startswith(layout.TABLE):
                 blocks[-1][topic] = begin, size
-            if topic == layout.PACKETS:
+            if topic == layout.REST:
                 blocks.append({})
         return cls(state, records, blocks[:-1], metadata)
 

@@ -214,6 +214,15 @@ class StreamDecoder:
             return None
         raise OSError("it hung up") if got == _HUNG_UP else OSError(-got, os.strerror(-got))
 
+    def completed(self) -> tuple[bytes, bytes]:
+        """Ids of all messages that the last step completed, in order, and all but rows as (id, length, payload).
+
+        A step is a ``read``, or a ``feed`` of at most ONE_STEP_BYTES.
+        """
+        decoder, kinds = self._state.decoder, (lib.BT_DECODED_IDS, lib.BT_DECODED_OTHER)
+        ids, others = (bytes(ffi.buffer(decoder.data[kind], decoder.filled[kind])) for kind in kinds)
+        return ids, others
+
     def chunk(self) -> bytes:
         """The bytes of the last ``read`` that returned a batch."""
         return bytes(self._in[: self.taken])

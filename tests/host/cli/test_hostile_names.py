@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from record_all import record_all, written
+from record_all import blocks_of, record_all, written
 
 import biotac
 from biotac.cli.main import main
@@ -57,7 +57,7 @@ def test_a_serial_number_of_any_length_is_refused(recorded: Path, tmp_path: Path
     """Under a right checksum: somebody made it so."""
     good = biotac.Recording(recorded)
     hello = json.dumps(json.loads(good.metadata["hello"]) | {"board_serial": serial})
-    path = written(tmp_path / "hostile.mcap", good.metadata | {"hello": hello}, [(good.blocks[0], 0)])
+    path = written(tmp_path / "hostile.mcap", good.metadata | {"hello": hello}, [(blocks_of(good)[0], 0)])
     with pytest.raises(biotac.RecordingError, match="damaged metadata"):
         biotac.Recording(path)
     assert main(["export", str(path), "--lake", str(tmp_path / "lake")]) == 2

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from record_all import record_all
+from record_all import blocks_of, record_all
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from scipy.io import loadmat
@@ -49,7 +49,7 @@ def recorded(tmp_path_factory) -> biotac.Recording:
 def written_again(whole: biotac.Recording, path: Path, gaps_s: dict[int, float], later_ns: int = 0) -> biotac.Recording:
     """``whole`` with gaps before blocks."""
     file = RecordingFile(path.open("xb"), whole.metadata)
-    for k, block in enumerate(whole.blocks):
+    for k, block in enumerate(blocks_of(whole)):
         at_ns = whole.arrived_ns[k] + later_ns
         if k in gaps_s:
             file.add_gap(Gap("silence", None, first_us(whole, k), at_ns - round(gaps_s[k] * 1e9), at_ns, 7))
@@ -59,7 +59,7 @@ def written_again(whole: biotac.Recording, path: Path, gaps_s: dict[int, float],
 
 
 def first_us(recording: biotac.Recording, block: int) -> int:
-    first_us = StreamDecoder().feed(recording.blocks[block]).first_t_us()
+    first_us = StreamDecoder().feed(blocks_of(recording)[block]).first_t_us()
     assert first_us is not None
     return first_us
 

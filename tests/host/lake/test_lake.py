@@ -24,7 +24,7 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 from maps import make_map
-from record_all import record_all, written
+from record_all import blocks_of, record_all, written
 
 import biotac
 from biotac.cli.main import main
@@ -46,7 +46,7 @@ def copies(recording: biotac.Recording, folder: Path, count: int, apart_s: float
         later_ns = round(k * apart_s * 1e9)
         file = RecordingFile(path.open("xb"), metadata)
         for block, arrived_ns, here_ns in zip(
-            recording.blocks, recording.arrived_ns, recording.all_here_ns, strict=True
+            blocks_of(recording), recording.arrived_ns, recording.all_here_ns, strict=True
         ):
             file.add(block, arrived_ns + later_ns, None if here_ns is None else here_ns + later_ns)
         file.close()
@@ -170,7 +170,7 @@ def test_times_of_messages_are_unwrapped(sources) -> None:
 def test_again_does_nothing_and_grown_files_replace(sources, tmp_path, capsys) -> None:
     folder, cut, grown = tmp_path / "lake", tmp_path / "cut.mcap", tmp_path / "grown.mcap"
     recording = biotac.Recording(sources[1])
-    data = b"".join(recording.blocks)
+    data = b"".join(blocks_of(recording))
     middle = data.index(b"\0", len(data) // 2) + 1
     for path, blocks in ((cut, [data[:middle]]), (grown, [data[:middle], data[middle:]])):
         written(path, recording.metadata, ((block, recording.begin_ns + k) for k, block in enumerate(blocks)))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from record_all import record_all
+from record_all import blocks_of, record_all
 from ros_topics import of_topic
 
 import biotac
@@ -39,10 +39,10 @@ def test_info_of_a_recording_says_what_is_in_it(recorded: Path, capsys) -> None:
     assert {"index", "middle"} <= set(recording._ipython_key_completions_())
 
 
-def test_a_part_has_the_bytes_and_labels_of_the_whole(recorded: Path, tmp_path: Path) -> None:
+def test_a_part_has_the_messages_and_labels_of_the_whole(recorded: Path, tmp_path: Path) -> None:
     assert main(["file", "cut", str(recorded), str(tmp_path / "part.mcap"), "--from", "5.2", "--to", "7"]) == 0
     whole, part = biotac.Recording(recorded), biotac.Recording(tmp_path / "part.mcap")
-    assert b"".join(part.blocks) in b"".join(whole.blocks) and part.problems == []
+    assert b"".join(blocks_of(part)) in b"".join(blocks_of(whole)) and part.problems == []
     since_s = (part.frames["t_us"] - whole.begin_us) / 1e6
     assert 3.2 < since_s.min() <= 5.2 and 7 - 0.01 <= since_s.max() < 9
     (label,) = part.labels  # in the recording itself now

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from record_all import record_all
+from record_all import blocks_of, record_all
 from ros_topics import STORE, of_topic
 from rosbags.typesys import get_types_from_msg
 
@@ -98,7 +98,7 @@ def test_tares_events_and_gaps_are_logged(tmp_path: Path) -> None:
         facts = Facts(hand.info, [], hand.board.settings())
         with_blocks = record_all("sim:press.toml?seconds=3", tmp_path / "a.mcap")
     recorder = writer.Writer(path, facts, "test")
-    first, *others = biotac.Recording(with_blocks).blocks
+    first, *others = blocks_of(biotac.Recording(with_blocks))
     recorder.write(first)
     gap = Gap("silence", 1, 2, 10**9, 3 * 10**9, 7)
     recorder.write_gap(gap)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from itertools import pairwise
@@ -13,7 +14,7 @@ import pytest
 from deframer import Deframer
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
-from record_all import written
+from record_all import blocks_of, written
 
 import biotac
 from biotac.board.gap import Gap
@@ -41,7 +42,7 @@ def recorded(tmp_path_factory) -> tuple[Path, np.ndarray, np.ndarray]:
 def rewrite(path: Path, target: Path, change: Callable[[bytes], bytes]) -> None:
     """Copy a recording, its blocks of the wire going through ``change``."""
     whole = biotac.Recording(path)
-    written(target, whole.metadata, zip(map(change, whole.blocks), whole.arrived_ns, strict=True))
+    written(target, whole.metadata, zip(map(change, blocks_of(whole)), whole.arrived_ns, strict=True))
 
 
 def alter(seq: int, finger: int, edit: Callable[[np.ndarray], None]) -> Callable[[bytes], bytes]:
@@ -116,7 +117,10 @@ def test_a_damaged_wire_byte_fails_and_names_the_gap(recorded, tmp_path, check) 
     rewrite(recorded[0], damaged, change)
     assert state["done"]
     code, _, err = check(damaged)
-    assert code == 1 and "1 packet(s) rejected" in err
+    at_s = re.search(r"1 packet\(s\) rejected, the first in the second that began at ([0-9.]+) s", err)
+    assert code == 1 and at_s is not None
+    first = json.loads(biotac.Recording(damaged).heads()[0].rest.pack().partition(b"\n")[0])
+    assert float(at_s[1]) == 0.0 and sum(first["rejected"].values()) == 1
 
 
 def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:
@@ -187,7 +191,7 @@ def test_a_recording_of_another_wire_major_is_refused(recorded, tmp_path) -> Non
     with path.open("wb") as out:
         other = Writer(out)
         other.start()
-        facts = {"format": "1", "wire": "7.0", "hello": "{}", "settings": "{}"}
+        facts = {"format": layout.FORMAT_VERSION, "wire": "7.0", "hello": "{}", "settings": "{}"}
         other.add_metadata("biotac", layout.with_checksum(facts))
         other.finish()
     with pytest.raises(biotac.RecordingError, match=r"wire version 7\.0.*install the version it was recorded with"):
@@ -213,14 +217,14 @@ def test_a_recording_cut_anywhere_gives_what_is_whole_or_says_why(recorded, tmp_
     assert {"refused", "all"} <= seen
 
 
-@pytest.mark.parametrize("part", ["table", "packets"])
+@pytest.mark.parametrize("part", ["table", "rest"])
 def test_a_damaged_second_is_left_out_and_counted(recorded, tmp_path, check, part: str) -> None:
     path, frames, _ = recorded
     whole = bytearray(path.read_bytes())
     with path.open("rb") as stream:
         chunks = [r for r in StreamReader(stream, emit_chunks=True).records if type(r).__name__ == "Chunk"]
-    # Of each second: a table of each finger, packets, plots.
-    chosen = chunks[4 * 2 + {"table": 0, "packets": 2}[part]]
+    # Of each second: a table of each finger, the rest, plots.
+    chosen = chunks[4 * 2 + {"table": 0, "rest": 2}[part]]
     whole[bytes(whole).find(chosen.data) + len(chosen.data) // 2] ^= 0xFF
     damaged = tmp_path / "damaged.mcap"
     damaged.write_bytes(whole)
@@ -239,7 +243,7 @@ def test_a_gap_is_in_the_file_and_told(recorded, tmp_path, capsys) -> None:
     """By Recording, load and check; its numbers are right, so check ends with 0."""
     source, path = biotac.Recording(recorded[0]), tmp_path / "gap.mcap"
     recorder = writer.Writer(path, facts_of(source), "test")
-    first, *others = source.blocks
+    first, *others = blocks_of(source)
     gap = Gap("silence", int(source.t_us[0]), int(source.t_us[-1]), 10**9, 3 * 10**9, 7)
     recorder.write(first)
     recorder.write_gap(gap)
@@ -337,5 +341,5 @@ def test_whatever_a_board_says_the_wire_is_kept(recorded, tmp_path: Path) -> Non
     recorder.write(wild)
     recorder.close()
     recording = biotac.Recording(path)
-    assert b"".join(recording.blocks) == wild
+    assert b"".join(blocks_of(recording)) == wild
     assert len(recording.frames) == 60 and recording.problems != []

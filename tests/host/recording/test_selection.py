@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
-from record_all import record_all, written
+from record_all import blocks_of, record_all, written
 
 import biotac
 from biotac.recording import layout
@@ -64,15 +64,15 @@ def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
         biotac.load(tmp_path / "none.mcap")
 
 
-def test_a_damaged_second_is_kept_as_it_came(recorded: Path, tmp_path: Path) -> None:
-    """To the byte, whatever was on the line; and its rows come with the others."""
+def test_noise_is_counted_and_messages_of_a_version_to_come_are_kept(recorded: Path, tmp_path: Path) -> None:
     whole = biotac.Recording(recorded)
-    blocks = list(whole.blocks)
+    blocks = blocks_of(whole)
     blocks[1] = b"noise\0" + blocks[1]
     blocks[3] += encode(0x7F, b"of a version to come")
     path = written(tmp_path / "noisy.mcap", whole.metadata, zip(blocks, whole.arrived_ns, strict=True))
     noisy = biotac.Recording(path)
-    assert b"".join(noisy.blocks) == b"".join(blocks)
+    assert [k for k, head in enumerate(noisy.heads()) if head.rest.rejected] == [1] and noisy.counts.bad == 1
+    assert [*noisy.messages_in(3)][-1] == (0x7F, b"of a version to come")
     same(noisy.frames, whole.frames)
     same(biotac.load(path), whole.frames)
 
@@ -84,7 +84,7 @@ def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, siz
         writer = Writer(stream, chunk_size=1, compression=CompressionType.ZSTD)
         writer.start()
         schema = writer.register_schema(layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, b"")
-        channel = writer.register_channel(layout.PACKETS, layout.PACKETS_ENCODING, schema)
+        channel = writer.register_channel(layout.REST, layout.REST_ENCODING, schema)
         writer.add_metadata(layout.METADATA_NAME, biotac.Recording(recorded).metadata)
         for k in range(2):  # the first one's chunk has the channel too
             writer.add_message(channel, k, bytes(200_000_000), k)

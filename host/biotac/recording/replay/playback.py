@@ -1,7 +1,7 @@
 """A recording that answers as the board did: commands in, stream out. No I/O, no clock.
 
-It answers with the recorded HELLO, settings and sensors, and plays those parts of the wire that START asks for, byte
-for byte. Commands that would change the board are refused: the recording cannot change any more.
+It answers with the recorded HELLO, settings and sensors, and plays those messages that START asks for. Commands that
+would change the board are refused: the recording cannot change any more.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from ...wire.counters import nearest
 from ...wire.decoder import Decoder
 from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
-from ..block import Packet
 from ..reader import Recording
 from ..stamps import unwrapped_us
 
@@ -68,9 +67,9 @@ class Playback:
     def next_us(self) -> int | None:
         """Device time in us since ``from_s`` at which the next bytes are due; None when the playback is over."""
         while self._next is None and not self.over:
-            t_us, packet = next(self._stream, (0, None))
-            self.over = packet is None
-            data = None if packet is None else self._wanted(packet)
+            t_us, message = next(self._stream, (0, None))
+            self.over = message is None
+            data = None if message is None else self._wanted(*message)
             self._next = None if data is None else (t_us - self.from_us, data)
         return None if self._next is None else self._next[0]
 
@@ -81,29 +80,26 @@ class Playback:
         self._next = None
         return data
 
-    def _timed(self) -> Iterator[tuple[int, Packet]]:
-        """Packets in the range played, each with the device time at which it came."""
+    def _timed(self) -> Iterator[tuple[int, tuple[int, bytes]]]:
+        """Messages in the range played, each with the device time at which it came."""
         now_us = self.from_us - (self.from_us > self.recording.begin_us)  # what comes before a clock is older
-        for packet in self._packets():
-            if packet.message_id in _CLOCKS:
-                (raw_us,) = _TIME.unpack_from(packet.payload, _TIME_AT)
+        for message_id, payload in self._messages():
+            if message_id in _CLOCKS:
+                (raw_us,) = _TIME.unpack_from(payload, _TIME_AT)
                 now_us = nearest(raw_us, now_us)
             if self._to_us is not None and now_us >= self._to_us:
                 return
             if now_us >= self.from_us:
-                yield now_us, packet
+                yield now_us, (message_id, payload)
 
-    def _packets(self) -> Iterator[Packet]:
+    def _messages(self) -> Iterator[tuple[int, bytes]]:
         """All, without the blocks that end before ``from_us``."""
         for k, block in enumerate(self.recording.heads()):
             if self.from_us <= (block.rest.last_us or self.from_us):
-                yield from self.recording.packets(k)
+                yield from self.recording.messages_in(k)
 
-    def _wanted(self, packet: Packet) -> bytes | None:
-        """The packet's bytes as sent to this session; None if they are not sent."""
-        message_id, payload = packet.message_id, packet.payload
-        if message_id is None:
-            return packet.data  # damaged then, and passed on for the host to count
+    def _wanted(self, message_id: int, payload: bytes) -> bytes | None:
+        """The message's bytes as sent to this session; None if they are not sent."""
         if self._asked is None:
             return None
         if message_id == wire.Reply.ID:
@@ -123,7 +119,7 @@ class Playback:
             status = wire.SensorStatus.unpack(payload[: wire.SensorStatus.STRUCT.size])
             self._sensor_status[status.finger] = status
         is_wanted = "finger" not in fields or self._asked.fingers >> payload[fields["finger"][1]] & 1
-        return packet.data if is_wanted else None
+        return encode(message_id, payload) if is_wanted else None
 
     # ---- what it answers -----------------------------------------------------------------------
 
