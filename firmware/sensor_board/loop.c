@@ -44,10 +44,13 @@ static const uint8_t *kept_samples(void)
 
 static uint32_t look(void)
 {
-    const label *its = kept();
-    bool sane = its->magic == MAGIC && its->fingers >= 1 && its->fingers <= BT_MAX_FINGERS && its->slots > 0
-                && its->slots % BT_SLOTS == 0 && its->slots <= MOST_BYTES / 2 / its->fingers;
-    return sane && bt_crc32(kept_samples(), 2 * its->slots * its->fingers) == its->crc32 ? its->slots : 0;
+    const label *header = kept();
+    bool sane = header->magic == MAGIC && header->fingers >= 1 && header->fingers <= BT_MAX_FINGERS
+                && header->slots > 0 && header->slots % BT_SLOTS == 0
+                && header->slots <= MOST_BYTES / 2 / header->fingers;
+    return sane && bt_crc32(kept_samples(), 2 * header->slots * header->fingers) == header->crc32
+               ? header->slots
+               : 0;
 }
 
 uint32_t loop_slots(void)

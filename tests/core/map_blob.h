@@ -42,12 +42,12 @@ static inline size_t put_map(uint8_t *blob, uint32_t number, uint8_t axes, const
 // the sensor; "" for any. Returns its size.
 static inline size_t make_map(uint8_t *blob, uint32_t number, int blocks, const char *serial)
 {
-    uint8_t its[7][2] = {{BT_MAP_KIND_OFFSET, BT_MAP_GATE_ONE}};
+    uint8_t kinds_and_gates[7][2] = {{BT_MAP_KIND_OFFSET, BT_MAP_GATE_ONE}};
     for (int k = 1; k < blocks; k++) {
-        its[k][0] = BT_MAP_KIND_SIGNAL;
-        its[k][1] = (uint8_t)(k - 1);
+        kinds_and_gates[k][0] = BT_MAP_KIND_SIGNAL;
+        kinds_and_gates[k][1] = (uint8_t)(k - 1);
     }
-    size_t bytes = put_map(blob, number, 3, its, blocks);
+    size_t bytes = put_map(blob, number, 3, kinds_and_gates, blocks);
     memcpy(blob + 4, serial, strlen(serial));
     return bytes;
 }
@@ -56,12 +56,12 @@ static inline size_t make_map(uint8_t *blob, uint32_t number, int blocks, const 
 static inline size_t make_big_map(uint8_t *blob, uint32_t number)
 {
     static const uint8_t kinds[16] = {4, 4, 4, 4, 4, 4, 6, 6, 1, 1, 1, 1, 1, 1, 2, 2};
-    uint8_t its[16][2];
+    uint8_t kinds_and_gates[16][2];
     for (uint8_t k = 0; k < 16; k++) {
-        its[k][0] = kinds[k];
-        its[k][1] = (uint8_t)(k < 6 ? k : k < 8 ? k - 6 : k < 14 ? k - 8 : k - 14);
+        kinds_and_gates[k][0] = kinds[k];
+        kinds_and_gates[k][1] = (uint8_t)(k < 6 ? k : k < 8 ? k - 6 : k < 14 ? k - 8 : k - 14);
     }
-    return put_map(blob, number, 6, its, 16);
+    return put_map(blob, number, 6, kinds_and_gates, 16);
 }
 
 #endif

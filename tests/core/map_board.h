@@ -179,9 +179,9 @@ static inline uint8_t upload(uint8_t finger, const uint8_t *blob, size_t bytes)
 // The finger has this map, by what is told and by every byte; NULL: none.
 static inline void assert_has(uint8_t finger, const uint8_t *blob, size_t bytes, uint8_t state)
 {
-    bt_msg_map_info its = info(finger);
-    assert_int_equal(its.state, state);
-    assert_int_equal(its.size_bytes, bytes);
+    bt_msg_map_info found = info(finger);
+    assert_int_equal(found.state, state);
+    assert_int_equal(found.size_bytes, bytes);
     for (uint16_t at = 0; at < bytes; at = (uint16_t)(at + PART)) {
         uint8_t payload[BT_READ_MAP_BYTES];
         bt_msg_read_map ask = {.req_id = 7, .finger = finger, .offset = at};
@@ -196,9 +196,9 @@ static inline void assert_has(uint8_t finger, const uint8_t *blob, size_t bytes,
         }
     }
     if (blob != NULL) {
-        assert_int_equal(its.crc32, bt_crc32(blob, bytes));
-        assert_int_equal(its.made_s, bt_get_u32(blob + 20));
-        assert_memory_equal(its.serial, blob + 4, sizeof its.serial);
+        assert_int_equal(found.crc32, bt_crc32(blob, bytes));
+        assert_int_equal(found.made_s, bt_get_u32(blob + 20));
+        assert_memory_equal(found.serial, blob + 4, sizeof found.serial);
     }
 }
 

@@ -185,14 +185,14 @@ TEST(results_without_a_tare_are_invalid_and_not_zero)
 
 TEST(a_new_tare_is_told_once_with_the_frame_that_first_uses_it)
 {
-    int told = 0;
+    int messages = 0;
     for (int k = 0; k < 50; k++) {
         rounds(1);
         assert_int_equal((frame.flags & BT_FRAME_FLAG_TARE_CHANGED) != 0, tare_changed);
         if (!tare_changed) {
             continue;
         }
-        told++;
+        messages++;
         assert_int_equal(tare.seq, frame.seq);
         assert_int_equal(tare.t_us, frame.t_us);
         assert_int_equal(tare.finger, 3);
@@ -205,7 +205,7 @@ TEST(a_new_tare_is_told_once_with_the_frame_that_first_uses_it)
             assert_int_equal(frame.tare_q4[i], slot_count(electrode_slot(i)) << 4);
         }
     }
-    assert_int_equal(told, 1);
+    assert_int_equal(messages, 1);
 }
 
 TEST(a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on)
@@ -340,16 +340,16 @@ TEST(a_move_of_any_electrode_alone_is_one)
 {
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         for (int sign = -1; sign <= 1; sign += 2) {
-            bt_finger its;
-            bt_finger_reset(&its, 0);
-            memset(&its.sent, 0, sizeof its.sent);
-            memset(&its.tare.trigger.smooth, 0, sizeof its.tare.trigger.smooth);
-            its.tare.threshold_count2 = 1000;
-            its.sent.lane[i] = 2000;
-            its.tare.trigger.smooth.lane[i] = (uint16_t)(2000 + sign * 31);
-            assert_false(bt_finger_moved(&its)); // 961
-            its.tare.trigger.smooth.lane[i] = (uint16_t)(2000 + sign * 32);
-            assert_true(bt_finger_moved(&its)); // 1024
+            bt_finger moved;
+            bt_finger_reset(&moved, 0);
+            memset(&moved.sent, 0, sizeof moved.sent);
+            memset(&moved.tare.trigger.smooth, 0, sizeof moved.tare.trigger.smooth);
+            moved.tare.threshold_count2 = 1000;
+            moved.sent.lane[i] = 2000;
+            moved.tare.trigger.smooth.lane[i] = (uint16_t)(2000 + sign * 31);
+            assert_false(bt_finger_moved(&moved)); // 961
+            moved.tare.trigger.smooth.lane[i] = (uint16_t)(2000 + sign * 32);
+            assert_true(bt_finger_moved(&moved)); // 1024
         }
     }
 }

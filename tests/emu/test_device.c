@@ -33,10 +33,10 @@ static int new_device(void **state)
     return 0;
 }
 
-static uint16_t transfer16(bt_emu_device *its, uint16_t mosi, uint64_t t_ns)
+static uint16_t transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
 {
-    uint8_t high = bt_emu_transfer8(its, (uint8_t)(mosi >> 8), t_ns);
-    return (uint16_t)(high << 8 | bt_emu_transfer8(its, (uint8_t)mosi, t_ns));
+    uint8_t high = bt_emu_transfer8(device, (uint8_t)(mosi >> 8), t_ns);
+    return (uint16_t)(high << 8 | bt_emu_transfer8(device, (uint8_t)mosi, t_ns));
 }
 
 // One transfer in its own chip select; it takes no time, so that the edges are exact.

@@ -161,8 +161,8 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
         fake_started_by = BT_FAULT_FLAG_HUNG;
         boot(START_NS);
         fake_started_by = BT_FAULT_FLAG_STARTED;
-        const uint16_t told = gateway.session.faults & BT_FAULT_FLAG_TARE_RESTORED;
-        assert_int_equal(told != 0, damaged < 2);
+        const uint16_t restored = gateway.session.faults & BT_FAULT_FLAG_TARE_RESTORED;
+        assert_int_equal(restored != 0, damaged < 2);
         for (int f = 0; f < BT_MAX_FINGERS; f++) {
             const bt_tare *tare = &gateway.session.finger[f].tare;
             assert_int_equal(tare->tared, damaged < 2);

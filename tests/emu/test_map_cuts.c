@@ -78,13 +78,13 @@ static void upload_and_save(uint8_t finger, uint32_t number, int blocks)
 static uint32_t has(uint8_t finger, int blocks)
 {
     static _Alignas(4) uint8_t want[BT_MAP_MAX_BYTES];
-    const bt_finger_map *its = &gateway.session.map[finger];
+    const bt_finger_map *kept_map = &gateway.session.map[finger];
     if (gateway.session.map_state[finger] == BT_CALIBRATION_STATE_NONE) {
         return 0;
     }
-    assert_int_equal(its->place.bytes, make_map(want, its->map.made_s, blocks, ""));
-    assert_memory_equal(bt_map_bytes(&gateway.map_flash, &its->place), want, its->place.bytes);
-    return its->map.made_s;
+    assert_int_equal(kept_map->place.bytes, make_map(want, kept_map->map.made_s, blocks, ""));
+    assert_memory_equal(bt_map_bytes(&gateway.map_flash, &kept_map->place), want, kept_map->place.bytes);
+    return kept_map->map.made_s;
 }
 
 // `left` counts down to the cut.

@@ -124,14 +124,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             fail("a result exceeds its limit");
         }
         int64_t total = 0;
-        const int16_t *its = (const int16_t *)(const void *)map.coefficients;
+        const int16_t *block = (const int16_t *)(const void *)map.coefficients;
         for (int b = 0; plain && b < map.block_count; b++) {
             const uint8_t *head = map.blocks + b * BT_MAP_BLOCK_BYTES;
             int width = a < 3 ? 3 : map.axes - 3;
-            const int16_t *c = its + (a < 3 ? a : 3 * (int)coefficients_of[head[0]] + a - 3);
+            const int16_t *c = block + (a < 3 ? a : 3 * (int)coefficients_of[head[0]] + a - 3);
             int64_t pressure = pdc_q4 < 0 ? -((1 - pdc_q4) / 2) : pdc_q4 / 2; // floor
             total += rounded(block_of(head[0], e, pressure, c, width), head[2 + a]);
-            its += coefficients_of[head[0]] * (uint32_t)map.axes;
+            block += coefficients_of[head[0]] * (uint32_t)map.axes;
         }
         total = total > BT_MAP_RESULT_MAX    ? BT_MAP_RESULT_MAX
                 : total < -BT_MAP_RESULT_MAX ? -BT_MAP_RESULT_MAX

@@ -3,7 +3,7 @@
 // their CRC, because no fuzzer guesses one; and so are whole uploads of maps, in an order of the input's
 // choice.
 //
-// What must hold: the session writes only whole frames that decode to a message of its own; a good
+// What must hold: the session writes only whole frames that decode to a message of calibration own; a good
 // command is answered exactly once; settings and calibrations stay in their ranges; a map that a finger has
 // is one that the firmware takes, byte for byte as it was sent, and no command erases two sectors. The rest
 // is the sanitizers'.
@@ -120,8 +120,8 @@ static void give(bt_session *session, uint8_t id, const uint8_t *payload, uint32
     bt_session_receive(session, 0, encoded, bytes, now_us);
 }
 
-// A map of a few blocks with coefficients of the input's, its parts in any order, some of them not at all.
-// The input may spoil a byte of its own map too.
+// A map of a few blocks with coefficients of the input's, calibration parts in any order, some of them not at
+// all. The input may spoil a byte of calibration own map too.
 static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
 {
     static const uint8_t coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
@@ -211,9 +211,9 @@ static void check_calibrations(const bt_session *session)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_settings own = session->settings;
-        const bt_calibration *its = &session->calibration[f];
+        const bt_calibration *calibration = &session->calibration[f];
         if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE
-            && (!its->present || bt_calibration_apply(its, &own) != BT_ERROR_OK)) {
+            && (!calibration->present || bt_calibration_apply(calibration, &own) != BT_ERROR_OK)) {
             FAIL("finger %d uses an invalid calibration", f);
         }
         if (session->solve[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
@@ -227,15 +227,15 @@ static void check_calibrations(const bt_session *session)
 static void check_maps(const bt_session *session)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        const bt_finger_map *its = &session->map[f];
-        const uint8_t *blob = slots + its->place.slot * (size_t)BT_MAP_SLOT_BYTES;
+        const bt_finger_map *finger_map = &session->map[f];
+        const uint8_t *blob = slots + finger_map->place.slot * (size_t)BT_MAP_SLOT_BYTES;
         bt_map map;
-        if (its->place.bytes == 0) {
+        if (finger_map->place.bytes == 0) {
             if (session->map_state[f] != BT_CALIBRATION_STATE_NONE) {
                 FAIL("finger %d is reported to have a map it does not have", f);
             }
-        } else if (bt_crc32(blob, its->place.bytes) != its->place.crc32
-                   || bt_map_open(&map, blob, its->place.bytes) != BT_ERROR_OK) {
+        } else if (bt_crc32(blob, finger_map->place.bytes) != finger_map->place.crc32
+                   || bt_map_open(&map, blob, finger_map->place.bytes) != BT_ERROR_OK) {
             FAIL("finger %d has an invalid map", f);
         }
     }

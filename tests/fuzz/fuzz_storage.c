@@ -62,10 +62,10 @@ typedef struct {
 
 static record read_one(uint16_t id)
 {
-    record its = {.bytes = -1};
-    its.bytes = bt_storage_read(&flash, id, &its.version, its.data, sizeof its.data);
-    if (its.bytes < 0) {
-        return its;
+    record found = {.bytes = -1};
+    found.bytes = bt_storage_read(&flash, id, &found.version, found.data, sizeof found.data);
+    if (found.bytes < 0) {
+        return found;
     }
     uint8_t wanted[BT_FLASH_PAGE_BYTES];
     for (int page = 0; page < PAGES; page++) {
@@ -74,9 +74,9 @@ static record read_one(uint16_t id)
             continue;
         }
         memcpy(wanted, at, sizeof wanted);
-        if (bt_get_u16(wanted + 6) == its.version && (int)bt_get_u32(wanted + 8) == its.bytes
-            && memcmp(wanted + BT_STORAGE_HEADER_BYTES, its.data, (size_t)its.bytes) == 0) {
-            return its;
+        if (bt_get_u16(wanted + 6) == found.version && (int)bt_get_u32(wanted + 8) == found.bytes
+            && memcmp(wanted + BT_STORAGE_HEADER_BYTES, found.data, (size_t)found.bytes) == 0) {
+            return found;
         }
     }
     FAIL("record %u was read but is on no page", (unsigned)id);
@@ -164,11 +164,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
         }
     }
     for (uint16_t id = 1; id <= BT_STORAGE_IDS; id++) {
-        record its = read_one(id);
-        if (its.bytes >= 0) {
-            uint8_t *exact = malloc((size_t)its.bytes + 1); // so that a byte too many is noticed
-            memcpy(exact, its.data, (size_t)its.bytes);
-            settings_are_in_range(its.version, exact, (size_t)its.bytes);
+        record found = read_one(id);
+        if (found.bytes >= 0) {
+            uint8_t *exact = malloc((size_t)found.bytes + 1); // so that a byte too many is noticed
+            memcpy(exact, found.data, (size_t)found.bytes);
+            settings_are_in_range(found.version, exact, (size_t)found.bytes);
             free(exact);
         }
     }

@@ -197,10 +197,10 @@ static bool is(const sent *message, uint8_t id, const uint8_t *payload, size_t b
            && memcmp(payload, message->payload, bytes) == 0;
 }
 
-static void accuse(const char *who, enum damage kind, const uint8_t *unit, size_t bytes)
+static void accuse(const char *deframer, enum damage kind, const uint8_t *unit, size_t bytes)
 {
     if (tallies[kind].wrong++ == 0) {
-        fprintf(stderr, "%s, accepted by the %s:", name[kind], who);
+        fprintf(stderr, "%s, accepted by the %s:", name[kind], deframer);
         for (size_t k = 0; k < bytes; k++) {
             fprintf(stderr, " %02x", unit[k]);
         }
@@ -231,7 +231,7 @@ static bool host_is_right(const sent *one, const sent *other)
 
 static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sent *one, const sent *other)
 {
-    tally *its = &tallies[kind];
+    tally *entry = &tallies[kind];
     uint64_t before[BT_DECODE_OUTCOMES];
     memcpy(before, decoder.outcomes, sizeof before);
     (void)bt_decode(&decoder, unit, bytes);
@@ -239,12 +239,12 @@ static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sen
         accuse("host", kind, unit, bytes);
     }
     for (int k = BT_DEFRAMED_GOOD; k < BT_DECODE_OUTCOMES; k++) {
-        its->outcomes[k] += decoder.outcomes[k] - before[k];
+        entry->outcomes[k] += decoder.outcomes[k] - before[k];
     }
     bool crc_alone = decoder.outcomes[BT_DEFRAMED_BAD_CRC] != before[BT_DEFRAMED_BAD_CRC];
-    its->unharmed += decoder.filled[BT_DECODED_IDS];
+    entry->unharmed += decoder.filled[BT_DECODED_IDS];
     uint8_t id = unit[0] == 1 ? 0 : unit[1];
-    its->shaped += crc_alone && bt_wire_payload_bytes(id) == (int)bytes - 2 - 1 - BT_CRC_BYTES;
+    entry->shaped += crc_alone && bt_wire_payload_bytes(id) == (int)bytes - 2 - 1 - BT_CRC_BYTES;
     for (size_t k = 0; k < bytes; k++) {
         if (bt_deframer_push(&deframer, unit[k]) == BT_DEFRAMED_GOOD) {
             const uint8_t *payload = deframer.buffer + 1;
@@ -254,7 +254,7 @@ static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sen
             }
         }
     }
-    its->frames++;
+    entry->frames++;
 }
 
 static void try_one(uint64_t number, int only)
@@ -279,25 +279,25 @@ static int report(void)
     printf("%-29s %13s %11s %11s %13s %11s %11s %13s %6s\n", "damage", "frames", "too long", "COBS", "CRC",
            "length", "unharmed", "only CRC", "wrong");
     for (int k = 0; k <= DAMAGES; k++) {
-        const tally *its = k < DAMAGES ? &tallies[k] : &all;
-        if (its->frames == 0) {
+        const tally *entry = k < DAMAGES ? &tallies[k] : &all;
+        if (entry->frames == 0) {
             continue;
         }
-        printf("%-29s %13" PRIu64, k < DAMAGES ? name[k] : "all", its->frames);
-        printf(" %11" PRIu64 " %11" PRIu64 " %13" PRIu64 " %11" PRIu64, its->outcomes[BT_DEFRAMED_TOO_LONG],
-               its->outcomes[BT_DEFRAMED_BAD_COBS], its->outcomes[BT_DEFRAMED_BAD_CRC],
-               its->outcomes[BT_DEFRAMED_BAD_LENGTH]);
-        printf(" %11" PRIu64 " %13" PRIu64 " %6" PRIu64 "\n", its->unharmed, its->shaped, its->wrong);
+        printf("%-29s %13" PRIu64, k < DAMAGES ? name[k] : "all", entry->frames);
+        printf(" %11" PRIu64 " %11" PRIu64 " %13" PRIu64 " %11" PRIu64, entry->outcomes[BT_DEFRAMED_TOO_LONG],
+               entry->outcomes[BT_DEFRAMED_BAD_COBS], entry->outcomes[BT_DEFRAMED_BAD_CRC],
+               entry->outcomes[BT_DEFRAMED_BAD_LENGTH]);
+        printf(" %11" PRIu64 " %13" PRIu64 " %6" PRIu64 "\n", entry->unharmed, entry->shaped, entry->wrong);
         if (k == DAMAGES) {
             continue;
         }
-        all.frames += its->frames;
+        all.frames += entry->frames;
         for (int outcome = 0; outcome < BT_DECODE_OUTCOMES; outcome++) {
-            all.outcomes[outcome] += its->outcomes[outcome];
+            all.outcomes[outcome] += entry->outcomes[outcome];
         }
-        all.unharmed += its->unharmed;
-        all.shaped += its->shaped;
-        all.wrong += its->wrong;
+        all.unharmed += entry->unharmed;
+        all.shaped += entry->shaped;
+        all.wrong += entry->wrong;
     }
     return all.wrong > 0;
 }

@@ -3,7 +3,7 @@
 
 #include "finger.h"
 
-#define MAX_TOLD      4096
+#define MAX_SENT      4096
 #define SLOT_US(slot) ((uint32_t)((slot) * 1000000u / BT_SLOT_HZ))
 
 typedef struct {
@@ -17,22 +17,22 @@ typedef struct {
     uint16_t pdc;
     double pac[BT_PAC_PER_FRAME]; // above rest, of the coming round
     int good_until;               // words from this slot on are missing
-    bt_msg_event told[MAX_TOLD];
+    bt_msg_event sent[MAX_SENT];
     int count;
 } course;
 
-static course its;
+static course run;
 
 static int new_course(void **state)
 {
     (void)state;
-    memset(&its, 0, sizeof its);
-    its.seed = 7;
-    its.pdc = PDC_REST;
-    its.pac_sigma = 4;
-    its.good_until = BT_SLOTS;
-    its.settings.contact_energy_count2 = SETTING_COUNT2;
-    bt_finger_reset(&its.finger, 2);
+    memset(&run, 0, sizeof run);
+    run.seed = 7;
+    run.pdc = PDC_REST;
+    run.pac_sigma = 4;
+    run.good_until = BT_SLOTS;
+    run.settings.contact_energy_count2 = SETTING_COUNT2;
+    bt_finger_reset(&run.finger, 2);
     return 0;
 }
 
@@ -41,42 +41,42 @@ static uint16_t word(unsigned slot)
     unsigned channel = bt_slot_channel[slot];
     unsigned electrode = channel - BT_CHANNEL_E1;
     if (electrode < BT_ELECTRODES) {
-        return to_count(2955 + 31 * electrode + its.load * load_shape((int)electrode)
-                        + its.sigma * gauss(&its.seed));
+        return to_count(2955 + 31 * electrode + run.load * load_shape((int)electrode)
+                        + run.sigma * gauss(&run.seed));
     }
     if (channel == BT_CHANNEL_PAC) {
-        return to_count(2038 + its.pac[bt_slot_pac[slot]] + its.pac_sigma * gauss(&its.seed));
+        return to_count(2038 + run.pac[bt_slot_pac[slot]] + run.pac_sigma * gauss(&run.seed));
     }
-    return channel == BT_CHANNEL_PDC ? its.pdc : 2000;
+    return channel == BT_CHANNEL_PDC ? run.pdc : 2000;
 }
 
-static void take(uint32_t told, uint8_t slot)
+static void collect(uint32_t due, uint8_t slot)
 {
     for (uint8_t event = BT_EVENT_KIND_TOUCH; event <= BT_EVENT_KIND_STUCK; event++) {
-        if (told >> event & 1) {
-            bt_msg_event *msg = &its.told[its.count++];
-            assert_true(its.count < MAX_TOLD);
-            bt_finger_event(&its.finger, event, slot, its.t_us + SLOT_US(slot), msg);
+        if (due >> event & 1) {
+            bt_msg_event *msg = &run.sent[run.count++];
+            assert_true(run.count < MAX_SENT);
+            bt_finger_event(&run.finger, event, slot, run.t_us + SLOT_US(slot), msg);
             assert_int_equal(msg->slot, slot);
             assert_int_equal(msg->finger, 2);
-            assert_int_equal(msg->t_us, its.t_us + SLOT_US(slot));
-            told &= ~(1u << event);
+            assert_int_equal(msg->t_us, run.t_us + SLOT_US(slot));
+            due &= ~(1u << event);
         }
     }
-    assert_int_equal(told, 0);
+    assert_int_equal(due, 0);
 }
 
 static void play(int rounds)
 {
     for (int k = 0; k < rounds; k++) {
-        bt_finger_begin(&its.finger, its.t_us, &its.settings);
+        bt_finger_begin(&run.finger, run.t_us, &run.settings);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
-            uint16_t count = slot < its.good_until ? word(slot) : BT_INVALID_COUNT;
-            bool touched = bt_finger_put(&its.finger, slot, count);
-            take(bt_finger_events(&its.finger, slot, touched), slot); // most slots are not due
+            uint16_t count = slot < run.good_until ? word(slot) : BT_INVALID_COUNT;
+            bool touched = bt_finger_put(&run.finger, slot, count);
+            collect(bt_finger_events(&run.finger, slot, touched), slot); // most slots are not due
         }
-        (void)bt_finger_end(&its.finger, &its.settings);
-        its.t_us += BT_FRAME_MS * 1000;
+        (void)bt_finger_end(&run.finger, &run.settings);
+        run.t_us += BT_FRAME_MS * 1000;
     }
 }
 
@@ -85,28 +85,28 @@ static void shaken(int rounds, double counts, double hz)
 {
     for (int k = 0; k < rounds; k++) {
         for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
-            double t_s = its.t_us * 1e-6 + i / 2200.0;
-            its.pac[i] = counts * sin(2 * 3.14159265358979324 * hz * t_s);
+            double t_s = run.t_us * 1e-6 + i / 2200.0;
+            run.pac[i] = counts * sin(2 * 3.14159265358979324 * hz * t_s);
         }
         play(1);
     }
-    memset(its.pac, 0, sizeof its.pac);
+    memset(run.pac, 0, sizeof run.pac);
 }
 
-static int told(uint8_t event)
+static int count_of(uint8_t event)
 {
     int n = 0;
-    for (int k = 0; k < its.count; k++) {
-        n += its.told[k].kind == event;
+    for (int k = 0; k < run.count; k++) {
+        n += run.sent[k].kind == event;
     }
     return n;
 }
 
 static const bt_msg_event *first(uint8_t event)
 {
-    for (int k = 0; k < its.count; k++) {
-        if (its.told[k].kind == event) {
-            return &its.told[k];
+    for (int k = 0; k < run.count; k++) {
+        if (run.sent[k].kind == event) {
+            return &run.sent[k];
         }
     }
     fail_msg("event %d was not told", event);
@@ -117,33 +117,33 @@ static const bt_msg_event *first(uint8_t event)
 static void hold(void)
 {
     play(300);
-    its.load = 120;
-    its.pdc = PDC_REST + 60;
+    run.load = 120;
+    run.pdc = PDC_REST + 60;
     play(50);
-    its.count = 0;
+    run.count = 0;
 }
 
 TEST(touch_and_lift_are_told_in_the_slot_that_shows_them)
 {
     play(300);
-    assert_int_equal(its.count, 0);
-    const uint32_t pressed_us = its.t_us;
-    its.load = 200;
+    assert_int_equal(run.count, 0);
+    const uint32_t pressed_us = run.t_us;
+    run.load = 200;
     play(20);
-    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 1);
     const bt_msg_event *touch = first(BT_EVENT_KIND_TOUCH);
     assert_in_range(touch->t_us, pressed_us, pressed_us + 20000); // a far word waits for its second
     assert_int_equal(touch->onset_us, touch->t_us);
     assert_in_range(touch->energy_count2, SETTING_COUNT2, 200 * 200 * 2);
     assert_int_equal(touch->peak_count, BT_INVALID_COUNT);
-    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
-    const uint32_t released_us = its.t_us;
-    its.load = 0;
+    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 0);
+    const uint32_t released_us = run.t_us;
+    run.load = 0;
     play(100);
-    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 1);
     assert_in_range(first(BT_EVENT_KIND_LIFT)->t_us, released_us, released_us + 20000);
     assert_in_range(first(BT_EVENT_KIND_LIFT)->energy_count2, 0, SETTING_COUNT2 / 2);
-    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 1);
 }
 
 // The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
@@ -151,24 +151,24 @@ TEST(touches_in_quick_succession_are_all_told)
 {
     play(300);
     for (int k = 0; k < 10; k++) {
-        its.load = 200;
+        run.load = 200;
         play(8);
-        its.load = 0;
+        run.load = 0;
         play(8);
     }
-    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 10);
-    assert_int_equal(told(BT_EVENT_KIND_LIFT), 10);
+    assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 10);
+    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 10);
 }
 
 TEST(pressure_that_stays_is_no_lift)
 {
     hold();
-    its.load = 0;
+    run.load = 0;
     play(20);
-    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
-    its.pdc = PDC_REST;
+    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 0);
+    run.pdc = PDC_REST;
     play(3);
-    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 1);
 }
 
 // A swing of 120 to 220 Hz: both ways of it take some milliseconds to be seen.
@@ -177,20 +177,20 @@ TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
     int told_late = 0, onset_off = 0;
     for (int k = 0; k < 200; k++) {
         (void)new_course(NULL);
-        its.seed = (uint64_t)(100 + k);
-        its.pac_sigma = 5;
+        run.seed = (uint64_t)(100 + k);
+        run.pac_sigma = 5;
         hold();
-        const uint32_t begins_us = its.t_us;
+        const uint32_t begins_us = run.t_us;
         shaken(30, 60, 120 + k / 2);
         const bt_msg_event *slip = first(BT_EVENT_KIND_SLIP);
         told_late += slip->t_us - begins_us > 10000;
         onset_off += abs((int32_t)(slip->onset_us - begins_us)) > 5000;
         assert_in_range(slip->peak_count, 40, 160);
-        assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
-        assert_int_equal(told(BT_EVENT_KIND_JOLT), 1);
+        assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
+        assert_int_equal(count_of(BT_EVENT_KIND_JOLT), 1);
         assert_int_equal(slip->energy_count2, UINT32_MAX);
         play(60);
-        assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
+        assert_int_equal(count_of(BT_EVENT_KIND_STUCK), 1);
         assert_int_equal(first(BT_EVENT_KIND_STUCK)->onset_us, slip->onset_us);
     }
     assert_in_range(told_late, 0, 10);
@@ -199,19 +199,19 @@ TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
 
 TEST(held_for_ten_minutes_in_noise_nothing_is_told)
 {
-    its.pac_sigma = 5;
-    its.sigma = 1.5;
+    run.pac_sigma = 5;
+    run.sigma = 1.5;
     hold();
     play(60000);
-    assert_int_equal(its.count, 0);
+    assert_int_equal(run.count, 0);
 }
 
 TEST(a_resting_worn_finger_tells_nothing)
 {
-    its.pac_sigma = 5;
-    its.sigma = 5;
+    run.pac_sigma = 5;
+    run.sigma = 5;
     play(6000);
-    assert_int_equal(its.count, 0);
+    assert_int_equal(run.count, 0);
 }
 
 // An arm that hums: what was there at rest is no slip later.
@@ -219,38 +219,38 @@ TEST(noise_at_rest_raises_what_it_takes)
 {
     play(300);
     shaken(600, 20, 150);
-    its.count = 0;
-    its.load = 120;
-    its.pdc = PDC_REST + 60;
+    run.count = 0;
+    run.load = 120;
+    run.pdc = PDC_REST + 60;
     shaken(300, 20, 150);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
     shaken(20, 400, 150);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
 }
 
 TEST(a_glitch_is_no_event)
 {
     hold();
     for (int k = 0; k < 50; k++) {
-        its.pac[k % BT_PAC_PER_FRAME] = k % 2 ? 1500 : -1500;
+        run.pac[k % BT_PAC_PER_FRAME] = k % 2 ? 1500 : -1500;
         play(1);
-        memset(its.pac, 0, sizeof its.pac);
+        memset(run.pac, 0, sizeof run.pac);
         play(20);
     }
-    assert_int_equal(its.count, 0);
+    assert_int_equal(run.count, 0);
 }
 
 TEST(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip)
 {
     hold();
     for (int i = 6; i < BT_PAC_PER_FRAME; i++) {
-        its.pac[i] = 36 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
+        run.pac[i] = 36 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
     }
     play(1);
-    memset(its.pac, 0, sizeof its.pac);
+    memset(run.pac, 0, sizeof run.pac);
     play(50);
-    assert_int_equal(told(BT_EVENT_KIND_JOLT), 1);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_int_equal(count_of(BT_EVENT_KIND_JOLT), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
     assert_in_range(first(BT_EVENT_KIND_JOLT)->peak_count, 20, 60);
 }
 
@@ -261,11 +261,11 @@ static void squeezed(int rounds, double counts_per_s)
     for (int k = 0; k < rounds; k++) {
         for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
             level += (counts_per_s / (2 * 3.14159265 * 10) - level) / (2200 / (2 * 3.14159265 * 10));
-            its.pac[i] = level;
+            run.pac[i] = level;
         }
         play(1);
     }
-    memset(its.pac, 0, sizeof its.pac);
+    memset(run.pac, 0, sizeof run.pac);
 }
 
 TEST(squeezing_harder_is_no_slip)
@@ -275,7 +275,7 @@ TEST(squeezing_harder_is_no_slip)
         squeezed(50, 98.6 * 100 * n_s);
         squeezed(50, 0);
     }
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
 }
 
 // White noise that grows with the squeeze, as skin may rattle; and skin that slides at 150 Hz meanwhile.
@@ -284,31 +284,31 @@ TEST(a_slip_within_a_rattling_squeeze_is_told_and_the_squeeze_is_not)
     for (int slides = 0; slides <= 1; slides++) {
         (void)new_course(NULL);
         hold();
-        its.pac_sigma = 16;
+        run.pac_sigma = 16;
         play(30);
-        assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
-        assert_int_equal(its.finger.events.slip_level, 0);
+        assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
+        assert_int_equal(run.finger.events.slip_level, 0);
         shaken(5, slides ? 60 : 0, 150);
-        assert_int_equal(told(BT_EVENT_KIND_SLIP), slides);
+        assert_int_equal(count_of(BT_EVENT_KIND_SLIP), slides);
         // The mean of four samples changes by 2 x .87 of the amplitude, which has 1 / sqrt(2) of it as rms.
-        assert_in_range(its.finger.events.slip_level, slides ? 50 : 0, slides ? 85 : 0);
-        its.pac_sigma = 4;
+        assert_in_range(run.finger.events.slip_level, slides ? 50 : 0, slides ? 85 : 0);
+        run.pac_sigma = 4;
         play(20);
-        assert_int_equal(told(BT_EVENT_KIND_STUCK), slides);
+        assert_int_equal(count_of(BT_EVENT_KIND_STUCK), slides);
     }
 }
 
 TEST(a_landing_is_no_slip)
 {
     play(300);
-    its.load = 120;
-    its.pdc = PDC_REST + 60;
+    run.load = 120;
+    run.pdc = PDC_REST + 60;
     shaken(20, 200, 130);
     play(100);
-    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
     shaken(20, 200, 130);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
 }
 
 // The slip is over in the PAC slot behind the word that showed the release.
@@ -316,22 +316,22 @@ TEST(a_slip_ends_with_the_hold)
 {
     hold();
     shaken(10, 100, 150);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
-    its.load = 0;
-    its.pdc = PDC_REST;
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
+    run.load = 0;
+    run.pdc = PDC_REST;
     shaken(3, 100, 150);
-    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
-    assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 1);
+    assert_int_equal(count_of(BT_EVENT_KIND_STUCK), 1);
 }
 
 TEST(missing_words_are_no_event)
 {
     hold();
     for (int k = 0; k < 40; k++) {
-        its.good_until = k % 3 ? BT_SLOTS : k;
+        run.good_until = k % 3 ? BT_SLOTS : k;
         play(1);
     }
-    assert_int_equal(its.count, 0);
+    assert_int_equal(run.count, 0);
 }
 
 // The widest words there are: nothing wraps (the sanitizers look on), and each begun slip ends.
@@ -339,17 +339,17 @@ TEST(the_rails_do_not_wrap)
 {
     play(300);
     for (int k = 0; k < 400; k++) {
-        its.load = k % 40 < 30 ? 4000 : 0;
+        run.load = k % 40 < 30 ? 4000 : 0;
         for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
-            its.pac[i] = (double)random_range(&its.seed, -4000, 4000);
+            run.pac[i] = (double)random_range(&run.seed, -4000, 4000);
         }
         play(1);
     }
-    memset(its.pac, 0, sizeof its.pac);
-    its.load = 0;
+    memset(run.pac, 0, sizeof run.pac);
+    run.load = 0;
     play(400);
-    assert_int_equal(told(BT_EVENT_KIND_SLIP), told(BT_EVENT_KIND_STUCK));
-    assert_int_equal(told(BT_EVENT_KIND_TOUCH), told(BT_EVENT_KIND_LIFT));
+    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), count_of(BT_EVENT_KIND_STUCK));
+    assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), count_of(BT_EVENT_KIND_LIFT));
 }
 
 // The pressure alone may be what is felt first; the finger is let go of all the same.

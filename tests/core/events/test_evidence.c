@@ -43,22 +43,22 @@ static uint32_t shaken(uint32_t risen_count2, uint32_t fallen_count2)
 {
     events.risen_count2 = risen_count2 + TOLL;
     events.fallen_count2 = fallen_count2 + (fallen_count2 > 0 ? TOLL : 0);
-    uint32_t told = stretch();
+    uint32_t flagged = stretch();
     assert_int_equal(events.risen_count2, risen_count2);
     assert_int_equal(events.fallen_count2, fallen_count2);
-    return told;
+    return flagged;
 }
 
 TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
 {
     static const struct {
-        uint32_t risen, fallen, told;
+        uint32_t risen, fallen, flagged;
     } cases[] = {{13600, 13601, 0}, {13601, 13600, 0}, {13601, 13601, TOLD(SLIP)}};
     for (int k = 0; k < 3; k++) {
         (void)held(NULL);
         events.jolt_raised = true;
-        assert_int_equal(shaken(cases[k].risen, cases[k].fallen), cases[k].told);
-        assert_int_equal(events.slipping, cases[k].told != 0);
+        assert_int_equal(shaken(cases[k].risen, cases[k].fallen), cases[k].flagged);
+        assert_int_equal(events.slipping, cases[k].flagged != 0);
         (void)held(NULL);
         events.touched = false;
         tare.state = BT_TARE_STATE_REST;

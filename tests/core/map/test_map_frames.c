@@ -36,31 +36,31 @@ static emulated_finger pressed(void)
     return finger;
 }
 
-static void mixed_map(blob *its, bt_map *map, uint32_t axes)
+static void mixed_map(blob *stored, bt_map *map, uint32_t axes)
 {
-    begin(its, axes, 2);
-    block(its, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6);
-    block(its, BT_MAP_KIND_PRESSURE, BT_MAP_GATE_X, 4);
-    uint32_t signal = fill(its, BT_MAP_KIND_SIGNAL, 0), pressure = fill(its, BT_MAP_KIND_PRESSURE, 0);
+    begin(stored, axes, 2);
+    block(stored, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6);
+    block(stored, BT_MAP_KIND_PRESSURE, BT_MAP_GATE_X, 4);
+    uint32_t signal = fill(stored, BT_MAP_KIND_SIGNAL, 0), pressure = fill(stored, BT_MAP_KIND_PRESSURE, 0);
     for (uint32_t k = 0; k < columns_of[BT_MAP_KIND_SIGNAL] * axes; k++) {
-        *half(its, signal, BT_MAP_KIND_SIGNAL, k / axes, k % axes) =
+        *half(stored, signal, BT_MAP_KIND_SIGNAL, k / axes, k % axes) =
             (int16_t)(40 + 13 * (k % 7) - (k % axes == 1 ? 400 : 0));
     }
     for (uint32_t k = 0; k < axes; k++) {
-        *half(its, pressure, BT_MAP_KIND_PRESSURE, 0, k) = (int16_t)(100 + k);
+        *half(stored, pressure, BT_MAP_KIND_PRESSURE, 0, k) = (int16_t)(100 + k);
     }
-    assert_int_equal(opened(its, map), BT_ERROR_OK);
+    assert_int_equal(opened(stored, map), BT_ERROR_OK);
 }
 
 TEST(a_mapped_frame_has_the_maps_force_and_says_so)
 {
-    static blob its;
+    static blob stored;
     bt_map map;
     emulated_finger finger = pressed();
     uint32_t rest_q4 = (finger.tare.base.pdc_q16 + (1 << 11)) >> 12;
     for (size_t k = 0; k < SOME_AXES; k++) {
         uint32_t axes = axes_of[k];
-        mixed_map(&its, &map, axes);
+        mixed_map(&stored, &map, axes);
         map.margin.base_mn[0] = BT_INVALID_COUNT;
         bt_msg_frame plain = published(&finger, NULL, 1400, BT_WANT_ALL);
         bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL);
@@ -95,12 +95,12 @@ TEST(a_mapped_frame_has_the_maps_force_and_says_so)
 
 TEST(without_pressure_a_map_that_needs_it_gives_nothing)
 {
-    static blob its;
+    static blob stored;
     bt_map map;
     emulated_finger finger = pressed();
     for (size_t k = 0; k < SOME_AXES; k++) {
         uint32_t axes = axes_of[k];
-        mixed_map(&its, &map, axes);
+        mixed_map(&stored, &map, axes);
         map.margin.base_mn[0] = BT_INVALID_COUNT;
         bt_msg_frame plain = published(&finger, NULL, BT_INVALID_COUNT, BT_WANT_ALL);
         bt_msg_frame msg = published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL);
@@ -118,20 +118,20 @@ TEST(without_pressure_a_map_that_needs_it_gives_nothing)
         assert_int_equal(msg.force_100un[0], BT_INVALID_I32);
         finger.tare.base.pdc_q16 = known;
     }
-    one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6, 30); // needs none
-    assert_int_equal(opened(&its, &map), BT_ERROR_OK);
+    one_block(&stored, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6, 30); // needs none
+    assert_int_equal(opened(&stored, &map), BT_ERROR_OK);
     assert_int_not_equal(published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL).force_100un[0],
                          BT_INVALID_I32);
 }
 
 TEST(what_is_not_asked_for_changes_nothing_that_is)
 {
-    static blob its;
+    static blob stored;
     bt_map map;
     emulated_finger finger = pressed();
     for (size_t k = 0; k < SOME_AXES; k++) {
         uint32_t axes = axes_of[k];
-        mixed_map(&its, &map, axes);
+        mixed_map(&stored, &map, axes);
         bt_msg_frame all = published(&finger, &map, 1400, BT_WANT_ALL);
         for (uint32_t wanted = 0; wanted <= BT_WANT_ALL; wanted++) {
             bt_msg_frame msg = published(&finger, &map, 1400, wanted);

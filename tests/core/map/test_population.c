@@ -18,13 +18,14 @@ static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7,
 TEST(the_map_is_as_it_is_opened)
 {
     bt_map map;
-    const bt_map *its = &bt_population;
-    assert_int_equal(bt_map_open(&map, its->serial - 4, BT_POPULATION_BYTES), BT_ERROR_OK);
-    assert_true(map.axes == its->axes && map.block_count == its->block_count && map.kinds == its->kinds
-                && map.gates == its->gates && map.serial == its->serial && map.blocks == its->blocks
-                && map.coefficients == its->coefficients);
-    assert_memory_equal(&map.margin, &its->margin, sizeof map.margin);
-    assert_false(bt_map_needs_pdc(its));
+    const bt_map *population = &bt_population;
+    assert_int_equal(bt_map_open(&map, population->serial - 4, BT_POPULATION_BYTES), BT_ERROR_OK);
+    assert_true(map.axes == population->axes && map.block_count == population->block_count
+                && map.kinds == population->kinds && map.gates == population->gates
+                && map.serial == population->serial && map.blocks == population->blocks
+                && map.coefficients == population->coefficients);
+    assert_memory_equal(&map.margin, &population->margin, sizeof map.margin);
+    assert_false(bt_map_needs_pdc(population));
 }
 
 // Every choice of extremes that a sign pattern makes; the sanitizer looks for what the bounds missed.
@@ -95,7 +96,7 @@ TEST(the_likeness_is_what_it_is_defined_as)
         }
         along[2] += sum / 32 * BT_CORE_RADIUS_UM;
         double length = hypot(hypot(along[0], along[1]), along[2]), strength = 12.5 * sum;
-        bt_likeness its = bt_population_force(e_q4, force);
+        bt_likeness result = bt_population_force(e_q4, force);
         bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, by_map);
         for (int d = 0; d < 3; d++) {
             along[d] *= strength / length;
@@ -103,18 +104,18 @@ TEST(the_likeness_is_what_it_is_defined_as)
         }
         double like = (1.375 - off) * 2, firm = (sum - 1500) / 1024, share = like < firm ? like : firm;
         share = share < 0 ? 0 : share > 1 ? 1 : share;
-        assert_true(fabs(its.share / 256.0 - share) < 0.02);
-        assert_true(fabs(its.strength_100un - strength) <= 12.5 * BT_ELECTRODES / 16 + 1);
+        assert_true(fabs(result.share / 256.0 - share) < 0.02);
+        assert_true(fabs(result.strength_100un - strength) <= 12.5 * BT_ELECTRODES / 16 + 1);
         for (int d = 0; d < 3; d++) {
-            assert_true(fabs(its.otherwise_100un[d] - along[d]) < 0.01 * strength);
+            assert_true(fabs(result.otherwise_100un[d] - along[d]) < 0.01 * strength);
             double expected =
-                its.otherwise_100un[d] + its.share / 256.0 * (by_map[d] - its.otherwise_100un[d]);
+                result.otherwise_100un[d] + result.share / 256.0 * (by_map[d] - result.otherwise_100un[d]);
             assert_true(fabs(expected - force[d]) <= 0.5 + 1e-6);
         }
-        if (fabs(off - 2) > 0.01 && fabs(8 * pressed - sum) > 8 && (its.share == 0 || share < 0.98)) {
-            assert_true(its.outside == (sum < 64 || off > 2 || 8 * pressed < sum));
+        if (fabs(off - 2) > 0.01 && fabs(8 * pressed - sum) > 8 && (result.share == 0 || share < 0.98)) {
+            assert_true(result.outside == (sum < 64 || off > 2 || 8 * pressed < sum));
         }
-        mixed += its.share > 0 && its.share < BT_POPULATION_ALL;
+        mixed += result.share > 0 && result.share < BT_POPULATION_ALL;
     }
     assert_true(mixed > 1000);
     const int32_t none[BT_ELECTRODES] = {0};
@@ -135,13 +136,14 @@ TEST(a_mirrored_finger_is_as_like)
         for (int i = 0; i < BT_ELECTRODES; i++) {
             image_q4[i] = e_q4[mirror[i]];
         }
-        bt_likeness its = bt_population_force(e_q4, force), image = bt_population_force(image_q4, mirrored);
-        uint32_t off = (BT_POPULATION_ALL * 2 * ROUNDED_100UN / (1 + its.strength_100un)) + 1;
-        assert_in_range(its.share + off - image.share, 0, 2 * off); // by the rounding of the map's force
-        assert_int_equal(its.strength_100un, image.strength_100un);
-        assert_int_equal(its.otherwise_100un[0], image.otherwise_100un[0]);
-        assert_int_equal(its.otherwise_100un[1], -image.otherwise_100un[1]);
-        assert_int_equal(its.otherwise_100un[2], image.otherwise_100un[2]);
+        bt_likeness result = bt_population_force(e_q4, force),
+                    image = bt_population_force(image_q4, mirrored);
+        uint32_t off = (BT_POPULATION_ALL * 2 * ROUNDED_100UN / (1 + result.strength_100un)) + 1;
+        assert_in_range(result.share + off - image.share, 0, 2 * off); // by the rounding of the map's force
+        assert_int_equal(result.strength_100un, image.strength_100un);
+        assert_int_equal(result.otherwise_100un[0], image.otherwise_100un[0]);
+        assert_int_equal(result.otherwise_100un[1], -image.otherwise_100un[1]);
+        assert_int_equal(result.otherwise_100un[2], image.otherwise_100un[2]);
     }
 }
 
@@ -210,15 +212,15 @@ TEST(what_is_guessed_goes_as_the_maps_share_grows)
         int32_t e_q4[BT_ELECTRODES], force[3];
         uint32_t guess_mn[2];
         signals_of(plate, eighths[k], e_q4);
-        bt_likeness its = bt_population_force(e_q4, force);
-        assert_int_equal((its.share > 0) + (its.share == BT_POPULATION_ALL), k);
+        bt_likeness result = bt_population_force(e_q4, force);
+        assert_int_equal((result.share > 0) + (result.share == BT_POPULATION_ALL), k);
         assert_int_equal(published(e_q4, force), BT_FRAME_FLAG_POPULATION);
         assert_true(force[2] > 0);
-        bt_population_guess(its.share, its.outside, its.strength_100un, guess_mn);
-        double away = (256.0 - its.share) / 256 * its.strength_100un / 10;
+        bt_population_guess(result.share, result.outside, result.strength_100un, guess_mn);
+        double away = (256.0 - result.share) / 256 * result.strength_100un / 10;
         assert_true(fabs(guess_mn[0] - .4 * away) < 2 + .003 * away
                     && fabs(guess_mn[1] - .3 * away) < 2 + .003 * away);
-        assert_int_equal(bt_strength_100un(e_q4), its.strength_100un);
+        assert_int_equal(bt_strength_100un(e_q4), result.strength_100un);
     }
 }
 

@@ -96,12 +96,12 @@ TEST(are_octaves)
         sine(hz[band], 400);
         run();
         for (int other = 0; other < BT_BANDS; other++) {
-            double its = 0, others = 0;
+            double in_band = 0, others = 0;
             for (int k = ROUNDS / 2; k < ROUNDS; k++) {
-                its += energy_q4[k][band];
+                in_band += energy_q4[k][band];
                 others += energy_q4[k][other];
             }
-            assert_true(other == band || others < its);
+            assert_true(other == band || others < in_band);
         }
     }
 }

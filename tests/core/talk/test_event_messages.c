@@ -7,7 +7,7 @@ static uint32_t t_us;
 // BT_SLOTS.
 static uint8_t played(uint16_t count)
 {
-    uint8_t told = BT_SLOTS;
+    uint8_t sent_in = BT_SLOTS;
     bt_session_begin(&session, t_us);
     for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
         uint16_t words[BT_MAX_FINGERS];
@@ -17,11 +17,11 @@ static uint8_t played(uint16_t count)
         }
         int before = host_count(BT_EVENT_ID);
         bt_session_slot(&session, slot, words, t_us + slot * 1000000u / BT_SLOT_HZ);
-        told = told == BT_SLOTS && host_count(BT_EVENT_ID) > before ? slot : told;
+        sent_in = sent_in == BT_SLOTS && host_count(BT_EVENT_ID) > before ? slot : sent_in;
     }
     bt_session_end_round(&session);
     t_us += BT_FRAME_MS * 1000;
-    return told;
+    return sent_in;
 }
 
 static void play(int rounds, uint16_t count)

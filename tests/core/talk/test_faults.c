@@ -59,11 +59,11 @@ TEST(a_round_that_lacks_a_word_is_told_until_it_is_cleared)
         rounds(100);
         one_round_without_an_electrode();
         rounds(100);
-        uint32_t told = status().finger_faults[FINGER];
-        assert_int_equal(told, BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_ELECTRODE_OUT);
+        uint32_t faults = status().finger_faults[FINGER];
+        assert_int_equal(faults, BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_ELECTRODE_OUT);
         clear(0, BT_FRAME_FLAG_RAIL); // another
-        assert_int_equal(status().finger_faults[FINGER], told);
-        clear(0, told);
+        assert_int_equal(status().finger_faults[FINGER], faults);
+        clear(0, faults);
         rounds(10);
         assert_int_equal(status().finger_faults[FINGER], 0);
     }

@@ -41,7 +41,7 @@ static uint8_t subscribe_at(unsigned link, uint8_t quantities)
 }
 
 // The ports that got a STATUS which nobody asked for, with LINK_TAKEN, in the answer to the latest command.
-static unsigned told(void)
+static unsigned links_that_sent(void)
 {
     unsigned ports = 0;
     for (int k = 0; k < host.count; k++) {
@@ -88,7 +88,7 @@ TEST(who_streams_with_a_keep_alive_keeps_the_link)
     bt_session_tick(&session, now_us);
     assert_int_equal(session.faults, BT_FAULT_FLAG_HOST_SILENT);
     assert_int_equal(stream_at(USB, 500), BT_ERROR_OK);
-    assert_int_equal(told(), 0); // nobody had anything
+    assert_int_equal(links_that_sent(), 0); // nobody had anything
     assert_int_equal(frames_go_to(), USB);
     assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
     bt_session_link_down(&session, USB);
@@ -102,7 +102,7 @@ TEST(a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told)
     assert_int_equal(ask(UART, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // every program begins with it
     assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
-    assert_int_equal(told(), 1 << USB | 1 << UART);
+    assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(frames_go_to(), UART);
     assert_int_equal(session.finger[0].quantities, BT_SUBSCRIBED_AT_FIRST); // not what the other one chose
 }
@@ -126,7 +126,7 @@ TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
     assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
     assert_int_equal(take_at(USB, 0), BT_ERROR_OUT_OF_RANGE);
     assert_int_equal(take_at(USB, 1000), BT_ERROR_OK);
-    assert_int_equal(told(), 1 << USB | 1 << UART);
+    assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(session.streams, 0);
     assert_true(session.finger[0].tare.held); // what it holds it still holds
     assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
@@ -204,7 +204,7 @@ TEST(a_link_that_is_taken_in_turns_tells_both_and_lets_go_of_nothing)
         if (at != owner) {
             assert_int_equal(stream_at(at, 200), BT_ERROR_LINK_BUSY);
             assert_int_equal(take_at(at, 200), BT_ERROR_OK);
-            assert_int_equal(told(), 1 << USB | 1 << UART);
+            assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
             assert_int_equal(stream_at(at, 200), BT_ERROR_OK);
             owner = at;
         }

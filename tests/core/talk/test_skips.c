@@ -173,7 +173,7 @@ static int tile(const course_log *log, int finger, int idle_rounds)
 
 static void assert_rounds_are_tiled(uint8_t quantities)
 {
-    int told = 0, frames = 0, rounds = 0;
+    int marked = 0, frames = 0, rounds = 0;
     for (int f = FIRST_FINGER; f <= SECOND_FINGER; f += SECOND_FINGER - FIRST_FINGER) {
         int all = messages_of(&full, BT_FRAME_ID, f);
         int of_this = tile(&lean, f, 10);
@@ -184,11 +184,11 @@ static void assert_rounds_are_tiled(uint8_t quantities)
         } else {
             assert_true(sent < all * 3 / 4);
         }
-        told += of_this;
+        marked += of_this;
         frames += sent;
         rounds += all;
     }
-    assert_true(told > 2 * (COURSE_ROUNDS - 60));
+    assert_true(marked > 2 * (COURSE_ROUNDS - 60));
     // STATUS against a count of what came.
     bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
     int idle = rounds - frames;
