@@ -177,7 +177,7 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
         frames += len(batch.wire)
 
     hand.on_batch(count)
-    hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
+    hand._board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
     hand.link.release()
     while hand._board.reader.silent_s < hand.link.patience and not hand.link.ended:  # an emulator is slow to begin
         time.sleep(0.01)

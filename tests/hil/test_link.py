@@ -113,7 +113,7 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     source = tmp_path / "rest.toml"
     source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
     hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
-    hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
+    hand._board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
     standstill = Overheard(still=True)
     hand._reader.add(standstill)
     hand.link.release()
@@ -216,12 +216,12 @@ def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_recorded_counts_give_the_same_results_as_the_simulated_board(board, shared_data: Path) -> None:
     trial = shared_data / "robotic_finger" / "trial_15330.npz"
-    here = board(str(trial)).read_batch(1000).wire
+    on_rig = board(str(trial)).read_batch(1000).wire
     with biotac.open(f"sim:{trial}") as hand:
-        there = hand.read_batch(1000).wire
-    assert len(here) == len(there) == 5185
-    for field in set(wire_fields(here)) - {"t_us"}:  # boards do not start at the same microsecond
-        assert here[field].tobytes() == there[field].tobytes(), field
+        simulated = hand.read_batch(1000).wire
+    assert len(on_rig) == len(simulated) == 5185
+    for field in set(wire_fields(on_rig)) - {"t_us"}:  # boards do not start at the same microsecond
+        assert on_rig[field].tobytes() == simulated[field].tobytes(), field
 
 
 def wire_fields(frames: np.ndarray) -> tuple[str, ...]:

@@ -46,11 +46,11 @@ PATIENCE_S = 5  # of the board's time, for what takes some ms of it
 
 
 def begin(hand: biotac.Hand, finger: int, blob: bytes) -> None:
-    hand._board.tell(wire.BeginMap(0, finger, len(blob), zlib.crc32(blob)))
+    hand._board.command(wire.BeginMap(0, finger, len(blob), zlib.crc32(blob)))
 
 
 def write(hand: biotac.Hand, finger: int, blob: bytes, offset: int) -> None:
-    hand._board.tell(wire.WriteMap(0, finger, offset, part(blob, offset)))
+    hand._board.command(wire.WriteMap(0, finger, offset, part(blob, offset)))
 
 
 def test_maps_of_all_sizes_come_back_as_they_were_sent(rig: Rig, board: Callable[[str], biotac.Hand]) -> None:

@@ -60,9 +60,9 @@ def assert_same(rows: np.ndarray, others: np.ndarray) -> None:
 def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open, seconds: float) -> None:
     hand, board = opened(seconds)
     batch = hand.read_batch(seconds + 1)
-    there = on_posix(seconds)
-    assert_same(batch.wire, there.wire)
-    assert_same(batch.pac, there.pac)
+    expected = on_posix(seconds)
+    assert_same(batch.wire, expected.wire)
+    assert_same(batch.pac, expected.pac)
     for finger in hand.fingers:
         sensor = hand.sensor_status(finger)
         assert sensor.words_parity == sensor.words_stuck == sensor.words_error == 0

@@ -256,8 +256,8 @@ def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_pat
     (lost,) = program.of("lost")
     assert re.search(CAUSES[cause], lost["lost"])
     if cause == "taken":  # a link that another took is not taken back, unless it says that it was this program's pause
-        told = len([*program.of("gap"), *program.of("counted")])
-        assert way == "record" or board.starts <= starts + max(told, taken_again)
+        reported = len([*program.of("gap"), *program.of("counted")])
+        assert way == "record" or board.starts <= starts + max(reported, taken_again)
     elif cause == "silent" and way != "page":  # which opens the board again
         assert board.starts == starts + 1
     # A board that answers but is silent is started once more before it is given up.

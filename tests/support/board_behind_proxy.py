@@ -112,10 +112,10 @@ class BoardBehindProxy:
                 t_us = int.from_bytes(payload[2:6], "little")
                 self.passed.append((t_us, payload[DTYPES[wire.Frame.ID].fields["finger"][1]]))  # type: ignore[index]
 
-    def wait_for(self, so: Callable[[], bool]) -> None:
+    def wait_for(self, condition: Callable[[], bool]) -> None:
         """Until ``so`` is true; only a failing test waits for minutes."""
         end_s = time.monotonic() + 300
-        while not so():
+        while not condition():
             assert time.monotonic() < end_s
             time.sleep(0.01)
 

@@ -68,10 +68,10 @@ class Model:
         sent_s = np.asarray(sent_s, float)
         slot = np.ceil((sent_s - self.usb_phase_s) / USB_S) * USB_S + self.usb_phase_s
         tail = TAIL_S * self.rng.pareto(2.0, sent_s.shape)
-        there = slot + way_s + np.minimum(tail, 0.5)
-        at = np.searchsorted(self.stalls, there, side="right") - 1
+        arrival_s = slot + way_s + np.minimum(tail, 0.5)
+        at = np.searchsorted(self.stalls, arrival_s, side="right") - 1
         end = np.where(at >= 0, self.stalls[np.maximum(at, 0)] + STALL_S, -np.inf)
-        return np.maximum.accumulate(np.maximum(there, end))
+        return np.maximum.accumulate(np.maximum(arrival_s, end))
 
     def frames(self) -> tuple[np.ndarray, np.ndarray]:
         """Rounds' t_us, whole us, and when their messages arrive."""
@@ -85,8 +85,8 @@ class Model:
         sent = np.concatenate(
             [start + 0.003 * np.arange(5), np.arange(start + 1, start + self.seconds - 2, PING_EVERY_S)]
         )
-        there = np.array([float(self.delivered(np.array([s]))[0]) for s in sent])
-        answered = there + self.rng.uniform(20e-6, 300e-6, len(sent))
+        arrival_s = np.array([float(self.delivered(np.array([s]))[0]) for s in sent])
+        answered = arrival_s + self.rng.uniform(20e-6, 300e-6, len(sent))
         back = np.array([float(self.delivered(np.array([s]), self.way_back_s)[0]) for s in answered])
         return sent, np.floor(self.device_us(answered)).astype(np.int64), back
 

@@ -151,10 +151,10 @@ def gaps_in(batches: list[Batch]) -> list[Gap]:
     return [m for batch in batches for m in batch.messages if isinstance(m, Gap)]
 
 
-def until(so: Callable[[], Any]) -> None:
+def until(condition: Callable[[], Any]) -> None:
     """Wait."""
     end_s = time.monotonic() + WAIT_S
-    while not so():
+    while not condition():
         assert time.monotonic() < end_s, "it never came true"
         time.sleep(0.001)
 

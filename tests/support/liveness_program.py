@@ -23,7 +23,7 @@ LOOK_S = 0.01
 over = threading.Event()
 
 
-def say(**what: Any) -> None:
+def report(**what: Any) -> None:
     """One observation, at the time of this computer that all processes share."""
     print(json.dumps({"at_s": time.monotonic()} | what), flush=True)
 
@@ -32,7 +32,7 @@ def say_gaps(batch: biotac.Batch) -> None:
     """The gaps that a batch tells."""
     for message in batch.messages:
         if isinstance(message, biotac.Gap):
-            say(gap=asdict(message))
+            report(gap=asdict(message))
 
 
 def say_batch(batch: biotac.Batch) -> None:
@@ -40,7 +40,7 @@ def say_batch(batch: biotac.Batch) -> None:
     say_gaps(batch)
     if len(batch.t_us):
         at_s, age_s = time.monotonic(), batch.age_s
-        say(at_s=at_s, t_us=int(batch.t_us[-1]), age_s=None if math.isnan(age_s) else age_s)
+        report(at_s=at_s, t_us=int(batch.t_us[-1]), age_s=None if math.isnan(age_s) else age_s)
 
 
 def pull(hand: biotac.Hand) -> None:
@@ -57,13 +57,13 @@ def views(hand: biotac.Hand) -> None:
         frame, stats = finger.frame, hand.stats
         if stats.gaps != gaps:
             gaps = stats.gaps
-            say(counted=gaps)
-        say(at_s=at_s, shown=None if math.isnan(frame.force_n[2]) else frame.t_us, stale=finger.stale)
+            report(counted=gaps)
+        report(at_s=at_s, shown=None if math.isnan(frame.force_n[2]) else frame.t_us, stale=finger.stale)
 
 
 def callbacks(hand: biotac.Hand) -> None:
     hand.on_batch(say_batch)
-    hand.on_gap(lambda gap: say(on_gap=gap.reason))
+    hand.on_gap(lambda gap: report(on_gap=gap.reason))
     hand.stream()
     while not over.wait(LOOK_S):
         hand.check()
@@ -75,7 +75,7 @@ def record(hand: biotac.Hand) -> None:
     while not over.wait(LOOK_S):
         hand.check()
     recorder.close()
-    say(paths=[str(path) for path in recorder.paths], frames=recorder.frames)
+    report(paths=[str(path) for path in recorder.paths], frames=recorder.frames)
 
 
 def lsl(hand: biotac.Hand) -> None:
@@ -85,7 +85,7 @@ def lsl(hand: biotac.Hand) -> None:
         push, lsl_now = outlet._outlets[hand.fingers[0], ""].push_chunk, outlet._lsl.local_clock
 
         def pushed(values: Any, stamps_s: list[float]) -> None:
-            say(stamp_age_s=lsl_now() - stamps_s[-1])
+            report(stamp_age_s=lsl_now() - stamps_s[-1])
             push(values, stamps_s)
 
         outlet._outlets[hand.fingers[0], ""].push_chunk = pushed  # type: ignore[method-assign]
@@ -117,12 +117,12 @@ def page(port: str) -> None:
             news = json.loads(line.removeprefix(b"data: "))
             health = news["health"] or {"link": "live", "events": []}
             if news["frames"] and not lost:
-                say(t_us=news["frames"][-1][FRAME_ROW.index("t_us")], age_s=None)
+                report(t_us=news["frames"][-1][FRAME_ROW.index("t_us")], age_s=None)
             for _ in (event for event in health["events"] if event["name"] == "gap"):
-                say(marked=True)
+                report(marked=True)
             if health["link"] in ("lost", "taken") and not lost:
                 lost = True
-                say(lost=health["words"])
+                report(lost=health["words"])
 
     with closing(Viewing(port, folder=Path(sys.argv[4]))) as viewing:
         threading.Thread(target=follow, args=(viewing.server.url,), daemon=True).start()
@@ -138,7 +138,7 @@ def ros(port: str) -> None:
     publish_row, publish, clock = node._publish, node.publish, node.get_clock()
 
     def published(row: Any, stamp_ns: int) -> None:
-        say(t_us=int(row["t_us"]), age_s=(clock.now().nanoseconds - stamp_ns) * 1e-9)
+        report(t_us=int(row["t_us"]), age_s=(clock.now().nanoseconds - stamp_ns) * 1e-9)
         publish_row(row, stamp_ns)
 
     def published_all(batch: biotac.Batch) -> None:
@@ -167,10 +167,10 @@ def main() -> None:
             WITH_HANDS_OF_THEIR_OWN[way](port)
         else:
             with biotac.open(port, reconnect=reconnect) as hand:
-                say(opened=True)
+                report(opened=True)
                 WAYS[way](hand)
     except biotac.DeviceLostError as error:
-        say(lost=str(error))
+        report(lost=str(error))
 
 
 main()

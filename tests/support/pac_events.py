@@ -25,8 +25,8 @@ def pac_events(pac: Any) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
     for k, words in enumerate(checked_words("pac", pac, None, 22).tolist()):
         finger.seq = k % 2**16
         for slot, before in enumerate(lib.bt_slot_pac):  # in those that are not due, nothing is found
-            there = min(before + 1, len(words))  # as the words come
-            finger.round.pac[0:there] = words[:there]
+            arrived = min(before + 1, len(words))  # as the words come
+            finger.round.pac[0:arrived] = words[:arrived]
             found = lib.bt_finger_events(finger, slot, False)
             for kind in (kind for kind in range(found.bit_length()) if found >> kind & 1):
                 t_us = (10_000 * k + slot * 1_000_000 // 4400) % 2**32

@@ -11,5 +11,5 @@ def row(cause: str, error_n: float, silent_n: float, flag: str, do: str) -> None
     """What the force is wrong by at most, in N, for this cause, and what without its flag; what a controller does."""
     cells = f"{cause}|{error_n:.1f}|{silent_n:.1f}|{flag}|{do}"
     print(f"\nROW|{cells}")
-    there = [line.strip("| ").replace(" | ", "|") for line in PAGE.read_text(encoding="utf-8").splitlines()]
-    assert cells in there, f"{PAGE.name} does not say what was measured: run tools/make/wrong_by_page.py"
+    rows = [line.strip("| ").replace(" | ", "|") for line in PAGE.read_text(encoding="utf-8").splitlines()]
+    assert cells in rows, f"{PAGE.name} does not say what was measured: run tools/make/wrong_by_page.py"

@@ -178,7 +178,7 @@ class Board:
         if self.link.keeps_time:
             self.reader.clock.round_trip(sent_s, self.reader.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 
-    def tell(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
+    def command(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
         """Send a command whose reply only confirms it; with ``lasting`` it is remembered, see ``remember``."""
         answers = wire.ANSWERS[type(request)]
         self.ask(request, answers)

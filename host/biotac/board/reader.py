@@ -153,7 +153,7 @@ class Reader:
             self.failure = self.failure or error
         self.wake()
 
-    def lose(self, error: DeviceLostError, reason: Reason) -> None:
+    def disconnect(self, error: DeviceLostError, reason: Reason) -> None:
         """Stop reading, because the link broke or the board fell silent."""
         spoilt = self.link.spoilt()
         if not (self.reconnects and self.link.ports()) and not self.closing.is_set():
@@ -240,10 +240,10 @@ class Reader:
         try:
             batch = self._next()
         except DeviceLostError as error:
-            self.lose(error, "unplugged")
+            self.disconnect(error, "unplugged")
             return
         except OSError as error:
-            self.lose(went_away(self.link.port, error), "unplugged")
+            self.disconnect(went_away(self.link.port, error), "unplugged")
             return
         self.silent_s = 0.0 if batch is not None else self.silent_s + POLL_S
         if batch is not None:

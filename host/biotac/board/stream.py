@@ -120,7 +120,7 @@ class Stream:
             self._quantities = asked.quantities
             self._subscribe()
             start = Start(0, int(asked.streams), asked.fingers, self.keepalive_ms())
-            board.tell(start)
+            board.command(start)
             self._wants, self.started = wants, start
             board.reader.every = asked.every
         board.reader.wake()
@@ -128,7 +128,7 @@ class Stream:
 
     def _subscribe(self) -> None:
         try:
-            self._board.tell(Subscribe(0, ALL_FINGERS, int(self._quantities)))
+            self._board.command(Subscribe(0, ALL_FINGERS, int(self._quantities)))
         except CommandRefusedError as error:
             # A recording, and a board that somebody else streams, have the quantities that were chosen there.
             if self._board.link.owns_stream and error.error != Error.NOT_HERE:
@@ -148,13 +148,13 @@ class Stream:
         with self._board.turn():
             if self.started is not None:
                 self._subscribe()
-                self._board.tell(self.started)
+                self._board.command(self.started)
 
     def stop(self) -> None:
         """Stop the stream. What was on its way has arrived when this returns."""
         with self._board.turn():
             self.started = None
-            self._board.tell(Stop(0))
+            self._board.command(Stop(0))
             self._board.reader.gaps.forget()
         self._board.reader.wake()
 

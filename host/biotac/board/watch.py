@@ -61,7 +61,7 @@ class StreamWatch:
                     self._step()
                 except DeviceLostError as error:
                     if not reader.closing.is_set():  # with a cause: the link's own error
-                        reader.lose(error, "unplugged" if error.__cause__ else "silence")
+                        reader.disconnect(error, "unplugged" if error.__cause__ else "silence")
                 reader.wait_for(self._is_due, LOOK_S)
         except BaseException as error:  # unforeseen errors too: a stream that nobody keeps alive would stop unseen
             reader.fail(error)
@@ -71,7 +71,7 @@ class StreamWatch:
         if reader.lost is not None:
             self._bring_back(reader.lost)
         elif stream.on and link.ended:
-            self._board.tell(wire.Ping(0))  # a barrier: its reply comes after the last frame
+            self._board.command(wire.Ping(0))  # a barrier: its reply comes after the last frame
             stream.end()
         elif stream.on and link.pace:
             self._look()
@@ -148,7 +148,7 @@ class StreamWatch:
         hello = self._board.ask(wire.HelloRequest(0, secrets.randbits(32)), wire.Hello, quiet=True)
         if hello.boot_id == self._reader.hello.boot_id:
             return False
-        self._reader.lose(DeviceLostError(f"{self._board.link.port} restarted; open it again"), "rebooted")
+        self._reader.disconnect(DeviceLostError(f"{self._board.link.port} restarted; open it again"), "rebooted")
         return True
 
     def _start_again(self, reason: Reason) -> None:
@@ -157,7 +157,7 @@ class StreamWatch:
             text = (
                 f"{self._board.link.port} answers, but its stream stays silent; look for the cause with `biotac doctor`"
             )
-            self._reader.lose(DeviceLostError(text), "silence")
+            self._reader.disconnect(DeviceLostError(text), "silence")
             return
         self._looks = 0
         self._reader.gaps.begin(reason)
@@ -181,7 +181,7 @@ class StreamWatch:
             board.restore()
             for tare in self._tares() if reason == "rebooted" else []:
                 with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
-                    board.tell(tare)
+                    board.command(tare)
             self._stream.resume()
             self._heard_us = None
 

@@ -82,41 +82,43 @@ class Bringup:
         return rows
 
 
-def measure(hand: Hand, seen: Bringup, tell: Callable[[str], None], *, seconds: float, press_s: float) -> BoardFacts:
+def measure(
+    hand: Hand, seen: Bringup, announce: Callable[[str], None], *, seconds: float, press_s: float
+) -> BoardFacts:
     """Measure a board that ``reconnect``s into ``seen``, step by step; return what the doctor judges, too.
 
-    ``tell`` gets what the user is to do, and what is under way. The board's state is as after a restart.
+    ``announce`` gets what the user is to do, and what is under way. The board's state is as after a restart.
     """
     seen.emulated = not has_crystal(hand)
     seen.serials = getattr(hand.link.source, "serials", ())
-    tell("words at 1 MHz, clocked by the core: touch nothing")
+    announce("words at 1 MHz, clocked by the core: touch nothing")
     hand.stream("results")  # an emulated board's time begins with it
     hand.stop()
     _rates(hand, seen.slow, (SLOW_KHZ,))
     for khz, words in seen.slow.items():
         answers = [f"finger {f}: {good} of {good + bad} good" for f, (good, bad) in enumerate(words) if good]
-        tell(f"at {khz / 1000:.2f} MHz: {', '.join(answers) or 'no good word: V+, SS or MISO'}")
-    tell("serial numbers, then words at the usual rate")
+        announce(f"at {khz / 1000:.2f} MHz: {', '.join(answers) or 'no good word: V+, SS or MISO'}")
+    announce("serial numbers, then words at the usual rate")
     facts = listen(hand, seconds)
     if facts.chip is not None:
         seen.chip.append(facts.chip)
     seen.frames = facts.frames
     if facts.present:
-        tell(f"press each finger on its pad, slowly and firmly, within {press_s:.0f} s")
+        announce(f"press each finger on its pad, slowly and firmly, within {press_s:.0f} s")
         seen.frames = np.concatenate([facts.frames, hand.read(press_s)])
         hand.stop()
     if not seen.chip:
         return facts
-    tell("this computer's USB")
+    announce("this computer's USB")
     _usb(hand, seen)
-    tell("the sensors' bus at faster rates, and the flash")
+    announce("the sensors' bus at faster rates, and the flash")
     _rates(hand, seen.rates, RATES_KHZ)
     seen.idle.append(hand.board.measure())
     _erase(hand)
     seen.chip.append(hand.board.measure())
     restarts = RESTARTS if hand.info.board != wire.Board.POSIX_SIM else 0  # a process, whose scenario may end meanwhile
     for k in range(restarts):
-        tell(f"restart {k + 1} of {restarts}")
+        announce(f"restart {k + 1} of {restarts}")
         begun_s = time.monotonic()
         hand.board.restart()
         status = hand.status()
@@ -175,10 +177,10 @@ def _words(hand: Hand) -> NDArray[np.int64]:
 def _erase(hand: Hand) -> None:
     """Begin to upload a map, which erases a sector that no map in force uses, and give it up."""
     with suppress(CommandRefusedError):
-        hand._board.tell(wire.BeginMap(0, 0, 128, 0))
-        hand._board.tell(wire.WriteMap(0, 0, 0, (0,) * 128))
+        hand._board.command(wire.BeginMap(0, 0, 128, 0))
+        hand._board.command(wire.WriteMap(0, 0, 0, (0,) * 128))
     hand.stop()
-    hand._board.tell(wire.Stop(0))
+    hand._board.command(wire.Stop(0))
 
 
 # ---- what follows from it -----------------------------------------------------------------------------

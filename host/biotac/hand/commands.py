@@ -39,8 +39,8 @@ class Commands:
         self._latest.report()
         return answer
 
-    def tell(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
-        self._board.tell(request, lasting=lasting)
+    def command(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
+        self._board.command(request, lasting=lasting)
         self._latest.report()
 
     def index(self, finger: Finger) -> int:
@@ -49,7 +49,7 @@ class Commands:
 
     def ping(self) -> None:
         """Wait for the board; when this returns, everything it sent before its reply has arrived."""
-        self.tell(wire.Ping(0))
+        self.command(wire.Ping(0))
 
     def status(self) -> wire.Status:
         """Counters of the board and its link. The round trip also feeds ``clock``."""
@@ -65,7 +65,7 @@ class Commands:
 
         Both are told, and the other is refused (LINK_BUSY) until this hand stops, or has said nothing for TAKEN_S.
         """
-        self.tell(wire.TakeLink(0, round(1000 * TAKEN_S)))
+        self.command(wire.TakeLink(0, round(1000 * TAKEN_S)))
 
     def sensor_status(self, finger: Finger) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""
@@ -88,7 +88,7 @@ class Commands:
 
         Raises CommandRefusedError while the signals move, KeyError for a finger that is not there.
         """
-        self.tell(wire.TareNow(0, self._latest.present(finger)))
+        self.command(wire.TareNow(0, self._latest.present(finger)))
 
     def set_tare(
         self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None, *, age_s: float | None = None
@@ -105,7 +105,7 @@ class Commands:
             raise ValueError(f"tare_counts has shape {tare.shape}, expected (19,)")
         tare_q4 = tuple(tare_to_q4(tare).tolist())
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else int(tare_to_q4(np.float64(pdc_counts)))
-        self.tell(wire.TareSet(0, self.index(finger), tare_q4, pdc_q4, age_ms(age_s)))
+        self.command(wire.TareSet(0, self.index(finger), tare_q4, pdc_q4, age_ms(age_s)))
 
     def hold(self, *fingers: Finger) -> None:
         """Say that these fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
@@ -116,7 +116,7 @@ class Commands:
         for a finger that is not there, and then changes nothing.
         """
         mask = self._mask(fingers)
-        self._board.tell(wire.Hold(0, mask))
+        self._board.command(wire.Hold(0, mask))
         self._board.reader.gaps.held |= mask & self._board.reader.present
         self._latest.report()
 
@@ -124,7 +124,7 @@ class Commands:
         """Say that these fingers hold nothing any more, so that a press's residue is tared. See ``hold``."""
         mask = self._mask(fingers)
         self._board.reader.gaps.held &= ~mask
-        self.tell(wire.Release(0, mask))
+        self.command(wire.Release(0, mask))
 
     @contextmanager
     def grasp(self, *fingers: Finger) -> Iterator[None]:

@@ -35,7 +35,7 @@ class Configuration:
     def clear_faults(self) -> Faults:
         """Like ``faults``, and clears those on the board. A fault that is new meanwhile stays for the next call."""
         latched = self.faults()
-        self._commands.tell(wire.ClearFaults(0, int(latched.board), latched.by_index))
+        self._commands.command(wire.ClearFaults(0, int(latched.board), latched.by_index))
         return latched
 
     def setting(self, setting: wire.Setting | int) -> int:
@@ -44,18 +44,18 @@ class Configuration:
 
     def set_setting(self, setting: wire.Setting | int, value: int) -> None:
         """Change a setting until the next reboot; refused while streaming."""
-        self._commands.tell(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
+        self._commands.command(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
 
     def save_settings(self) -> None:
         """Save the settings, calibrations and maps in force, so that they survive reboots.
 
         Not while streaming: the board loses slots meanwhile.
         """
-        self._commands.tell(wire.SaveSettings(0))
+        self._commands.command(wire.SaveSettings(0))
 
     def reboot_bootloader(self) -> None:
         """Send the board to its bootloader; it disconnects and comes back as a drive."""
-        self._commands.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
+        self._commands.command(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def restart(self) -> None:
         """Restart the board as a reset would, and wait until it is back. What was not saved is lost.
@@ -63,11 +63,11 @@ class Configuration:
         Raises DeviceLostError unless this hand reconnects, or if the board does not come back within ten seconds.
         """
         reader, before = self._board.reader, self._board.info.boot_id
-        self._commands.tell(wire.RebootBootloader(0, wire.RESTART_MAGIC))
+        self._commands.command(wire.RebootBootloader(0, wire.RESTART_MAGIC))
         lost = DeviceLostError(f"{self._board.link.port} restarts, and has not come back; open it again")
         until_s = time.monotonic() + RESTART_S * self._board.link.patience
         while self._board.info.boot_id == before:  # it may answer once more before it goes
-            reader.lose(lost, "rebooted")
+            reader.disconnect(lost, "rebooted")
             if not reader.wait_for(lambda: reader.lost is None or reader.failure, until_s - time.monotonic()):
                 raise lost
             reader.check()
@@ -116,12 +116,12 @@ class Configuration:
         request = wire.SetCalibration(
             0, number, calibration.wire_serial(), calibration.made_s, calibration.wire_values()
         )
-        self._commands.tell(request, lasting=("calibration", number))
+        self._commands.command(request, lasting=("calibration", number))
 
     def clear_calibration(self, finger: Finger) -> None:
         """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
         number = self._commands.index(finger)
-        self._commands.tell(wire.ClearCalibration(0, number), lasting=("calibration", number))
+        self._commands.command(wire.ClearCalibration(0, number), lasting=("calibration", number))
 
     def calibrations(self) -> dict[int, Calibration]:
         """The calibrations in force, by finger."""
@@ -164,7 +164,7 @@ class Configuration:
         Its force then comes from the setting force_model and the gains again.
         """
         number = self._commands.index(finger)
-        self._commands.tell(wire.ClearMap(0, number), lasting=("map", number))
+        self._commands.command(wire.ClearMap(0, number), lasting=("map", number))
 
     def maps(self) -> dict[int, bytes]:
         """The maps in force, by finger."""

@@ -40,10 +40,10 @@ def write(board: Board, finger: int, blob: bytes) -> None:
 
 def _write(board: Board, finger: int, blob: bytes) -> None:
     crc32 = zlib.crc32(blob)
-    board.tell(wire.BeginMap(0, finger, len(blob), crc32))
+    board.command(wire.BeginMap(0, finger, len(blob), crc32))
     for offset in range(0, len(blob), PART_BYTES):
-        board.tell(wire.WriteMap(0, finger, offset, part(blob, offset)))
-    board.tell(wire.EndMap(0, finger, crc32))
+        board.command(wire.WriteMap(0, finger, offset, part(blob, offset)))
+    board.command(wire.EndMap(0, finger, crc32))
 
 
 def info(board: Board, finger: int) -> wire.MapInfo:

@@ -155,14 +155,14 @@ hand.stream()
 hand.read(0.3)
 view = hand["index"]
 if os.fork() == 0:
-    told = []
+    refused = []
     for use in (hand.ping, lambda: hand.read(1.0), lambda: view.force_n, hand.stream, hand.stop, hand.status,
                 lambda: hand.on_batch(print), lambda: list(hand.batches()), hand.check):
         try:
             use()
         except biotac.DeviceLostError as error:
-            told.append("belongs to the process that opened it" in str(error))
-    print("child", told.count(True), hand.connected, flush=True)
+            refused.append("belongs to the process that opened it" in str(error))
+    print("child", refused.count(True), hand.connected, flush=True)
     try:
         hand.close()
     except biotac.DeviceLostError:

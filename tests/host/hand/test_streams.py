@@ -169,12 +169,12 @@ def test_a_second_thread_that_reads_is_told_so(live: Live) -> None:
 def test_readers_may_take_turns(live: Live) -> None:
     live.hand.stream()
     live.send(frame(1), frame(2), frame(3), frame(4), frame(5))
-    here = live.hand.read(0.02)["seq"].tolist()
-    there: list[int] = []
-    thread = threading.Thread(target=lambda: there.extend(live.hand.read(0.02)["seq"].tolist()))
+    in_main = live.hand.read(0.02)["seq"].tolist()
+    in_thread: list[int] = []
+    thread = threading.Thread(target=lambda: in_thread.extend(live.hand.read(0.02)["seq"].tolist()))
     thread.start()
     thread.join()
-    assert (here, there) == ([1, 2], [3, 4])
+    assert (in_main, in_thread) == ([1, 2], [3, 4])
 
 
 # ---- what is wanted ------------------------------------------------------------------------------

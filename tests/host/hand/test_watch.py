@@ -217,13 +217,13 @@ def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
         point(world.path, board.path)
         return SimpleNamespace(board=board, firmware=firmware)
 
-    def unplug(there: SimpleNamespace) -> None:
+    def unplug(plugged: SimpleNamespace) -> None:
         point(world.path, "")
-        there.board.hang_up()  # as the kernel does: whoever reads the port gets an error from now on
+        plugged.board.hang_up()  # as the kernel does: whoever reads the port gets an error from now on
 
-    def opened(there: SimpleNamespace, reconnect: bool = True) -> Live:
+    def opened(plugged: SimpleNamespace, reconnect: bool = True) -> Live:
         link = SerialLink(str(world.path))
-        live = Live(there.board, there.firmware, link, reconnect=reconnect, host_clock=world.clock)
+        live = Live(plugged.board, plugged.firmware, link, reconnect=reconnect, host_clock=world.clock)
         world.hand = live.hand
         return live
 
@@ -235,9 +235,9 @@ def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
 
 
 def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:
-    live = world.opened(there := world.plug(), reconnect=False)
+    live = world.opened(plugged := world.plug(), reconnect=False)
     live.hand.stream()
-    world.unplug(there)
+    world.unplug(plugged)
     for _ in range(2):
         with pytest.raises(biotac.DeviceLostError, match="went away while it was open"):
             live.hand.read(1.0)
@@ -247,7 +247,7 @@ def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:
 
 @pytest.mark.parametrize(("boot_id", "reason"), [(1, "unplugged"), (2, "rebooted")])
 def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, boot_id, reason) -> None:
-    live = world.opened(there := world.plug(boot_id=1))
+    live = world.opened(plugged := world.plug(boot_id=1))
     hand, back = live.hand, []
     for setting, value in ((1, 2), (2, 50), (1, 0)):
         hand.board.set_setting(setting, value)
@@ -264,7 +264,7 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
 
     world.clock.while_away = return_at_third
     live.send(b"\x01half a fra")
-    world.unplug(there)
+    world.unplug(plugged)
     until(gaps)
     (gap,), firmware = gaps(), back[0].firmware
     assert (gap.reason, gap.last_t_us, gap.next_t_us, gap.boot_id) == (reason, 110_000, 500_000, boot_id)
@@ -279,20 +279,20 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
 
 def test_a_board_that_came_back_and_stopped_at_once_was_not_taken(world, quick) -> None:
     """It may have heard START long before its reply came here."""
-    live = world.opened(there := world.plug(boot_id=1))
-    there.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
+    live = world.opened(plugged := world.plug(boot_id=1))
+    plugged.firmware.faults = int(wire.FaultFlags.HOST_SILENT)
     live.hand.stream()
     live.send(frame(1))
-    there.firmware.wait_for_looks()
+    plugged.firmware.wait_for_looks()
     back = []
 
     def come_back(pauses: int) -> None:
         back.append(world.plug(boot_id=1).firmware)
-        back[0].faults, back[0].t_us = int(wire.FaultFlags.HOST_SILENT), there.firmware.t_us
+        back[0].faults, back[0].t_us = int(wire.FaultFlags.HOST_SILENT), plugged.firmware.t_us
         stops_at_the_next_look(back[0], after_us=0)
 
     world.clock.while_away = come_back
-    world.unplug(there)
+    world.unplug(plugged)
     until(lambda: live.hand.check() or (back and len(back[0].of(wire.Start)) == 2))
     back[0].wait_for_looks()
     assert live.hand.connected
@@ -300,14 +300,14 @@ def test_a_board_that_came_back_and_stopped_at_once_was_not_taken(world, quick) 
 
 def test_a_board_that_comes_back_and_refuses_what_it_had_ends_the_hand_in_words(world) -> None:
     # Going on would show forces by another setting than the program's.
-    live = world.opened(there := world.plug(boot_id=1))
+    live = world.opened(plugged := world.plug(boot_id=1))
     live.hand.board.set_setting(2, 50)
     live.hand.stream()
     live.send(frame(1))
     world.clock.while_away = lambda pauses: world.plug(boot_id=2).firmware.refuses.update(
         {wire.SetSetting: wire.Error.OUT_OF_RANGE}
     )
-    world.unplug(there)
+    world.unplug(plugged)
     with pytest.raises(
         biotac.CommandRefusedError, match=r"came back, but not with its setting 2: .*OUT_OF_RANGE"
     ) as refused:
@@ -317,15 +317,15 @@ def test_a_board_that_comes_back_and_refuses_what_it_had_ends_the_hand_in_words(
 
 def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) -> None:
     for reconnect in (False, True):
-        live = world.opened(there := world.plug(boot_id=1), reconnect=reconnect)
+        live = world.opened(plugged := world.plug(boot_id=1), reconnect=reconnect)
         live.hand.board.set_setting(1, 2)
         gaps = gaps_of(live.hand)
         live.hand.stream()
         live.send(frame(1000))
-        there.firmware.wait_for_looks()
-        there.firmware.facts["boot_id"], there.firmware.streams = 2, 0
-        there.firmware.t_us = 0
-        there.firmware.after[wire.Start] = frame(1)
+        plugged.firmware.wait_for_looks()
+        plugged.firmware.facts["boot_id"], plugged.firmware.streams = 2, 0
+        plugged.firmware.t_us = 0
+        plugged.firmware.after[wire.Start] = frame(1)
         if not reconnect:
             with pytest.raises(biotac.DeviceLostError, match="restarted; open it again"):
                 live.hand.read(1000.0)
@@ -333,12 +333,12 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
                 live.hand.close()
     until(gaps)
     assert (gaps()[0].reason, gaps()[0].next_t_us, live.hand.info.boot_id) == ("rebooted", 10_000, 2)
-    assert [m.value for m in there.firmware.of(wire.SetSetting)] == [2, 2]
+    assert [m.value for m in plugged.firmware.of(wire.SetSetting)] == [2, 2]
     assert live.hand.stats.disordered == 0  # numbers that begin anew are no step back
 
 
 def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
-    live = world.opened(there := world.plug(boot_id=1))
+    live = world.opened(plugged := world.plug(boot_id=1))
     live.hand.stream()
     strangers, refusals = [], []
 
@@ -358,7 +358,7 @@ def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
             world.plug(boot_id=1)
 
     world.clock.while_away = others
-    world.unplug(there)
+    world.unplug(plugged)
     until(lambda: live.hand.connected and world.clock.pauses == 3)
     assert {type(m) for m in strangers[0].firmware.commands} == {wire.Stop, wire.HelloRequest}
     assert refusals == ["the board is away and being looked for"]
@@ -366,7 +366,7 @@ def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
 
 
 def test_a_board_that_is_lost_while_it_is_restored_is_restored_again(world) -> None:
-    live = world.opened(there := world.plug(boot_id=1))
+    live = world.opened(plugged := world.plug(boot_id=1))
     live.hand.board.set_setting(1, 2)
     gaps = gaps_of(live.hand)
     live.hand.stream()
@@ -383,14 +383,14 @@ def test_a_board_that_is_lost_while_it_is_restored_is_restored_again(world) -> N
         firmware.after[wire.Start] = frame(1)
 
     world.clock.while_away = while_away
-    world.unplug(there)
+    world.unplug(plugged)
     until(gaps)
     assert [gap.reason for gap in gaps()] == ["rebooted"]
     assert [m.value for m in back[-1].firmware.of(wire.SetSetting)] == [2]
 
 
 def test_a_stream_that_is_stopped_while_the_board_is_away_stays_stopped(world) -> None:
-    live = world.opened(there := world.plug())
+    live = world.opened(plugged := world.plug())
     live.hand.stream()
     back = []
 
@@ -406,16 +406,16 @@ def test_a_stream_that_is_stopped_while_the_board_is_away_stays_stopped(world) -
             live.hand.stop()
 
     world.clock.while_away = while_away
-    world.unplug(there)
+    world.unplug(plugged)
     until(lambda: live.hand.connected and back)
     live.hand.ping()
     assert back[0].firmware.of(wire.Start) == [] and not live.hand.streaming
 
 
 def test_close_ends_the_search(world) -> None:
-    live = world.opened(there := world.plug())
+    live = world.opened(plugged := world.plug())
     live.hand.stream()
-    world.unplug(there)
+    world.unplug(plugged)
     until(lambda: world.clock.pauses > 3)
     live.hand.close()
     assert live.hand._board.closed

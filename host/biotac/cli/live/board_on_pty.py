@@ -31,7 +31,7 @@ def until_ctrl_c(board: SimBoard | ReplayPty, link: Path | None) -> Iterator[Non
         board.close()
 
 
-def tell(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
+def announce(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
     """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port.
 
     Replaces a link left over from before, never anything else. Raises PortError when it leads to a port that is there:
@@ -50,6 +50,6 @@ def tell(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, fact
     say(args, {"port": board.path, **facts}, f"{board.path} plays {plays}; Ctrl-C stops")
 
 
-def tell_over(plays: str) -> None:
+def announce_end(plays: str) -> None:
     """Say that the source is over: the board goes on answering."""
     print(f"{plays} has ended; the board keeps answering until Ctrl-C", file=sys.stderr)

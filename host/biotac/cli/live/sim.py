@@ -22,7 +22,7 @@ from .. import values
 from ..outputs import say
 from ..recordings.loading import load
 from . import sensor_board
-from .board_on_pty import tell, tell_over, until_ctrl_c
+from .board_on_pty import announce, announce_end, until_ctrl_c
 
 LOOK_S = 0.5
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
@@ -100,11 +100,11 @@ def run(args: argparse.Namespace) -> int:
     with until_ctrl_c(board, args.link):
         prepare(board)
         facts = {"source": source.name, "fingers": source.samples.shape[1]}
-        tell(board, args, source.name, facts)
+        announce(board, args, source.name, facts)
         while not board.over:
             board.hear(LOOK_S)  # a signal just before an endless wait would not end that
         if args.seconds is None:
-            tell_over(source.name)
+            announce_end(source.name)
             while True:
                 time.sleep(LOOK_S)
     return 0
@@ -117,7 +117,7 @@ def serve_loads(args: argparse.Namespace) -> int:
     board = live_board(fingers, args.board or "posix", args.image)
     with until_ctrl_c(board, args.link):
         server = LoadServer(fingers, board)
-        tell(board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
+        announce(board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
         server.serve()
     return 0
 
@@ -128,10 +128,10 @@ def play_recording(args: argparse.Namespace) -> int:
 
     board = ReplayPty(Playback(load(Path(args.source))), args.pace or 1.0)
     with until_ctrl_c(board, args.link):
-        tell(board, args, args.source, {"source": args.source})
+        announce(board, args, args.source, {"source": args.source})
         while not board.over:
             board.turn(1.0)
-        tell_over(args.source)
+        announce_end(args.source)
         while True:
             board.turn(1.0)
     return 0
