@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import InputError
 from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
+from ..rounds.bag import opened
 from .columns import Show, Table
 
 KINDS_APART = False
@@ -85,19 +84,14 @@ def _copy(source: Path, bag: Any, ros1: bool) -> None:
     """All messages of the bag ``source``. Raises InputError for one that cannot be read, or of the other ROS."""
     if (source.suffix == ".bag") != ros1:
         raise InputError(f"{source} is no bag of ROS {1 if ros1 else 2}: name the output {'.ros2' if ros1 else '.bag'}")
-    try:
-        with Reader1(source) if ros1 else Reader2(source) as reader:
-            digest = "md5sum" if ros1 else "rihs01"
-            to = {
-                c.id: bag.add_connection(c.topic, c.msgtype, msgdef=c.msgdef.data, **{digest: c.digest})
-                for c in reader.connections
-            }
-            for connection, logged_ns, raw in reader.messages():
-                bag.write(to[connection.id], logged_ns, raw)
-    except InputError:
-        raise
-    except Exception as error:  # rosbags raises what it finds
-        raise InputError(f"{source} cannot be read as a ROS bag ({error})") from error
+    with opened(source) as reader:
+        digest = "md5sum" if ros1 else "rihs01"
+        to = {
+            c.id: bag.add_connection(c.topic, c.msgtype, msgdef=c.msgdef.data, **{digest: c.digest})
+            for c in reader.connections
+        }
+        for connection, logged_ns, raw in reader.messages():
+            bag.write(to[connection.id], logged_ns, raw)
 
 
 def _header(types: Any, stamp_ns: int, frame_id: str | None) -> Any:

@@ -15,6 +15,18 @@ from .message import Message, RefusedError
 from .ros import Decode, decoder, is_known
 
 
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """rosbags' reader of a bag, of ROS 1 by its suffix. Raises InputError for one that cannot be read."""
+    try:
+        with Reader1(path) if path.suffix == ".bag" else Reader2(path) as bag:
+            yield bag
+    except BiotacError:
+        raise
+    except Exception as error:  # rosbags raises what it finds
+        raise InputError(f"{path} cannot be read as a ROS bag ({error}); copy it again") from error
+
+
 class Bag:
     """A topic of a bag: the only one with BioTacs, or ``topic``. Raises InputError for any other."""
 
@@ -25,7 +37,7 @@ class Bag:
             raise InputError(f"{path} does not exist; expected a ROS 1 .bag, or the folder of a ROS 2 bag")
         self._path = path
         self._ros1 = path.suffix == ".bag"
-        with self._reader() as bag:
+        with opened(self._path) as bag:
             found = [c for c in bag.connections if is_known(c.msgtype) and topic in ("", c.topic)]
             topics = sorted({c.topic for c in found})
             if len(topics) != 1:
@@ -39,16 +51,6 @@ class Bag:
                 raise InputError(f"{path}: {error}") from error
             self._ids = set(self._decode)
 
-    @contextmanager
-    def _reader(self) -> Iterator[Any]:
-        try:
-            with Reader1(self._path) if self._ros1 else Reader2(self._path) as bag:
-                yield bag
-        except BiotacError:
-            raise
-        except Exception as error:  # rosbags raises what it finds
-            raise InputError(f"{self._path} cannot be read as a ROS bag ({error}); copy it again") from error
-
     def _decoder(self, connection: Any) -> Decode:
         text = connection.msgdef.data
         if not text:
@@ -56,7 +58,7 @@ class Bag:
         return decoder(connection.msgtype, text, ros1=self._ros1, idl=connection.msgdef.format.name == "IDL")
 
     def __iter__(self) -> Iterator[Message | RefusedError]:
-        with self._reader() as bag:
+        with opened(self._path) as bag:
             chosen = [c for c in bag.connections if c.id in self._ids]
             for connection, logged_ns, raw in bag.messages(connections=chosen):
                 try:
