@@ -10,7 +10,7 @@
 #define BT_INTAKE_OUT       (2 * BT_DECODE_ROOM / 8)
 #define BT_INTAKE_ROW_KINDS 3 // the first of enum bt_decoded: FRAME, PAC, IDLE
 
-// What a call completed. All are int64, so that one read in Python gets them.
+// What a call completed.
 typedef struct {
     int64_t taken;      // bytes of input
     int64_t arrived_ns; // when they were read, by the clock of time.monotonic(); bt_intake_read() only

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import struct
 import threading
 import time
 from dataclasses import dataclass, field
@@ -30,7 +29,6 @@ _read = lib.bt_intake_read
 _frombuffer = np.frombuffer
 _NOTHING, _AGAIN = int(lib.BT_DESCRIPTOR_NOTHING), int(lib.BT_DESCRIPTOR_AGAIN)
 _HUNG_UP = int(lib.BT_DESCRIPTOR_HUNG_UP)
-_facts_of = struct.Struct(f"={ffi.sizeof('bt_intake_facts') // 8}q").unpack_from
 ROUND_US = 1_000_000 * len(SLOTS) // SLOT_HZ
 _WRAP_US = 1 << 32
 _UNSURE_US = 1 << 27  # of a silence: the drift of the clocks, and messages under way
@@ -112,7 +110,7 @@ class StreamDecoder:
         lib.bt_intake_reset(self._state)
         self._alone = threading.Lock()  # needed because the C code runs without Python's lock
         # Views of the state; they do not keep it alive, self._state does.
-        self._facts = ffi.buffer(ffi.addressof(self._state, "facts"))
+        self._facts = self._state.facts
         self._out = ffi.buffer(self._state.out)
         self._in = ffi.buffer(getattr(self._state, "in"))
         #: (finger, seq before the gap, frames lost) of every gap so far.
@@ -228,13 +226,15 @@ class StreamDecoder:
         return bytes(self._in[: self.taken])
 
     def _batch(self) -> Batch:
-        # Copy everything out of the state: the next call overwrites it. The order is that of bt_intake_facts and of
-        # bt_intake.out: numbers of FRAMEs, PACs and IDLEs, then the rows, then the others.
-        self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _facts_of(self._facts)
-        self.last_t_us = last_us if n or idles else None
-        raw = self._out[:size]
-        if gaps:
-            self.lost_after += [(gap.finger, gap.before, gap.missing) for gap in self._state.gaps[0:gaps]]
+        # Copy everything out of the state: the next call overwrites it. The order is that of bt_intake.out: numbers of
+        # FRAMEs, PACs and IDLEs, then the rows, then the others.
+        facts = self._facts
+        self.taken, others = facts.taken, facts.other_bytes
+        n, pacs, idles = facts.rows
+        self.last_t_us = facts.last_t_us if n or idles else None
+        raw = self._out[: facts.out_bytes]
+        if facts.gaps:
+            self.lost_after += [(gap.finger, gap.before, gap.missing) for gap in self._state.gaps[0 : facts.gaps]]
         sent, seq, t_us = NO_FRAME, _NO_NUMBERS, _NO_NUMBERS
         pac, idle, messages = _NO_PAC, _NO_IDLE, []
         at = 16 * (n + pacs + idles)
@@ -248,8 +248,8 @@ class StreamDecoder:
         if idles:
             idle = _numbered(_frombuffer(raw, IDLE, idles, at), IDLE_DTYPE, *_numbers(raw, idles, 16 * (n + pacs)))
         if others:
-            messages = known(pairs(raw[size - others :]))
-        return Batch(sent, seq, t_us, pac, idle, messages, fingers, arrived_ns * 1e-9)
+            messages = known(pairs(raw[-others:]))
+        return Batch(sent, seq, t_us, pac, idle, messages, facts.fingers, facts.arrived_ns * 1e-9)
 
 
 def _numbers(raw: bytes, n: int, at: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
