@@ -115,7 +115,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
     msg->trust = event == BT_EVENT_KIND_TRUST ? finger->trust : UINT8_MAX;
 }
 
-static void fall_silent(bt_finger *finger)
+static void mark_silent(bt_finger *finger)
 {
     finger->present = false;
     finger->bands.begun = false; // samples before and after the gap do not belong together
@@ -175,7 +175,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
 {
     close_round(finger);
     if (finger->round.good_words == 0) {
-        fall_silent(finger);
+        mark_silent(finger);
         return false;
     }
     finger->seq++;
@@ -233,7 +233,7 @@ static uint16_t seq_of(const bt_finger *finger)
     return (uint16_t)(finger->seq - 1);
 }
 
-static void tell_pressure(const bt_pressure *pressure, bool asked, bt_msg_frame *msg)
+static void fill_pressure(const bt_pressure *pressure, bool asked, bt_msg_frame *msg)
 {
     msg->pdc_filtered_q4 = asked ? bt_pressure_filtered_q4(pressure) : BT_INVALID_COUNT;
     msg->pressure_force_100un = bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, pressure->gain_nn);
@@ -241,8 +241,9 @@ static void tell_pressure(const bt_pressure *pressure, bool asked, bt_msg_frame 
 
 uint32_t bt_finger_wrench_age(const bt_finger *finger, const bt_solve_settings *settings)
 {
-    bool there = finger->kept.valid && settings->map != NULL && finger->tare.reason != BT_TARE_REASON_NONE;
-    return there ? (uint16_t)(seq_of(finger) - finger->kept.seq) : BT_REPEAT_MAX_ROUNDS + 1;
+    bool has_wrench =
+        finger->kept.valid && settings->map != NULL && finger->tare.reason != BT_TARE_REASON_NONE;
+    return has_wrench ? (uint16_t)(seq_of(finger) - finger->kept.seq) : BT_REPEAT_MAX_ROUNDS + 1;
 }
 
 static void keep_wrench(bt_finger *finger, const bt_msg_frame *msg)
@@ -277,7 +278,7 @@ static void repeat_wrench(const bt_kept_wrench *kept, uint8_t quantities, bt_msg
 }
 
 // The results without what is shed; flags distinguish that from what nobody asked for.
-static void tell_results(bt_finger *finger, const bt_solve_settings *settings, uint8_t quantities,
+static void fill_results(bt_finger *finger, const bt_solve_settings *settings, uint8_t quantities,
                          uint32_t shed, bt_msg_frame *msg)
 {
     const uint32_t wrench = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE;
@@ -309,11 +310,11 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     msg->pdc_tare_q4 = bt_tare_q4(finger->tare.base.pdc_q16);
     memcpy(msg->counts, round->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
-    tell_results(finger, settings, quantities, shed, msg);
+    fill_results(finger, settings, quantities, shed, msg);
     msg->flags |= health_flags(finger);
     msg->electrodes_out = finger->tare.trigger.without;
     msg->slip_level = finger->events.slip_level;
-    tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
+    fill_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     bool valid = msg->force_100un[2] != BT_INVALID_I32;
     msg->trust = valid ? bt_trust(msg->flags, msg->normal_mn, msg->normal_half_mn) : BT_TRUST_NONE;

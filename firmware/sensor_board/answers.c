@@ -66,8 +66,8 @@ bool bt_port_alarm(void)
 static uint32_t offer_at(const bt_emu_device *device, unsigned bytes, bool settled)
 {
     uint64_t t_ns = device->released_ns + (settled ? BT_SETTLE_US * 1000 : 0);
-    bool there = device->present && !device->unplugged;
-    return OFFER_WORD(bt_emu_word_ahead(device, bytes, settled, t_ns)) | (there ? OFFER_DRIVE : 0)
+    bool connected = device->present && !device->unplugged;
+    return OFFER_WORD(bt_emu_word_ahead(device, bytes, settled, t_ns)) | (connected ? OFFER_DRIVE : 0)
            | (settled ? OFFER_SETTLED : 0);
 }
 

@@ -255,11 +255,11 @@ void port_spi_rate(bt_port *board, uint32_t khz)
 
 port_identity port_identify(bt_port *board)
 {
-    static const port_identity of[] = {
+    static const port_identity identities[] = {
         {.board = BT_BOARD_LINUX_SBC, .serial = "linux-spidev"},
         {.board = BT_BOARD_MESSAGES, .serial = "messages"},
     };
-    port_identity identity = of[board->no_bus];
+    port_identity identity = identities[board->no_bus];
     identity.boot_id = board->boot_id;
     identity.started_by = BT_FAULT_FLAG_STARTED;
     identity.image_crc32 = UINT32_MAX;

@@ -19,7 +19,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import InputError, taken
+from .errors import InputError, exists_error
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -119,7 +119,7 @@ def write_new(path: Path, text: str, *, overwrite: bool = False) -> None:
         with path.open("w" if overwrite else "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise taken(path) from error
+        raise exists_error(path) from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
 

@@ -27,7 +27,7 @@ class InputError(BiotacError):
     exit_code = 2
 
 
-def taken(path: object) -> InputError:
+def exists_error(path: object) -> InputError:
     """What to raise when ``path`` exists and may not be overwritten."""
     return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")
 

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from .errors import InputError, taken
+from .errors import InputError, exists_error
 
 ROS2_METADATA = "metadata.yaml"
 
@@ -24,7 +24,7 @@ def whole(path: Path, *, overwrite: bool, made_of: Iterable[Path] = ()) -> Itera
     """
     refuse_source(path, made_of)
     if path.exists() and not overwrite:
-        raise taken(path)
+        raise exists_error(path)
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
         raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:

@@ -16,10 +16,10 @@ _Static_assert(sizeof(((bt_msg_calibration *)NULL)->value) == sizeof(((bt_calibr
                           == sizeof(((bt_calibration *)NULL)->value),
                "both messages carry every value");
 
-bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t there[BT_SERIAL_BYTES])
+bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t serial[BT_SERIAL_BYTES])
 {
     static const uint8_t any[BT_SERIAL_BYTES];
-    return memcmp(made_for, any, sizeof any) == 0 || memcmp(made_for, there, sizeof any) == 0;
+    return memcmp(made_for, any, sizeof any) == 0 || memcmp(made_for, serial, sizeof any) == 0;
 }
 
 uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings)

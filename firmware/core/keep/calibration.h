@@ -17,9 +17,9 @@ typedef struct {
     int32_t value[BT_CALIBRATION_VALUES];
 } bt_calibration;
 
-// Whether something made for one sensor (made_for; all zero: for any) may be used with the sensor that is
-// there (all zero: its serial number is unknown).
-bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t there[BT_SERIAL_BYTES]);
+// Whether something made for one sensor (made_for; all zero: for any) may be used with the sensor of this
+// serial number (all zero: unknown).
+bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t serial[BT_SERIAL_BYTES]);
 
 // Replace the settings' values with the calibration's. Returns an enum bt_error: OK, or OUT_OF_RANGE and
 // settings unchanged.

@@ -64,7 +64,7 @@ typedef struct {
     int32_t weight, along, across;
 } moments;
 
-static moments signals(const int32_t e_q4[BT_ELECTRODES], features *of)
+static moments signals(const int32_t e_q4[BT_ELECTRODES], features *inputs)
 {
     static const int16_t place[BT_ELECTRODES][2] = BT_MAP_PLACES;
     moments sum = {0, 0, 0};
@@ -72,14 +72,14 @@ static moments signals(const int32_t e_q4[BT_ELECTRODES], features *of)
         int32_t e = rounded(e_q4[i], 4 - BT_MAP_SIGNAL_Q);
         int32_t compression = e & bt_shift_down(e, 31);
         int32_t w = FLOOR - compression;
-        of->signal[i] = e;
-        of->compression[i] = compression;
-        of->bulge[i] = e - compression;
+        inputs->signal[i] = e;
+        inputs->compression[i] = compression;
+        inputs->bulge[i] = e - compression;
         sum.weight += w;
         sum.along += w * place[i][0];
         sum.across += w * place[i][1];
     }
-    of->compression[BT_ELECTRODES] = of->bulge[BT_ELECTRODES] = 0;
+    inputs->compression[BT_ELECTRODES] = inputs->bulge[BT_ELECTRODES] = 0;
     return sum;
 }
 
@@ -105,10 +105,10 @@ static int32_t gate_of(int32_t moment, int32_t weight)
 }
 
 // The compressions' centroid, in units of its reach, and its products.
-static void gates(const moments *of, int32_t gate[BT_MAP_GATES])
+static void gates(const moments *pressed, int32_t gate[BT_MAP_GATES])
 {
-    int32_t x = gate_of(of->along, of->weight);
-    int32_t y = gate_of(of->across, of->weight);
+    int32_t x = gate_of(pressed->along, pressed->weight);
+    int32_t y = gate_of(pressed->across, pressed->weight);
     gate[BT_MAP_GATE_X] = x;
     gate[BT_MAP_GATE_Y] = y;
     gate[BT_MAP_GATE_XX] = rounded(x * x, BT_MAP_GATE_Q);
@@ -118,20 +118,20 @@ static void gates(const moments *of, int32_t gate[BT_MAP_GATES])
 
 static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                    int32_t pdc_above_rest_q4, features *of)
+                    int32_t pdc_above_rest_q4, features *inputs)
 {
-    moments of_compression = signals(e_q4, of);
+    moments of_compression = signals(e_q4, inputs);
     if (map->kinds & (1u << BT_MAP_KIND_SIGNAL | 1u << BT_MAP_KIND_SIGNAL_PAIRS)) {
-        close_ring(of->signal);
+        close_ring(inputs->signal);
     }
     if (map->kinds & (1u << BT_MAP_KIND_CONDUCTANCE | 1u << BT_MAP_KIND_CONDUCTANCE_PAIRS)) {
-        conductances(counts, tare_q4, of->conductance);
+        conductances(counts, tare_q4, inputs->conductance);
     }
     if (map->gates & ~(1u << BT_MAP_GATE_ONE)) {
-        gates(&of_compression, of->gate);
+        gates(&of_compression, inputs->gate);
     }
-    of->one = 1 << BT_MAP_ONE_Q;
-    of->pressure =
+    inputs->one = 1 << BT_MAP_ONE_Q;
+    inputs->pressure =
         bt_shift_down(bt_clamp(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
 }
 
@@ -228,11 +228,11 @@ static void single(int32_t factor, const bt_map_word *word, int width, int32_t s
 }
 
 // Add a block to the totals of `width` axes from `axis` on.
-static inline void add_block(const uint8_t *head, const features *of, const bt_map_word *word, int axis,
+static inline void add_block(const uint8_t *head, const features *inputs, const bt_map_word *word, int axis,
                              int width, int32_t total[BT_MAP_AXES_MAX])
 {
     int32_t sum[BT_MAP_GROUP_MAX];
-    const int32_t *f = (const int32_t *)(const void *)((const char *)of + factors_at[head[0]]);
+    const int32_t *f = (const int32_t *)(const void *)((const char *)inputs + factors_at[head[0]]);
     switch (bt_map_coefficients[head[0]]) {
     case BT_MAP_PAIR_COEFFICIENTS:
         (width == 3 ? pairs_of_3 : pairs_of_4)(f, word, sum);
@@ -245,7 +245,7 @@ static inline void add_block(const uint8_t *head, const features *of, const bt_m
         break;
     }
     if (head[1] != BT_MAP_GATE_ONE) {
-        int32_t gate = of->gate[head[1]];
+        int32_t gate = inputs->gate[head[1]];
         BT_UNROLL
         for (int a = 0; a < width; a++) {
             sum[a] = rounded(sum[a], BT_MAP_GATE_CUT) * gate;
@@ -261,19 +261,19 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                     int32_t pdc_above_rest_q4, int axes, int32_t result[])
 {
-    features of;
+    features inputs;
     const bt_map_word *word = bt_map_words(map);
     int32_t total[BT_MAP_AXES_MAX];
     total[0] = total[1] = total[2] = total[3] = total[4] = total[5] = total[6] = 0; // spares a memset
-    prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, &of);
+    prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, &inputs);
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
         int words = bt_map_coefficients[head[0]] / 2; // per axis
-        add_block(head, &of, word, 0, 3, total);
+        add_block(head, &inputs, word, 0, 3, total);
         if (axes == BT_MAP_AXES_TORSION) {
-            add_block(head, &of, word + 3 * words, 3, 4, total);
+            add_block(head, &inputs, word + 3 * words, 3, 4, total);
         } else if (axes == BT_MAP_AXES_TORQUE) {
-            add_block(head, &of, word + 3 * words, 3, 3, total);
+            add_block(head, &inputs, word + 3 * words, 3, 3, total);
         }
         word += map->axes * words;
     }

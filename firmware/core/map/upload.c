@@ -29,9 +29,9 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     }
     const size_t bytes =
         (size_t)(size - offset) < BT_MAP_PART_BYTES ? (size_t)(size - offset) : BT_MAP_PART_BYTES;
-    const uint8_t *there = bt_map_bytes(flash, &upload->place) + offset;
+    const uint8_t *stored = bt_map_bytes(flash, &upload->place) + offset;
     if (is_written(upload, part)) { // its reply was lost, or another host writes too
-        return memcmp(there, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
+        return memcmp(stored, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
     }
     const uint32_t at = upload->place.slot * flash->slot_bytes + offset;
     if (!(upload->erased & sector)) {
@@ -44,7 +44,7 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     memset(page, 0xFF, sizeof page); // programming 0xFF changes nothing
     memcpy(page + at % BT_FLASH_PAGE_BYTES, data, bytes);
     if (!flash->program(flash->context, at - at % BT_FLASH_PAGE_BYTES, page)
-        || memcmp(there, data, bytes) != 0) {
+        || memcmp(stored, data, bytes) != 0) {
         return BT_ERROR_NOT_STORED;
     }
     upload->written[part / 8] |= (uint8_t)(1u << part % 8);

@@ -393,7 +393,7 @@ static uint8_t set_bus_rate(bt_session *session, const uint8_t *payload)
     if (session->board.set_bus_rate == NULL) {
         return BT_ERROR_NOT_HERE;
     }
-    session->bus_tried = true;
+    session->bus_rate_overridden = true;
     session->board.set_bus_rate(session->context, msg.bus_khz);
     return get_board_facts(session, payload);
 }

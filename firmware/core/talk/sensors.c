@@ -12,7 +12,7 @@ void bt_sensors_doubt(bt_session *session, unsigned f)
 {
     if (!(session->unsure >> f & 1)) {
         session->unsure |= (uint8_t)(1u << f);
-        session->query[f] = (bt_sensor_query){.to_wait = 0};
+        session->query[f] = (bt_sensor_query){.rounds_left = 0};
     }
 }
 
@@ -38,14 +38,14 @@ static bool wants(bt_session *session, unsigned f)
     bool answers = session->finger[f].present;
     bool back = answers && !query->answered;
     query->answered = answers;
-    if (back || query->to_wait == 0) {
-        if (query->times < LATE_AFTER) {
-            query->times++;
+    if (back || query->rounds_left == 0) {
+        if (query->attempts < LATE_AFTER) {
+            query->attempts++;
         }
-        query->to_wait = query->times < LATE_AFTER ? ASK_PERIOD : ASK_PERIOD_LATE;
+        query->rounds_left = query->attempts < LATE_AFTER ? ASK_PERIOD : ASK_PERIOD_LATE;
         return true;
     }
-    query->to_wait--;
+    query->rounds_left--;
     return false;
 }
 

@@ -106,8 +106,8 @@ uint8_t bt_session_present(const bt_session *session)
 
 void bt_session_end_trial(bt_session *session)
 {
-    if (session->bus_tried) {
-        session->bus_tried = false;
+    if (session->bus_rate_overridden) {
+        session->bus_rate_overridden = false;
         session->board.set_bus_rate(session->context, 0);
     }
 }

@@ -60,10 +60,10 @@ typedef struct {
 
 // What sensors.c knows about which sensor is there.
 typedef struct {
-    uint8_t bad_words; // consecutive, at most BT_AWAY_WORDS
-    uint8_t to_wait;   // rounds until it is asked again
-    uint8_t times;     // it was asked, up to a limit
-    bool answered;     // in the last round
+    uint8_t bad_words;   // consecutive, at most BT_AWAY_WORDS
+    uint8_t rounds_left; // rounds until it is asked again
+    uint8_t attempts;    // it was asked, up to a limit
+    bool answered;       // in the last round
 } bt_sensor_query;
 
 typedef struct {
@@ -74,7 +74,7 @@ typedef struct {
     uint8_t unsure;  // may be another sensor than info says
     uint8_t other;   // is another one than at START
     uint8_t refused; // likewise, and calibration or map are not its own
-    bool bus_tried;  // at a rate of SET_BUS_RATE
+    bool bus_rate_overridden; // at a rate of SET_BUS_RATE
     bt_settings settings;
     bt_calibration calibration[BT_MAX_FINGERS];
     uint8_t calibration_state[BT_MAX_FINGERS]; // enum bt_calibration_state; derived from the above

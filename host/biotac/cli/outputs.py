@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, taken
+from ..errors import InputError, exists_error
 
 
 def say(args: argparse.Namespace, facts: Any, text: str) -> None:
@@ -32,7 +32,7 @@ def step(text: str) -> None:
 def check_file(path: Path | None, *, overwrite: bool) -> None:
     """Raises InputError if the file, where one is named, exists and may not be overwritten."""
     if path is not None and path.exists() and not overwrite:
-        raise taken(path)
+        raise exists_error(path)
 
 
 def check(folder: Path, paths: Sequence[Path], *, overwrite: bool) -> None:
@@ -44,7 +44,7 @@ def check(folder: Path, paths: Sequence[Path], *, overwrite: bool) -> None:
                 "separate --out folders"
             )
         if path.exists() and not overwrite:
-            raise taken(path)
+            raise exists_error(path)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is not a folder; choose another name")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ..board.gap import Gap
-from ..errors import InputError, printable, taken
+from ..errors import InputError, exists_error, printable
 from ..link.base import AppliedN
 from ..link.port_text import file_and_query
 from ..partial_file import refuse_source
@@ -204,6 +204,6 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
         _own(stream, path)
         return stream
     except FileExistsError as error:
-        raise taken(path) from error
+        raise exists_error(path) from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error

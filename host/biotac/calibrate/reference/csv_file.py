@@ -22,7 +22,7 @@ from typing import TextIO
 import numpy as np
 
 from ...core.geometry import Floats
-from ...errors import DeviceLostError, InputError, RecordingError, taken
+from ...errors import DeviceLostError, InputError, RecordingError, exists_error
 from .mounting import Mounting, from_json
 from .samples import Reference, Samples, check
 
@@ -172,7 +172,7 @@ class CsvWriter:
         try:
             self._stream: TextIO = path.open("w" if overwrite else "x", encoding="utf-8", newline="\n")
         except FileExistsError:
-            raise taken(path) from None
+            raise exists_error(path) from None
         except OSError as error:
             raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from None
         self._stream.write(f"# sensor: {' '.join(sensor.split())}\n# mounting: {json.dumps(mounting.facts())}\n")
