@@ -219,8 +219,8 @@ def to_frames(rows: StructArray) -> StructArray:
 
     ``seq`` and ``t_us`` are as in the rows, not unwrapped.
     """
-    there = rows[rows["present"] != 0]
-    return frames_from_wire(there, there["seq"], there["t_us"])
+    present = rows[rows["present"] != 0]
+    return frames_from_wire(present, present["seq"], present["t_us"])
 
 
 def _accept(command: str, error: int) -> None:

@@ -20,8 +20,8 @@ def check(facts: Facts) -> Iterator[Finding]:
         yield Finding("in_loader", f"a board waits in its loader at {drive}")
     if facts.port is None:
         if len(system.boards) > 1:
-            there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
-            yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
+            ports = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
+            yield Finding("several_boards", f"{len(system.boards)} boards: {ports}")
         elif system.usb_boards:
             yield Finding("no_serial_port", "a device with our USB ids is plugged in, but it has no serial port")
         elif not system.loaders:

@@ -32,9 +32,9 @@ def examine(
     system = look(port)
     device = device_of(port, system.boards)
     if device is None and port is not None and system.boards:
-        there = ", ".join(f"{SERIAL_PREFIX}{b.serial_number}" for b in system.boards)
+        serials = ", ".join(f"{SERIAL_PREFIX}{b.serial_number}" for b in system.boards)
         number = port.removeprefix(SERIAL_PREFIX).upper()
-        return Facts(port, system, PortError(f"no board has serial number {number}; expected one of {there}"))
+        return Facts(port, system, PortError(f"no board has serial number {number}; expected one of {serials}"))
     if device is None:
         return Facts(None, system)
     try:

@@ -25,8 +25,8 @@ def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
         yield Finding("no_sensor", f"no sensor answers on any of {board.hello.fingers} chip selects")
         return
     if expected is not None and len(board.present) < expected:
-        there = ", ".join(map(str, board.present))
-        yield Finding("sensor_missing", f"{len(board.present)} of {expected} sensors answer: finger {there}")
+        fingers = ", ".join(map(str, board.present))
+        yield Finding("sensor_missing", f"{len(board.present)} of {expected} sensors answer: finger {fingers}")
     yield from _lost(board)
     yield from _changed(board)
     yield from _serials(board)

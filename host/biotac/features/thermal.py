@@ -37,7 +37,7 @@ def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
     celsius = _sensor.TDC_BETA_K / np.log(np.where(known, inside, np.e)) - KELVIN_AT_0_C
     result["valid"] = known & (celsius >= RANGE_C[0]) & (celsius <= RANGE_C[1])
     result["celsius"] = np.where(result["valid"], celsius, np.nan)
-    there = rows["tac"] != INVALID_COUNT
-    first = float(rows["tac"][there][0]) if there.any() else np.nan
-    result["flux_counts"] = np.where(there, rows["tac"] - first, np.nan)
+    known = rows["tac"] != INVALID_COUNT
+    first = float(rows["tac"][known][0]) if known.any() else np.nan
+    result["flux_counts"] = np.where(known, rows["tac"] - first, np.nan)
     return result

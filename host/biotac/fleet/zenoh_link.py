@@ -100,10 +100,10 @@ class ZenohLink(Link):
         ]
 
     def _claim(self, session: Any) -> None:
-        who = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}".replace("/", "_")
-        token = session.liveliness().declare_token(network.key(self._name, f"writer/{who}"))
+        client = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}".replace("/", "_")
+        token = session.liveliness().declare_token(network.key(self._name, f"writer/{client}"))
         self._declared.append(token)
-        replies = session.get(network.key(self._name, "claim"), payload=who.encode(), timeout=ANSWER_S)
+        replies = session.get(network.key(self._name, "claim"), payload=client.encode(), timeout=ANSWER_S)
         answer = next((reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None), b"")
         if not answer.startswith(network.GRANTED):
             holder = answer.decode(errors="replace") or "unknown, as nobody answers"

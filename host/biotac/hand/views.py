@@ -84,8 +84,8 @@ class Latest:
         """Chip select of a finger whose sensor answers, or did. Raises KeyError for any other, naming those."""
         finger = finger_index(self.names, key)
         if not self._reader.present >> finger & 1:
-            there = [repr(self.name(f)) for f in FINGERS_IN[self._reader.present]]
-            raise KeyError(f"no sensor answers as {key!r}; those that do: {', '.join(there) or 'none'}")
+            present = [repr(self.name(f)) for f in FINGERS_IN[self._reader.present]]
+            raise KeyError(f"no sensor answers as {key!r}; those that do: {', '.join(present) or 'none'}")
         return finger
 
     def mask(self, fingers: Fingers) -> int:

@@ -43,13 +43,13 @@ def choose(serial_number: str | None = None, entries: Iterable[ListPortInfo] | N
     fitting = [p for p in found if serial_number is None or same_serial(p.serial_number, serial_number)]
     if len(fitting) == 1:
         return str(fitting[0].device)
-    there = ", ".join(f"{SERIAL_PREFIX}{p.serial_number} on {p.device}" for p in found)
+    named = ", ".join(f"{SERIAL_PREFIX}{p.serial_number} on {p.device}" for p in found)
     if not found:
         wanted = "no board" if serial_number is None else f"no board with serial number {serial_number}"
         raise PortError(f"{wanted} on any USB port; plug one in and run `biotac doctor`, or try `biotac demo`")
     if not fitting:
-        raise PortError(f"no board has serial number {serial_number}; expected one of {there}")
-    raise PortError(f"found {len(fitting)} boards: {there}; name one of them as PORT")
+        raise PortError(f"no board has serial number {serial_number}; expected one of {named}")
+    raise PortError(f"found {len(fitting)} boards: {named}; name one of them as PORT")
 
 
 def open_serial(port: str) -> SerialLink:

@@ -103,11 +103,11 @@ def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uin
     texts = [""]
     code = np.zeros(len(t_us), np.int64)
     for label in labels:
-        there = np.ones(len(t_us), np.bool_) if label.finger is None else finger == label.finger
+        covered = np.ones(len(t_us), np.bool_) if label.finger is None else finger == label.finger
         if label.t_us is not None:
-            there &= t_us >= label.t_us
-            there &= t_us <= (label.end_us if label.end_us is not None else label.t_us + 1_000_000)
-        at = np.flatnonzero(there)
+            covered &= t_us >= label.t_us
+            covered &= t_us <= (label.end_us if label.end_us is not None else label.t_us + 1_000_000)
+        at = np.flatnonzero(covered)
         if label.t_us is not None and label.end_us is None:
             at = at[np.unique(finger[at], return_index=True)[1]]
         for before in np.unique(code[at]).tolist():
@@ -124,8 +124,8 @@ def spans_us(labels: list[Label], wanted: str | Iterable[str]) -> list[tuple[int
     names = {wanted} if isinstance(wanted, str) else set(wanted)
     timed = [label for label in labels if label.t_us is not None]
     if missing := sorted(names - {label.text for label in timed}):
-        there = ", ".join(sorted({repr(label.text) for label in timed})) or "none"
-        raise InputError(f"no label {missing[0]!r} with a time: expected one or more of {there}")
+        texts = ", ".join(sorted({repr(label.text) for label in timed})) or "none"
+        raise InputError(f"no label {missing[0]!r} with a time: expected one or more of {texts}")
     spans: list[tuple[int, int]] = []
     for label in timed:
         if label.text in names and label.t_us is not None:

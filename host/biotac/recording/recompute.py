@@ -254,8 +254,8 @@ def _pac_at(t_us: NDArray[np.int64], rows: StructArray) -> NDArray[np.uint16]:
     """PAC (n, 22) of the rounds that began at ``t_us`` (n,), INVALID_COUNT where none was recorded."""
     pac = np.full((len(t_us), len(slots.PAC_SLOT)), wire.INVALID_COUNT, np.uint16)
     at = np.searchsorted(t_us, rows["t_us"], "right") - 1
-    there = (at >= 0) & (rows["t_us"] - t_us[at] < ROUND_US)
-    pac[at[there]] = rows["pac"][there]
+    recorded = (at >= 0) & (rows["t_us"] - t_us[at] < ROUND_US)
+    pac[at[recorded]] = rows["pac"][recorded]
     return pac
 
 

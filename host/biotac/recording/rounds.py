@@ -89,10 +89,10 @@ def frames_and_tares(
         row += len(part)
         if row in ends:
             messages[int(order[row - 1])] = finger.tare_message()
-    there = rows[rows["present"] != 0]
-    frames = np.empty(len(there), DTYPES[wire.Frame.ID])
+    present = rows[rows["present"] != 0]
+    frames = np.empty(len(present), DTYPES[wire.Frame.ID])
     for name in _FRAME_FIELDS:
-        frames[name] = there[name]
+        frames[name] = present[name]
     return frames, messages
 
 

@@ -157,9 +157,9 @@ class Selection:
         return len(self.rows)
 
     def __repr__(self) -> str:
-        there = ", ".join(self.names.get(f, str(f)) for f in np.unique(self.rows["finger"]).tolist())
+        fingers = ", ".join(self.names.get(f, str(f)) for f in np.unique(self.rows["finger"]).tolist())
         what = ", ".join(f"{field.name} ({field.unit})" for field in self.fields if field.name not in _OF_ROW)
-        return f"<biotac.Selection: {len(self)} rows of {there or 'no finger'}: {what}>"
+        return f"<biotac.Selection: {len(self)} rows of {fingers or 'no finger'}: {what}>"
 
     @property
     def label(self) -> NDArray[np.str_]:

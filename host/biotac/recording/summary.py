@@ -70,6 +70,6 @@ def lines(facts: dict[str, Any]) -> list[str]:
     for label in facts["labels"]:
         span = "" if label["until_s"] is None else f" to {label['until_s']:.2f} s"
         when = "all of it" if label["at_s"] is None else f"{label['at_s']:.2f} s{span}"
-        whose = "" if label["finger"] is None else f", finger {label['finger']}"
-        out.append(f"label, {when}{whose}: {label['text']}")
+        of_finger = "" if label["finger"] is None else f", finger {label['finger']}"
+        out.append(f"label, {when}{of_finger}: {label['text']}")
     return out

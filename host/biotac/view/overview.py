@@ -32,8 +32,8 @@ def overview(recording: Recording) -> dict[str, Any]:
     for event, t_us in zip(events, times_us, strict=True):
         fingers.setdefault(((t_us - begin_us) // 100_000, kind_name(event).lower()), []).append(event.finger)
     for (tenth, name), felt in list(fingers.items())[:EVENTS]:
-        whose = " ".join(str(finger) for finger in sorted({*felt}))
-        marks.append({"at_s": tenth / 10, "finger": None, "name": f"{name}, finger {whose}"})
+        touched = " ".join(str(finger) for finger in sorted({*felt}))
+        marks.append({"at_s": tenth / 10, "finger": None, "name": f"{name}, finger {touched}"})
     for gap in recording.gaps:
         marks.append({"at_s": ((gap.next_t_us or begin_us) - begin_us) / 1e6, "finger": None, "name": gap.line()})
     marks.sort(key=lambda mark: mark["at_s"])

@@ -83,9 +83,9 @@ def read_btd(path: Path) -> BtdFrames:
     rows = starts[:, None] + np.arange(len(_sensor.SLOTS))
     # a stable sort by channel aligns the k-th sample of a channel in the file with its k-th slot in SLOTS
     here = np.argsort(channel[rows], axis=1, kind="stable")
-    there = np.argsort(_SLOT_CHANNELS, kind="stable")
+    order = np.argsort(_SLOT_CHANNELS, kind="stable")
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
-    samples[:, :, there] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
+    samples[:, :, order] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
     serials = zip(_serials(header, len(present)), present, strict=True)
     return BtdFrames(samples, table[starts, 0], skipped, tuple(serial for serial, there in serials if there))
 
