@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -184,9 +185,13 @@ class Contents:
         self.messages: list[Any] = [message for rest in rests for message in known(pairs(rest.others))]
         self.sent, self.pac, self.idle = (self._rows_of(kind) for kind in (FRAME, PAC, IDLE))
         self.seq, self.t_us = self.sent["seq"].astype(np.int64), self.sent["t_us"]
-        self.counts = FramingCounts(good=sum(len(rest.order) for rest in rests))
-        for kind, count in ((kind, count) for rest in rests for kind, count in rest.rejected.items()):
-            setattr(self.counts, kind, getattr(self.counts, kind) + count)
+        self.rejected = [
+            {"at_s": (block.arrived_ns - self.arrived_ns[0]) / 1e9, **block.rest.rejected}
+            for block in self.blocks
+            if block.rest.rejected
+        ]
+        bad = sum((Counter(rest.rejected) for rest in rests), Counter[str]())
+        self.counts = FramingCounts(sum(len(rest.order) for rest in rests), **bad)
         last = max(rests, key=lambda rest: rest.frames, default=Rest(np.empty(0, np.uint16), b""))
         self.pac_lost, self.disordered = last.pac_lost, last.disordered
         self.gaps_before = [[gap for facts in rest.gaps if (gap := self._gap(facts)) is not None] for rest in rests]
@@ -230,10 +235,9 @@ class Contents:
         if not self.damage and len(numbers) != max(numbers, default=-1) + 1:
             self.damage.append(f"{self._path.name} is damaged: seconds of it are missing")
         if (counts := self.counts).bad:
-            first_ns = next(block.arrived_ns for block in self.blocks if block.rest.rejected)
             self.damage.append(
                 f"{counts.bad} packet(s) rejected, the first in the second that began at "
-                f"{(first_ns - self.arrived_ns[0]) / 1e9:.1f} s: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
+                f"{self.rejected[0]['at_s']:.1f} s: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
         self.problems = [*self.damage, *self.problems]

@@ -54,7 +54,8 @@ class Recording:
     ``problems`` lists in words what is missing or damaged; the rest is good. ``damage``: those of the file, not of the
     link. ``cut_off``: the file ends without its index. ``damaged_chunks``: number of seconds left out.
     ``wrong_checksums``: number of wrong checksums over the file's records and its index. ``gaps``: times when the board
-    was away.
+    was away. ``rejected``: what came damaged, for each block that had any: ``at_s``, when it began after the first one,
+    and how many by kind (``bad_crc``, ``bad_cobs``, ``bad_length``, ``too_long``).
 
     It consists of blocks of about a second. ``arrived_ns`` is when each block began, ``all_here_ns`` when it was
     complete (None where unknown), both in ns on the host's clock (Unix).
@@ -77,6 +78,7 @@ class Recording:
     seq: NDArray[np.int64] = _of_contents("seq")
     t_us: NDArray[np.int64] = _of_contents("t_us")
     counts: FramingCounts = _of_contents("counts")
+    rejected: list[dict[str, Any]] = _of_contents("rejected")
     pac_lost: int = _of_contents("pac_lost")
     disordered: int = _of_contents("disordered")
     frames_lost: int = _of_contents("frames_lost")

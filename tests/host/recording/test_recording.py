@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from itertools import pairwise
@@ -117,10 +116,8 @@ def test_a_damaged_wire_byte_fails_and_names_the_gap(recorded, tmp_path, check) 
     rewrite(recorded[0], damaged, change)
     assert state["done"]
     code, _, err = check(damaged)
-    at_s = re.search(r"1 packet\(s\) rejected, the first in the second that began at ([0-9.]+) s", err)
-    assert code == 1 and at_s is not None
-    first = json.loads(biotac.Recording(damaged).heads()[0].rest.pack().partition(b"\n")[0])
-    assert float(at_s[1]) == 0.0 and sum(first["rejected"].values()) == 1
+    assert code == 1 and "1 packet(s) rejected, the first in the second that began at 0.0 s" in err
+    assert biotac.Recording(damaged).rejected in ([{"at_s": 0.0, kind: 1}] for kind in ("bad_crc", "bad_cobs"))
 
 
 def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:

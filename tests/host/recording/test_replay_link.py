@@ -165,7 +165,7 @@ def test_a_restart_within_the_recording_is_no_loss(tmp_path) -> None:
     recording = biotac.Recording(path)
     assert recording.frames_lost == 0
     with biotac.open(f"replay:{path}") as hand:
-        assert hand.read(100).tobytes() == recording.frames.tobytes()
+        assert hand.read_batch(100).frames.tobytes() == recording.frames.tobytes()
         assert hand.stats.frames_lost == 0
 
 
@@ -178,7 +178,9 @@ def test_a_damaged_frame_is_counted_and_its_replay_has_a_loss(recorded, tmp_path
     block[at + 30] = block[at + 30] % 255 + 1  # another byte, and no delimiter
     blocks[1] = bytes(block)
     damaged = written(tmp_path / "damaged.mcap", recording.metadata, zip(blocks, recording.arrived_ns, strict=True))
-    assert [sum(head.rest.rejected.values()) for head in biotac.Recording(damaged).heads()][:3] == [0, 1, 0]
+    (found,) = biotac.Recording(damaged).rejected
+    second_s = (recording.arrived_ns[1] - recording.arrived_ns[0]) / 1e9
+    assert found in ({"at_s": second_s, kind: 1} for kind in ("bad_crc", "bad_cobs"))
     with biotac.open(f"replay:{damaged}") as hand:
         assert len(hand.read(100)) == len(recording.frames) - 1
         assert hand.stats.frames_lost == biotac.Recording(damaged).frames_lost == 1

@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
         "frames": len(recording.frames),
         "frames_lost": recording.frames_lost,
         "crc_errors": recording.counts.bad_crc,
+        "rejected": recording.rejected,
         "cut_off": recording.cut_off,
         "gaps": [asdict(gap) for gap in recording.gaps],
         "problems": recording.problems,
