@@ -44,13 +44,12 @@ static const uint8_t *kept_samples(void)
 
 static uint32_t look(void)
 {
-    const label *header = kept();
-    bool sane = header->magic == MAGIC && header->fingers >= 1 && header->fingers <= BT_MAX_FINGERS
-                && header->slots > 0 && header->slots % BT_SLOTS == 0
-                && header->slots <= MOST_BYTES / 2 / header->fingers;
-    return sane && bt_crc32(kept_samples(), 2 * header->slots * header->fingers) == header->crc32
-               ? header->slots
-               : 0;
+    const label *found = kept();
+    bool sane = found->magic == MAGIC && found->fingers >= 1 && found->fingers <= BT_MAX_FINGERS
+                && found->slots > 0 && found->slots % BT_SLOTS == 0
+                && found->slots <= MOST_BYTES / 2 / found->fingers;
+    return sane && bt_crc32(kept_samples(), 2 * found->slots * found->fingers) == found->crc32 ? found->slots
+                                                                                               : 0;
 }
 
 uint32_t loop_slots(void)

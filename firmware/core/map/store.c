@@ -19,9 +19,9 @@ size_t bt_map_place_pack(const bt_map_place *place, uint8_t record[BT_MAP_RECORD
     return BT_MAP_RECORD_BYTES;
 }
 
-void bt_finger_map_reset(bt_finger_map *finger_map)
+void bt_finger_map_reset(bt_finger_map *kept)
 {
-    *finger_map = (bt_finger_map){.stored_slot = BT_MAP_SLOTS};
+    *kept = (bt_finger_map){.stored_slot = BT_MAP_SLOTS};
 }
 
 const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place)
@@ -40,7 +40,7 @@ static uint8_t copy_to_ram(bt_map *map, const bt_map_flash *flash, uint8_t finge
     return bt_map_open(map, ram, place->bytes) == BT_ERROR_OK ? BT_ERROR_OK : BT_ERROR_OUT_OF_RANGE;
 }
 
-uint8_t bt_finger_map_use(bt_finger_map *finger_map, const bt_map_flash *flash, uint8_t finger,
+uint8_t bt_finger_map_use(bt_finger_map *kept, const bt_map_flash *flash, uint8_t finger,
                           const bt_map_place *place, const uint8_t *serial)
 {
     bt_map map;
@@ -49,25 +49,24 @@ uint8_t bt_finger_map_use(bt_finger_map *finger_map, const bt_map_flash *flash, 
         error = BT_ERROR_OTHER_SENSOR;
     }
     if (error == BT_ERROR_OK) {
-        finger_map->map = map;
-        finger_map->place = *place;
-    } else if (finger_map->place.bytes != 0
-               && copy_to_ram(&finger_map->map, flash, finger, &finger_map->place) != BT_ERROR_OK) {
-        finger_map->place.bytes = 0; // the flash has changed: rather no map than half of each
-        bt_map_close(&finger_map->map);
+        kept->map = map;
+        kept->place = *place;
+    } else if (kept->place.bytes != 0
+               && copy_to_ram(&kept->map, flash, finger, &kept->place) != BT_ERROR_OK) {
+        kept->place.bytes = 0; // the flash has changed: rather no map than half of each
+        bt_map_close(&kept->map);
     }
     return error;
 }
 
-bool bt_finger_map_load(bt_finger_map *finger_map, const bt_map_flash *flash, uint8_t finger,
-                        uint16_t version, const uint8_t *record, size_t bytes)
+bool bt_finger_map_load(bt_finger_map *kept, const bt_map_flash *flash, uint8_t finger, uint16_t version,
+                        const uint8_t *record, size_t bytes)
 {
-    bt_finger_map_reset(finger_map);
+    bt_finger_map_reset(kept);
     if (bytes < 4 || bt_get_u32(record) >= flash->slots) {
         return false;
     }
-    finger_map->stored_slot =
-        (uint8_t)bt_get_u32(record); // also in later versions, which may differ in the rest
+    kept->stored_slot = (uint8_t)bt_get_u32(record); // also in later versions, which may differ in the rest
     if (version != BT_MAP_RECORD_VERSION || bytes != BT_MAP_RECORD_BYTES) {
         return false;
     }
@@ -75,11 +74,11 @@ bool bt_finger_map_load(bt_finger_map *finger_map, const bt_map_flash *flash, ui
     if (size == 0 || size > flash->max_bytes) {
         return size == 0;
     }
-    bt_map_place place = {.slot = finger_map->stored_slot, .bytes = (uint16_t)size, .crc32 = crc32};
-    if (copy_to_ram(&finger_map->map, flash, finger, &place) != BT_ERROR_OK) {
+    bt_map_place place = {.slot = kept->stored_slot, .bytes = (uint16_t)size, .crc32 = crc32};
+    if (copy_to_ram(&kept->map, flash, finger, &place) != BT_ERROR_OK) {
         return false;
     }
-    finger_map->place = place;
+    kept->place = place;
     return true;
 }
 

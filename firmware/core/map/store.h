@@ -57,17 +57,17 @@ typedef struct {
 size_t bt_map_place_pack(const bt_map_place *place, uint8_t record[BT_MAP_RECORD_BYTES]);
 
 // Reset to no map and nothing stored.
-void bt_finger_map_reset(bt_finger_map *finger_map);
+void bt_finger_map_reset(bt_finger_map *kept);
 
 // Load a map from its record. Returns false, with no map, if it is damaged or this firmware cannot compute
 // it; it stays stored.
-bool bt_finger_map_load(bt_finger_map *finger_map, const bt_map_flash *flash, uint8_t finger,
-                        uint16_t version, const uint8_t *record, size_t bytes);
+bool bt_finger_map_load(bt_finger_map *kept, const bt_map_flash *flash, uint8_t finger, uint16_t version,
+                        const uint8_t *record, size_t bytes);
 
 // Copy a map to the finger's RAM, check it there and put it in force. If that fails, the finger's previous
 // map is in RAM again. serial: of the sensor that the map must be made for. Returns an enum bt_error: OK,
 // NOT_WHOLE (wrong CRC-32), OUT_OF_RANGE (no map that this firmware can compute) or OTHER_SENSOR.
-uint8_t bt_finger_map_use(bt_finger_map *finger_map, const bt_map_flash *flash, uint8_t finger,
+uint8_t bt_finger_map_use(bt_finger_map *kept, const bt_map_flash *flash, uint8_t finger,
                           const bt_map_place *place, const uint8_t *serial);
 
 // The map's bytes in flash.

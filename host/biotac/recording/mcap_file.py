@@ -88,32 +88,23 @@ class RecordingFile:
         decoder = self._decoder
         if all_here_ns is not None and self._last_ns is not None:
             decoder.passed((arrived_ns - self._last_ns) / 1e9)
+        self._last_ns = all_here_ns
         losses, before = len(decoder.lost_after), decoder.counts
         batches, ids, others = [], b"", b""
         for at in range(0, len(data), ONE_STEP_BYTES):
             batches.append(decoder.feed(data[at : at + ONE_STEP_BYTES]))
-            ids, others = (so_far + step for so_far, step in zip((ids, others), decoder.completed(), strict=True))
+            step_ids, step_others = decoder.completed()
+            ids, others = ids + step_ids, others + step_others
         damaged = Counter(rejected or {}) + Counter(vars(decoder.counts)) - Counter(vars(before))
         del damaged["good"]
         if not ids and not damaged:
             return
-        self._last_ns = all_here_ns
         batch = join(batches)
         tables, order = encode_block(batch, ids, applied_n(batch.wire["finger"], batch.t_us))
         self.frames += len(batch.wire)
-        rest = Rest(
-            order,
-            others,
-            sorted(tables),
-            batch.first_t_us(),
-            batch.last_t_us(),
-            decoder.lost_after[losses:],
-            dict(damaged),
-            self.frames,
-            decoder.lost,
-            decoder.lost_pac,
-            decoder.disordered,
-        )
+        of_block = batch.first_t_us(), batch.last_t_us(), decoder.lost_after[losses:], dict(damaged)
+        so_far = self.frames, decoder.lost, decoder.lost_pac, decoder.disordered
+        rest = Rest(order, others, sorted(tables), *of_block, *so_far)
         self._last_us = rest.last_us or self._last_us
         self._put(tables, rest, arrived_ns, all_here_ns)
         self._plots.add(batch, decoder, arrived_ns, all_here_ns)
