@@ -2,7 +2,8 @@
 
 Those made live are in the blocks of the recording itself. Later ones go to a file beside it, ``press.labels.jsonl`` for
 ``press.mcap``, a line each, so that the recording is never rewritten and a crash costs at most the last line. A line
-names the recording that it belongs to by when that began: another one of the same name does not inherit it.
+names the recording that it belongs to by when that began: another one of the same name does not inherit it. One that
+is removed is named once more, as ``removed``.
 """
 
 from __future__ import annotations
@@ -59,43 +60,50 @@ def beside(recording: Path) -> Path:
     return recording.with_suffix(".labels.jsonl")
 
 
-def append(recording: Path, begin_ns: int, label: Label) -> None:
+def append(recording: Path, begin_ns: int, label: Label, *, removed: bool = False) -> None:
     """Add a line for the recording that began at ``begin_ns``. Raises InputError where it cannot be written."""
+    gone = {"removed": True} if removed else {}
     try:
         with beside(recording).open("a+b") as file:
             end = file.seek(0, 2)
             file.seek(max(0, end - 1))
             torn = file.read() not in (b"", b"\n")  # a kill in the middle of a line
-            line = json.dumps({"recording": begin_ns} | asdict(label)).encode()
+            line = json.dumps({"recording": begin_ns} | gone | asdict(label)).encode()
             file.write(b"\n" * torn + line + b"\n")
     except OSError as error:
         raise InputError(f"{beside(recording)} cannot be written ({error.strerror})") from error
 
 
-def read(recording: Path, begin_ns: int) -> tuple[list[Label], list[str]]:
-    """The labels beside a recording, and in words which lines are none of its own."""
+def read(recording: Path, begin_ns: int, live: Iterable[Label] = ()) -> tuple[list[Label], list[str]]:
+    """A recording's labels, and in words which lines beside it are none of its own.
+
+    By time, those about the whole recording first; of the same text, time and finger only the last.
+    """
+    latest = {(label.text, label.t_us, label.finger): label for label in live}
     path = beside(recording)
     if not path.is_file():
-        return [], []
+        return _in_order(latest.values()), []
     if (size := path.stat().st_size) > MAX_BYTES:
         raise RecordingError(f"{path} has {size} bytes, expected at most {MAX_BYTES}; split the recording")
-    labels, problems = [], []
+    problems = []
     for k, line in enumerate(path.read_bytes().splitlines()):
         try:
             facts = json.loads(line)
             if facts.pop("recording") != begin_ns:
                 problems.append(f"line {k + 1} of {path.name} is about another recording of that name")
                 continue
-            labels.append(Label(**facts))
+            removed = facts.pop("removed", False)
+            label = Label(**facts)
+            latest[label.text, label.t_us, label.finger] = label
+            if removed:
+                del latest[label.text, label.t_us, label.finger]
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, InputError):
             problems.append(f"line {k + 1} of {path.name} is damaged and was skipped")
-    return labels, problems
+    return _in_order(latest.values()), problems
 
 
-def in_order(labels: Iterable[Label]) -> list[Label]:
-    """By time, those about the whole recording first; of the same text, time and finger only the last."""
-    latest = {(label.text, label.t_us, label.finger): label for label in labels}
-    return sorted(latest.values(), key=lambda label: -1 if label.t_us is None else label.t_us)
+def _in_order(labels: Iterable[Label]) -> list[Label]:
+    return sorted(labels, key=lambda label: -1 if label.t_us is None else label.t_us)
 
 
 def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uint8]) -> NDArray[np.str_]:

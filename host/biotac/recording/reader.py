@@ -182,6 +182,9 @@ class Recording:
             times_s = [((begin - self.begin_us) / 1e6, (end + 1 - self.begin_us) / 1e6) for begin, end in found]
             spans = [(max(start_s, a), b if stop_s is None else min(stop_s, b)) for a, b in times_s]
         rows = np.concatenate([part_of(self.path, self._index, chosen, fingers, *span)[0] for span in spans])
+        if fingers is not None and not len(rows):  # none in these seconds, or none at all
+            wanted = {fingers} if isinstance(fingers, (int, str)) else set(fingers)
+            self._check_present({finger_of(finger, self.names) for finger in wanted})
         by_number = {finger: name for name, finger in self.names.items()}
         return Selection(rows, tuple(chosen), by_number, self._label_of, self.stamp_ns)
 
@@ -195,7 +198,7 @@ class Recording:
         for facts in (facts for block in self.heads() for facts in block.rest.labels):
             with suppress(TypeError, AttributeError, InputError):  # a damaged one
                 live.append(Label(**facts))
-        return labels_module.in_order([*live, *labels_module.read(self.path, self.begin_ns)[0]])
+        return labels_module.read(self.path, self.begin_ns, live)[0]
 
     def events(self) -> StructArray:
         """Touches, lifts, jolts, slips and changes of trust, EVENT_DTYPE (n,), in order of arrival.
@@ -217,12 +220,42 @@ class Recording:
         """Add a label, in a file beside the recording: the recording itself is not touched.
 
         ``at_s`` and ``until_s`` are device seconds since the first row; without them the label is about all of it. See
-        Label for the rest. Raises InputError where that cannot be written, KeyError for an unknown finger.
+        Label for the rest. Raises InputError for a time or a finger without rows, or where it cannot be written, and
+        KeyError for an unknown name.
         """
-        t_us, end_us = (None if s is None else self.begin_us + round(s * 1e6) for s in (at_s, until_s))
+        last_s = (self.end_us - self.begin_us) / 1e6
+        if outside := [s for s in (at_s, until_s) if s is not None and not 0 <= s <= last_s]:
+            raise InputError(f"a label at {outside[0]:g} s: {self.path.name} has rows from 0 to {last_s:g} s")
         number = None if finger is None else finger_of(finger, self.names)
+        if number is not None:
+            self._check_present({number})
+        t_us, end_us = (None if s is None else self.begin_us + round(s * 1e6) for s in (at_s, until_s))
         labels_module.append(self.path, self.begin_ns, Label(text, t_us, end_us, number, facts))
         vars(self).pop("labels", None)
+
+    def unmark(self, text: str, at_s: float | None = None) -> int:
+        """Remove all labels of this text, or those that begin within 10 ms of ``at_s``; return how many.
+
+        The recording itself is not touched: what was labelled live is removed in the file beside it, too. Raises
+        InputError where there is none, or that file cannot be written.
+        """
+        named = [label for label in self.labels if label.text == text]
+        if at_s is not None:
+            at_us = self.begin_us + at_s * 1e6
+            named = [label for label in named if label.t_us is not None and abs(label.t_us - at_us) <= 10_000]
+        if not named:
+            there = ", ".join(sorted({repr(label.text) for label in self.labels})) or "none"
+            raise InputError(f"no label {text!r}{'' if at_s is None else f' at {at_s:g} s'}: expected one of {there}")
+        for label in named:
+            labels_module.append(self.path, self.begin_ns, label, removed=True)
+        vars(self).pop("labels", None)
+        return len(named)
+
+    def _check_present(self, fingers: set[int]) -> None:
+        there = {finger for block in self.heads() for finger in block.rest.fingers}
+        if absent := fingers - there:
+            seen = ", ".join(map(str, sorted(there))) or "none"
+            raise InputError(f"{self.path.name} has no rows of finger {min(absent)}: expected one or more of {seen}")
 
     def __repr__(self) -> str:
         facts = summary(self)

@@ -67,9 +67,12 @@ def lines(facts: dict[str, Any]) -> list[str]:
             f"finger {finger}: {about['name'] or 'no name'}, sensor {about['serial'] or 'unknown'}, "
             f"{about['frames']} frames" + (f"; {shares}" if shares else "")
         )
-    for label in facts["labels"]:
-        span = "" if label["until_s"] is None else f" to {label['until_s']:.2f} s"
-        when = "all of it" if label["at_s"] is None else f"{label['at_s']:.2f} s{span}"
-        of_finger = "" if label["finger"] is None else f", finger {label['finger']}"
-        out.append(f"label, {when}{of_finger}: {label['text']}")
-    return out
+    return [*out, *map(label_line, facts["labels"])]
+
+
+def label_line(label: dict[str, Any]) -> str:
+    """One of ``summary``'s labels for people."""
+    span = "" if label["until_s"] is None else f" to {label['until_s']:.2f} s"
+    when = "all of it" if label["at_s"] is None else f"{label['at_s']:.2f} s{span}"
+    of_finger = "" if label["finger"] is None else f", finger {label['finger']}"
+    return f"label, {when}{of_finger}: {label['text']}"

@@ -73,8 +73,22 @@ def test_a_picture_shows_force_and_labels(recorded: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "words", [["--finger", "nose"], ["--fact", "trial"], ["--fact", "finger=3"], ["--at", "3", "--until", "2"]]
-)
+    "words",
+    [["--finger", "nose"], ["--finger", "thumb"], ["--fact", "trial"], ["--fact", "finger=3"], ["--at", "99"],
+     ["--at", "3", "--until", "2"], ["--remove"]],
+)  # fmt: skip
 def test_a_label_that_makes_no_sense_is_refused_in_a_line(recorded: Path, capsys, words: list[str]) -> None:
     assert main(["file", "label", str(recorded), "x", *words]) == 2
     assert capsys.readouterr().err.startswith("biotac: ") and len(biotac.Recording(recorded).labels) == 1
+
+
+def test_labels_are_listed_and_removed_by_a_command(recorded: Path, tmp_path: Path, capsys) -> None:
+    path = tmp_path / "b.mcap"
+    path.write_bytes(recorded.read_bytes())
+    for words in (["tap", "--at", "1"], ["tap", "--at", "2"], ["tap", "--at", "2", "--remove"]):
+        assert main(["file", "label", str(path), *words]) == 0
+    capsys.readouterr()
+    assert main(["file", "label", str(path)]) == 0
+    assert capsys.readouterr().out == "label, 1.00 s: tap\n"
+    assert main(["file", "label", str(path), "tap", "--remove"]) == main(["file", "--json", "label", str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == ["[]"]

@@ -76,6 +76,42 @@ def test_rows_know_which_labels_hold(recorded: Path, tmp_path: Path) -> None:
         recording.select(labels="slip")
 
 
+def test_a_label_is_removed_live_ones_too(recorded: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(recorded.read_bytes())
+    recording = biotac.Recording(path)
+    recording.mark("tap", 1.0)
+    recording.mark("tap", 2.0, finger="index")
+    assert recording.unmark("tap", 1.004) == 1 and [
+        label.finger for label in recording.labels if label.text == "tap"
+    ] == [0]
+    assert recording.unmark("grasp") == recording.unmark("tap") == 1
+    again = biotac.Recording(path)
+    assert [label.text for label in again.labels] == ["glass, 3 mm", "touched"] and again.problems == []
+    again.mark("tap", 1.0)
+    assert (
+        "tap" in [label.text for label in biotac.Recording(path).labels] and path.read_bytes() == recorded.read_bytes()
+    )
+    for wanted, expected in ((("grasp",), "no label 'grasp': expected one of"), (("tap", 3.0), "'tap' at 3 s")):
+        with pytest.raises(biotac.InputError, match=expected):
+            again.unmark(*wanted)
+
+
+def test_what_is_not_in_the_recording_is_not_labelled_or_selected(recorded: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(recorded.read_bytes())
+    recording = biotac.Recording(path)
+    last_s = (recording.end_us - recording.begin_us) / 1e6
+    for times in ((99,), (1.0, 99), (-0.1,)):
+        with pytest.raises(biotac.InputError, match=rf"{times[-1]} s: a.mcap has rows from 0 to {last_s:g} s"):
+            recording.mark("x", *times)
+    for asks in (lambda: recording.mark("x", finger="thumb"), lambda: recording.select(fingers=["thumb"])):
+        with pytest.raises(biotac.InputError, match="has no rows of finger 4: expected one or more of 0, 1"):
+            asks()
+    recording.mark("the end", last_s, finger=1)
+    assert len(recording.select(fingers="middle", start_s=99).rows) == 0  # it is there, but not then
+
+
 def test_a_long_span_keeps_its_beginning(tmp_path: Path) -> None:
     with biotac.open("sim:press.toml?seconds=90") as hand, hand.record(tmp_path / "long.mcap"):
         hand.read(seconds=1)

@@ -8,6 +8,7 @@ from pathlib import Path
 from ...errors import InputError, printable
 from ...partial_file import whole
 from ...recording.rewrite import cut
+from ...recording.summary import label_line, summary
 from .. import values
 from ..outputs import say
 from .loading import code, load
@@ -31,16 +32,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             verb.add_argument("--to", dest="to_s", type=values.moment, help="seconds since its first row")
         verb.add_argument("--force", action="store_true", help="overwrite OUT")
         verb.set_defaults(run=run_cut, from_s=0.0, to_s=None)
-    text = "add a label to REC, in a file beside it; biotac info lists them"
+    text = "add a label to REC, in a file beside it, or remove one; without TEXT, list them"
     verb = verbs.add_parser("label", help=text, description=text)
     verb.add_argument("recording", metavar="REC", type=Path)
-    verb.add_argument("text", metavar="TEXT")
+    verb.add_argument("text", metavar="TEXT", nargs="?")
     verb.add_argument(
         "--at", dest="at_s", type=values.moment, help="seconds since its first row (default: about all of it)"
     )
     verb.add_argument("--until", dest="until_s", type=values.moment, help="the end of a span")
     verb.add_argument("--finger", help="name or number (default: all)")
     verb.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
+    verb.add_argument("--remove", action="store_true", help="the labels of this TEXT; with --at, the one there")
     verb.set_defaults(run=run_label)
 
 
@@ -56,10 +58,17 @@ def run_cut(args: argparse.Namespace) -> int:
 def run_label(args: argparse.Namespace) -> int:
     recording = load(args.recording, quiet=True)
     finger = int(args.finger) if (args.finger or "").isdecimal() else args.finger
-    try:
-        recording.mark(args.text, args.at_s, args.until_s, finger=finger, **values.facts(args.fact))
-    except KeyError as error:
-        raise InputError(str(error.args[0])) from None
+    if args.text is None:
+        labels = summary(recording)["labels"]
+        say(args, labels, printable("\n".join(map(label_line, labels))) or f"{args.recording}: no labels")
+        return 0
+    if args.remove:
+        recording.unmark(args.text, args.at_s)
+    else:
+        try:
+            recording.mark(args.text, args.at_s, args.until_s, finger=finger, **values.facts(args.fact))
+        except KeyError as error:
+            raise InputError(str(error.args[0])) from None
     made = len(recording.labels)
     say(args, {"labels": made}, printable(f"{args.recording}: {made} label(s); `biotac info` lists them"))
     return 0
