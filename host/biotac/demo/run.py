@@ -157,7 +157,7 @@ def draw(source: Source, frames: Any, messages: Any, applied_n: Any, answers: di
     with picture(path) as figure:
         figure.set_size_inches(13, 5.6)
         axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
-        figure.suptitle(f"{source.name}: finger 0 through the simulated board")
+        figure.suptitle(f"{source.name}, played to a simulated board: where a finger is touched, and with what force")
         draw_fingertip(figure, axes[0], frames, messages)
         draw_force(axes[1], frames, applied_n, answers)
 
@@ -173,16 +173,19 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     dots = axes.scatter(
         across, along, c=signals[strongest], s=520, cmap="RdBu", vmin=-limit, vmax=limit, edgecolors="#444444"
     )
-    for name, a, b in zip(sensor.ELECTRODE_NAMES, across, along, strict=True):
-        axes.annotate(name, (a, b), ha="center", va="center", fontsize=7)
+    for name, a, b, signal in zip(sensor.ELECTRODE_NAMES, across, along, signals[strongest], strict=True):
+        dark = abs(signal) > limit / 2
+        axes.annotate(name, (a, b), ha="center", va="center", fontsize=7, color="white" if dark else "black")
     flags = frames["flags"]
     contact = ((flags & wire.FrameFlags.CONTACT) != 0) & ((flags & wire.FrameFlags.POC_LOW) == 0)
     poc_across, poc_along = unroll(frames["poc_mm"][contact])
     axes.plot(poc_across, poc_along, ".", color="#7c3aed", markersize=3, alpha=0.5, label="point of contact")
     if len(frames) and contact.any():
         a, b = unroll(frames["poc_mm"][strongest : strongest + 1])
-        axes.plot(a, b, "x", color="#7c3aed", markersize=13, markeredgewidth=3, label="at peak signal")
-        axes.set_title(f"electrodes at {frames['t_us'][strongest] / 1e6:.2f} s", fontsize=10)
+        axes.plot(
+            a, b, "o", color="#7c3aed", markersize=15, markeredgewidth=2, fillstyle="none", label="the colours' moment"
+        )
+        axes.set_title(f"electrodes at {frames['t_us'][strongest] / 1e6:.2f} s, of the strongest signals", fontsize=10)
     axes.set(xlabel="around the finger [mm], + towards E11", ylabel="along the finger [mm], tip up")
     axes.set_aspect("equal")
     axes.margins(0.15)
@@ -203,7 +206,7 @@ def draw_force(axes: Any, frames: Any, applied_n: Any, answers: dict[str, Any]) 
     contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
     axes.fill_between(t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06)
     axes.set(xlabel="device time [s]; grey: contact", ylabel="force on the finger [N]")
-    title = f"felt by the {best} (thin) and by {LIN} as shipped (dotted)"
+    title = f"felt by the {best} (thin) and by {LIN} (dotted)"
     axes.set_title(title if applied_n is None else f"force applied (wide), {title}", fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

@@ -33,7 +33,7 @@ def write(path: Path, seen: Bringup, facts: Facts, findings: Sequence[Finding]) 
     lines += [*_bus(seen, facts), *_link(seen)]
     if len(seen.frames):
         try:
-            _draw(path.with_suffix(".png"), seen, facts)
+            _draw(path.with_suffix(".png"), seen, facts, findings)
             lines += [f"![Noise, bus margin, pressure against force, latency]({path.with_suffix('.png').name})", ""]
         except InputError as error:
             lines += [str(error), ""]
@@ -119,10 +119,12 @@ def _link(seen: Bringup) -> list[str]:
     return ["## This computer's USB", "", *table([f"of {len(ms)} pings; of large messages", "seen"], rows)]
 
 
-def _draw(path: Path, seen: Bringup, facts: Facts) -> None:
+def _draw(path: Path, seen: Bringup, facts: Facts, findings: Sequence[Finding]) -> None:
     present = facts.board.present if facts.board is not None else []
     with picture(path) as page:
         page.set_size_inches(10, 7)
+        found = ", ".join(sorted({finding.code for finding in findings}))
+        page.suptitle(f"Outside its range: {found}" if found else "Everything measured is within its range")
         (noise, bus), (press, ping) = page.subplots(2, 2)
         for finger in present:
             rows = seen.of(finger)
@@ -132,11 +134,19 @@ def _draw(path: Path, seen: Bringup, facts: Facts) -> None:
             khz = np.array(list(seen.words))
             bad = [100 * words[finger, 1] / max(1, words[finger].sum()) for words in seen.words.values()]
             bus.plot(khz / 1000, bad, "o-", label=f"finger {finger}")
-        noise.set(title="Noise at rest", xlabel="electrode", ylabel="counts", ylim=(0, None))
-        bus.set(title="Sensors' bus", xlabel="MHz", ylabel="words not good, %", ylim=(-5, 105))
-        press.set(title="Static pressure", xlabel="force by the board, N", ylabel="PDC above rest, counts")
+        noise.set(title="Noise at rest", xlabel="electrode", ylabel="counts", ylim=(0, None), xticks=range(1, 20, 2))
+        bus.set(
+            title="Sensors' bus: 0 % up to the line is good", xlabel="MHz", ylabel="words not good, %", ylim=(-5, 105)
+        )
+        if seen.words:
+            bus.axvline(bringup.MARGIN * next(iter(seen.words)) / 1000, color="0.5", linestyle="--")
+        press.axline((0, 0), slope=bringup.PDC_PER_N, color="0.5", linestyle="--")
+        press.set(title="Static pressure: above the line is good", xlabel="force by the board, N",
+                  ylabel="PDC above rest, counts")  # fmt: skip
         if seen.ping_s:
             ping.hist(1000 * np.array(seen.ping_s), 60)
-        ping.set(title=f"{len(seen.ping_s)} pings", xlabel="ms", ylabel="how many", yscale="log")
+            ping.axvline(1000 * np.median(seen.ping_s), color="0.5", linestyle="--", label="median")
+            ping.legend()
+        ping.set(title=f"{len(seen.ping_s)} pings", xlabel="ms to the board and back", ylabel="how many", yscale="log")
         if present:
             noise.legend()

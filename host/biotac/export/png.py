@@ -38,15 +38,17 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
         for gap in (gap for gap in recording.gaps if gap.last_t_us is not None and gap.next_t_us is not None):
             for axis in axes:
                 axis.axvspan((gap.last_t_us - begin_us) / 1e6, (gap.next_t_us - begin_us) / 1e6, color="0.85")  # type: ignore[operator]
-        free_s = -np.inf
+        free_s = [-np.inf, -np.inf]  # of two rows of texts
         for label in (label for label in recording.labels if label.t_us is not None):
             at_s, until_s = ((t_us - begin_us) / 1e6 for t_us in (label.t_us or 0, label.end_us or label.t_us or 0))
             for axis in axes:
                 axis.axvspan(at_s, until_s, color="C5", alpha=0.25)
-            if at_s >= free_s:
-                force.text(at_s, 1.0, label.text, transform=force.get_xaxis_transform(), va="bottom", fontsize=8)
-                free_s = at_s + len(label.text) * (end_us - begin_us) / 1e6 / 150  # as wide as its letters
-        force.set_title(recording.path.name, pad=16)
+            row = 0 if at_s >= free_s[0] else 1
+            if at_s >= free_s[row]:
+                up = 1.0 + 0.06 * row
+                force.text(at_s, up, label.text, transform=force.get_xaxis_transform(), va="bottom", fontsize=8)
+                free_s[row] = at_s + len(label.text) * (end_us - begin_us) / 1e6 / 150  # as wide as its letters
+        force.set_title(recording.path.name, pad=28)
         force.set(ylabel="size of the force on the finger, N")
         force.legend(loc="upper right")
         pressure.set(xlabel="time, s", ylabel="pressure above rest, count")

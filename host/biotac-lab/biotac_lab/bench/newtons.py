@@ -225,7 +225,7 @@ def draw(outcome: Outcome, path: Path) -> None:
         for panel, (title, core) in zip(axes, PANELS, strict=True):
             _panel(panel, outcome, core)
             panel.set(title=title, xlabel="cycles per force")
-        axes[0].set_ylabel("RMS length of the force error [N]")
+        axes[0].set_ylabel("error of the force, length of its vector, RMS [N]")
         figure.legend(*axes[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3)
 
 
@@ -248,6 +248,9 @@ def _panel(axes: Any, outcome: Outcome, core: str) -> None:
                       xytext=(-8 if left else 8, -12 if below else 4), fontsize=8, color=color,
                       ha="right" if left else "left", va="top" if below else "bottom")  # fmt: skip
     axes.set(xscale="log", yscale="log")
+    axes.xaxis.set_major_formatter("{x:,.0f}")
+    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.yaxis.set_major_formatter("{x:g}")
     cycles = [point.cycles[core] for point in outcome.points]
     axes.set_xlim(min(cycles) / 1.6, max(cycles) * 14)
     axes.grid(alpha=0.25, which="both")
