@@ -11,7 +11,7 @@ import sys
 
 from committed import ROOT
 
-HEAD_END = "|---|---|---|---|---|\n"
+HEAD_END = "|---|---|---|---|---|---|\n"
 PAGE = ROOT / "host/docs/reference/wrong_by.md"
 
 
