@@ -110,6 +110,7 @@ def facts() -> dict[str, Any]:
         ],
         "pac_hz": sensor.SLOT_HZ * sensor.SLOTS.count("PAC") / len(sensor.SLOTS),
         "pac_pa_per_count": sensor.PAC_PA_PER_COUNT,
+        "tdc": {"a": sensor.TDC_A, "b": sensor.TDC_B, "beta_k": sensor.TDC_BETA_K},
         "flags": [
             {
                 "mask": int(flag),

@@ -13,6 +13,7 @@ from record_all import record_all
 
 import biotac
 from biotac.documents import tomllib
+from biotac.features.thermal import thermal
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.fields import INVALID_U8
@@ -29,6 +30,7 @@ SNAPSHOT = """() => {
     seq: Number(panel.dataset.seq), finger: Number(panel.dataset.finger), flags: Number(panel.dataset.flags),
     force_n: vector("forceN"), torque_nmm: vector("torqueNmm"), poc_mm: vector("pocMm"),
     pdc: panel.querySelector("[data-key=pdc]").dataset.value,
+    celsius: panel.querySelector("[data-key=celsius]").dataset.value,
     slip: panel.querySelector("[data-key=slipLevel]").dataset.value,
     trust: [document.getElementById("trust").textContent, document.getElementById("trust-words").textContent],
     grip_n: [...document.querySelectorAll(".grip")].flatMap(({ dataset }) => [dataset.value, dataset.half]),
@@ -61,6 +63,7 @@ def assert_shows(seen: dict[str, Any], frames: Any, signals: Any) -> None:
     for name in ("force_n", "torque_nmm", "poc_mm"):
         np.testing.assert_array_equal(numbers(seen[name]), frame[name])
     assert float(seen["pdc"]) == frame["pdc"]
+    assert float(seen["celsius"]) == pytest.approx(thermal(frames)["celsius"][at[0]], rel=1e-12, nan_ok=True)
     slip_level = np.nan if frame["slip_level"] == INVALID_U8 else frame["slip_level"]
     np.testing.assert_array_equal(float(seen["slip"]), slip_level)
     assert seen["trust"] == [f"trust: {wire.Trust(frame['trust']).name}", wire.TRUST_DOC[frame["trust"]]]

@@ -41,15 +41,15 @@ const VECTORS = [
   { key: "pocMm", name: "Contact", unit: "mm", digits: 2 },
 ];
 const SCALARS = [
-  { key: "pdc", name: "Pressure, PDC" },
-  { key: "tac", name: "Flux, TAC" },
-  { key: "tdc", name: "Temperature, TDC" },
-  { key: "slipLevel", name: "Slip, counts" },
+  { key: "pdc", name: "Pressure, count" },
+  { key: "tac", name: "Flux, count" },
+  { key: "celsius", name: "Temperature, °C", digits: 1 },
+  { key: "slipLevel", name: "Slip, count" },
 ];
 
 export class Results {
   constructor(about) {
-    this.trusts = about.trust;
+    [this.trusts, this.thermistor] = [about.trust, about.tdc];
     const table = byId("results");
     table.replaceChildren();
     this.cells = VECTORS.map(({ key, name, unit }) => {
@@ -78,7 +78,9 @@ export class Results {
     panel.dataset.flags = frame.flags;
     VECTORS.forEach(({ key, digits }, row) => frame[key].forEach((v, k) => put(this.cells[row][k], v, digits)));
     for (const element of [this.cells[1][0].parentNode, byId("applied-key")]) element.hidden = Number.isNaN(frame.appliedN[0]);
-    for (const { key } of SCALARS) put(this.scalars[key], frame[key], 0);
+    const { a, b, beta_k } = this.thermistor; // biotac.features.thermal has the formula's source
+    const celsius = frame.tdc < 1 ? NaN : beta_k / Math.log((4095 * a) / frame.tdc - b) - 273.15;
+    for (const { key, digits = 0 } of SCALARS) put(this.scalars[key], { ...frame, celsius }[key], digits);
     this.scalars.slipLevel.dataset.kind = frame.slipLevel > 0 ? "warn" : "calm";
     put(this.scalars.seq, frame.seq, 0);
     this.showTrust(frame.trust);
