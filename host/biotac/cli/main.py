@@ -23,7 +23,7 @@ VERBS = {
     "doctor": ("boards.doctor", "Find what is wrong with a board, its sensors or this computer, and the cure."),
     "info": ("boards.info", "Show what is on a port, or in a recording: sensors, settings, losses, labels, flags."),
     "view": ("live.view", "Show a board or a recording live in the browser."),
-    "stream": ("live.stream", "Print frames as they arrive: one line each, or one JSON object each."),
+    "stream": ("live.stream", "Print frames as they arrive, ten a second from each finger, as lines or JSON."),
     "share": ("live.share", "Share a board with other programs and computers, by Zenoh or LSL."),
     "record": ("live.record", "Record everything a board sends to an MCAP file."),
     "check": ("recordings.check", "Check every on-board result of a recording against the float64 reference."),

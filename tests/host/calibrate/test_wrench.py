@@ -457,6 +457,6 @@ def test_calibrate_writes_report_picture_and_map(
 def test_calibrate_in_words_and_as_recorded(finger: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(finger), "--as-recorded"]) == 0
     output = capsys.readouterr().out
-    assert "counts are 3 rows late, [0, 0, 0] corrected; mean of 1 row(s)" in output
+    assert "counts lag by 3 row(s), not corrected; mean of 1 row(s)" in output
     for counts in SHIFTS_COUNTS[1:]:
         assert f"drifted {counts:+.0f} counts" in output

@@ -287,9 +287,10 @@ def _verdict(rmse_n: list[float | None]) -> str:
 
 
 def _lag(facts: dict[str, Any]) -> str:
-    if not facts["lag_rows"] and not any(facts["lag_corrected_rows"]):
-        return "in step"
-    return f"counts are {facts['lag_rows']} rows late, {facts['lag_corrected_rows']} corrected"
+    lag, corrected = facts["lag_rows"], facts["lag_corrected_rows"]
+    if not any(corrected):
+        return f"counts lag by {lag} row(s), not corrected" if lag else "in step"
+    return f"counts lag by {lag} row(s), corrected by axis: {', '.join(map(str, corrected))}"
 
 
 def _board_lines(found: dict[str, Any]) -> list[str]:

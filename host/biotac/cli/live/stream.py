@@ -27,7 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate", type=values.rate, default=10.0, help="lines per second and finger (default 10; 0: all)"
     )
-    parser.add_argument("--events", action="store_true", help="also print a line for each touch, lift, jolt and slip")
+    parser.add_argument(
+        "--events", action="store_true", help="also print a line for each touch, lift, jolt, slip and change of trust"
+    )
     parser.add_argument(
         "--touched", action="store_true", help="only fingers that are touched; the others send heartbeats"
     )
