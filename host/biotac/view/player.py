@@ -174,5 +174,5 @@ COMMANDS = ("tare", "record", "stop", "pause", "resume", "again", "seek", "pace"
 def writable(folder: Path) -> Path:
     """``folder``. Raises InputError if recordings cannot be written there."""
     if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"{folder} is not a writable folder; name another with --folder")
+        raise InputError(f"{folder} is not a folder that can be written to; make it, or name another with --folder")
     return folder

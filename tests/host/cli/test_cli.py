@@ -122,6 +122,11 @@ def test_stream_prints_events_between_the_frames(capsys) -> None:
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     kinds = [row["event"] for row in rows if "event" in row]
     assert "touch" in kinds and any("force_n" in row for row in rows)
+    levels = [row["trust"] for row in rows if row.get("event") == "trust"]
+    assert levels and {row["trust"] for row in rows if row.get("event") == "jolt"} == {None}
+    assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "4", "--events"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if "  trust " in line]
+    assert [line.split("trust ")[1] for line in lines] == [biotac.Trust(level).name for level in levels]
 
 
 def test_stream_thins_out_for_people(capsys) -> None:

@@ -13,7 +13,7 @@ from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
-from ...wire.messages_gen import INVALID_COUNT, Event
+from ...wire.messages_gen import INVALID_COUNT, Event, EventKind, Trust
 from ...wire.slots import FRAME_HZ
 from .. import values
 from ..outputs import note
@@ -97,11 +97,14 @@ def event_as_json(event: Event) -> dict[str, object]:
         "began_s_ago": event_age_s(event),
         "energy_count2": None if event.energy_count2 == INVALID_U32 else event.energy_count2,
         "peak_count": None if event.peak_count == INVALID_COUNT else event.peak_count,
+        "trust": None if event.kind != EventKind.TRUST else event.trust,
     }
 
 
 def event_as_line(event: Event) -> str:
     line = f"{event.t_us / 1e6:9.3f} s finger {event.finger}  {kind_name(event).lower()}"
+    if event.kind == EventKind.TRUST:
+        line += f" {Trust(event.trust).name}"
     if event.peak_count != INVALID_COUNT:
         line += f", peak {event.peak_count} counts"
     age_s = event_age_s(event)
