@@ -40,7 +40,7 @@ def test_links_lead_somewhere(link: str) -> None:
 
 def test_the_force_error_to_state_is_the_default_maps() -> None:
     page = (Path(__file__).parents[2] / "host/docs/reference/accuracy.md").read_text(encoding="utf-8")
-    row = re.search(r"error (\.\d+) N along the finger, (\.\d+) N sideways, (\.\d+) N into the pad", README)
+    row = re.search(r"error (0\.\d+) N along the finger, (0\.\d+) N sideways, (0\.\d+) N into the pad", README)
     said = re.search(r"(0\.\d+) N towards the tip, (0\.\d+) N sideways and (0\.\d+) N normal", page.replace("\n", " "))
     for told in (row, said):
         assert told and list(map(float, told.groups())) == population.load(None).sigma_n.round(2).tolist()
