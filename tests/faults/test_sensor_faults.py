@@ -36,14 +36,14 @@ SQUEEZED = "in the middle of a squeeze everything moves, and a worn sensor's noi
 PRESSED = "the counts are those of a finger that is pressed there, too"
 # What is flagged too late or never, why, and with which gains and when.
 UNSEEN: dict[str, tuple[str, dict[str, tuple[str, ...]]]] = {
-    "electrode floating: walks 20 counts a round": (SQUEEZED, {"fitted": WHEN, "lin": ("touch",)}),
+    "electrode floating: walks 20 counts a round": (SQUEEZED, dict.fromkeys(("fitted", "lin"), ("touch",))),
+    "electrode stuck": ("a round more than a tenth of a second", {"fitted": ("touch",)}),
     "electrode at half gain": ("so reads another press", {"fitted": ("rest", "touch")}),
-    "electrode drifts 10 counts/s": ("a worn sensor's noise hides half a newton", {"fitted": WHEN}),
-    "electrode drifts 50 counts/s": (SQUEEZED, {"fitted": ("rest", "touch")}),
-    "electrode drifts 200 counts/s": (SQUEEZED, {"fitted": WHEN}),
-    "all electrodes drift 1 count/s": ("so does warmth", {"fitted": WHEN}),
-    "all electrodes drift 5 counts/s": ("warmth does as much, before the thermometer", dict.fromkeys(MODELS, WHEN)),
-    "all electrodes drift 20 counts/s": ("up to 5 counts it is warmth, too", {"fitted": WHEN}),
+    "electrode drifts 10 counts/s": ("a worn sensor's noise hides half a newton", {"fitted": ("rest",)}),
+    "electrode drifts 200 counts/s": (SQUEEZED, {"fitted": ("touch",)}),
+    "all electrodes drift 1 count/s": ("the tare follows as much", {"fitted": ("rest", "hold")}),
+    "all electrodes drift 5 counts/s": (SQUEEZED, {"fitted": ("touch",)}),
+    "all electrodes drift 20 counts/s": (SQUEEZED, dict.fromkeys(("fitted", "lin"), ("touch",))),
     "two electrodes' wires exchanged": (SQUEEZED, {"fitted": ("touch",), "population": ("touch",)}),
     "cross-talk of 30 % between fingers": (PRESSED, {"fitted": WHEN}),
     "cross-talk of 100 % between fingers": (PRESSED, dict.fromkeys(MODELS, WHEN)),
@@ -285,10 +285,12 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
         ("two electrodes' wires exchanged",), "ELECTRODE_OUT, ELECTRODE_ALONE; none in a squeeze", LEFT_OUT,
     ),
     "all electrodes drift by 1 to 5 counts/s, as warmth makes them": (
-        ("all electrodes drift 1 count/s", "all electrodes drift 5 counts/s"), "none", "lets go from time to time",
+        ("all electrodes drift 1 count/s", "all electrodes drift 5 counts/s"), "BASE_OLD, of 1 count/s late or none",
+        "lets go from time to time",
     ),
     "all electrodes drift by 20 counts/s, or jump by 50": (
-        ("all electrodes drift 20 counts/s", "all electrodes jump by 50"), "SENSOR_FAULT", "lets go, to tare",
+        ("all electrodes drift 20 counts/s", "all electrodes jump by 50"),
+        "BASE_OLD, late in a squeeze; of a jump SENSOR_FAULT", "lets go, to tare",
     ),
     "a sensor repeats its words for ever": (
         ("the same words for ever", "electrodes frozen, pressure alive"), "FAULT, SENSOR_FAULT", "holds its actuators",

@@ -2,15 +2,16 @@
 //
 // Under the skin is one body of fluid: what squeezes it in one place lets it bulge in others, and no touch
 // moves an electrode alone. Of 80 000 rounds of real fingers, pressed and sheared on plates, one electrode
-// moved at most 5.7 times as far as all others together, as long as noise does not hide those. So an
-// electrode that moves by more than 8 times their sum is broken, and so is one that keeps saying one count
-// while they move, or jumps back and forth. And no living sensor repeats all its words: each has its noise.
+// moved at most 2.2 times as far as all others together, as long as noise does not hide those. So an
+// electrode that moves by more than 5 times their sum is suspected, and one that does so twice over is
+// broken; and so is what keeps saying one count while they move, or jumps back and forth. And no living
+// sensor repeats all its words: each has its noise.
 //
 // A condemned electrode is used again at rest, once it has been calm near its tare for two seconds.
 //
 // Four rounds are a window. No round pays for everything: while a window fills, the one before is searched
-// in the first round for words that repeat, and enters half of the running means; in the second for moves;
-// its verdict comes in the third, and the fourth is for half of the means.
+// for words that repeat, and enters the running means; then these are compared with where they were when the
+// skin last moved, and judged.
 //
 // Units: counts; a window's sums are in 1/4 count (q2), running means in 1/16 count (q4).
 #ifndef BIOTAC_HEALTH_H
@@ -38,25 +39,20 @@ typedef struct {
     uint8_t still_rounds;    // since pressure was far off; saturates
     uint32_t up, down;       // trigger's, of the round before
     uint32_t flips[3];       // electrodes that jumped back and forth once, twice, three times lately
-    bt_lanes anchor;         // a window's sums when the skin last moved
-    bt_lanes mean;           // running: goes a quarter of the way to every second window
-    bt_lanes mean_anchor;
-    bt_moves moves, mean_moves;
-    uint32_t same;      // electrodes that said one count throughout the window
-    uint32_t unchanged; // that did so for unchanged_windows
+    bt_lanes mean;           // running: goes a quarter of the way to every window
+    bt_lanes anchor;         // the means when the skin last moved
+    bt_moves moves;          // since then
+    uint32_t same;           // electrodes that said one count throughout the window
+    uint32_t unchanged;      // that did so for unchanged_windows
     uint8_t unchanged_windows;
     uint8_t longest; // windows in which an electrode of this sensor repeated its word, and then changed it
     uint8_t alive_windows; // in which words changed; saturates: only what was alive is soon called frozen
-    uint8_t moved_windows; // since nothing had moved; saturates
     uint8_t calm_windows;  // in which no condemned electrode moved; saturates
-    uint16_t travel_q2;    // by how much the others moved while some were unchanged; saturates
-    uint16_t anchor_tdc;
-    uint32_t unknown;               // trigger's, of the window before
-    uint32_t suspect, mean_suspect; // electrodes that were seen moving alone
-    uint32_t alone;                 // in this touch: those that did
-    uint32_t noise_count2;          // the noise that the limits are for
-    uint16_t sum_sd, mean_sd;       // of a difference of two sums, of two means, by noise
-    uint16_t sum_limit, mean_limit; // up to which a move is not alone, whatever the others do
+    uint16_t travel_q4;    // by how much the others moved while some were unchanged; saturates
+    uint32_t unknown;      // trigger's, of the window before
+    uint32_t suspect;      // electrodes that in this window moved so far alone that they are broken
+    uint32_t alone;        // in this touch: those that moved alone
+    uint16_t sd_q4;        // of a difference of two means, by noise
 } bt_health;
 
 void bt_health_reset(bt_health *health);

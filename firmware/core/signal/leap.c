@@ -38,8 +38,7 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         now.lane[i] = far >> i & 1 ? round->electrode[i] : now.lane[i];
     }
-    bt_moves moves;
-    bt_moves_add(&moves, &now, smooth, 0, BT_ELECTRODES);
+    bt_moves moves = bt_moves_of(&now, smooth);
     uint32_t total = moves.total;
     bool one_way = bt_abs32(moves.along) >= total - total / 8;
     bool pressed = far >> BT_LANE_PDC & 1;

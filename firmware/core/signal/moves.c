@@ -32,16 +32,15 @@ void bt_mean_add(bt_lanes *mean_q4, const bt_lanes *sum_q2, unsigned first)
     }
 }
 
-void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end)
+bt_moves bt_moves_of(const bt_lanes *now, const bt_lanes *anchor)
 {
-    bt_moves sum = first == 0 ? (bt_moves){0} : *moves;
-    const uint16_t *a = now->lane + first, *b = anchor->lane + first, *last = now->lane + end;
-    do {
-        int32_t move = *a++ - *b++;
+    bt_moves sum = {0};
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        int32_t move = now->lane[i] - anchor->lane[i];
         uint32_t size = bt_abs32(move);
         sum.total += size;
         sum.along += move;
         sum.top = size > sum.top ? size : sum.top;
-    } while (a != last);
-    *moves = sum;
+    }
+    return sum;
 }

@@ -24,7 +24,6 @@ typedef struct {
     uint32_t top;   // and the largest
 } bt_moves;
 
-// Add electrodes first <= i < end. Starts over with the first.
-void bt_moves_add(bt_moves *moves, const bt_lanes *now, const bt_lanes *anchor, unsigned first, unsigned end);
+bt_moves bt_moves_of(const bt_lanes *now, const bt_lanes *anchor);
 
 #endif

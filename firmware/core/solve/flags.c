@@ -36,8 +36,9 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     flags |= tare->held ? BT_FRAME_FLAG_HELD : 0;
     if (bt_tare_touched(tare)) {
         flags |= tare->state == BT_TARE_STATE_DOUBT ? BT_FRAME_FLAG_DOUBT : BT_FRAME_FLAG_CONTACT;
-        flags |= tare->contact_rounds > BASE_OLD_FRAMES || tare->drifted ? BT_FRAME_FLAG_BASE_OLD : 0;
+        flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
     }
+    flags |= tare->drifted_sweeps != 0 ? BT_FRAME_FLAG_BASE_OLD : 0;
     if (tare->tared && (tare->unsure || tare->likely)) {
         flags |= tare->unsure ? BT_FRAME_FLAG_TARE_UNSURE : BT_FRAME_FLAG_TARE_LIKELY;
     }

@@ -101,6 +101,13 @@ void bt_point_signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[B
     bt_signals_q4(counts, tare->electrode_q4, e_q4);
 }
 
+// What static pressure says that presses at least: no finger makes 1000 counts of a newton.
+static uint32_t pressed_mn(const bt_round *round, const bt_tare *tare)
+{
+    int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
+    return above_q4 == BT_INVALID_I32 || above_q4 < 0 ? 0 : (uint32_t)above_q4 >> 4;
+}
+
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg)
 {
@@ -139,6 +146,8 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
+        uint32_t pressed = pressed_mn(round, tare);
+        uncertainty.guess_mn[0] = pressed > uncertainty.guess_mn[0] ? pressed : uncertainty.guess_mn[0];
     }
     uint32_t warmed_q8 = bt_abs32(bt_thermal_warmed_q8(&tare->thermal));
     uint32_t limit_q8 = settings->map != NULL ? BT_DEGREE_Q8 : settings->warmed_max_q8;

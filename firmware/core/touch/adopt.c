@@ -2,9 +2,7 @@
 
 #include "fixed_point.h"
 
-// Pressure that may be missing right after a press (9 counts seen) and comes back.
-#define UNDERSHOOT_SHARE         64 // of the press's peak; a hundredth seen
-#define UNDERSHOOT_PDC_COUNT_MAX 16
+#define UNDERSHOOT_PDC_COUNT_MAX 16 // pressure that a press leaves missing, and that comes back
 
 void bt_adopt_aim_pressure(bt_tare *tare)
 {
@@ -40,7 +38,6 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     tare->base = *base;
     tare->state = state;
     tare->tared = true;
-    tare->comes_back_q16 = 0;
     bt_adopt_tell(tare, reason);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         bt_adopt_electrode(tare, i);
@@ -48,7 +45,6 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     bt_adopt_aim_pressure(tare);
     tare->hits = 0;
     tare->contact_rounds = 0;
-    tare->drifted = false;
     tare->let_go = false;
     bt_release_begin(&tare->release);
     bt_thermal_begin(&tare->thermal);
@@ -77,10 +73,7 @@ void bt_adopt_after_press(bt_tare *tare, uint8_t reason)
 {
     uint32_t rest_q16 = tare->base.pdc_q16;
     uint32_t present = present_q16(tare, BT_LANE_PDC);
-    int32_t undershoot = tare->release.pdc_peak / UNDERSHOOT_SHARE;
     bt_adopt_present(tare, reason);
-    tare->comes_back_q16 = (undershoot < UNDERSHOOT_PDC_COUNT_MAX ? undershoot : UNDERSHOOT_PDC_COUNT_MAX)
-                           << 16;
     if (rest_q16 != BT_TARE_UNKNOWN && present < rest_q16
         && rest_q16 - present < UNDERSHOOT_PDC_COUNT_MAX << 16) {
         tare->base.pdc_q16 = rest_q16;

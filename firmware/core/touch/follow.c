@@ -6,8 +6,8 @@
 
 #define PDC_SLEW_Q16 (8 * 131)  // per sweep; 0.2 count/s
 #define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
-#define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: an undershoot comes back within seconds
-#define BACK_ROUNDS  400        // and is over after these
+#define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: what a press left missing comes back within seconds
+#define BACK_ROUNDS  400        // after a new tare
 // What all electrodes are away by counts for more than an electrode's own part: drift is shared, noise is
 // not, and following each alone lags a worn finger's worst drift by a count.
 #define SHARED_TIMES 4
@@ -59,10 +59,12 @@ static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
     tare->sum_q4 += away_q4;
     int32_t drift_q16 = tare->drift_q16;
     bool watched = bt_watch_sees(&tare->watch, &tare->sweep);
-    if (watched) {
-        uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
-        uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
+    uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
+    uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
+    if (tare->watch.wait_sweeps == 0) {
         bt_watch_side(&tare->watch, mean_q16, watched_q16);
+    }
+    if (watched) {
         drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, mean_q16, watched_q16);
     }
     tare->drift.moved_q16 += drift_q16;
@@ -113,12 +115,10 @@ static void serve_pressure(bt_tare *tare)
     uint32_t mean_q16 = (uint32_t)bt_sweep_close(&tare->sweep, BT_LANE_PDC, BT_STILL_SPAN_Q3) << 13;
     if (rests(tare) && !tare->held && bt_tare_pdc_known(tare)) {
         uint32_t before_q16 = tare->base.pdc_q16;
-        bool back = tare->age_rounds < BACK_ROUNDS && tare->comes_back_q16 > 0;
-        int32_t slew_q16 = mean_q16 < before_q16 ? PDC_SINK_Q16 : back ? PDC_BACK_Q16 : PDC_SLEW_Q16;
+        int32_t rise_q16 = tare->age_rounds < BACK_ROUNDS ? PDC_BACK_Q16 : PDC_SLEW_Q16;
+        int32_t slew_q16 = mean_q16 < before_q16 ? PDC_SINK_Q16 : rise_q16;
         int32_t step_q16 = bt_clamp((int32_t)(mean_q16 - before_q16), -slew_q16, slew_q16);
         tare->base.pdc_q16 = bt_baseline_moved(before_q16, step_q16);
-        tare->comes_back_q16 -=
-            mean_q16 > before_q16 && back ? (int32_t)(tare->base.pdc_q16 - before_q16) : 0;
         bt_adopt_aim_pressure(tare);
     }
 }

@@ -10,6 +10,7 @@
 #define FAINT_Q16              (1 << 16) // what all electrodes share and may be drift
 #define PATTERN_SHARE          4         // of a press's energy is not shared by all electrodes, at least
 #define DRIFTED_Q16            (2 << 16)
+#define DRIFTED_SWEEPS         64  // of rest, until drift counts as over
 #define DRIFT_ROUNDS_PER_COUNT 400 // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
 
@@ -146,9 +147,14 @@ static void judge_drift(bt_tare *tare)
     bool steady = rests ? watch->level_sweeps >= BT_LEVEL_SWEEPS : bt_watch_level(watch);
     bool level = valid && shown && !tare->partial && steady;
     bool creeps = touched && bt_watch_creeps(watch);
+    uint32_t away_q16 = bt_abs32(watch->shared_q16);
     bool alike =
-        bt_tare_touched(tare) && valid && watch->one_way && bt_abs32(watch->shared_q16) > DRIFTED_Q16;
-    tare->drifted = tare->drifted || alike;
+        (valid && watch->one_way && away_q16 > DRIFTED_Q16) || (watch->alike && away_q16 > 2 * DRIFTED_Q16);
+    if (alike) {
+        tare->drifted_sweeps = DRIFTED_SWEEPS;
+    } else if (!touched && tare->drifted_sweeps > 0) {
+        tare->drifted_sweeps--;
+    }
     watch->follows = level && touched && !(creeps && bt_drift_known(&tare->drift));
     if (level && !creeps) {
         bt_drift_learn(&tare->drift);

@@ -24,18 +24,18 @@ typedef struct {
 typedef struct {
     bt_trigger trigger;
     bt_sweep sweep;
-    uint8_t state;        // enum bt_tare_state
-    uint8_t reason;       // enum bt_tare_reason of the last change
-    uint8_t before_fault; // the state to go back to
-    bool changed;         // by the last round, beyond drift tracking, or by the host
-    bool tared;           // there is a tare
-    bool held;            // the host says so: no new tare is taken
-    bool let_go;          // the host says so: what is in doubt is residue
-    bool drifted;         // in this touch all electrodes moved alike by more than drift does
-    bool unsure;          // no release has confirmed the tare: START's, or one that the reading contradicts
-    bool likely;          // nor this one, of a host or a SHIFT; what the finger read does not contradict it
-    bool unchecked;       // the host gave it, and no whole sweep has been compared with it
-    bool aged;            // and it was old
+    uint8_t state;          // enum bt_tare_state
+    uint8_t reason;         // enum bt_tare_reason of the last change
+    uint8_t before_fault;   // the state to go back to
+    bool changed;           // by the last round, beyond drift tracking, or by the host
+    bool tared;             // there is a tare
+    bool held;              // the host says so: no new tare is taken
+    bool let_go;            // the host says so: what is in doubt is residue
+    uint8_t drifted_sweeps; // of rest, until all electrodes have long not moved alike by more than drift does
+    bool unsure;            // no release has confirmed the tare: START's, or one that the reading contradicts
+    bool likely;            // nor this one, of a host or a SHIFT; what the finger read does not contradict it
+    bool unchecked;         // the host gave it, and no whole sweep has been compared with it
+    bool aged;              // and it was old
     bt_baseline base;
     uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
     uint32_t threshold_count2;            // energy above which a round counts as touched
@@ -53,7 +53,6 @@ typedef struct {
     bt_release release;
     bt_witness witness;
 
-    int32_t comes_back_q16; // what may come back of the pressure that the latest press left missing
     uint8_t hits;           // consecutive rounds in which the trigger fired
     bool touched;           // the trigger fired in this round, or earlier and is still over its limit
     bool partial;           // this sweep did not serve all electrodes in one state

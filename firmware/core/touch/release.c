@@ -55,13 +55,6 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     return back && gone && sweep->still_sweeps >= BT_ENDED_SWEEPS;
 }
 
-static bool is_untouched(const bt_release *release, const bt_release_sweep *sweep)
-{
-    return sweep->witness && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= BT_QUIET_SWEEPS
-           && sweep->still_sweeps >= BT_QUIET_SWEEPS
-           && sweep->energy_count2 < BT_SETTLED_COUNT2 + sweep->forgiven_count2;
-}
-
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
 {
     bool even = sweep->uncooled < BT_PDC_PRESSED && sweep->uneven_count2 < BT_EVEN_COUNT2;
@@ -102,7 +95,7 @@ static bt_release_verdict verdict(const bt_release *release, const bt_release_sw
     if (sweep->energy_count2 < BT_CALM_COUNT2 && low && sweep->still_sweeps > 0) {
         return BT_RELEASE_CLEAN;
     }
-    if (is_residue(release, sweep) || is_untouched(release, sweep)) {
+    if (is_residue(release, sweep)) {
         return BT_RELEASE_RESIDUE;
     }
     if (is_shift(release, sweep)) {

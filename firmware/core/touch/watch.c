@@ -8,6 +8,7 @@
 #define LEVEL_SWEEPS 32             // 2.6 s
 #define WAIT_SWEEPS  5              // until means are free of what came before
 #define ONE_WAY_Q2   26             // 13 electrodes one way and 6 the other: three sigmas of noise
+#define ALIKE_SIDE   17             // 18 electrodes one way and one the other
 #define CREEP_Q3     (5 * LEVEL_Q3) // at most in a silence: 13 s of skin creep at the limit of level
 #define CREEP_SWEEPS 250            // 20 s, two of its time constants
 #define MISSED_Q16   (BT_SLEW_Q16 / 2) // 15 counts/min, the worst drift measured, as so few rounds are noisy
@@ -105,6 +106,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
     watch->one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
     watch->shared_q16 = watch->away_q3 * EACH_Q16;
+    watch->alike = bt_abs32(watch->side) >= ALIKE_SIDE;
     watch->side = 0;
     watch->away_q3 = 0;
 }

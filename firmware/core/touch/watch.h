@@ -27,6 +27,7 @@ typedef struct {
     int32_t away_q3;      // sum of the distances of this sweep's means from the watched baseline
     int32_t shared_q16;   // their mean in the last whole sweep
     bool one_way;         // in the last whole sweep nearly all had moved one way
+    bool alike;           // in the last whole sweep all but one had
     bool follows;         // each electrode follows drift at its own pace
 } bt_watch;
 

@@ -8,7 +8,7 @@
 #define BT_PDC_PRESSED 24 // counts that make a press, a quarter of a newton
 #define BT_CALM_COUNT2 400 // energy that is no touch: 4.6 counts on each electrode
 #define BT_EVEN_COUNT2 200 // energy of a pattern that is only noise: seven sigmas of a worn sensor's means
-#define BT_SETTLED_COUNT2 6000 // energy of skin that settled, where pressure never rose
+#define BT_SETTLED_COUNT2 6000 // energy that a host's tare may leave at rest: skin that settles
 #define BT_RESIDUE_SHARE 64 // a press left at most a 356th of its energy
 #define BT_FALLEN_SHARE 4 // what has fallen to a quarter is no longer the press it was
 #define BT_QUIET_PDC 4 // counts above the tare: 27 real presses left a median of 1 and at most 5.6 ...

@@ -67,7 +67,7 @@ class SensorFault(IntEnum):
     ALONE = 3  # it moved while the rest of the skin did not: it floats, drifts or is loose
     STUCK = 4  # it repeats one count while the skin moves
     FROZEN = 5  # every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s
-    TOGETHER = 6  # all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one
+    TOGETHER = 6  # all electrodes leapt alike without pressure, or the thermometer did: supply or reference; the tare is wrong until the next one
     NOISY = 7  # it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken
     EXCHANGED = 8  # its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor
     OTHER_KIND = 9  # no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque
@@ -270,7 +270,7 @@ SENSOR_FAULT_DOC: dict[int, str] = {
     3: "it moved while the rest of the skin did not: it floats, drifts or is loose",
     4: "it repeats one count while the skin moves",
     5: "every electrode has repeated its word for 8 to 12 rounds, or since power-up for 10 s",
-    6: "all electrodes moved alike, faster than any warmth and without pressure: supply or reference; the tare is wrong until the next one",
+    6: "all electrodes leapt alike without pressure, or the thermometer did: supply or reference; the tare is wrong until the next one",
     7: "it jumps from round to round; of the sensor: more than two do, too much for a tare to be taken",
     8: "its words leapt as no touch and no warmth moves them: another channel's, or another sensor's; TARE_NOW or TARE_SET ends it, or another sensor",
     9: "no BioTac with 19 electrodes, by its serial number (BioTac SP: BTSP, BTTB) or its counts: no point, force or torque",
