@@ -64,7 +64,9 @@ static void replace_force(const bt_population_column *columns, const int32_t e_q
     int32_t force_100un[3];
     bt_likeness likeness = bt_population_force(e_q4, force_100un);
     bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
-    double share = likeness.share / (double)BT_POPULATION_ALL;
+    uint32_t part_q8 = likeness.share * likeness.gain >> 8;
+    double part = part_q8 / (double)BT_POPULATION_ALL,
+           rest = (likeness.gain - part_q8) / (double)BT_POPULATION_ALL;
     double *force = result->force_n;
     gates_of(e_q4, &gate_x, &gate_y);
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -75,7 +77,7 @@ static void replace_force(const bt_population_column *columns, const int32_t e_q
     }
     for (int d = 0; d < 3; d++) {
         double by_map = sum[d] + gate_x * sum[3 + d] + gate_y * sum[6 + d];
-        force[d] = share * by_map + (1 - share) * likeness.otherwise_100un[d] / 1e4;
+        force[d] = part * by_map + rest * likeness.otherwise_100un[d] / 1e4;
     }
     result->torque_nmm[0] = result->poc_mm[1] * force[2] - result->poc_mm[2] * force[1];
 }

@@ -27,7 +27,10 @@ _Static_assert((BT_POPULATION_KINDS & ~(1 << BT_MAP_KIND_COMPRESSION | 1 << BT_M
 #define LIGHT_Q4      (1500 * 16)
 #define FIRM_BITS     14                // the map makes all of the force from LIGHT_Q4 + 2^FIRM_BITS on
 #define FEW_PRESSED   8                 // the share of the sum, 1/8, below which no direction is known
-#define STRENGTH(sum) ((sum) * 25 >> 5) // 1.25 mN a count
+#define STRENGTH(sum) ((sum) * 25 >> 5) // 1.25 mN a count, of a firm touch
+// A light touch has more counts for its newtons, as bulges come before compression: its force goes with their
+// square.
+#define GAIN(sum)     ((uint32_t)bt_clamp((int32_t)((sum) * 13 >> 11), 102, BT_POPULATION_ALL))
 #define UPRIGHT(sum)  ((sum) * (BT_CORE_RADIUS_UM / 32)) // keeps the direction from being that of noise
 #define UNIT_BITS     12
 #define NEAR_8        7  // in eighths of the strength: up to which the map may be off the normals,
@@ -117,10 +120,10 @@ static uint32_t furthest(const int32_t a[3], const int32_t b[3])
 
 static void mix(const bt_likeness *its, int32_t force_100un[3])
 {
+    int32_t part = (int32_t)(its->share * its->gain >> 8), rest = (int32_t)its->gain - part;
     for (int d = 0; d < 3; d++) {
-        int32_t by_map =
-            its->share > 0 ? force_100un[d] * (int32_t)its->share : 0; // far off, it need not fit
-        int32_t sum = by_map + its->otherwise_100un[d] * (int32_t)(BT_POPULATION_ALL - its->share);
+        int32_t by_map = part > 0 ? force_100un[d] * part : 0; // far off, it need not fit
+        int32_t sum = by_map + its->otherwise_100un[d] * rest;
         force_100un[d] = bt_with_sign((bt_abs32(sum) + BT_POPULATION_ALL / 2) >> 8, sum);
     }
 }
@@ -128,23 +131,25 @@ static void mix(const bt_likeness *its, int32_t force_100un[3])
 bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
 {
     touch of = touch_of(e_q4);
-    bt_likeness its = {.outside = of.sum_q4 < LEAST_Q4, .strength_100un = STRENGTH(of.sum_q4)};
+    uint32_t firm_100un = STRENGTH(of.sum_q4);
+    bt_likeness its = {.outside = of.sum_q4 < LEAST_Q4, .gain = GAIN(of.sum_q4)};
+    its.strength_100un = firm_100un * its.gain >> 8;
     force_100un[0] = force_100un[1] = force_100un[2] = 0;
     if (of.sum_q4 == 0) {
         return its;
     }
-    along_normals(&of, its.strength_100un, its.otherwise_100un);
+    along_normals(&of, firm_100un, its.otherwise_100un);
     bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
-    uint32_t off = furthest(force_100un, its.otherwise_100un), far = FAR_8 * its.strength_100un;
+    uint32_t off = furthest(force_100un, its.otherwise_100un), far = FAR_8 * firm_100un;
     if (off < far / 8) {
-        uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / its.strength_100un;
+        uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
         its.share = at_most((int32_t)share);
         uint32_t firm = at_most(bt_shift_down((int32_t)of.sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
         its.share = its.share < firm ? its.share : firm;
     }
-    its.outside |= off > OUTSIDE * its.strength_100un
+    its.outside |= off > OUTSIDE * firm_100un
                    || (its.share < BT_POPULATION_ALL && FEW_PRESSED * of.pressed_q4 < of.sum_q4);
-    if (its.share < BT_POPULATION_ALL) {
+    if (its.share < BT_POPULATION_ALL || its.gain < BT_POPULATION_ALL) {
         mix(&its, force_100un);
     }
     return its;
@@ -156,5 +161,5 @@ uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES])
     for (int i = 0; i < BT_ELECTRODES; i++) {
         sum_q4 += bounded(bt_abs32(e_q4[i]));
     }
-    return STRENGTH(sum_q4);
+    return STRENGTH(sum_q4) * GAIN(sum_q4) >> 8;
 }

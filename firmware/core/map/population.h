@@ -16,9 +16,10 @@ extern const bt_map bt_population;
 #define BT_POPULATION_ALL 256
 typedef struct {
     uint32_t share;             // of the force that comes from the map, in 1/256
+    uint32_t gain;              // of both, in 1/256: below 1 in a light touch
     bool outside;               // nothing touches, or the map and the normals contradict each other
     uint32_t strength_100un;    // from the sum of all signals
-    int32_t otherwise_100un[3]; // along the normals
+    int32_t otherwise_100un[3]; // along the normals, before the gain
 } bt_likeness;
 
 // Force on the finger in 100 uN, of signals as from bt_signals_q4, and how like the training they are

@@ -42,6 +42,7 @@ _UNIT_BITS = 12
 _LEAST_Q4 = 64 * 16
 _LIGHT_Q4 = 1500 * 16
 _FAR_8, _OUTSIDE = 11, 2
+_GAIN_LEAST = 102
 _CHUNK_ROWS = 4096
 
 
@@ -81,11 +82,12 @@ def board_map(newtons: Mapping[tuple[Kind, Gate], Floats], margin: Margin = UNKN
 class Likeness:
     """How like the training n frames are; defined in integers, so that all boards agree (SPEC.md, Population map).
 
-    ``share`` (n,) of the force that comes from the map, in 1/256; ``outside`` (n,); ``otherwise_n`` (n, 3), the rest;
-    ``strength_100un`` (n,) by the sum of all signals.
+    ``share`` (n,) of the force that comes from the map, and ``gain`` (n,) of all of it, in 1/256; ``outside`` (n,);
+    ``otherwise_n`` (n, 3), the rest before its gain; ``strength_100un`` (n,) by the sum of all signals.
     """
 
     share: Integers
+    gain: Integers
     outside: npt.NDArray[np.bool_]
     otherwise_n: Floats
     strength_100un: Integers
@@ -103,9 +105,9 @@ class Likeness:
         return found / MN_PER_N
 
     def mixed(self, force_n: Floats) -> Floats:
-        """The map's force (n, 3) in N, mixed with the rest."""
-        part = (self.share / ALL)[:, None]
-        return part * force_n + (1 - part) * self.otherwise_n
+        """The map's force (n, 3) in N, mixed with the rest, times the gain."""
+        part = self.share * self.gain // ALL
+        return (part / ALL)[:, None] * force_n + ((self.gain - part) / ALL)[:, None] * self.otherwise_n
 
 
 def likeness(e: Floats, force_100un: Integers) -> Likeness:
@@ -116,14 +118,15 @@ def likeness(e: Floats, force_100un: Integers) -> Likeness:
     total = np.abs(q4).sum(axis=1)
     up = (_SUM_BITS - np.ceil(np.log2(total + 1.0)).astype(np.int64))[:, None]
     size = np.abs(q4) << np.maximum(up, 0) >> np.maximum(-up, 0)
-    strength = total * 25 >> 5
-    otherwise = _along_normals(np.sign(q4) * size, size.sum(axis=1), strength)
-    off = np.abs(force_100un - otherwise).max(axis=1)
-    share = (_FAR_8 * strength - 8 * off) * (ALL // 4) // np.maximum(strength, 1)
+    firm = total * 25 >> 5
+    along = _along_normals(np.sign(q4) * size, size.sum(axis=1), firm)
+    off = np.abs(force_100un - along).max(axis=1)
+    share = (_FAR_8 * firm - 8 * off) * (ALL // 4) // np.maximum(firm, 1)
     share = np.clip(np.minimum(share, total - _LIGHT_Q4 >> 6), 0, ALL)
     pressed = -np.minimum(q4, 0).sum(axis=1)
-    outside = (total < _LEAST_Q4) | (off > _OUTSIDE * strength) | ((share < ALL) & (8 * pressed < total))
-    return Likeness(share, outside, otherwise / FORCE_LSB_PER_N, strength)
+    outside = (total < _LEAST_Q4) | (off > _OUTSIDE * firm) | ((share < ALL) & (8 * pressed < total))
+    gain = np.clip(total * 13 >> 11, _GAIN_LEAST, ALL)
+    return Likeness(share, gain, outside, along / FORCE_LSB_PER_N, firm * gain // ALL)
 
 
 def board_force_100un(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Integers:

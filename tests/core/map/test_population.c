@@ -14,7 +14,7 @@
 static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7, 9,
                                               0,  1,  2,  3,  4,  5,  16, 17, 18};
 
-// The map that the firmware carries is one that it would take from a host, which proves its sums' bounds.
+// The map that the firmware carries is one that it would take from a host, which proves result sums' bounds.
 TEST(the_map_is_as_it_is_opened)
 {
     bt_map map;
@@ -56,7 +56,7 @@ TEST(extremes_do_not_overflow)
     }
 }
 
-// The map is symmetric, its rounding is not: half up. Of each of four gated blocks half a unit that is met by
+// The map is symmetric, result rounding is not: half up. Of each of four gated blocks half a unit that is met by
 // a gate of at most 2.9 2^13 and divided by 2^6 or more; of six blocks a unit at most.
 #define ROUNDED_100UN (2 * (4 * 186 + 6))
 
@@ -95,22 +95,24 @@ TEST(the_likeness_is_what_it_is_defined_as)
             }
         }
         along[2] += sum / 32 * BT_CORE_RADIUS_UM;
-        double length = hypot(hypot(along[0], along[1]), along[2]), strength = 12.5 * sum;
+        double length = hypot(hypot(along[0], along[1]), along[2]), firm_100un = 12.5 * sum;
+        double gain = fmin(fmax(sum / 2520.6, .4), 1);
         bt_likeness result = bt_population_force(e_q4, force);
         bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, by_map);
         for (int d = 0; d < 3; d++) {
-            along[d] *= strength / length;
-            off = fmax(off, fabs(by_map[d] - along[d]) / strength);
+            along[d] *= firm_100un / length;
+            off = fmax(off, fabs(by_map[d] - along[d]) / firm_100un);
         }
         double like = (1.375 - off) * 2, firm = (sum - 1500) / 1024, share = like < firm ? like : firm;
         share = share < 0 ? 0 : share > 1 ? 1 : share;
         assert_true(fabs(result.share / 256.0 - share) < 0.02);
-        assert_true(fabs(result.strength_100un - strength) <= 12.5 * BT_ELECTRODES / 16 + 1);
+        assert_true(fabs(result.strength_100un - gain * firm_100un)
+                    <= 12.5 * BT_ELECTRODES / 16 + 2 + firm_100un / 256); // a step of the gain
         for (int d = 0; d < 3; d++) {
-            assert_true(fabs(result.otherwise_100un[d] - along[d]) < 0.01 * strength);
-            double expected =
-                result.otherwise_100un[d] + result.share / 256.0 * (by_map[d] - result.otherwise_100un[d]);
-            assert_true(fabs(expected - force[d]) <= 0.5 + 1e-6);
+            assert_true(fabs(result.otherwise_100un[d] - along[d]) < 0.01 * firm_100un);
+            double part = floor(result.share * result.gain / 256.0);
+            double expected = part * by_map[d] + (result.gain - part) * result.otherwise_100un[d];
+            assert_true(fabs(expected / 256 - force[d]) <= 0.5 + 1e-6);
         }
         if (fabs(off - 2) > 0.01 && fabs(8 * pressed - sum) > 8 && (result.share == 0 || share < 0.98)) {
             assert_true(result.outside == (sum < 64 || off > 2 || 8 * pressed < sum));
@@ -234,7 +236,7 @@ TEST(what_only_bulges_is_outside)
     assert_true(published(e_q4, force) & BT_FRAME_FLAG_OUTSIDE);
 }
 
-// Whatever its neighbours say: a count that a live electrode can have.
+// Whatever result neighbours say: a count that a live electrode can have.
 TEST(an_electrode_that_is_estimated_stays_in_its_range)
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ APART_ROWS = 100
 MINUTE_S = 60
 MINUTES = 4  # number tried, each alone, spread over the recording
 SIGMAS = (1.0, 2.0)
+BANDS_N = (0.3, 1.0, 2.0, 3.0, 5.0, 7.0, np.inf)
+LEAST_ROWS = 10  # of a band that is printed; fewer than some hundred come from one or two touches
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,22 @@ def worth_of_force(population: Population, run: Run) -> tuple[Floats, Floats]:
     raw = rmse(population.published(run.counts, run.tare), run.truth)
     _, scale5 = _scaled(population.force(run.counts, run.tare), run.truth)
     return raw, raw if scale5 is None else scale5
+
+
+def by_band(found: Worth) -> list[list[Any]]:
+    """By band of the true force: its name, rows, bias along the true force in N and % of it, RMS of the error in N."""
+    size = np.linalg.norm(found.truth_n, axis=1)
+    error = found.published_n - found.truth_n
+    along = (error * found.truth_n).sum(axis=1) / np.maximum(size, BANDS_N[0])
+    result: list[list[Any]] = []
+    for low, high in pairwise(BANDS_N):
+        rows = (size >= low) & (size < high)
+        if rows.sum() >= LEAST_ROWS:
+            bias = along[rows].mean()
+            name = f"{low:g} to {high:g}" if high < np.inf else f"above {low:g}"
+            rms = np.sqrt((error[rows] ** 2).sum(axis=1).mean())
+            result.append([name, int(rows.sum()), bias, 100.0 * bias / size[rows].mean(), rms])
+    return result
 
 
 def coverage(error_n: Floats, sigma_n: Floats) -> list[float]:

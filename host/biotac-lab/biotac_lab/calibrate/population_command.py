@@ -12,11 +12,12 @@ from threadpoolctl import threadpool_limits
 
 from biotac import InputError
 from biotac.calibrate.population import COLUMNS, Trained, dumps, provenance_of
-from biotac.calibrate.wrench import Run, load
+from biotac.calibrate.wrench import load
 
 from ..report import Show, Table
 from . import held_out_error, training
 from .direction_command import of_population
+from .held_out_error import Worth
 from .interval import Finger, population_margin
 
 ABOUT = "A force map for uncalibrated fingers, trained on other fingers on a force plate."
@@ -50,8 +51,15 @@ def run(args: argparse.Namespace, show: Show) -> int:
     with threadpool_limits(limits=THREADS, user_api="blas"):
         fingers = [Finger.of(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
-        facts, trained = _calibrated(args, fingers, tested)
-        tables = _tables(facts)
+        trained, sigma = _calibrated(args, fingers)
+        judged = _left_out(args, fingers)
+        facts = _facts(args, trained)
+        if tested is not None:
+            worth = held_out_error.worth(trained.population, tested)
+            judged[f"{args.test.name}, the test"] = worth
+            facts |= {"test": args.test.name} | held_out_error.facts(worth, sigma)
+        tables = [_errors(facts, judged), _bands(judged)]
+        facts["bands"] = tables[-1].facts()
         if tested is not None:
             tables.append(of_population(args.test.name, trained.population, tested))
             facts["direction"] = tables[-1].facts()
@@ -62,33 +70,48 @@ def run(args: argparse.Namespace, show: Show) -> int:
     return 0
 
 
-def _calibrated(args: argparse.Namespace, fingers: list[Finger], tested: Run | None) -> tuple[dict[str, Any], Trained]:
+def _calibrated(args: argparse.Namespace, fingers: list[Finger]) -> tuple[Trained, tuple[Any, Any]]:
     sums, runs = [one.sums for one in fingers], [one.aligned for one in fingers]
     population = training.train(sums, symmetric=args.symmetric)
     if len(fingers) > 1:
         population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
     sigma = held_out_error.sigma_of(sums, runs, symmetric=args.symmetric)
-    facts: dict[str, Any] = {
+    return Trained(population, *sigma, provenance_of(args.files, args.source, symmetric=args.symmetric)), sigma
+
+
+def _left_out(args: argparse.Namespace, fingers: list[Finger]) -> dict[str, Worth]:
+    """Each finger by the map of the others, if there are others."""
+    found = {}
+    for k, path in enumerate(args.files if len(fingers) > 1 else []):
+        others = training.train([one.sums for j, one in enumerate(fingers) if j != k], symmetric=args.symmetric)
+        found[f"{path.name} by the others"] = held_out_error.worth(others, fingers[k].aligned)
+    return found
+
+
+def _facts(args: argparse.Namespace, trained: Trained) -> dict[str, Any]:
+    margin = trained.population.margin
+    return {
         "files": [path.name for path in args.files],
         "symmetric": args.symmetric,
         "columns": COLUMNS,
-        "sigma_n": sigma[0].tolist(),
-        "sigma_scale5_n": sigma[1].tolist(),
-        "margin": [list(population.margin.base_mn), list(population.margin.share_q8)],
+        "sigma_n": trained.sigma_n.tolist(),
+        "sigma_scale5_n": trained.sigma_scale5_n.tolist(),
+        "margin": [list(margin.base_mn), list(margin.share_q8)],
     }
-    if tested is not None:
-        facts["test"] = args.test.name
-        facts |= held_out_error.facts(held_out_error.worth(population, tested), sigma)
-    source = provenance_of(args.files, args.source, symmetric=args.symmetric)
-    return facts, Trained(population, sigma[0], sigma[1], source)
 
 
-def _tables(facts: dict[str, Any]) -> list[Table]:
+def _errors(facts: dict[str, Any], judged: dict[str, Worth]) -> Table:
     rows = [[f"a new finger of {', '.join(facts['files'])}, one sigma", *facts["sigma_n"]]]
     rows.append(["the same after five presses on a scale", *facts["sigma_scale5_n"]])
-    for what, field in (("RMSE", "rmse_n"), ("five presses", "rmse_scale5_n"), ("a minute of plate", "rmse_60s_n")):
-        if facts.get(field):
-            rows.append([f"{facts['test']}, {what}", *facts[field]])
+    for name, worth in judged.items():
+        each = {"RMSE": worth.rmse_n, "five presses": worth.rmse_scale5_n, "a minute of plate": worth.rmse_60s_n}
+        rows += [[f"{name}, {what}", *rmse] for what, rmse in each.items() if rmse is not None]
     within = "".join(f" {share:.0%}" for share in facts.get("coverage", ()))
     text = f"Of the test, within one and two sigma:{within}." if within else ""
-    return [Table("Force error [N]", ["", "x", "y", "z"], rows, text)]
+    return Table("Force error [N]", ["", "x", "y", "z"], rows, text)
+
+
+def _bands(judged: dict[str, Worth]) -> Table:
+    rows = [[name, *band] for name, worth in judged.items() for band in held_out_error.by_band(worth)]
+    head = ["finger", "true force [N]", "rows", "bias along it [N]", "bias [%]", "RMS error [N]"]
+    return Table("In bands of the true force", head, rows, digits=2)

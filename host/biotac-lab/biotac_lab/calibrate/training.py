@@ -22,6 +22,7 @@ from biotac.calibrate.population import (
     Population,
     Sums,
     columns,
+    light_gain,
     normals,
 )
 from biotac.calibrate.wrench import DRIFT_NODES, Blocks, Lags, Run
@@ -32,6 +33,7 @@ Floats = npt.NDArray[np.float64]
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up
 # x, y, z; of each column's variance. It pulls to the normals, as data of one rig do not know better.
 RIDGE = (5e-4, 1e-2, 1e-3)
+RELATIVE_N = 1.0  # a row weighs 1 / (its force + this), between errors in newtons and errors as shares of the force
 VARIANCE_FLOOR = 0.02  # of the median: a column that hardly varies in training must not dominate in use
 
 _MM = np.asarray(surface.ELECTRODE_MM)
@@ -77,20 +79,23 @@ def sums_of(run: Run) -> FingerSums:
 
 
 def sums(run: Run) -> Sums:
-    """Sums over the run's counts and force, averaged over three drifts."""
+    """Weighted means over the run's rows, averaged over three drifts."""
+    weight = 1.0 / (np.linalg.norm(run.truth, axis=1) + RELATIVE_N)
+    weight /= weight.sum()
     gram = np.zeros((COLUMNS, COLUMNS))
     cross = np.zeros((COLUMNS, len(AXES)))
     mean = np.zeros(COLUMNS)
-    for at, weight in DRIFT_NODES:
+    for at, share in DRIFT_NODES:
         drift = at * DRIFT_SIGMA_COUNTS * run.drift
         for start in range(0, len(run.counts), ROWS_AT_ONCE):
             rows = slice(start, start + ROWS_AT_ONCE)
-            z = columns(run.counts[rows] - run.tare + drift, run.tare)
-            gram += weight * (z.T @ z)
-            cross += weight * (z.T @ run.truth[rows])
-            mean += weight * z.sum(axis=0)
-    n = len(run.counts)
-    return Sums(gram / n, cross / n, mean / n)
+            e = run.counts[rows] - run.tare + drift
+            z = light_gain(e)[:, None] * columns(e, run.tare)
+            weighted = (share * weight[rows, None] * z).T
+            gram += weighted @ z
+            cross += weighted @ run.truth[rows]
+            mean += weighted.sum(axis=1)
+    return Sums(gram, cross, mean)
 
 
 def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: bool = True) -> Population:
