@@ -14,7 +14,7 @@
 static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7, 9,
                                               0,  1,  2,  3,  4,  5,  16, 17, 18};
 
-// The map that the firmware carries is one that it would take from a host, which proves result sums' bounds.
+// The map that the firmware carries is one that it would take from a host, which proves its sums' bounds.
 TEST(the_map_is_as_it_is_opened)
 {
     bt_map map;
@@ -56,7 +56,7 @@ TEST(extremes_do_not_overflow)
     }
 }
 
-// The map is symmetric, result rounding is not: half up. Of each of four gated blocks half a unit that is met by
+// The map is symmetric, its rounding is not: half up. Of each of four gated blocks half a unit that is met by
 // a gate of at most 2.9 2^13 and divided by 2^6 or more; of six blocks a unit at most.
 #define ROUNDED_100UN (2 * (4 * 186 + 6))
 
@@ -236,7 +236,7 @@ TEST(what_only_bulges_is_outside)
     assert_true(published(e_q4, force) & BT_FRAME_FLAG_OUTSIDE);
 }
 
-// Whatever result neighbours say: a count that a live electrode can have.
+// Whatever its neighbours say: a count that a live electrode can have.
 TEST(an_electrode_that_is_estimated_stays_in_its_range)
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {
