@@ -17,15 +17,15 @@ from biotac.sim import SimFinger, Touch, fit_gains, world
 
 REST_S, MINUTE_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 60.0, 0.9, 0.3, 0.3
 PAD_MM, ROLL_MM = ((-8.0, -3.0), (1.0, 3.0)), 3.0  # where a hand meets things, and how far a press rolls
-FORCE_N, PULL = (0.5, 10.0), (0.1, 0.6)
+FORCE_N, PULL, MOST_PULL_N = (0.5, 10.0), (0.2, 0.9), 2.5
 PLATE_N = 1 / 320  # its resolution; its noise is .7 of that
 
 
 def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
     """What touches in each round of a minute, and the force (n, 3) on the finger in N that the plate measures.
 
-    Each press is on the pad, of .5 to 10 N, rolls by up to 3 mm and is drawn once around by .1 to .6 of its force: one
-    drawn to a side alone leaves shear unlearnt, which then reads half of what it is.
+    Each press is on the pad, of .5 to 10 N, rolls by up to 3 mm and is drawn once around by .3 to .9 of its force, as far
+    as skin clings: less, or one side alone, leaves shear unlearnt, which then reads two thirds or half of what it is.
     """
     rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
     while len(touches) < MINUTE_S * 100:
@@ -39,7 +39,7 @@ def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
             normal = surface.normals_at(surface.on_surface(np.array([[x_mm, y_mm]])))
             normal_n = float(peak_n * np.clip(min(t_s, PRESS_S - t_s) / RAMP_S, 0, 1))
             angle = turn_rad + sense * 2 * np.pi * share
-            pulled_n = normal_n * pull * min(1, 6 * share, 6 * (1 - share))
+            pulled_n = min(normal_n * pull, MOST_PULL_N) * min(1, 6 * share, 6 * (1 - share))
             to_tip, to_side = float(pulled_n * np.cos(angle)), float(pulled_n * np.sin(angle))
             touches.append(Touch(normal_n, (to_tip, to_side), (x_mm, y_mm)))
             tangents = np.concatenate(surface.tangents_at(normal))

@@ -15,6 +15,7 @@ from biotac.sim import SimFinger, Touch, world
 from .plant import Plant
 
 TOUCHED_N = 0.05
+SLIDES = 100  # the slip level of true slides
 FINGERS = {2: ("index", "thumb"), 3: ("thumb", "index", "middle")}
 SHARES = {2: (1.0, 1.0), 3: (1.0, 0.5, 0.5)}  # what each bears of its side's force: the first is alone on its side
 REST_S, TOUCH_S = 7.0, 0.5  # a hand learns its drift, and is touched once, before it grasps
@@ -51,10 +52,14 @@ class TrueForce:
         touched, none, good = normal_n > TOUCHED_N, np.full(3, np.nan), Trust.ACT
         force_n = np.array([0.0, shear_n, max(normal_n + self._off_n, 0.0) if touched else 0.0])
         flags = FrameFlags.CONTACT if touched else FrameFlags(0)
+        level = SLIDES if slides and not self._deaf else 0
         return [
-            Frame(k, self._seq, 0, np.zeros(19, np.uint16), 0, 0, 0, none, force_n * share, none, flags, trust=good)
+            Frame(
+                k, self._seq, 0, np.zeros(19, np.uint16), 0, 0, 0, none, force_n * share, none, flags,
+                trust=good, slip_level=level,
+            )
             for k, share in enumerate(self._shares)
-        ], slipped
+        ], slipped  # fmt: skip
 
     def hold(self, held: bool) -> None:
         """The law begins to hold the thing, or lets go."""

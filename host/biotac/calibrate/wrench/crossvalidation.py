@@ -25,7 +25,7 @@ from ...wire.sensor_gen import FULL_SCALE_COUNT
 from . import models
 from .lag import Lags
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
-from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums
+from .moments import Rows, Sums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
 from .run import Run
 from .splits import BLOCKS, Blocks
 
@@ -237,14 +237,14 @@ class _Trainer:
     ) -> None:
         self._blocks, self._others = blocks, others
         self._late = sorted({late for training in trainings for late in enumerate(training.lag_rows)})
-        truth = _late(run, self._late)
+        truth, weights = _late(run, self._late), row_weights(run)
         self._sums: dict[int, Sums] = {}
         self._air: dict[int, Sums | None] = {}
         for window in sorted({training.window_rows for training in trainings}):
             signals = smoothed(run, window)
 
             def sums_of(rows: Rows, signals: Signals = signals) -> Sums:
-                return strip_sums(at(signals, rows), truth[rows], run.drift)
+                return strip_sums(at(signals, rows), truth[rows], run.drift, weights=weights[rows])
 
             self._sums[window] = stacked(pool.map(sums_of, blocks.strips))
             self._air[window] = air_sums(run, window)

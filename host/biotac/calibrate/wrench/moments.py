@@ -20,9 +20,12 @@ from ...core.geometry import Floats
 from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
 from .run import Run
 
-# A finger drifts by some 100 counts in two minutes of warm-up. Training for all of that costs a
-# map a tenth of its accuracy in x; when trained for this, 100 counts cost at most 0.03 N (F1, F2).
-DRIFT_SIGMA_COUNTS = 60.0
+# A finger drifts by some 100 counts in two minutes of warm-up, of which the board's tare leaves what comes during a hold.
+# Training for more than that takes from light touches, whose signals are as small, a tenth of their shear.
+DRIFT_SIGMA_COUNTS = 40.0
+# A hand acts on a share of the force, so that is what the error is made small in: rows weigh as 1 / (this + |F|)^2.
+# Unweighted, presses of several newtons decide alone (F2 at 1 to 2 N: bias -0.19 N instead of -0.07).
+SHARE_FROM_N = 0.7
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))
 NO_DRIFT = ((0.0, 1.0),)
 
@@ -125,19 +128,32 @@ def linear_columns(signals: Signals) -> Floats:
     return signals.e / SIGNAL_COUNTS
 
 
+def row_weights(run: Run) -> Floats:
+    """How much each of the run's rows counts (n,), 1 on average; see SHARE_FROM_N."""
+    weights = (SHARE_FROM_N + np.linalg.norm(run.truth[:, :3], axis=1)) ** -2.0
+    normalised: Floats = weights / weights.mean()
+    return normalised
+
+
 def strip_sums(
     signals: Signals,
     truth: Floats,
     drift: Floats,
     columns_of: Columns = columns,
     nodes: Nodes = DRIFT_NODES,
+    weights: Floats | None = None,
 ) -> Sums:
-    """Sums over rows of ``signals`` and ``truth`` (n, axes); ``drift`` (19,) is per count of mean drift."""
+    """Sums over rows of ``signals`` and ``truth`` (n, axes); ``drift`` (19,) is per count of mean drift.
+
+    ``weights`` (n,) are those of the rows; 1 if None.
+    """
     gram, cross = np.zeros(()), np.zeros(())
-    for node, weight in nodes:
-        z = with_one(columns_of(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift)))
-        gram = gram + weight * (z.T @ z)
-        cross = cross + weight * (z.T @ truth)
+    root = np.ones(1) if weights is None else np.sqrt(weights)
+    truth = truth * root[:, None]
+    for node, share in nodes:
+        z = with_one(columns_of(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift))) * root[:, None]
+        gram = gram + share * (z.T @ z)
+        cross = cross + share * (z.T @ truth)
     return Sums(gram, cross, (truth**2).sum(axis=0))
 
 

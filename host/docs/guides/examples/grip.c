@@ -6,17 +6,18 @@
 void hand_send(uint8_t id, const void *msg); // example_bare.c
 void close_at(float mm_s);                   // the hand's own: both fingers; negative: open
 #define FINGERS 0x11u                        // index and thumb, chip selects 0 and 4, which meet along z
+#define RESERVE 1.25f
 static const uint32_t WIDE = BT_FRAME_FLAG_ELECTRODE_OUT | BT_FRAME_FLAG_ELECTRODE_MISSING
                              | BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_ELECTRODE_ALONE | BT_FRAME_FLAG_OUTSIDE;
 static const uint32_t COARSE = BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_BASE_OLD;
 struct grip {
     float least_n, most_n, friction, stiffness, speed_mm_s, normal_n, shear_n, way_mm, first_n;
-    int round, jerk_until, reflex_until, slipped, holds, settled, slips;
+    int round, reflex_until, pending_until, holds, settled, slips;
 } grip;
 static struct felt {
-    float normal_n, shear_n;
+    float normal_n, shear_n; // sums
     uint32_t flags, lifted;
-    int frames, slips, slides;
+    int frames, slips, level;
 } felt; // since the last grip_round
 
 void act_on(const bt_msg_frame *frame)
@@ -24,10 +25,11 @@ void act_on(const bt_msg_frame *frame)
     const int32_t *force = frame->force_100un;
     if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[2])) {
         felt.normal_n += (float)force[2] / 1e4f;
-        felt.shear_n = fmaxf(felt.shear_n, hypotf((float)force[0], (float)force[1]) / 1e4f);
+        felt.shear_n += hypotf((float)force[0], (float)force[1]) / 1e4f;
         felt.flags |= frame->flags;
         felt.lifted |= ~frame->flags & BT_FRAME_FLAG_CONTACT;
-        felt.slides |= frame->slip_level != 0 && frame->slip_level != 255; // 255: not judged
+        felt.level =
+            frame->slip_level != 255 && frame->slip_level > felt.level ? frame->slip_level : felt.level;
         felt.frames++;
     }
 }
@@ -58,15 +60,14 @@ static float squeeze(float reserve, int coarse)
     const float wanted = near ? 0 : fminf(fmaxf((reflex ? 40 : 6) * missing_n, -0.9f), reflex ? 20 : 5);
     const float before = grip.speed_mm_s * grip.stiffness, change = 0.3f * (wanted - before); // N/s, smoothly
     grip.settled = fabsf(missing_n) < 0.15f * wanted_n ? grip.settled + 1 : 0;
-    grip.jerk_until = fabsf(change) > 1 ? grip.round + 4 : grip.jerk_until; // until then, go by slip_level
     return (before + change) / grip.stiffness;
 }
 
-static void learn_from_slip(void)
+static void learn_from_slip(float ratio)
 {
-    const float felt_friction = 0.9f * grip.shear_n / fmaxf(grip.normal_n, 0.05f);
-    grip.friction = grip.shear_n > 0.1f ? fmaxf(fminf(grip.friction, felt_friction), 0.15f) : grip.friction;
-    grip.least_n = fminf(fmaxf(grip.least_n, 1.3f * grip.normal_n), grip.most_n);
+    grip.friction = fmaxf(0.9f * ratio, 0.03f);
+    grip.least_n = fminf(fmaxf(grip.least_n, RESERVE * grip.normal_n), grip.most_n);
+    grip.pending_until = 0;
     grip.reflex_until = grip.round + 8;
     grip.slips++;
 }
@@ -83,17 +84,17 @@ void grip_round(void)
         grip.first_n = grip.normal_n;
     }
     if (!blind && grip.holds) {
-        grip.shear_n += 0.5f * (felt.shear_n - grip.shear_n);
+        const float shear_n = felt.shear_n / (float)felt.frames,
+                    ratio = shear_n / fmaxf(grip.normal_n, 0.05f);
+        grip.shear_n += 0.3f * (shear_n - grip.shear_n);
         grip.way_mm += grip.speed_mm_s * 0.01f;
         if (grip.way_mm > 0.3f && grip.normal_n - grip.first_n > 0.3f)
             grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
-        grip.slipped |= felt.slips != 0;
-        if (grip.round > grip.jerk_until && grip.round > grip.reflex_until) {
-            if (felt.slips != 0 || (grip.slipped && felt.slides))
-                learn_from_slip();
-            grip.slipped = 0;
-        }
-        grip.speed_mm_s = squeeze(felt.flags & WIDE ? 1.56f : 1.3f, (felt.flags & COARSE) != 0);
+        grip.pending_until = felt.slips ? grip.round + 3 : grip.pending_until;
+        if (grip.round >= grip.reflex_until && grip.round < grip.pending_until && felt.level >= 22
+            && (grip.slips == 0 || shear_n < 0.1f || ratio > 0.8f * grip.friction))
+            learn_from_slip(ratio);
+        grip.speed_mm_s = squeeze(felt.flags & WIDE ? 1.2f * RESERVE : RESERVE, (felt.flags & COARSE) != 0);
     }
     felt = (struct felt){0};
     close_at(grip.speed_mm_s);

@@ -8,14 +8,15 @@ from biotac.sim import SimFinger, Touch, world
 
 ROUND_S, CLOSING_MM_S = 0.01, 10.0
 LAG_S = 0.03  # from a command to the motion that the next frame shows: the actuator's, and a round
-RESERVE, FRICTION = 1.3, 0.6  # press that much harder than friction needs, of which a slip teaches less
+RESERVE, FRICTION = 1.25, 0.6  # press that much harder than friction needs, which the first slip teaches
 GAIN_PER_S, SQUEEZE_N_PER_S = 6.0, 5.0  # squeeze with so many N/s for each N that is missing, at most
 REFLEX_PER_S, REFLEX_N_PER_S, REFLEX_ROUNDS = 40.0, 20.0, 8  # the same after a slip, and for how long
-RELEASE_N_PER_S = 0.9  # a thing that begins to slip is not let go by much before that is told
+RELEASE_N_PER_S = 0.9  # a thing that begins to slip is not let go by much before that is reported
+SMOOTH = 0.3  # of a change of rate, or of shear, made in each round: what jumps to and fro shakes like a slip
+SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
+LIKELY, FAINT_N = 0.8, 0.1  # of the friction that a slip taught: with less shear another is unlikely, if shear is felt
 WIDE = F.ELECTRODE_OUT | F.ELECTRODE_MISSING | F.RAIL | F.ELECTRODE_ALONE | F.OUTSIDE
 COARSE = F.TEMP | F.BASE_OLD
-SMOOTH = 0.3  # of a change of rate made in each round: what jumps to and fro shakes like a slip
-JERK_N_S, JERK_ROUNDS = 1.0, 4  # so does a larger change than this: for so long it waits for the slip's level
 
 
 class Grip:
@@ -31,7 +32,7 @@ class Grip:
         self.friction, self.stiffness = FRICTION, 0.8  # N/mm in front of the fingers, until it is felt
         self.speed_mm_s, self.normal_n, self.shear_n = CLOSING_MM_S, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
-        self._round = self._jerk_until = self._reflex_until = self._slipped = self._way_mm = self._first_n = 0
+        self._round = self._reflex_until = self._pending_until = self._way_mm = self._first_n = 0
 
     def step(self, frames, slipped: bool) -> float:
         """How fast the sides are to close until the next round, in mm/s; negative: open.
@@ -47,7 +48,7 @@ class Grip:
             return 0.0
         normals = [float(force @ to) for _, force, to in felt]
         shears = [float(np.linalg.norm(force - n * to)) for n, (_, force, to) in zip(normals, felt, strict=True)]
-        flags = np.bitwise_or.reduce([int(f.flags) for f, *_ in felt])
+        shear_n, flags = sum(shears) / len(shears), np.bitwise_or.reduce([int(f.flags) for f, *_ in felt])
         self.normal_n = sum(normals) / len(normals)
         if not self.holds:
             if not all(f.flags & F.CONTACT for f, *_ in felt):
@@ -56,18 +57,17 @@ class Grip:
         self._way_mm += self.speed_mm_s * ROUND_S
         if self._way_mm > 0.3 and self.normal_n - self._first_n > 0.3:
             self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
-        self.shear_n += 0.5 * (max(shears) - self.shear_n)
-        self._slipped |= slipped
-        if self._round > max(self._jerk_until, self._reflex_until):
-            if slipped or (self._slipped and any(0 < f.slip_level < 255 for f, *_ in felt)):
-                self._learn_from_slip()
-            self._slipped = False
+        self.shear_n += SMOOTH * (shear_n - self.shear_n)
+        self._pending_until = self._round + PENDING_ROUNDS if slipped else self._pending_until
+        if self._reflex_until <= self._round < self._pending_until:
+            ratio, strong = shear_n / max(self.normal_n, 0.05), any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in felt)
+            if strong and (not self.slips or shear_n < FAINT_N or ratio > LIKELY * self.friction):
+                self._learn_from_slip(ratio)
         return self._squeeze(RESERVE * (1.2 if flags & WIDE else 1.0), bool(flags & COARSE))
 
-    def _learn_from_slip(self) -> None:
-        self.slips += 1
-        if self.shear_n > 0.1:
-            self.friction = max(min(self.friction, 0.9 * self.shear_n / max(self.normal_n, 0.05)), 0.15)
+    def _learn_from_slip(self, ratio: float) -> None:
+        self.friction = max(0.9 * ratio, 0.03)  # of what is felt, which may be a fifth of the true shear
+        self.slips, self._pending_until = self.slips + 1, 0
         self.least_n = min(max(self.least_n, RESERVE * self.normal_n), self.most_n)
         self._reflex_until = self._round + REFLEX_ROUNDS
 
@@ -80,12 +80,8 @@ class Grip:
         near = (coarse and not reflex) or abs(missing_n) <= 0.05 * self.wanted_n
         wanted_n_s = 0.0 if near else min(max(gain * missing_n, -RELEASE_N_PER_S), most)
         before_n_s = self.speed_mm_s * self.stiffness
-        rate_n_s = before_n_s + SMOOTH * (wanted_n_s - before_n_s)
-        if abs(rate_n_s - before_n_s) > JERK_N_S:
-            self._jerk_until = self._round + JERK_ROUNDS
-        self.speed_mm_s = rate_n_s / self.stiffness
+        self.speed_mm_s = (before_n_s + SMOOTH * (wanted_n_s - before_n_s)) / self.stiffness
         return self.speed_mm_s
-
 
 if __name__ == "__main__":
     grip, closed_mm = Grip(), 0.0
