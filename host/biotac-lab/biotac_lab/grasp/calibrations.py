@@ -24,8 +24,9 @@ PLATE_N = 1 / 320  # its resolution; its noise is .7 of that
 def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
     """What touches in each round of a minute, and the force (n, 3) on the finger in N that the plate measures.
 
-    Each press is on the pad, of .5 to 10 N, rolls by up to 3 mm and is drawn once around by .3 to .9 of its force, as far
-    as skin clings: less, or one side alone, leaves shear unlearnt, which then reads two thirds or half of what it is.
+    Each press is on the pad, of .5 to 10 N, rolls by up to 3 mm, and is drawn once around by .2 to .9 of its force and
+    by 2.5 N at most. Drawn by less, or to one side alone, it leaves shear unlearnt, which then reads half to two thirds
+    of what it is. Drawn by more, as skin yields less to a strong pull, it doubles the shear felt in a firm grip.
     """
     rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
     while len(touches) < MINUTE_S * 100:

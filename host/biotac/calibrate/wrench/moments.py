@@ -20,8 +20,8 @@ from ...core.geometry import Floats
 from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
 from .run import Run
 
-# A finger drifts by some 100 counts in two minutes of warm-up, of which the board's tare leaves what comes during a hold.
-# Training for more than that takes from light touches, whose signals are as small, a tenth of their shear.
+# A finger drifts by some 100 counts in two minutes of warm-up; a hold sees of it what comes after the board's tare.
+# Training for more takes some of the shear from light touches, whose signals are as small.
 DRIFT_SIGMA_COUNTS = 40.0
 # A hand acts on a share of the force, so that is what the error is made small in: rows weigh as 1 / (this + |F|)^2.
 # Unweighted, presses of several newtons decide alone (F2 at 1 to 2 N: bias -0.19 N instead of -0.07).

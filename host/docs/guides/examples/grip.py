@@ -83,6 +83,7 @@ class Grip:
         self.speed_mm_s = (before_n_s + SMOOTH * (wanted_n_s - before_n_s)) / self.stiffness
         return self.speed_mm_s
 
+
 if __name__ == "__main__":
     grip, closed_mm = Grip(), 0.0
     with world({"index": SimFinger(11), "thumb": SimFinger(12)}) as hand:
