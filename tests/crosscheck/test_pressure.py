@@ -52,7 +52,7 @@ SETTINGS = default_settings() | {GAIN: 12_345_678, FILTER: 500}
 @pytest.mark.parametrize(
     ("field", "row", "off_by", "value", "words"),
     [
-        ("pressure_force_100un", 280, 1, None, "force from pressure off by 0.0"),
+        ("pressure_force_100un", 280, 1, None, "force from pressure off by"),
         ("pressure_force_100un", 280, -1, None, "force from pressure off by"),
         ("pdc_filtered_q4", 280, 3, None, "filtered pressure off by"),
         ("pdc_filtered_q4", 280, -3, None, "filtered pressure off by"),

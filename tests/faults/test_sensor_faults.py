@@ -44,7 +44,7 @@ UNSEEN: dict[str, tuple[str, dict[str, tuple[str, ...]]]] = {
     "all electrodes drift 1 count/s": ("the tare follows as much", {"fitted": ("rest", "hold")}),
     "all electrodes drift 5 counts/s": (SQUEEZED, {"fitted": ("touch",)}),
     "all electrodes drift 20 counts/s": (SQUEEZED, dict.fromkeys(("fitted", "lin"), ("touch",))),
-    "two electrodes' wires exchanged": (SQUEEZED, {"fitted": ("touch",), "population": ("touch",)}),
+    "two electrodes' wires exchanged": (SQUEEZED, {"fitted": ("touch",)}),
     "cross-talk of 30 % between fingers": (PRESSED, {"fitted": WHEN}),
     "cross-talk of 100 % between fingers": (PRESSED, dict.fromkeys(MODELS, WHEN)),
 }  # fmt: skip

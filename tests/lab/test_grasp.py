@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biotac import FrameFlags, Trust
+from biotac import Frame, FrameFlags, Trust
 from biotac_lab.cli import main
 from biotac_lab.grasp import law, runs
 from biotac_lab.grasp.felt import Board, TrueForce
@@ -73,7 +73,7 @@ def test_slides_and_slips_are_counted() -> None:
     assert slides.facts() == expected
 
 
-def test_the_law_stays_where_nothing_is_known_and_is_deaf_while_it_squeezes() -> None:
+def test_the_law_stays_where_nothing_is_known_and_believes_strong_and_likely_slips() -> None:
     grip, plant, sense = law.load(law.EXAMPLE)(), Plant(THING), TrueForce(2)
     speed = 10.0
     for _ in range(150):
@@ -81,9 +81,21 @@ def test_the_law_stays_where_nothing_is_known_and_is_deaf_while_it_squeezes() ->
         frames, _ = sense.feel(plant)
         speed = grip.step(frames, False)
     assert grip.holds and grip.normal_n == pytest.approx(0.8, rel=0.06)
-    sheared = [replace(frame, force_n=np.add(frame.force_n, [0.0, 0.6, 0.0])) for frame in frames]
-    assert grip.step(sheared, True) > 0 and grip.slips == 1  # heard, and squeezes
-    assert grip.step(sheared, True) > 0 and grip.slips == 1  # its own squeeze
+
+    def sheared(shear_n: float, level: int) -> list[Frame]:
+        return [replace(f, force_n=np.add(f.force_n, [0.0, shear_n, 0.0]), slip_level=level) for f in frames]
+
+    for level, slipped, slips in ((15, True, 0), (255, False, 0), (0, False, 0), (60, False, 0), (60, True, 1)):
+        grip.step(sheared(0.3, level), slipped)  # as a squeeze shakes; not judged; nothing; too late; a slip
+        assert grip.slips == slips
+    assert grip.friction == pytest.approx(0.9 * 0.3 / grip.normal_n)
+    assert grip.step(sheared(0.3, 60), True) > 0 and grip.slips == 1  # its own squeeze
+    for _ in range(10):
+        grip.step(sheared(0.1, 0), False)
+    grip.step(sheared(0.15, 60), True)
+    assert grip.slips == 1  # half of the friction that the slip taught
+    grip.step(sheared(0.3, 60), True)
+    assert grip.slips == 2
     blind = [replace(frame, trust=Trust.HOLD) for frame in frames]
     for none in ([None, None], blind, [replace(frame, force_n=np.full(3, math.nan)) for frame in frames]):
         assert grip.step(none, False) == 0.0

@@ -161,5 +161,5 @@ uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES])
     for (int i = 0; i < BT_ELECTRODES; i++) {
         sum_q4 += bounded(bt_abs32(e_q4[i]));
     }
-    return STRENGTH(sum_q4) * GAIN(sum_q4) >> 8;
+    return STRENGTH(sum_q4);
 }

@@ -26,7 +26,7 @@ typedef struct {
 // (SPEC.md, Population map). No input overflows.
 bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3]);
 
-// The strength of a touch by the sum of all signals, in 100 uN, at most 303 000.
+// The strength of a firm touch by the sum of all signals, before the gain, in 100 uN, at most 303 000.
 uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES]);
 
 #endif

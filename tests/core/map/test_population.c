@@ -222,7 +222,7 @@ TEST(what_is_guessed_goes_as_the_maps_share_grows)
         double away = (256.0 - result.share) / 256 * result.strength_100un / 10;
         assert_true(fabs(guess_mn[0] - .4 * away) < 2 + .003 * away
                     && fabs(guess_mn[1] - .3 * away) < 2 + .003 * away);
-        assert_int_equal(bt_strength_100un(e_q4), result.strength_100un);
+        assert_int_equal(bt_strength_100un(e_q4) * result.gain >> 8, result.strength_100un);
     }
 }
 

@@ -118,21 +118,27 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
         found["poked: SLIP", n_s, rattle].append(reported)
 
 
-def _held(pac: Any) -> list[Any]:
-    """When, in s, a finger that has long held something tells SLIP and STUCK, of PAC (n, 22) from then on."""
+def _held(pac: Any) -> tuple[Any, Any, Any]:
+    """When, in s, a finger that has long held something reports SLIP and STUCK, and each round's level.
+
+    ``pac`` (n, 22) is its PAC from then on.
+    """
     counts, pdc = np.full((420 + len(pac), 19), 3000), np.full(420 + len(pac), 1326)
     counts[300:, :6], pdc[300:] = 2900, 1386
     quiet = np.full((420, 22), int(np.median(pac[0])))
-    events = Finger().events(counts, pdc, pac=np.concatenate([quiet, pac]).astype(np.uint16))
-    return [times - 4.2 for times in _times(events)]
+    pac = np.concatenate([quiet, pac]).astype(np.uint16)
+    begin_s, end_s = (times - 4.2 for times in _times(Finger().events(counts, pdc, pac=pac)))
+    results = Finger(quantities=messages.QuantityFlags.EVENTS).feed(counts, pdc, pac=pac)
+    return begin_s, end_s, results["slip_level"][len(quiet) :]
 
 
 def _real_slides(data: Any) -> list[tuple[str, Any]]:
-    slid, late_ms = list[bool](), list[float]()
+    slid, late_ms, levels = list[bool](), list[float](), list[int]()
     for trial in sorted(name[: -len("frame")] for name in data.files if name.endswith("_frame")):
         t_s, at_s = data[f"{trial}t"], data[f"{trial}cv_t"]
         speed_m_s = np.linalg.norm(data[f"{trial}cv"][:, :3], axis=1)
-        begin_s, end_s = _held(data[f"{trial}frame"][:, 3:25])
+        begin_s, end_s, level = _held(data[f"{trial}frame"][:, 3:25])
+        levels += [int(level[round_ : round_ + 3].max()) for round_ in (begin_s * 100).astype(int)]
         ends_s = (np.arange(len(t_s)) + 1) / 100
         slips = np.searchsorted(begin_s, ends_s) > np.searchsorted(end_s, ends_s)
         slid += slips[np.interp(t_s, at_s, speed_m_s) > SLIDING_M_S].tolist()
@@ -141,7 +147,8 @@ def _real_slides(data: Any) -> list[tuple[str, Any]]:
             late_ms.append(1e3 * (t_s[0] + begin_s[0] - onset_s) if len(begin_s) else np.inf)
     late = np.abs(late_ms)
     within = [(f"onsets within {ms} ms of {len(late)}", int((late <= ms).sum())) for ms in (30, 50)]
-    return [("sliding told, %", 100 * float(np.mean(slid))), *within, ("latest, ms", max(late_ms))]
+    strong = [("level in the first three rounds, exceeded by 95 %", float(np.percentile(levels, 5)))]
+    return [("sliding reported, %", 100 * float(np.mean(slid))), *within, ("latest, ms", max(late_ms)), *strong]
 
 
 def _real_taps(data: Any) -> list[tuple[str, Any]]:

@@ -18,7 +18,7 @@ from ...wire.map_gen import Gate, Kind
 from .moments import Sums
 
 # Ridge per row, in units of each column's own variance; every model is fitted with both.
-LAMBDAS = (1e-6, 1e-4)
+LAMBDAS = (3e-6, 3e-4)
 # The same towards the map of other fingers, which deserves more trust. For F1 and F2, each with the other's map, a
 # third of the recording is then as good as half of it without; with the whole recording it adds a fiftieth to F1's
 # error and takes a fifteenth off F2's.

@@ -22,7 +22,7 @@ from .run import Run
 
 # A finger drifts by some 100 counts in two minutes of warm-up; a hold sees of it what comes after the board's tare.
 # Training for more takes some of the shear from light touches, whose signals are as small.
-DRIFT_SIGMA_COUNTS = 40.0
+DRIFT_SIGMA_COUNTS = 50.0
 # A hand acts on a share of the force, so that is what the error is made small in: rows weigh as 1 / (this + |F|)^2.
 # Unweighted, presses of several newtons decide alone (F2 at 1 to 2 N: bias -0.19 N instead of -0.07).
 SHARE_FROM_N = 0.7
