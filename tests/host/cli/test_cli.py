@@ -126,7 +126,9 @@ def test_stream_prints_events_between_the_frames(capsys) -> None:
     assert levels and {row["trust"] for row in rows if row.get("event") == "jolt"} == {None}
     assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "4", "--events"]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if "  trust " in line]
-    assert [line.split("trust ")[1] for line in lines] == [biotac.Trust(level).name for level in levels]
+    seen, expected = [line.split("trust ")[1] for line in lines], [biotac.Trust(level).name for level in levels]
+    both = min(len(seen), len(expected))  # either run may read a round more than the other
+    assert both and seen[:both] == expected[:both]
 
 
 def test_stream_thins_out_for_people(capsys) -> None:
