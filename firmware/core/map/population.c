@@ -59,29 +59,29 @@ static inline uint32_t bounded(uint32_t size_q4)
 
 static touch touch_of(const int32_t e_q4[BT_ELECTRODES])
 {
-    touch of = {.sum_q4 = 0};
+    touch sums = {.sum_q4 = 0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t size = bounded(bt_abs32(e_q4[i]));
-        of.sum_q4 += size;
-        of.pressed_q4 += e_q4[i] < 0 ? size : 0;
-        of.x[i] = bt_with_sign(size, e_q4[i]);
+        sums.sum_q4 += size;
+        sums.pressed_q4 += e_q4[i] < 0 ? size : 0;
+        sums.x[i] = bt_with_sign(size, e_q4[i]);
     }
-    int up = SUM_BITS - bt_bit_length(of.sum_q4);
+    int up = SUM_BITS - bt_bit_length(sums.sum_q4);
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint32_t size = bt_abs32(of.x[i]);
+        uint32_t size = bt_abs32(sums.x[i]);
         size = up > 0 ? size << up : size >> -up;
-        of.sum += size;
-        of.x[i] = bt_with_sign(size, of.x[i]);
+        sums.sum += size;
+        sums.x[i] = bt_with_sign(size, sums.x[i]);
     }
-    return of;
+    return sums;
 }
 
 // Along the outward normals of the compressed electrodes, with .6 of their tilt.
-static void along_normals(const touch *of, uint32_t strength_100un, int32_t force_100un[3])
+static void along_normals(const touch *sums, uint32_t strength_100un, int32_t force_100un[3])
 {
     int32_t to[3] = {0, 0, 0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        int32_t x = of->x[i] & bt_shift_down(of->x[i], 31);
+        int32_t x = sums->x[i] & bt_shift_down(sums->x[i], 31);
         const int16_t *r = bt_electrode_um[i];
         to[0] += x * (r[0] > 0 ? r[0] : 0); // on the cylinder a normal has no x
         to[1] += x * r[1];
@@ -89,7 +89,7 @@ static void along_normals(const touch *of, uint32_t strength_100un, int32_t forc
     }
     to[0] *= 3; // of 5
     to[1] *= 3;
-    to[2] = 5 * to[2] + 5 * (int32_t)UPRIGHT(of->sum);
+    to[2] = 5 * to[2] + 5 * (int32_t)UPRIGHT(sums->sum);
     int down = bt_bit_length(bt_abs32(to[0]) | bt_abs32(to[1]) | bt_abs32(to[2])) - 15;
     uint32_t size[3], square = 0;
     for (int d = 0; d < 3; d++) {
@@ -118,41 +118,42 @@ static uint32_t furthest(const int32_t a[3], const int32_t b[3])
     return most;
 }
 
-static void mix(const bt_likeness *its, int32_t force_100un[3])
+static void mix(const bt_likeness *likeness, int32_t force_100un[3])
 {
-    int32_t part = (int32_t)(its->share * its->gain >> 8), rest = (int32_t)its->gain - part;
+    int32_t part = (int32_t)(likeness->share * likeness->gain >> 8), rest = (int32_t)likeness->gain - part;
     for (int d = 0; d < 3; d++) {
         int32_t by_map = part > 0 ? force_100un[d] * part : 0; // far off, it need not fit
-        int32_t sum = by_map + its->otherwise_100un[d] * rest;
+        int32_t sum = by_map + likeness->otherwise_100un[d] * rest;
         force_100un[d] = bt_with_sign((bt_abs32(sum) + BT_POPULATION_ALL / 2) >> 8, sum);
     }
 }
 
 bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
 {
-    touch of = touch_of(e_q4);
-    uint32_t firm_100un = STRENGTH(of.sum_q4);
-    bt_likeness its = {.outside = of.sum_q4 < LEAST_Q4, .gain = GAIN(of.sum_q4)};
-    its.strength_100un = firm_100un * its.gain >> 8;
+    touch sums = touch_of(e_q4);
+    uint32_t firm_100un = STRENGTH(sums.sum_q4);
+    bt_likeness likeness = {.outside = sums.sum_q4 < LEAST_Q4, .gain = GAIN(sums.sum_q4)};
+    likeness.strength_100un = firm_100un * likeness.gain >> 8;
     force_100un[0] = force_100un[1] = force_100un[2] = 0;
-    if (of.sum_q4 == 0) {
-        return its;
+    if (sums.sum_q4 == 0) {
+        return likeness;
     }
-    along_normals(&of, firm_100un, its.otherwise_100un);
+    along_normals(&sums, firm_100un, likeness.otherwise_100un);
     bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
-    uint32_t off = furthest(force_100un, its.otherwise_100un), far = FAR_8 * firm_100un;
+    uint32_t off = furthest(force_100un, likeness.otherwise_100un), far = FAR_8 * firm_100un;
     if (off < far / 8) {
         uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
-        its.share = at_most((int32_t)share);
-        uint32_t firm = at_most(bt_shift_down((int32_t)of.sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
-        its.share = its.share < firm ? its.share : firm;
+        likeness.share = at_most((int32_t)share);
+        uint32_t firm = at_most(bt_shift_down((int32_t)sums.sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
+        likeness.share = likeness.share < firm ? likeness.share : firm;
     }
-    its.outside |= off > OUTSIDE * firm_100un
-                   || (its.share < BT_POPULATION_ALL && FEW_PRESSED * of.pressed_q4 < of.sum_q4);
-    if (its.share < BT_POPULATION_ALL || its.gain < BT_POPULATION_ALL) {
-        mix(&its, force_100un);
+    likeness.outside |=
+        off > OUTSIDE * firm_100un
+        || (likeness.share < BT_POPULATION_ALL && FEW_PRESSED * sums.pressed_q4 < sums.sum_q4);
+    if (likeness.share < BT_POPULATION_ALL || likeness.gain < BT_POPULATION_ALL) {
+        mix(&likeness, force_100un);
     }
-    return its;
+    return likeness;
 }
 
 uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES])
