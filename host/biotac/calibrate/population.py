@@ -24,13 +24,13 @@ from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, GATED, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
 from ..map.margin import UNKNOWN, Margin
-from ..map.population import ALL, SHIPPED, Likeness, board_map, likeness, shipped
+from ..map.population import SHIPPED, Likeness, board_map, likeness, shipped
 from ..version import __version__
 from ..wire.frames import FORCE_LSB_PER_N
 
 __all__ = [
-    "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps",
-    "light_gain", "load", "normals", "provenance_of",
+    "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps", "load",
+    "normals", "provenance_of",
 ]  # fmt: skip
 
 FORMAT = "biotac-population-map/1"
@@ -89,11 +89,6 @@ class Population:
 def columns(e: Floats, tare: Floats) -> Floats:
     """The columns (n, 114) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
     return map_columns.columns(Signals(e, tare), GATED)
-
-
-def light_gain(e: Floats) -> Floats:
-    """The gain (n,), .4 to 1, of the published force of signals ``e`` (n, 19) in counts: below 1 in a light touch."""
-    return likeness(e, np.zeros((len(e), len(AXES)), np.int64)).gain / ALL
 
 
 def normals() -> Floats:

@@ -104,17 +104,20 @@ class Likeness:
             found[k] = guess[0], guess[1]
         return found / MN_PER_N
 
+    @property
+    def map_part(self) -> Integers:
+        """The factor (n,) of the map's force in what is published, in 1/256; the rest's is gain less this."""
+        return self.share * self.gain // ALL
+
     def mixed(self, force_n: Floats) -> Floats:
         """The map's force (n, 3) in N, mixed with the rest, times the gain."""
-        part = self.share * self.gain // ALL
+        part = self.map_part
         return (part / ALL)[:, None] * force_n + ((self.gain - part) / ALL)[:, None] * self.otherwise_n
 
 
 def likeness(e: Floats, force_100un: Integers) -> Likeness:
     """How like the training the signals ``e`` (n, 19) in counts are, of which the map makes ``force_100un`` (n, 3)."""
-    e_q4 = np.rint(16 * e).astype(np.int64)
-    size = np.maximum(np.abs(e_q4) - _NOISE_Q4, 0)
-    q4 = np.sign(e_q4) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
+    q4 = _bounded_q4(e)
     total = np.abs(q4).sum(axis=1)
     up = (_SUM_BITS - np.ceil(np.log2(total + 1.0)).astype(np.int64))[:, None]
     size = np.abs(q4) << np.maximum(up, 0) >> np.maximum(-up, 0)
@@ -125,8 +128,25 @@ def likeness(e: Floats, force_100un: Integers) -> Likeness:
     share = np.clip(np.minimum(share, total - _LIGHT_Q4 >> 6), 0, ALL)
     pressed = -np.minimum(q4, 0).sum(axis=1)
     outside = (total < _LEAST_Q4) | (off > _OUTSIDE * firm) | ((share < ALL) & (8 * pressed < total))
-    gain = np.clip(total * 13 >> 11, _GAIN_LEAST, ALL)
+    gain = _gain(total)
     return Likeness(share, gain, outside, along / FORCE_LSB_PER_N, firm * gain // ALL)
+
+
+def light_gain(e: Floats) -> Floats:
+    """The gain (n,), .4 to 1, of the published force of signals ``e`` (n, 19) in counts: below 1 in a light touch."""
+    return _gain(np.abs(_bounded_q4(e)).sum(axis=1)) / ALL
+
+
+def _bounded_q4(e: Floats) -> Integers:
+    e_q4 = np.rint(16 * e).astype(np.int64)
+    size = np.maximum(np.abs(e_q4) - _NOISE_Q4, 0)
+    bounded: Integers = np.sign(e_q4) * np.where(size > _KNEE_Q4, _KNEE_Q4 + (size - _KNEE_Q4 >> 2), size)
+    return bounded
+
+
+def _gain(total_q4: Integers) -> Integers:
+    gain: Integers = np.clip(total_q4 * 13 >> 11, _GAIN_LEAST, ALL)
+    return gain
 
 
 def board_force_100un(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Integers:

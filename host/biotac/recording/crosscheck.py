@@ -233,7 +233,7 @@ def _likeness(messages: StructArray) -> population.Likeness:
 
 def _population_bound_n(messages: StructArray) -> NDArray[np.float64]:
     """Bound (n, 3) of the population map's force in N from its formats; what it is mixed with is exact."""
-    part = (_likeness(messages).share / population.ALL)[:, None]
+    part = (_likeness(messages).map_part / population.ALL)[:, None]
     wanted = {block: values * FORCE_LSB_PER_N for block, values in population.blocks().items()}
     off = bound_of(population.on_board(), wanted, tared(messages["counts"], messages["tare_q4"])) / FORCE_LSB_PER_N
     half = 0.5 + 1e-6  # what the normals make alone is often off by just a half, give or take float64's own rounding

@@ -28,7 +28,7 @@ from .finger_fit import Fit, Floats, Half, completed, dumps, halves
 ABOUT = "The simulated finger: its numbers fitted to two real fingers, and how it compares with them."
 EXAMPLE = "biotac-lab finger F1.npz F2.npz --check"
 FINGERS = 20
-UNSEEN_N = np.array([0.54, 0.37, 0.44])  # F2 by the map of F1 before light touches had a gain; now: the other way round
+UNSEEN_N = np.array([0.54, 0.37, 0.44])  # F2 by the map of F1, before light touches had a gain
 LEAST_SHARE, MOST_SHARE, MOST_OUTSIDE = 0.5, 1.2, 0.1
 PROBE_MM, PROBE_N = 1.0, 2.0
 PRESSES, PRESS_N = 5, (2.0, 6.0)

@@ -51,12 +51,13 @@ def run(args: argparse.Namespace, show: Show) -> int:
     with threadpool_limits(limits=THREADS, user_api="blas"):
         fingers = [Finger.of(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
-        trained, sigma = _calibrated(args, fingers)
+        trained = _calibrated(args, fingers)
         judged = _left_out(args, fingers)
         facts = _facts(args, trained)
         if tested is not None:
             worth = held_out_error.worth(trained.population, tested)
             judged[f"{args.test.name}, the test"] = worth
+            sigma = trained.sigma_n, trained.sigma_scale5_n
             facts |= {"test": args.test.name} | held_out_error.facts(worth, sigma)
         tables = [_errors(facts, judged), _bands(judged)]
         facts["bands"] = tables[-1].facts()
@@ -70,13 +71,13 @@ def run(args: argparse.Namespace, show: Show) -> int:
     return 0
 
 
-def _calibrated(args: argparse.Namespace, fingers: list[Finger]) -> tuple[Trained, tuple[Any, Any]]:
+def _calibrated(args: argparse.Namespace, fingers: list[Finger]) -> Trained:
     sums, runs = [one.sums for one in fingers], [one.aligned for one in fingers]
     population = training.train(sums, symmetric=args.symmetric)
     if len(fingers) > 1:
         population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
     sigma = held_out_error.sigma_of(sums, runs, symmetric=args.symmetric)
-    return Trained(population, *sigma, provenance_of(args.files, args.source, symmetric=args.symmetric)), sigma
+    return Trained(population, *sigma, provenance_of(args.files, args.source, symmetric=args.symmetric))
 
 
 def _left_out(args: argparse.Namespace, fingers: list[Finger]) -> dict[str, Worth]:

@@ -24,7 +24,7 @@ from .run import Run
 # Training for more takes some of the shear from light touches, whose signals are as small.
 DRIFT_SIGMA_COUNTS = 50.0
 # A hand acts on a share of the force, so that is what the error is made small in: rows weigh as 1 / (this + |F|)^2.
-# Unweighted, presses of several newtons decide alone (F2 at 1 to 2 N: bias -0.19 N instead of -0.07).
+# Unweighted, presses of several newtons decide alone (F2 at 1 to 2 N: bias -0.19 N instead of -0.06).
 SHARE_FROM_N = 0.7
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))
 NO_DRIFT = ((0.0, 1.0),)
