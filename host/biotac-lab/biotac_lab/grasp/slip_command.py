@@ -24,7 +24,7 @@ EXAMPLE = "biotac-lab slip --fingers 10"
 SLOW_N_S, FAST_N_S = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (8.0, 10.0)
 RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of what biotac.sim draws from
 PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
-REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED = 3.0, 0.1, 0.05, 0.002, 95
+REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED, HELD_S = 3.0, 0.1, 0.05, 0.002, 95, 4.2
 SQUEEZED, LET_GO, CALM = ("squeezed: SLIP", 5), ("let go: SLIP", 5), ("at rest and in still holds: level 0", 99)
 Found = dict[tuple[str, float, float], list[bool]]  # by what, N/s and rattle
 
@@ -118,18 +118,19 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
         found["poked: SLIP", n_s, rattle].append(reported)
 
 
-def _held(pac: Any) -> tuple[Any, Any, Any]:
-    """When, in s, a finger that has long held something reports SLIP and STUCK, and each round's level.
-
-    ``pac`` (n, 22) is its PAC from then on.
-    """
-    counts, pdc = np.full((420 + len(pac), 19), 3000), np.full(420 + len(pac), 1326)
+def _long_held(pac: Any) -> tuple[Any, Any, Any]:
+    """Counts, PDC and PAC of a finger that has held something for HELD_S, with PAC (n, 22) as ``pac`` from then on."""
+    rounds = round(100 * HELD_S)
+    counts, pdc = np.full((rounds + len(pac), 19), 3000), np.full(rounds + len(pac), 1326)
     counts[300:, :6], pdc[300:] = 2900, 1386
-    quiet = np.full((420, 22), int(np.median(pac[0])))
-    pac = np.concatenate([quiet, pac]).astype(np.uint16)
-    begin_s, end_s = (times - 4.2 for times in _times(Finger().events(counts, pdc, pac=pac)))
-    results = Finger(quantities=messages.QuantityFlags.EVENTS).feed(counts, pdc, pac=pac)
-    return begin_s, end_s, results["slip_level"][len(quiet) :]
+    quiet = np.full((rounds, 22), int(np.median(pac[0])))
+    return counts, pdc, np.concatenate([quiet, pac]).astype(np.uint16)
+
+
+def _held_times(pac: Any) -> list[Any]:
+    """When, in s from the beginning of ``pac``, such a finger reports SLIP and STUCK."""
+    counts, pdc, pac = _long_held(pac)
+    return [times - HELD_S for times in _times(Finger().events(counts, pdc, pac=pac))]
 
 
 def _real_slides(data: Any) -> list[tuple[str, Any]]:
@@ -137,7 +138,10 @@ def _real_slides(data: Any) -> list[tuple[str, Any]]:
     for trial in sorted(name[: -len("frame")] for name in data.files if name.endswith("_frame")):
         t_s, at_s = data[f"{trial}t"], data[f"{trial}cv_t"]
         speed_m_s = np.linalg.norm(data[f"{trial}cv"][:, :3], axis=1)
-        begin_s, end_s, level = _held(data[f"{trial}frame"][:, 3:25])
+        pac = data[f"{trial}frame"][:, 3:25]
+        begin_s, end_s = _held_times(pac)
+        counts, pdc, words = _long_held(pac)
+        level = Finger(quantities=messages.QuantityFlags.EVENTS).feed(counts, pdc, pac=words)["slip_level"][-len(pac) :]
         levels += [int(level[round_ : round_ + 3].max()) for round_ in (begin_s * 100).astype(int)]
         ends_s = (np.arange(len(t_s)) + 1) / 100
         slips = np.searchsorted(begin_s, ends_s) > np.searchsorted(end_s, ends_s)
@@ -153,6 +157,8 @@ def _real_slides(data: Any) -> list[tuple[str, Any]]:
 
 def _real_taps(data: Any) -> list[tuple[str, Any]]:
     pac = np.concatenate([data[name] for name in data.files if name.endswith("_signals")])[:, :594].astype(int)
-    first_s = np.array([min(_held(np.clip(2038 + one.reshape(-1, 22), 0, 4095))[0], default=np.inf) for one in pac])
+    first_s = np.array(
+        [min(_held_times(np.clip(2038 + one.reshape(-1, 22), 0, 4095))[0], default=np.inf) for one in pac]
+    )
     shares = [100 * float(np.mean(first_s < before_s)) for before_s in (np.inf, TAPPED / 2200)]
     return [("handovers", len(pac)), ("with a SLIP, %", shares[0]), ("before the tap, %", shares[1])]
