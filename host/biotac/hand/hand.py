@@ -52,6 +52,18 @@ def _of(part: Callable[[Hand], T], method: Callable[Concatenate[T, P], R]) -> Ca
     return call
 
 
+def _commands(hand: Hand) -> Commands:
+    return hand._commands
+
+
+def _reading(hand: Hand) -> Reading:
+    return hand._reading
+
+
+def _subscriptions(hand: Hand) -> Subscriptions:
+    return hand._subscriptions
+
+
 class Hand:
     """A board with its fingers. Made by ``biotac.open``; use it as a context manager."""
 
@@ -216,18 +228,18 @@ class Hand:
 
     # ---- commands (commands.py) ----------------------------------------------------------------
 
-    ping = _of(lambda hand: hand._commands, Commands.ping)
-    status = _of(lambda hand: hand._commands, Commands.status)
-    sync = _of(lambda hand: hand._commands, Commands.sync)
-    take_link = _of(lambda hand: hand._commands, Commands.take_link)
-    sensor_status = _of(lambda hand: hand._commands, Commands.sensor_status)
-    sensor_info = _of(lambda hand: hand._commands, Commands.sensor_info)
-    point = _of(lambda hand: hand._commands, Commands.point)
-    tare = _of(lambda hand: hand._commands, Commands.tare)
-    set_tare = _of(lambda hand: hand._commands, Commands.set_tare)
-    hold = _of(lambda hand: hand._commands, Commands.hold)
-    release = _of(lambda hand: hand._commands, Commands.release)
-    grasp = _of(lambda hand: hand._commands, Commands.grasp)
+    ping = _of(_commands, Commands.ping)
+    status = _of(_commands, Commands.status)
+    sync = _of(_commands, Commands.sync)
+    take_link = _of(_commands, Commands.take_link)
+    sensor_status = _of(_commands, Commands.sensor_status)
+    sensor_info = _of(_commands, Commands.sensor_info)
+    point = _of(_commands, Commands.point)
+    tare = _of(_commands, Commands.tare)
+    set_tare = _of(_commands, Commands.set_tare)
+    hold = _of(_commands, Commands.hold)
+    release = _of(_commands, Commands.release)
+    grasp = _of(_commands, Commands.grasp)
 
     # ---- what arrives --------------------------------------------------------------------------
 
@@ -275,9 +287,9 @@ class Hand:
             for row in batch.frames:
                 yield Frame.from_row(row)
 
-    _go = _of(lambda hand: hand._reading, Reading.go)
-    read = _of(lambda hand: hand._reading, Reading.read)
-    read_batch = _of(lambda hand: hand._reading, Reading.read_batch)
+    _go = _of(_reading, Reading.go)
+    read = _of(_reading, Reading.read)
+    read_batch = _of(_reading, Reading.read_batch)
 
     def next_round(self, after: Round | None = None, timeout_s: float = 1.0) -> Round:
         """The frames of all fingers of one round and the events up to its end, starting the stream if need be.
@@ -296,14 +308,14 @@ class Hand:
 
     # ---- callbacks (subscriptions.py) ----------------------------------------------------------
 
-    on_batch = _of(lambda hand: hand._subscriptions, Subscriptions.on_batch)
-    on_event = _of(lambda hand: hand._subscriptions, Subscriptions.on_event)
-    on_slip = _of(lambda hand: hand._subscriptions, Subscriptions.on_slip)
-    on_touch = _of(lambda hand: hand._subscriptions, Subscriptions.on_touch)
-    on_bands = _of(lambda hand: hand._subscriptions, Subscriptions.on_bands)
-    on_tare = _of(lambda hand: hand._subscriptions, Subscriptions.on_tare)
-    on_status = _of(lambda hand: hand._subscriptions, Subscriptions.on_status)
-    on_gap = _of(lambda hand: hand._subscriptions, Subscriptions.on_gap)
+    on_batch = _of(_subscriptions, Subscriptions.on_batch)
+    on_event = _of(_subscriptions, Subscriptions.on_event)
+    on_slip = _of(_subscriptions, Subscriptions.on_slip)
+    on_touch = _of(_subscriptions, Subscriptions.on_touch)
+    on_bands = _of(_subscriptions, Subscriptions.on_bands)
+    on_tare = _of(_subscriptions, Subscriptions.on_tare)
+    on_status = _of(_subscriptions, Subscriptions.on_status)
+    on_gap = _of(_subscriptions, Subscriptions.on_gap)
 
     # ---- recording -----------------------------------------------------------------------------
 

@@ -244,17 +244,17 @@ class Recording:
             at_us = self.begin_us + at_s * 1e6
             named = [label for label in named if label.t_us is not None and abs(label.t_us - at_us) <= 10_000]
         if not named:
-            there = ", ".join(sorted({repr(label.text) for label in self.labels})) or "none"
-            raise InputError(f"no label {text!r}{'' if at_s is None else f' at {at_s:g} s'}: expected one of {there}")
+            texts = ", ".join(sorted({repr(label.text) for label in self.labels})) or "none"
+            raise InputError(f"no label {text!r}{'' if at_s is None else f' at {at_s:g} s'}: expected one of {texts}")
         for label in named:
             labels_module.append(self.path, self.begin_ns, label, removed=True)
         vars(self).pop("labels", None)
         return len(named)
 
     def _check_present(self, fingers: set[int]) -> None:
-        there = {finger for block in self.heads() for finger in block.rest.fingers}
-        if absent := fingers - there:
-            seen = ", ".join(map(str, sorted(there))) or "none"
+        present = {finger for block in self.heads() for finger in block.rest.fingers}
+        if absent := fingers - present:
+            seen = ", ".join(map(str, sorted(present))) or "none"
             raise InputError(f"{self.path.name} has no rows of finger {min(absent)}: expected one or more of {seen}")
 
     def __repr__(self) -> str:

@@ -41,12 +41,17 @@ def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
         "fingers": fingers,
         "frames_lost": sum(lost for block in heads for _, _, lost in block.rest.lost),
         "gaps": sum(len(block.rest.gaps) for block in heads),
-        "labels": [
-            {"text": label.line(), "at_s": at(recording, label.t_us), "until_s": at(recording, label.end_us)}
-            | {"finger": label.finger}
-            for label in recording.labels
-        ],
+        "labels": labels(recording),
     }
+
+
+def labels(recording: Any) -> list[dict[str, Any]]:
+    """A Recording's labels, for JSON."""
+    return [
+        {"text": label.line(), "at_s": at(recording, label.t_us), "until_s": at(recording, label.end_us)}
+        | {"finger": label.finger}
+        for label in recording.labels
+    ]
 
 
 def at(recording: Any, t_us: int | None) -> float | None:
@@ -71,7 +76,7 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def label_line(label: dict[str, Any]) -> str:
-    """One of ``summary``'s labels for people."""
+    """One of ``labels`` for people."""
     span = "" if label["until_s"] is None else f" to {label['until_s']:.2f} s"
     when = "all of it" if label["at_s"] is None else f"{label['at_s']:.2f} s{span}"
     of_finger = "" if label["finger"] is None else f", finger {label['finger']}"

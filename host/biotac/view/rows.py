@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.unroll import unroll
+from ..features.thermal import KELVIN_AT_0_C
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
@@ -110,7 +111,13 @@ def facts() -> dict[str, Any]:
         ],
         "pac_hz": sensor.SLOT_HZ * sensor.SLOTS.count("PAC") / len(sensor.SLOTS),
         "pac_pa_per_count": sensor.PAC_PA_PER_COUNT,
-        "tdc": {"a": sensor.TDC_A, "b": sensor.TDC_B, "beta_k": sensor.TDC_BETA_K},
+        "thermistor": {
+            "a": sensor.TDC_A,
+            "b": sensor.TDC_B,
+            "beta_k": sensor.TDC_BETA_K,
+            "full_scale": sensor.FULL_SCALE_COUNT,
+            "zero_k": KELVIN_AT_0_C,
+        },
         "flags": [
             {
                 "mask": int(flag),

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import InputError, printable
 from ...partial_file import whole
 from ...recording.rewrite import cut
-from ...recording.summary import label_line, summary
+from ...recording.summary import label_line, labels
 from .. import values
 from ..outputs import say
 from .loading import code, load
@@ -59,8 +59,8 @@ def run_label(args: argparse.Namespace) -> int:
     recording = load(args.recording, quiet=True)
     finger = int(args.finger) if (args.finger or "").isdecimal() else args.finger
     if args.text is None:
-        labels = summary(recording)["labels"]
-        say(args, labels, printable("\n".join(map(label_line, labels))) or f"{args.recording}: no labels")
+        facts = labels(recording)
+        say(args, facts, printable("\n".join(map(label_line, facts))) or f"{args.recording}: no labels")
         return 0
     if args.remove:
         recording.unmark(args.text, args.at_s)
