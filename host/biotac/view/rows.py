@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.unroll import unroll
-from ..features.thermal import KELVIN_AT_0_C
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
@@ -116,7 +115,6 @@ def facts() -> dict[str, Any]:
             "b": sensor.TDC_B,
             "beta_k": sensor.TDC_BETA_K,
             "full_scale": sensor.FULL_SCALE_COUNT,
-            "zero_k": KELVIN_AT_0_C,
         },
         "flags": [
             {

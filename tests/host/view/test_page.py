@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_waits import await_text, link_is, until
 from record_all import record_all
 
 import biotac
@@ -38,6 +37,18 @@ SNAPSHOT = """() => {
     signals: [...panel.querySelectorAll("[data-electrode]")].map((e) => [e.dataset.electrode, e.dataset.value]),
   };
 }"""
+
+
+def until(page: Any, condition: str, argument: Any = None) -> None:
+    page.wait_for_function(condition, arg=argument)
+
+
+def link_is(page: Any, link: str) -> None:
+    page.wait_for_selector(f'#link[data-link="{link}"]')
+
+
+def await_text(page: Any, words: str) -> None:
+    until(page, "w => told.textContent.includes(w)", words)
 
 
 def numbers(texts: list[str]) -> list[float]:

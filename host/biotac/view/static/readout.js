@@ -78,8 +78,8 @@ export class Results {
     panel.dataset.flags = frame.flags;
     VECTORS.forEach(({ key, digits }, row) => frame[key].forEach((v, k) => put(this.cells[row][k], v, digits)));
     for (const element of [this.cells[1][0].parentNode, byId("applied-key")]) element.hidden = Number.isNaN(frame.appliedN[0]);
-    const { a, b, beta_k, full_scale, zero_k } = this.thermistor; // biotac.features.thermal has the formula's source
-    const celsius = frame.tdc < 1 ? NaN : beta_k / Math.log((full_scale * a) / frame.tdc - b) - zero_k;
+    const { a, b, beta_k, full_scale } = this.thermistor; // biotac.features.thermal has the formula's source
+    const celsius = frame.tdc < 1 ? NaN : beta_k / Math.log((full_scale * a) / frame.tdc - b) - 273.15;
     for (const { key, digits = 0 } of SCALARS) put(this.scalars[key], { ...frame, celsius }[key], digits);
     this.scalars.slipLevel.dataset.kind = frame.slipLevel > 0 ? "warn" : "calm";
     put(this.scalars.seq, frame.seq, 0);
