@@ -88,14 +88,27 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_and_likely_sli
     for level, slipped, slips in ((15, True, 0), (255, False, 0), (0, False, 0), (60, False, 0), (60, True, 1)):
         grip.step(sheared(0.3, level), slipped)  # as a squeeze shakes; not judged; nothing; too late; a slip
         assert grip.slips == slips
-    assert grip.friction == pytest.approx(0.9 * 0.3 / grip.normal_n)
-    assert grip.step(sheared(0.3, 60), True) > 0 and grip.slips == 1  # its own squeeze
+    assert grip.needed_n(0.6) == pytest.approx(2 * grip.normal_n / 0.9)  # twice the shear, twice the force
+    assert grip.speed_mm_s > 0
+    grip.step(sheared(0.3, 60), True)
+    assert grip.slips == 1  # its own squeeze
     for _ in range(10):
         grip.step(sheared(0.1, 0), False)
     grip.step(sheared(0.15, 60), True)
-    assert grip.slips == 1  # half of the friction that the slip taught
+    assert grip.slips == 1  # half of the shear at the slip
     grip.step(sheared(0.3, 60), True)
     assert grip.slips == 2
+    for half_n, more in ((0.0, 2.0), (0.3 / 0.45, 2**0.5), (20.0, 1.0)):  # what is hardly known says hardly anything
+        doubted = [replace(f, shear_half_n=half_n) for f in sheared(0.3, 60)]
+        for _ in range(10):
+            grip.step([replace(f, slip_level=0) for f in doubted], False)
+        grip.slips = 0
+        grip.step(doubted, True)
+        assert grip.needed_n(0.6) / grip.needed_n(0.3) == pytest.approx(more, rel=1e-3)
+    for trust, off_n in ((Trust.ACT, 0.0), (Trust.INTERVAL, 0.4)):
+        for _ in range(60):
+            grip.step([replace(f, trust=trust, normal_half_n=0.8) for f in frames], False)
+        assert grip.normal_n - frames[0].force_n[2] == pytest.approx(off_n, abs=0.01)
     blind = [replace(frame, trust=Trust.HOLD) for frame in frames]
     for none in ([None, None], blind, [replace(frame, force_n=np.full(3, math.nan)) for frame in frames]):
         assert grip.step(none, False) == 0.0

@@ -84,7 +84,7 @@ class Board(TrueForce):
         self._world.hand.stop()
         for name, gain in gains.items():
             self._world.hand.board.set_calibration(name, Calibration(force_gain_nn=tuple(gain)))
-        self._world.hand.stream("force", "events")  # what the law needs
+        self._world.hand.stream("force", "poc", "events")  # what the law needs: an interval is one at a contact
         self._world.run(REST_S)
         self._world.run(TOUCH_S, **dict.fromkeys(self._names, Touch(normal_n=1.0, at=at)))
         self._world.run(TOUCH_S)

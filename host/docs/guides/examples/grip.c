@@ -5,19 +5,17 @@
 
 void hand_send(uint8_t id, const void *msg); // example_bare.c
 void close_at(float mm_s);                   // the hand's own: both fingers; negative: open
-#define FINGERS 0x11u                        // index and thumb, chip selects 0 and 4, which meet along z
-#define RESERVE 1.25f
-static const uint32_t WIDE = BT_FRAME_FLAG_ELECTRODE_OUT | BT_FRAME_FLAG_ELECTRODE_MISSING
-                             | BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_ELECTRODE_ALONE | BT_FRAME_FLAG_OUTSIDE;
-static const uint32_t COARSE = BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_BASE_OLD;
+#define FINGERS         0x11u                // index and thumb, chip selects 0 and 4, which meet along z
+#define RESERVE         1.25f
+#define MARGIN(half_mn) ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
 struct grip {
-    float least_n, most_n, friction, stiffness, speed_mm_s, normal_n, shear_n, way_mm, first_n;
+    float least_n, most_n, slip_n, slip_shear_n, power, stiffness, speed_mm_s, normal_n, shear_n, margin_n,
+        way_mm, first_n;
     int round, reflex_until, pending_until, holds, settled, slips;
 } grip;
 static struct felt {
-    float normal_n, shear_n; // sums
-    uint32_t flags, lifted;
-    int frames, slips, level;
+    float normal_n, shear_n, margin_n, half_n; // sums
+    int frames, strong, lifted;
 } felt; // since the last grip_round
 
 void act_on(const bt_msg_frame *frame)
@@ -26,23 +24,24 @@ void act_on(const bt_msg_frame *frame)
     if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[2])) {
         felt.normal_n += (float)force[2] / 1e4f;
         felt.shear_n += hypotf((float)force[0], (float)force[1]) / 1e4f;
-        felt.flags |= frame->flags;
-        felt.lifted |= ~frame->flags & BT_FRAME_FLAG_CONTACT;
-        felt.level =
-            frame->slip_level != 255 && frame->slip_level > felt.level ? frame->slip_level : felt.level;
+        felt.margin_n += frame->trust == BT_TRUST_ACT ? 0 : MARGIN(frame->normal_half_mn) / 2;
+        felt.half_n += MARGIN(frame->shear_half_mn);
+        felt.lifted |= !(frame->flags & BT_FRAME_FLAG_CONTACT);
+        felt.strong |= frame->slip_level >= 22 && frame->slip_level < 255;
         felt.frames++;
     }
 }
 
 void act_on_event(const bt_msg_event *event)
 {
-    felt.slips += event->kind == BT_EVENT_KIND_SLIP;
+    if (event->kind == BT_EVENT_KIND_SLIP)
+        grip.pending_until = grip.round + 4; // the next round, and two
 }
 
 void grip_begin(float least_n, float most_n) // grip.py: 0.8, 12
 {
-    grip = (struct grip){
-        .least_n = least_n, .most_n = most_n, .friction = 0.6f, .stiffness = 0.8f, .speed_mm_s = 10};
+    grip = (struct grip){.least_n = least_n, .most_n = most_n, .slip_n = 0.9f, .slip_shear_n = 0.6f};
+    grip.power = 1, grip.stiffness = 0.8f, grip.speed_mm_s = 10;
 }
 
 void grip_end(void)
@@ -51,51 +50,51 @@ void grip_end(void)
     close_at(-20);
 }
 
-static float squeeze(float reserve, int coarse)
+static float needed_n(float shear_n)
 {
-    const float wanted_n = fminf(fmaxf(grip.least_n, reserve * grip.shear_n / grip.friction), grip.most_n);
-    const float missing_n = wanted_n - grip.normal_n - grip.speed_mm_s * grip.stiffness * 0.03f;
-    const int reflex = grip.round < grip.reflex_until;
-    const int near = (coarse && !reflex) || fabsf(missing_n) <= 0.05f * wanted_n;
-    const float wanted = near ? 0 : fminf(fmaxf((reflex ? 40 : 6) * missing_n, -0.9f), reflex ? 20 : 5);
-    const float before = grip.speed_mm_s * grip.stiffness, change = 0.3f * (wanted - before); // N/s, smoothly
-    grip.settled = fabsf(missing_n) < 0.15f * wanted_n ? grip.settled + 1 : 0;
-    return (before + change) / grip.stiffness;
+    return grip.slip_n / 0.9f * powf(shear_n / grip.slip_shear_n, grip.power);
 }
 
-static void learn_from_slip(float ratio)
+static void learn_from_slip(float shear_n, float half_n)
 {
-    grip.friction = fmaxf(0.9f * ratio, 0.03f);
-    grip.least_n = fminf(fmaxf(grip.least_n, RESERVE * grip.normal_n), grip.most_n);
-    grip.pending_until = 0;
-    grip.reflex_until = grip.round + 8;
-    grip.slips++;
+    grip.slip_n = fmaxf(grip.normal_n, 0.05f), grip.slip_shear_n = fmaxf(shear_n, 0.02f);
+    const float doubt = 0.45f * half_n / grip.slip_shear_n;
+    grip.power = 1 / (1 + doubt * doubt);
+    grip.least_n = fmaxf(grip.least_n, (RESERVE + 0.5f * (1 - grip.power)) * grip.normal_n);
+    grip.pending_until = 0, grip.reflex_until = grip.round + 8, grip.slips++;
+}
+
+static float step(float shear_n)
+{
+    if (!grip.holds) {
+        hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});
+        grip.holds = 1, grip.first_n = grip.normal_n;
+    }
+    grip.way_mm += grip.speed_mm_s * 0.01f;
+    if (grip.way_mm > 0.3f && grip.normal_n - grip.first_n > 0.3f)
+        grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
+    grip.shear_n += 0.3f * (shear_n - grip.shear_n);
+    if (grip.round >= grip.reflex_until && grip.round < grip.pending_until && felt.strong
+        && (!grip.slips || grip.power < 0.5f || grip.normal_n < 1.12f * needed_n(shear_n)))
+        learn_from_slip(shear_n, felt.half_n / (float)felt.frames);
+    const float wanted_n = fminf(fmaxf(grip.least_n, RESERVE * needed_n(grip.shear_n)), grip.most_n);
+    const float before = grip.speed_mm_s * grip.stiffness; // N/s
+    const float missing_n = wanted_n - grip.normal_n - 0.03f * before;
+    const int reflex = grip.round < grip.reflex_until, near = fabsf(missing_n) <= 0.05f * wanted_n;
+    const float wanted = near ? 0 : fminf(fmaxf((reflex ? 40 : 6) * missing_n, -0.9f), reflex ? 40 : 5);
+    grip.settled = fabsf(missing_n) < 0.15f * wanted_n ? grip.settled + 1 : 0;
+    return (before + (reflex ? 1 : 0.3f) * (wanted - before)) / grip.stiffness;
 }
 
 void grip_round(void)
 {
-    const int blind = felt.frames == 0;
+    const float frames = (float)felt.frames;
     grip.round++;
-    grip.speed_mm_s = blind ? 0 : grip.speed_mm_s; // nothing is known: stay
-    grip.normal_n = blind ? grip.normal_n : felt.normal_n / (float)felt.frames;
-    if (!blind && !grip.holds && !felt.lifted) {
-        hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});
-        grip.holds = 1;
-        grip.first_n = grip.normal_n;
-    }
-    if (!blind && grip.holds) {
-        const float shear_n = felt.shear_n / (float)felt.frames,
-                    ratio = shear_n / fmaxf(grip.normal_n, 0.05f);
-        grip.shear_n += 0.3f * (shear_n - grip.shear_n);
-        grip.way_mm += grip.speed_mm_s * 0.01f;
-        if (grip.way_mm > 0.3f && grip.normal_n - grip.first_n > 0.3f)
-            grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
-        grip.pending_until = felt.slips ? grip.round + 3 : grip.pending_until;
-        if (grip.round >= grip.reflex_until && grip.round < grip.pending_until && felt.level >= 22
-            && (grip.slips == 0 || shear_n < 0.1f || ratio > 0.8f * grip.friction))
-            learn_from_slip(ratio);
-        grip.speed_mm_s = squeeze(felt.flags & WIDE ? 1.2f * RESERVE : RESERVE, (felt.flags & COARSE) != 0);
+    if (frames > 0) {
+        grip.margin_n += 0.1f * (felt.margin_n / frames - grip.margin_n);
+        grip.normal_n = felt.normal_n / frames + grip.margin_n;
+        grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : grip.speed_mm_s;
     }
     felt = (struct felt){0};
-    close_at(grip.speed_mm_s);
+    close_at(grip.speed_mm_s = frames > 0 ? grip.speed_mm_s : 0); // nothing is known: stay
 }

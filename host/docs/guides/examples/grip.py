@@ -8,15 +8,14 @@ from biotac.sim import SimFinger, Touch, world
 
 ROUND_S, CLOSING_MM_S = 0.01, 10.0
 LAG_S = 0.03  # from a command to the motion that the next frame shows: the actuator's, and a round
-RESERVE, FRICTION = 1.25, 0.6  # press that much harder than friction needs, which the first slip teaches
-GAIN_PER_S, SQUEEZE_N_PER_S = 6.0, 5.0  # squeeze with so many N/s for each N that is missing, at most
-REFLEX_PER_S, REFLEX_N_PER_S, REFLEX_ROUNDS = 40.0, 20.0, 8  # the same after a slip, and for how long
+RESERVE, FRICTION = 1.25, 0.6  # press that much harder than is needed; the friction that is assumed until a slip
 RELEASE_N_PER_S = 0.9  # a thing that begins to slip is not let go by much before that is reported
 SMOOTH = 0.3  # of a change of rate, or of shear, made in each round: what jumps to and fro shakes like a slip
+CALM = 6.0, 5.0, SMOOTH  # squeeze with so many N/s for each N that is missing, at most, and change it so smoothly
+REFLEX, REFLEX_ROUNDS = (40.0, 40.0, 1.0), 8  # the same after a slip, and for how long
 SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
-LIKELY, FAINT_N = 0.8, 0.1  # of the friction that a slip taught: with less shear another is unlikely, if shear is felt
-WIDE = F.ELECTRODE_OUT | F.ELECTRODE_MISSING | F.RAIL | F.ELECTRODE_ALONE | F.OUTSIDE
-COARSE = F.TEMP | F.BASE_OLD
+LATE, UNLIKELY = 0.9, 1.12  # of what is needed: pressed when a slip is felt; with so much, another is unlikely
+DOUBT, BLIND_RESERVE = 0.45, 0.5  # of shear's half width; of what pressed, on top where shear says nothing
 
 
 class Grip:
@@ -29,8 +28,9 @@ class Grip:
     def __init__(self, towards=((0, 0, 1), (0, 0, 1)), shares=(1.0, 1.0), least_n=0.8, most_n=12.0) -> None:
         self.towards, self.shares = [np.asarray(to, float) for to in towards], shares
         self.least_n, self.most_n, self.wanted_n = least_n, most_n, least_n
-        self.friction, self.stiffness = FRICTION, 0.8  # N/mm in front of the fingers, until it is felt
-        self.speed_mm_s, self.normal_n, self.shear_n = CLOSING_MM_S, 0.0, 0.0
+        self.stiffness = 0.8  # N/mm in front of the fingers, until it is felt
+        self.slip_n, self.slip_shear_n, self.power = LATE, FRICTION, 1.0  # of the latest slip: see needed_n
+        self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = CLOSING_MM_S, 0.0, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
         self._round = self._reflex_until = self._pending_until = self._way_mm = self._first_n = 0
 
@@ -40,47 +40,50 @@ class Grip:
         ``frames`` has each finger's Frame of this round, None where none came; ``slipped``: the board reported a SLIP.
         """
         self._round += 1
-        felt = zip(frames, self.towards, self.shares, strict=True)
-        felt = [(f, f.force_n / share, to) for f, to, share in felt if f is not None and f.trust >= Trust.INTERVAL]
-        felt = [one for one in felt if np.isfinite(one[1]).all()]
-        if not felt:
-            self.speed_mm_s = 0.0  # nothing is known: stay where you are
-            return 0.0
-        normals = [float(force @ to) for _, force, to in felt]
-        shears = [float(np.linalg.norm(force - n * to)) for n, (_, force, to) in zip(normals, felt, strict=True)]
-        shear_n, flags = sum(shears) / len(shears), np.bitwise_or.reduce([int(f.flags) for f, *_ in felt])
-        self.normal_n = sum(normals) / len(normals)
-        if not self.holds:
-            if not all(f.flags & F.CONTACT for f, *_ in felt):
-                return self.speed_mm_s
-            self.holds, self._first_n = True, self.normal_n
+        sides = zip(frames, self.towards, self.shares, strict=True)
+        known = [(f, to, w) for f, to, w in sides if f and f.trust >= Trust.INTERVAL and np.isfinite(f.force_n).all()]
+        self.speed_mm_s = self.speed_mm_s if known else 0.0  # where nothing is known it stays
+        if not known or (not self.holds and not all(f.flags & F.CONTACT for f, *_ in known)):
+            return self.speed_mm_s
+        parts = np.nan_to_num(np.mean([self._parts(*one) for one in known], axis=0))
+        normal_n, shear_n, margin_n, half_n = parts.tolist()
+        self.margin_n += 0.1 * (margin_n - self.margin_n)
+        self.normal_n = normal_n + self.margin_n
+        self._first_n, self.holds = self._first_n if self.holds else self.normal_n, True
         self._way_mm += self.speed_mm_s * ROUND_S
         if self._way_mm > 0.3 and self.normal_n - self._first_n > 0.3:
             self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
         self.shear_n += SMOOTH * (shear_n - self.shear_n)
         self._pending_until = self._round + PENDING_ROUNDS if slipped else self._pending_until
         if self._reflex_until <= self._round < self._pending_until:
-            ratio, strong = shear_n / max(self.normal_n, 0.05), any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in felt)
-            if strong and (not self.slips or shear_n < FAINT_N or ratio > LIKELY * self.friction):
-                self._learn_from_slip(ratio)
-        return self._squeeze(RESERVE * (1.2 if flags & WIDE else 1.0), bool(flags & COARSE))
+            likely = not self.slips or self.power < 0.5 or self.normal_n < UNLIKELY * self.needed_n(shear_n)
+            if likely and any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in known):
+                self._learn_from_slip(shear_n, half_n)
+        return self._squeeze()
 
-    def _learn_from_slip(self, ratio: float) -> None:
-        self.friction = max(0.9 * ratio, 0.03)  # of what is felt, which may be a fifth of the true shear
-        self.slips, self._pending_until = self.slips + 1, 0
-        self.least_n = min(max(self.least_n, RESERVE * self.normal_n), self.most_n)
-        self._reflex_until = self._round + REFLEX_ROUNDS
+    def _parts(self, frame, to, share):  # of its side: what presses, shear, what else may press, shear's half width
+        normal_n = frame.force_n @ to
+        margin_n = 0.0 if frame.trust == Trust.ACT else frame.normal_half_n / 2
+        return np.array([normal_n, np.linalg.norm(frame.force_n - normal_n * to), margin_n, frame.shear_half_n]) / share
 
-    def _squeeze(self, reserve: float, coarse: bool) -> float:
-        self.wanted_n = min(max(self.least_n, reserve * self.shear_n / self.friction), self.most_n)
-        coming_n = self.speed_mm_s * self.stiffness * LAG_S
-        missing_n, reflex = self.wanted_n - self.normal_n - coming_n, self._round < self._reflex_until
-        self.settled = self.settled + 1 if abs(missing_n) < 0.15 * self.wanted_n else 0
-        gain, most = (REFLEX_PER_S, REFLEX_N_PER_S) if reflex else (GAIN_PER_S, SQUEEZE_N_PER_S)
-        near = (coarse and not reflex) or abs(missing_n) <= 0.05 * self.wanted_n
-        wanted_n_s = 0.0 if near else min(max(gain * missing_n, -RELEASE_N_PER_S), most)
+    def needed_n(self, shear_n: float) -> float:
+        """What each side has to press with at this shear, by the latest slip; where shear says nothing, as then."""
+        return self.slip_n / LATE * (shear_n / self.slip_shear_n) ** self.power
+
+    def _learn_from_slip(self, shear_n: float, half_n: float) -> None:
+        self.slip_n, self.slip_shear_n = max(self.normal_n, 0.05), max(shear_n, 0.02)
+        self.power = 1 / (1 + (DOUBT * half_n / self.slip_shear_n) ** 2)
+        self.least_n = max(self.least_n, (RESERVE + BLIND_RESERVE * (1 - self.power)) * self.normal_n)
+        self.slips, self._pending_until, self._reflex_until = self.slips + 1, 0, self._round + REFLEX_ROUNDS
+
+    def _squeeze(self) -> float:
+        self.wanted_n = min(max(self.least_n, RESERVE * self.needed_n(self.shear_n)), self.most_n)
         before_n_s = self.speed_mm_s * self.stiffness
-        self.speed_mm_s = (before_n_s + SMOOTH * (wanted_n_s - before_n_s)) / self.stiffness
+        missing_n = self.wanted_n - self.normal_n - LAG_S * before_n_s
+        self.settled = self.settled + 1 if abs(missing_n) < 0.15 * self.wanted_n else 0
+        gain, most, smooth = REFLEX if self._round < self._reflex_until else CALM
+        wanted_n_s = min(max(gain * missing_n * (abs(missing_n) > 0.05 * self.wanted_n), -RELEASE_N_PER_S), most)
+        self.speed_mm_s = (before_n_s + smooth * (wanted_n_s - before_n_s)) / self.stiffness
         return self.speed_mm_s
 
 
