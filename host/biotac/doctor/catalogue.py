@@ -73,7 +73,7 @@ CATALOGUE: dict[str, Entry] = {
         "`sudo biotac doctor --udev-rule install` tells it to leave our boards alone; then plug the board in again.",
     ),
     "port_failed": error(
-        "The port is there or was named, but cannot be opened.",
+        "The port is there or was named, but cannot be opened, or is no board.",
         "Read the message above; `biotac list` shows this machine's ports.",
     ),
     "not_a_gateway": error(

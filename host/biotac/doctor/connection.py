@@ -5,12 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ..errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
+from .. import errors
 from ..link.holders import holders_text
 from ..version import __version__
 from ..wire.identity import version_text
 from .catalogue import Finding
 from .facts import Facts
+
+#: What a port that opened ended with, and the finding's code; any other error is ``port_failed``.
+BY_ERROR: dict[type[errors.BiotacError], str] = {
+    errors.NotAGatewayError: "not_a_gateway",
+    errors.DeviceLostError: "board_lost",
+    errors.WireVersionError: "wire_version",
+    errors.CommandRefusedError: "refused",
+}
 
 
 def check(facts: Facts) -> Iterator[Finding]:
@@ -29,22 +37,17 @@ def check(facts: Facts) -> Iterator[Finding]:
         return
     if not system.permitted:
         yield Finding("no_permission", f"no permission to open {facts.port}; it is owned by {system.owner}")
-    elif isinstance(error, PortBusyError) or (isinstance(error, PortError) and system.holders):
+    elif isinstance(error, errors.PortBusyError) or (isinstance(error, errors.PortError) and system.holders):
         yield Finding("port_busy", f"{facts.port} is in use by {holders_text(system.holders)}")
-    elif isinstance(error, PortError):
+    elif error is not None and not isinstance(error, tuple(BY_ERROR)):
         yield Finding("port_failed", str(error))
     elif system.holders:
         yield Finding("port_shared", f"{facts.port} is also open in {holders_text(system.holders)}")
     if system.modem_manager and not system.left_alone:
         yield Finding("modem_manager", f"ModemManager is running, and udev has no ID_MM_DEVICE_IGNORE for {facts.port}")
-    if isinstance(error, NotAGatewayError):
-        yield Finding("not_a_gateway", str(error))
-    if isinstance(error, DeviceLostError):
-        yield Finding("board_lost", str(error))
-    if isinstance(error, WireVersionError):
-        yield Finding("wire_version", str(error))
-    if isinstance(error, CommandRefusedError):
-        yield Finding("refused", str(error))
+    for kind, code in BY_ERROR.items():
+        if isinstance(error, kind):
+            yield Finding(code, str(error))
     if facts.board is not None:
         for warning in facts.board.warnings:
             yield Finding(warning.code, warning.text)

@@ -40,6 +40,9 @@ def examine(
     try:
         # pace=1.0: a simulated board runs in real time, unless its PORT says otherwise.
         with open_board(device, pace=1.0, reconnect=by is not None) as hand:
+            if device.startswith("replay:"):
+                text = "is a recording, no board: `biotac check FILE` verifies it, `biotac info FILE` lists losses"
+                return Facts(device, system, PortError(f"{device} {text}"))
             if take_link:
                 hand.take_link()
             return Facts(device, system, None, by(hand) if by else listen(hand, seconds), expected_fingers)

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 from doctor_facts import PORT, RELEASE, board, dynamic_pressure, healthy, hello, info, message, rounds, usb_port
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
 
 import biotac
 from biotac import HandWarning
@@ -356,6 +358,32 @@ def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, 
     stranger = scripted_board(lambda i, p: b"OK\r\n")
     assert main(["doctor", stranger.path]) == 1
     assert "error not_a_gateway" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "port",
+    ["sim:nothere.toml", "replay:nothere.mcap", "bag:nothere.bag", "csv:no.csv?columns=no.toml", "bag:other.bag"],
+)
+def test_what_cannot_be_played_is_not_healthy_but_told_as_stream_does(port: str, capsys, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with Writer("o.bag") as bag:  # a bag whose only topic is no BioTac's
+        store = get_typestore(Stores.ROS1_NOETIC)
+        topic = bag.add_connection("/other", "std_msgs/msg/Empty", typestore=store)
+        bag.write(topic, 0, store.serialize_ros1(store.types["std_msgs/msg/Empty"](), "std_msgs/msg/Empty"))
+    assert main(["stream", port]) != 0
+    words = capsys.readouterr().err.removeprefix("biotac: ").strip()
+    assert main(["doctor", port, "--json"]) != 0
+    out = json.loads(capsys.readouterr().out)
+    assert [(f["code"], f["seen"]) for f in out["findings"]] == [("port_failed", words)]
+
+
+def test_a_good_recording_is_no_board_and_refuses_nothing(tmp_path: Path, capsys) -> None:
+    with biotac.open("sim:press.toml?fingers=2") as hand, hand.record(tmp_path / "good.mcap"):
+        hand.read(0.5)
+    assert main(["doctor", f"replay:{tmp_path / 'good.mcap'}", "--json"]) == 1
+    (finding,) = json.loads(capsys.readouterr().out)["findings"]
+    assert finding["code"] == "port_failed"
+    assert "`biotac check" in finding["seen"]
 
 
 def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:

@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         with whole(Path(args.report), overwrite=True) as file:
             file.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
     say(args, summary(facts, findings), as_text(facts, findings))
-    return 1 if findings else 0
+    return 1 if findings or facts.board is None else 0
 
 
 def udev_rule(args: argparse.Namespace) -> int:
@@ -158,5 +158,5 @@ def as_text(facts: Facts, findings: list[Finding]) -> str:
         if "drift_ppm" in seen:
             drift = f", clock {seen['drift_ppm']:+.0f} ppm, +/- {seen['drift_uncertainty_ppm']:.0f}"
         lines.append(f"measured: {seen['frames']} frames, {rates or 'no rates'}{drift}")
-    verdict = f"{len(findings)} finding(s)" if findings else "healthy"
+    verdict = f"{len(findings)} finding(s)" if findings else "healthy" if facts.board else "not measured"
     return "\n".join([*lines, f"{facts.port or 'no port'}: {verdict}"])
