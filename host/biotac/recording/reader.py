@@ -242,10 +242,14 @@ class Recording:
         named = [label for label in self.labels if label.text == text]
         if at_s is not None:
             at_us = self.begin_us + at_s * 1e6
-            named = [label for label in named if label.t_us is not None and abs(label.t_us - at_us) <= 10_000]
+            placed = [label for label in named if label.t_us is not None]
+            named = [label for label in placed if abs(max(label.t_us or 0, self.begin_us) - at_us) <= 10_000]
         if not named:
-            texts = ", ".join(sorted({repr(label.text) for label in self.labels})) or "none"
-            raise InputError(f"no label {text!r}{'' if at_s is None else f' at {at_s:g} s'}: expected one of {texts}")
+            texts = ", ".join(sorted({repr(label.text) for label in self.labels if label.text}))
+            seen = f"no label {text!r}{'' if at_s is None else f' at {at_s:g} s'}: "
+            raise InputError(
+                seen + (f"expected one of {texts}" if texts else "this recording has no labels with a text")
+            )
         for label in named:
             labels_module.append(self.path, self.begin_ns, label, removed=True)
         vars(self).pop("labels", None)

@@ -55,8 +55,8 @@ def labels(recording: Any) -> list[dict[str, Any]]:
 
 
 def at(recording: Any, t_us: int | None) -> float | None:
-    """Seconds since the first row."""
-    return None if t_us is None else (t_us - recording.begin_us) / 1e6
+    """Seconds since the first row; 0 for what was labelled before it."""
+    return None if t_us is None else max(0, t_us - recording.begin_us) / 1e6
 
 
 def lines(facts: dict[str, Any]) -> list[str]:

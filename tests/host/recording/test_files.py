@@ -92,3 +92,18 @@ def test_labels_are_listed_and_removed_by_a_command(recorded: Path, tmp_path: Pa
     assert capsys.readouterr().out == "label, 1.00 s: tap\n"
     assert main(["file", "label", str(path), "tap", "--remove"]) == main(["file", "--json", "label", str(path)]) == 0
     assert capsys.readouterr().out.splitlines()[1:] == ["[]"]
+    assert main(["file", "label", str(path), "tap", "--remove"]) == 2
+    assert "this recording has no labels with a text" in capsys.readouterr().err
+
+
+def test_each_label_is_a_line_and_one_before_the_first_row_is_at_0(tmp_path: Path, capsys) -> None:
+    path = tmp_path / "early.mcap"
+    with biotac.open("sim:press.toml?fingers=1") as hand, hand.record(path):
+        hand.mark("early")
+        hand.read(1.0)
+        hand.mark("late")
+        hand.read(0.2)
+    assert main(["file", "label", str(path)]) == 0
+    early, late = capsys.readouterr().out.splitlines()
+    assert early == "label, 0.00 s: early" and late.endswith("late")
+    assert main(["file", "label", str(path), "early", "--at", "0", "--remove"]) == 0

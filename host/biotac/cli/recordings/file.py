@@ -60,7 +60,7 @@ def run_label(args: argparse.Namespace) -> int:
     finger = int(args.finger) if (args.finger or "").isdecimal() else args.finger
     if args.text is None:
         facts = labels(recording)
-        say(args, facts, printable("\n".join(map(label_line, facts))) or f"{args.recording}: no labels")
+        say(args, facts, "\n".join(printable(label_line(fact)) for fact in facts) or f"{args.recording}: no labels")
         return 0
     if args.remove:
         recording.unmark(args.text, args.at_s)
