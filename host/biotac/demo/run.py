@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ..calibrate.wrench.report import AXIS_COLORS
 from ..core.geometry import ELECTRODE_MM
 from ..core.unroll import unroll
 from ..errors import InputError
@@ -29,9 +28,11 @@ from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch, join
 from ..wire.frames import electrode_signals
 from ..wire.slots import FRAME_HZ, PAC_SLOT
-from .answers import LIN, answers_to, own_map
+from .answers import OWN, POPULATION, answers_to, own_map
 
 Show = Callable[[str], None]
+#: The answers in the picture: color and label.
+DRAWN = {OWN: ("#2563eb", "felt, calibrated"), POPULATION: ("#dc2626", "felt, not calibrated (the default)")}
 
 
 @dataclass(frozen=True)
@@ -182,10 +183,8 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     axes.plot(poc_across, poc_along, ".", color="#7c3aed", markersize=3, alpha=0.5, label="point of contact")
     if len(frames) and contact.any():
         a, b = unroll(frames["poc_mm"][strongest : strongest + 1])
-        axes.plot(
-            a, b, "o", color="#7c3aed", markersize=15, markeredgewidth=2, fillstyle="none", label="the colours' moment"
-        )
-        axes.set_title(f"electrodes at {frames['t_us'][strongest] / 1e6:.2f} s, of the strongest signals", fontsize=10)
+        axes.plot(a, b, "o", color="#7c3aed", markersize=15, markeredgewidth=2, fillstyle="none", label="at that time")
+        axes.set_title(f"what the electrodes read at {frames['t_us'][strongest] / 1e6:.1f} s", fontsize=10)
     axes.set(xlabel="around the finger [mm], + towards E11", ylabel="along the finger [mm], tip up")
     axes.set_aspect("equal")
     axes.margins(0.15)
@@ -194,19 +193,14 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
 
 
 def draw_force(axes: Any, frames: Any, applied_n: Any, answers: dict[str, Any]) -> None:
-    """The best answer's force on the finger over device time, and Lin's, with what was applied behind them."""
+    """The force's strength over device time, by each of ``DRAWN`` that is known, with what was applied behind them."""
     t_s = frames["t_us"] / 1e6
-    best = next(iter(answers))
-    for axis, color in enumerate(AXIS_COLORS):
-        name = "xyz"[axis]
-        if applied_n is not None:
-            axes.plot(t_s, applied_n[:, axis], color=color, linewidth=4, alpha=0.25, label=f"{name}, applied")
-        axes.plot(t_s, answers[best][:, axis], color=color, linewidth=1, label=f"{name}, {best}")
-        axes.plot(t_s, answers[LIN][:, axis], ":", color=color, linewidth=1, label=f"{name}, {LIN}")
-    contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
-    axes.fill_between(t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06)
-    axes.set(xlabel="device time [s]; grey: contact", ylabel="force on the finger [N]")
-    title = f"felt by the {best} (thin) and by {LIN} (dotted)"
-    axes.set_title(title if applied_n is None else f"force applied (wide), {title}", fontsize=10)
+    if applied_n is not None:
+        axes.plot(t_s, np.linalg.norm(applied_n, axis=1), color="#999999", linewidth=6, alpha=0.5, label="applied")
+    for name, (color, label) in DRAWN.items():
+        if name in answers:
+            axes.plot(t_s, np.linalg.norm(answers[name], axis=1), color=color, linewidth=1.5, label=label)
+    axes.set(xlabel="device time [s]", ylabel="strength of the force on the finger [N]")
+    axes.set_title("the force that was applied, and what the board makes of it", fontsize=10)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)
+    axes.legend(fontsize=9, loc="upper left")
