@@ -1,4 +1,4 @@
-"""Pictures of one grasp and of what became of all things, over friction and fragility."""
+"""A picture of one grasp, and of how many things each controller dropped and crushed."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from biotac import FrameFlags
-
 from ..report import Facts
 from . import runs
 from .plant import things
@@ -16,41 +14,31 @@ from .runs import CONTROLLERS, TRUE, Case
 
 
 def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts], law_file: Path) -> None:
-    """Above a grasp of the first thing, by a board if one was tried; below, a panel for each controller."""
+    """Above, a grasp of the first thing, by a board if one was tried; below, the losses of each controller."""
     case = next((case for case in cases if case.controller not in TRUE), cases[0])
     names = list(dict.fromkeys(case.controller for case in cases))
-    figure.set_size_inches(max(8.0, 2.2 * len(names)), 8.0)
-    above, below = figure.subfigures(2, 1, height_ratios=(3, 2))
+    figure.set_size_inches(10.0, 4.2 + 0.35 * len(names))
+    above, below = figure.subplots(2, 1, height_ratios=(10, 2 + len(names)))
     trace: list[Any] = []
     runs.one(case, 0, law_file, outcomes.get((case.calibration, 0)), trace)
-    _grasp(above.subplots(2, 1, sharex=True, height_ratios=(3, 1)), trace, CONTROLLERS[case.controller])
-    limit_n = things(1, case.seed + case.pair)[0].limit_n
-    above.axes[0].axhline(limit_n, color="tab:red", label="crushes")
-    above.axes[0].legend(fontsize=7, loc="upper left")
-    for axes, name in zip(below.subplots(1, len(names), sharey=True, squeeze=False)[0], names, strict=True):
-        became: dict[str, list[tuple[float, float]]] = {"kept": [], "dropped": [], "crushed": []}
-        for (tried, number), row in outcomes.items():
-            if tried in cases and tried.controller == name and not tried.fault:
-                thing = things(number + 1, tried.seed + tried.pair)[number]
-                kind = "dropped" if row["dropped"] else "crushed" if row["crushed"] else "kept"
-                became[kind].append((thing.friction, thing.limit_n / thing.worst_n))
-        for (kind, where), marker, colour in zip(became.items(), ".vx", ("0.7", "C0", "C3"), strict=True):
-            axes.scatter(*np.array(where).reshape(-1, 2).T, marker=marker, color=colour, s=18, label=kind)
-        axes.set_title(CONTROLLERS[name], fontsize=8)
-        axes.set_xlabel("friction")
-    below.axes[0].set_ylabel("crush limit / worst need")
-    below.axes[0].legend(fontsize=6)
+    _grasp(above, trace, CONTROLLERS[case.controller])
+    above.axhline(things(1, case.seed + case.pair)[0].limit_n, color="tab:red", label="crushes")
+    above.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, frameon=False)
+    for name in reversed(names):
+        rows = [row for (one, _), row in outcomes.items() if one in cases and one.controller == name and not one.fault]
+        left = 0.0
+        for kind, colour in (("dropped", "C0"), ("crushed", "C3")):
+            percent = 100.0 * float(np.mean([row[kind] for row in rows]))
+            below.barh(CONTROLLERS[name], percent, left=left, color=colour, label=kind if name == names[-1] else None)
+            left += percent
+        below.text(left + 1, CONTROLLERS[name], f"{left:.0f} %", va="center", fontsize=8)
+    below.set(xlim=(0, 110), xlabel=f"lost [%] of {len(rows)} simulated things, by what the controller is told")
+    below.legend(fontsize=8, loc="lower right")
 
 
 def _grasp(axes: Any, trace: list[Any], felt_by: str) -> None:
-    forces, flagged = axes
-    t_s, applied, felt, need, flags, told = (np.array(column) for column in zip(*trace, strict=True))
-    for line, values in (("applied", applied), (f"felt: {felt_by}", felt), ("needed in the air", need)):
-        forces.plot(t_s, values, label=line, linewidth=1, linestyle="--" if values is need else "-")
-    forces.vlines(t_s[told], 0, 0.3, color="tab:purple", label="SLIP")
-    forces.set_ylabel("N on a side")
-    seen = [flag for flag in FrameFlags if (flags & int(flag)).any()]
-    for row, flag in enumerate(seen):
-        flagged.fill_between(t_s, row, row + 0.8, where=flags & int(flag) != 0, step="mid")
-    flagged.set_yticks([row + 0.4 for row in range(len(seen))], [str(flag.name) for flag in seen], fontsize=6)
-    flagged.set_xlabel("s")
+    t_s, applied, felt, need, _, told = (np.array(column) for column in zip(*trace, strict=True))
+    for label, values, style in ((f"felt: {felt_by}", felt, "-"), ("applied", applied, "-"), ("needed", need, "--")):
+        axes.plot(t_s, values, style, label=label, linewidth=1.2)
+    axes.vlines(t_s[told], 0, 0.5, color="tab:purple", linewidth=2, label="SLIP reported")
+    axes.set(xlabel="time [s]", ylabel="force on each side [N]")
