@@ -1,4 +1,4 @@
-// Prints what a board's fingers feel: cc -o example example.c biotac_client.c && ./example /dev/ttyACM0 500
+// Prints finger, us, x, y, z in 0.1 mN, flags, trust: ./example /dev/ttyACM0 500. README.md says how to build
 #define _DEFAULT_SOURCE // cfmakeraw
 #include "biotac_client.h"
 
@@ -43,16 +43,16 @@ int main(int argc, char **argv)
                 return 2;
             }
             board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
-            // Controllers give a keep-alive and PING now and then: so the board stops when they are gone.
-            command(BT_START_ID,
-                    &(bt_msg_start){.req_id = 2, .streams = BT_STREAM_FLAG_FRAMES, .fingers = 0x1F});
+            bt_msg_start start = {2, BT_STREAM_FLAG_FRAMES, .fingers = 0x1F, .keepalive_ms = 500};
+            command(BT_START_ID, &start); // it stops when this program has been gone for the keep-alive
         } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame)) {
-            printf("%u %u", frame.finger, (unsigned)frame.t_us);
-            for (int axis = 0; axis < 3; axis++) { // BT_INVALID_I32 where there is no force
-                printf(" %ld", (long)frame.force_100un[axis]);
-            }
-            printf(" %lx\n", (unsigned long)frame.flags);
+            const int32_t *force = frame.force_100un; // BT_INVALID_I32 where there is none
+            printf("%u %u %ld %ld %ld %lx %u\n", frame.finger, (unsigned)frame.t_us, (long)force[0],
+                   (long)force[1], (long)force[2], (unsigned long)frame.flags, frame.trust);
             left--;
+        }
+        if (id == BT_IDLE_ID || (id == BT_FRAME_ID && left % 16 == 0)) {
+            command(BT_PING_ID, &(bt_msg_ping){.req_id = 4}); // more than three in each keep-alive
         }
     }
     command(BT_STOP_ID, &(bt_msg_stop){.req_id = 3});

@@ -12,7 +12,8 @@ import pytest
 
 from biotac.calibrate import population
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    biotac (\S.*?)(?:\s+#.*)?$", README, flags=re.MULTILINE)
 
 
@@ -35,11 +36,22 @@ def test_the_commands_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("link", re.findall(r"\]\(([^)#:]+)\)", README))
 def test_links_lead_somewhere(link: str) -> None:
-    assert (Path(__file__).parents[2] / link).exists()
+    assert (ROOT / link).exists()
+
+
+def test_the_losses_that_the_controllers_page_states_are_the_tables() -> None:
+    experiments, page = (
+        (ROOT / path).read_text() for path in ("host/biotac-lab/docs/experiments.md", "host/docs/guides/controller.md")
+    )
+    row = r"^\| {} \|(?:[^|]*\|){{5}} ([\d.]+) "
+    names = ("default map", "own map", "true force", "constant 3 N")
+    lost = [round(float(re.findall(row.format(name), experiments, re.M)[0])) for name in names]
+    said = re.search(r"loses (\d+) % .*?(\d+) % .*?(\d+) % by\s.*?loses (\d+) %", page, re.S)
+    assert said and list(map(int, said.groups())) == lost
 
 
 def test_the_force_error_to_state_is_the_default_maps() -> None:
-    page = (Path(__file__).parents[2] / "host/docs/reference/accuracy.md").read_text(encoding="utf-8")
+    page = (ROOT / "host/docs/reference/accuracy.md").read_text(encoding="utf-8")
     row = re.search(r"error (0\.\d+) N along the finger, (0\.\d+) N sideways, (0\.\d+) N into the pad", README)
     said = re.search(r"(0\.\d+) N towards the tip, (0\.\d+) N sideways and (0\.\d+) N normal", page.replace("\n", " "))
     for told in (row, said):

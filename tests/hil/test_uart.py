@@ -153,6 +153,6 @@ def the_client_prints_what_python_reads(board: EmulatedBoard, folder: Path) -> N
     assert running.returncode == 0
     messages = [message for frame in came.split(b"\0") if frame and (message := open_frame(frame)) is not None]
     frames = [wire.Frame.unpack(payload) for number, payload in messages if number == wire.Frame.ID]
-    sent = [(f.finger, f.t_us, *f.force_100un, f.flags) for f in frames[:FRAMES]]
-    assert sent == [(*map(int, fields[:5]), int(fields[5], 16)) for fields in printed]
+    sent = [(f.finger, f.t_us, *f.force_100un, f.flags, f.trust) for f in frames[:FRAMES]]
+    assert sent == [(*map(int, fields[:5]), int(fields[5], 16), int(fields[6])) for fields in printed]
     assert len(sent) == FRAMES

@@ -71,10 +71,11 @@ def test_the_example_prints_the_frames_that_python_reads(program: Path) -> None:
             wire |= {(int(m["finger"]), int(m["t_us"])): m for m in batch.wire}
             if wire and max(t_us for _, t_us in wire) > max(t_us for _, t_us, *_ in output) + 20_000:
                 break
-    for finger, t_us, x, y, z, flags in output:
+    for finger, t_us, x, y, z, flags, trust in output:
         message = wire[finger, t_us]
         assert (message["force_100un"].tolist(), int(message["flags"])) == ([x, y, z], flags)
-    assert any(abs(z) < 2**31 - 1 for *_, z, _ in output)
+        assert int(message["trust"]) == trust
+    assert any(abs(z) < 2**31 - 1 for *_, z, _, _ in output)
 
 
 def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) -> None:

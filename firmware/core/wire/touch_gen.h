@@ -9,7 +9,7 @@
 #define BT_CALM_COUNT2 400 // energy that is no touch: 4.6 counts on each electrode
 #define BT_EVEN_COUNT2 200 // energy of a pattern that is only noise: seven sigmas of a worn sensor's means
 #define BT_SETTLED_COUNT2 6000 // energy that a host's tare may leave at rest: skin that settles
-#define BT_RESIDUE_SHARE 64 // a press left at most a 356th of its energy
+#define BT_RESIDUE_SHARE 64 // a press left at most a 348th of its energy
 #define BT_FALLEN_SHARE 4 // what has fallen to a quarter is no longer the press it was
 #define BT_QUIET_PDC 4 // counts above the tare: 27 real presses left a median of 1 and at most 5.6 ...
 #define BT_REST_PDC_MAX 10 // ... and a hold at a tenth of a press's peak is at least 11 above
@@ -24,7 +24,7 @@
 #define BT_EVEN_SWEEPS 100 // 8 s: the pressure that a long press leaves takes minutes to go
 #define BT_LOADING_PDC 2 // counts that a slow load adds in a second
 #define BT_FIRM_COUNT2 36000 // energy of a press of 2 N, at which pressure must have moved
-#define BT_MOVES_SHARE 64 // at most this many times pressure's square in energy: 1 to 14 in real presses
+#define BT_MOVES_SHARE 64 // at most this many times pressure's square in energy: 1 to 11 in real presses
 #define BT_FLAT_SHARE 1024 // more than this many times: up to 400 were seen in the first second of real presses, and 2500 at 2 counts/N
 #define BT_DEGREE_TDC 33 // counts of TDC in a degree, at 30 C
 #define BT_WARMED_100UN 1200 // force, 0.1 mN, that temperature may make wrong before TEMP is set; with a map and the population's: a degree

@@ -1,5 +1,5 @@
-// Closes a loop over a simulated finger: presses until it feels 2 N. `biotac sim --live index` prints its
-// arguments.
+// Closes a loop over a simulated finger: presses until it feels 2 N, and stays where it is while `trust` says
+// not to act on the force. `biotac sim --live index` prints its arguments.
 //   cc -I firmware/client -o loop press_loop.c firmware/client/biotac_client.c && ./loop /dev/pts/4 43817
 #define _DEFAULT_SOURCE // cfmakeraw
 #include "biotac_client.h"
@@ -13,7 +13,9 @@
 #include <unistd.h>
 
 #define ROUNDS   800
-#define REST     500 // rounds in which the board takes its tare
+#define REST     350 // rounds in which the board takes its tare ...
+#define CONFIRM  400 // ... a press of 2 N until here, whose end confirms that it was not taken of a hold
+#define BEGIN    500
 #define WANTED_N 2.0
 
 static bt_client board;
@@ -65,7 +67,11 @@ int main(int argc, char **argv)
         bt_msg_frame frame;
         receive(BT_FRAME_ID, &frame); // of this round: the board's time stands still until the next line
         const double felt_n = bt_valid_i32(frame.force_100un[2]) ? frame.force_100un[2] * 1e-4 : 0;
-        press_n += round < REST ? 0 : 0.05 * (WANTED_N - felt_n);
+        if (round < BEGIN) {
+            press_n = round < REST || round >= CONFIRM ? 0 : WANTED_N;
+        } else if (frame.trust >= BT_TRUST_INTERVAL) {
+            press_n += 0.05 * (WANTED_N - felt_n);
+        }
         printf("%u %.3f %.3f\n", frame.seq, press_n, felt_n);
     }
     return 0;
