@@ -56,11 +56,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def about(name: str) -> str:
-    """What a bundled scenario applies, and by what a board without a calibration feels it, in one clause."""
+    """What a bundled scenario applies, in one clause."""
     played = parse_scenario(bundled_scenario(name), file=name)
     times_s = np.arange(0.0, played.seconds, 0.05)
     most_n = max(np.linalg.norm(track.states(times_s).wrench()[0], axis=1).max() for track in played.tracks)
-    return f"{played.seconds:3.0f} s, up to {most_n:.1f} N, felt by the population map: {played.about}"
+    return f"{played.seconds:3.0f} s, up to {most_n:.1f} N: {played.about}"
 
 
 def simulated() -> dict[str, str]:

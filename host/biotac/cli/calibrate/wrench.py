@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import biotac
 
 from ...calibrate import population
@@ -145,7 +147,8 @@ def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | Non
         progress.done()
     origin = loaded.provenance(int(time.time()))
     facts = figures.summary(validation) | loaded.facts() | {key: origin[key] for key in ("serial", "data_sha256")}
-    facts["verdict"] = _verdict(facts["rmse_n"])
+    bare = biotac.compute(np.rint(run.counts).astype(np.uint16), run.tare)["force_n"]
+    facts["verdict"] = _verdict(facts["rmse_n"], figures.rmse(bare, run.truth[:, :3]).tolist())
     facts["fixed_point"] = summary(validation.wrench_map, run.counts, run.pdc)
     if args.out is not None:
         written = _write(validation, origin, loaded.files[0], args.out, overwrite=args.force)
@@ -276,11 +279,10 @@ def _text(facts: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _verdict(rmse_n: list[float | None]) -> str:
-    """Whether the map is better than none, and the error to state (x, y, z)."""
-    default_n = population.load(None).sigma_n
+def _verdict(rmse_n: list[float | None], default_n: list[float]) -> str:
+    """Whether the map is better than none on the same rows, and the error to state (x, y, z)."""
     own, default = ("/".join("-" if v is None else f"{v:.2f}" for v in axes) for axes in (rmse_n, default_n))
-    against = f"{own} N RMS in x/y/z, held out, against {default} N of a finger without calibration"
+    against = f"{own} N RMS in x/y/z, held out, against {default} N without a calibration on the same rows"
     if math.hypot(*(math.inf if v is None else v for v in rmse_n)) < math.hypot(*default_n):
         return f"usable: state {against}"
     return f"not worth using: {against}; load it in more places and directions, or leave the finger as it is"
