@@ -135,17 +135,21 @@ def _draw(path: Path, seen: Bringup, facts: Facts, findings: Sequence[Finding]) 
             bad = [100 * words[finger, 1] / max(1, words[finger].sum()) for words in seen.words.values()]
             bus.plot(khz / 1000, bad, "o-", label=f"finger {finger}")
         noise.set(title="Noise at rest", xlabel="electrode", ylabel="counts", ylim=(0, None), xticks=range(1, 20, 2))
-        bus.set(
-            title="Sensors' bus: 0 % up to the line is good", xlabel="MHz", ylabel="words not good, %", ylim=(-5, 105)
-        )
+        bus.set(title="Sensors' bus: bad words by its rate", xlabel="MHz", ylabel="words not good, %", ylim=(-5, 105))
         if seen.words:
-            bus.axvline(bringup.MARGIN * next(iter(seen.words)) / 1000, color="0.5", linestyle="--")
-        press.axline((0, 0), slope=bringup.PDC_PER_N, color="0.5", linestyle="--")
-        press.set(title="Static pressure: above the line is good", xlabel="force by the board, N",
+            least = bringup.MARGIN * next(iter(seen.words)) / 1000
+            line = bus.axvline(least, color="0.5", linestyle="--", label=f"good at least up to {least:.1f} MHz")
+            bus.legend(handles=[line])
+        at_least = f"at least {bringup.PDC_PER_N:g} counts per newton"
+        line = press.axline((0, 0), slope=bringup.PDC_PER_N, color="0.5", linestyle="--", label=at_least)
+        press.legend(handles=[line], loc="lower right")
+        press.set(title="Static pressure", xlabel="force by the board, N",
                   ylabel="PDC above rest, counts")  # fmt: skip
         if seen.ping_s:
-            ping.hist(1000 * np.array(seen.ping_s), 60)
-            ping.axvline(1000 * np.median(seen.ping_s), color="0.5", linestyle="--", label="median")
+            ms = 1000 * np.array(seen.ping_s)
+            shown_ms = float(1.5 * np.quantile(ms, 0.99))
+            ping.hist(ms, 60, range=(0, shown_ms))
+            ping.axvline(np.median(ms), color="0.5", linestyle="--", label=f"median; slowest {ms.max():.0f} ms")
             ping.legend()
         ping.set(title=f"{len(seen.ping_s)} pings", xlabel="ms to the board and back", ylabel="how many", yscale="log")
         if present:

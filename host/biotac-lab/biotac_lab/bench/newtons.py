@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +39,9 @@ OWN_MODELS = (
     ("joined", "joined, 3 axes", "joined map"),
     ("pooled", "pooled, 3 axes", "large map"),
 )
-PANELS = (("Cortex-M0+", "m0plus"), ("Cortex-M4F", "m4f"))
 #: By what is known about the finger.
 COLORS = {"nothing": "#c2410c", OWN: "#1d4ed8"}
 LITTLE = "#15803d"
-# Labels stand to the right of their points and above, except these.
-LEFT = ("affine", "population map")
-BELOW = ("Lin's scales, the firmware's", "joined map", "population map, pulled")
 FLOORS = (("repeatability_n", "the plate, same pattern again", "--"), ("noise_n", "electrode noise, one frame", ":"))
 NEAREST = 0.05  # share of the rows, those with the most similar counts, that stand for "the same pattern"
 EVERY_ROW = 4  # one row in this many is looked at for that
@@ -216,41 +211,24 @@ def _pooled(rmse_n: dict[str, list[float]]) -> float:
 
 
 def draw(outcome: Outcome, path: Path) -> None:
-    """Write a PNG."""
+    """Write a PNG: a bar for each point, its error over all recordings, and a tick for each recording."""
     with drawn(path) as figure:
-        figure.set_size_inches(13, 6)
-        files = ", ".join(outcome.noise_n)
-        figure.suptitle(f"Force on real fingers: cycles against held-out error ({files})")
-        axes = figure.subplots(1, 2, sharey=True)
-        for panel, (title, core) in zip(axes, PANELS, strict=True):
-            _panel(panel, outcome, core)
-            panel.set(title=title, xlabel="cycles per force")
-        axes[0].set_ylabel("error of the force, length of its vector, RMS [N]")
-        figure.legend(*axes[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3)
-
-
-def _panel(axes: Any, outcome: Outcome, core: str) -> None:
-    for field, name, style in FLOORS:
-        level = _pooled(getattr(outcome, field))
-        axes.axhline(level, color="#334155", linestyle=style, linewidth=1, label=f"{name}: {level:.2f} N")
-    seen = set()
-    for point in outcome.points:
-        color = COLORS.get(point.knows, LITTLE)
-        known = point.knows if point.knows in COLORS else "a little"
-        label = None if known in seen else f"known about the finger: {known}"
-        seen.add(known)
-        x = point.cycles[core]
-        axes.plot(x, point.error_n, "o", color=color, markersize=9, label=label)
-        for three in point.rmse_n.values():
-            axes.plot(x, np.linalg.norm(three), "_", color=color, markersize=9, alpha=0.6)
-        below, left = point.name in BELOW, point.name in LEFT
-        axes.annotate(f"{point.name}: {x:,}, {point.error_n:.2f} N", (x, point.error_n), textcoords="offset points",
-                      xytext=(-8 if left else 8, -12 if below else 4), fontsize=8, color=color,
-                      ha="right" if left else "left", va="top" if below else "bottom")  # fmt: skip
-    axes.set(xscale="log", yscale="log")
-    axes.xaxis.set_major_formatter("{x:,.0f}")
-    axes.yaxis.set_minor_formatter("{x:g}")
-    axes.yaxis.set_major_formatter("{x:g}")
-    cycles = [point.cycles[core] for point in outcome.points]
-    axes.set_xlim(min(cycles) / 1.6, max(cycles) * 14)
-    axes.grid(alpha=0.25, which="both")
+        figure.set_size_inches(10, 4.6)
+        axes = figure.subplots()
+        for row, point in enumerate(reversed(outcome.points)):
+            axes.barh(row, point.error_n, color=COLORS.get(point.knows, LITTLE), height=0.7)
+            axes.plot(
+                [np.linalg.norm(three) for three in point.rmse_n.values()], [row] * len(point.rmse_n), "|k", ms=12
+            )
+            axes.text(3.55, row, f"{point.error_n:.2f} N", va="center", fontsize=10)
+        for field, name, style in FLOORS:
+            level = _pooled(getattr(outcome, field))
+            axes.axvline(level, color="#334155", linestyle=style, linewidth=1, label=f"{name}: {level:.2f} N")
+        labels = [f"{point.knows}: {point.name}" for point in reversed(outcome.points)]
+        axes.set_yticks(range(len(labels)), labels, fontsize=9)
+        axes.set(
+            xlim=(0, 4.0),
+            title="What is known about the finger, and how far off its force is",
+            xlabel="error of the force on data not used to fit it, length of its vector, RMS [N]",
+        )
+        figure.legend(fontsize=9, loc="outside lower center", ncols=2)
