@@ -115,13 +115,15 @@ function pairs(list, rows) {
 export class Flags {
   constructor(about) {
     this.flags = about.flags;
+    this.contact = about.flags.find(({ name }) => name === "CONTACT").mask;
     this.shown = null;
   }
 
   show(flags) {
     if (flags === this.shown) return;
     this.shown = flags;
-    const active = this.flags.filter(({ mask }) => flags & mask);
+    const atRest = (name) => name === "OUTSIDE" && !(flags & this.contact); // it is set then, and warns of nothing
+    const active = this.flags.filter(({ name, mask }) => flags & mask && !atRest(name));
     const items = (wanted) => active.filter(({ warns }) => warns === wanted).map(({ name, words, warns }) => {
       const item = make("li", {}, { flag: name, kind: warns ? "warn" : "calm" });
       item.append(make("b", { textContent: name.replaceAll("_", " ") }), words);
@@ -161,7 +163,7 @@ const HEALTH = [
   { key: "other", name: "Other wire errors", warns: true, of: ({ stats }) => stats.other_errors },
   { key: "late", name: "Late slots on the board", warns: true, of: ({ status }) => status.slots_late },
   { key: "boardDropped", name: "Messages dropped by the board", warns: true, of: ({ status }) => status.messages_dropped },
-  { key: "dropped", name: "Frames dropped by this page", warns: true, of: (_, dropped) => dropped },
+  { key: "dropped", name: "Frames not drawn by this page", of: (_, dropped) => dropped },
 ];
 
 export class Link {
