@@ -102,7 +102,6 @@ def test_each_label_is_a_line_and_one_before_the_first_row_is_at_0(tmp_path: Pat
         hand.mark("early")
         hand.read(1.0)
         hand.mark("late")
-        hand.read(0.2)
     assert main(["file", "label", str(path)]) == 0
     early, late = capsys.readouterr().out.splitlines()
     assert early == "label, 0.00 s: early" and late.endswith("late")
