@@ -73,11 +73,11 @@ enum bt_tare_reason {
     BT_TARE_REASON_RESTORED = 13, // the tare from before a reset of the board, with HELD as it was
 };
 
-// What a force is good for: the lowest level of the flags that are set (trust in [flags.frame]), INTERVAL too if its interval is wide or unknown, NONE without a number.
+// What a force is good for: the lowest level that a flag of the round allows (trust in [flags.frame]); without such a flag ACT, or INTERVAL if half of the force's 95 % interval is unknown, or exceeds both 0.4 N and a quarter of the force; NONE without a force.
 enum bt_trust {
-    BT_TRUST_NONE = 0, // there is no force: hold the actuators where they are, and grasp nothing
+    BT_TRUST_NONE = 0, // there is no force, or none to go by: hold the actuators where they are, and grasp nothing
     BT_TRUST_HOLD = 1, // there is a number, but do not act on it: hold what you have
-    BT_TRUST_INTERVAL = 2, // act on it with margins as wide as its interval
+    BT_TRUST_INTERVAL = 2, // act on it with margins: its interval, and what the flag that is set adds
     BT_TRUST_ACT = 3, // act on it
 };
 

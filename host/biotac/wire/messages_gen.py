@@ -92,11 +92,11 @@ class TareReason(IntEnum):
 
 
 class Trust(IntEnum):
-    """What a force is good for: the lowest level of the flags that are set (trust in [flags.frame]), INTERVAL too if its interval is wide or unknown, NONE without a number."""
+    """What a force is good for: the lowest level that a flag of the round allows (trust in [flags.frame]); without such a flag ACT, or INTERVAL if half of the force's 95 % interval is unknown, or exceeds both 0.4 N and a quarter of the force; NONE without a force."""
 
-    NONE = 0  # there is no force: hold the actuators where they are, and grasp nothing
+    NONE = 0  # there is no force, or none to go by: hold the actuators where they are, and grasp nothing
     HOLD = 1  # there is a number, but do not act on it: hold what you have
-    INTERVAL = 2  # act on it with margins as wide as its interval
+    INTERVAL = 2  # act on it with margins: its interval, and what the flag that is set adds
     ACT = 3  # act on it
 
 
@@ -295,9 +295,9 @@ TARE_REASON_DOC: dict[int, str] = {
 
 
 TRUST_DOC: dict[int, str] = {
-    0: "there is no force: hold the actuators where they are, and grasp nothing",
+    0: "there is no force, or none to go by: hold the actuators where they are, and grasp nothing",
     1: "there is a number, but do not act on it: hold what you have",
-    2: "act on it with margins as wide as its interval",
+    2: "act on it with margins: its interval, and what the flag that is set adds",
     3: "act on it",
 }
 
