@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x5965834Eu
+#define BT_SCHEMA_HASH 0xEA108B10u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -215,7 +215,7 @@ enum bt_event_kind {
 // Flags of a FRAME or IDLE that hold trust down to this level; LATCHED: that STATUS keeps.
 #define BT_TRUST_FLAGS_NONE 0x40008002u
 #define BT_TRUST_FLAGS_HOLD 0x09800000u
-#define BT_TRUST_FLAGS_INTERVAL 0xB4292370u
+#define BT_TRUST_FLAGS_INTERVAL 0xB6292370u
 #define BT_TRUST_FLAGS_LATCHED 0x71E1A1F0u
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]

@@ -15,7 +15,7 @@ from .named import NamedFlag
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x5965834E
+SCHEMA_HASH = 0xEA108B10
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -432,7 +432,7 @@ LATCHED_FLAGS = FrameFlags(0x71E1A1F0)
 TRUST_FLAGS: dict[Trust, FrameFlags] = {
     Trust.NONE: FrameFlags(0x40008002),
     Trust.HOLD: FrameFlags(0x09800000),
-    Trust.INTERVAL: FrameFlags(0xB4292370),
+    Trust.INTERVAL: FrameFlags(0xB6292370),
 }
 
 

@@ -60,7 +60,7 @@ static void learn_from_slip(float shear_n, float half_n)
     grip.slip_n = fmaxf(grip.normal_n, 0.05f), grip.slip_shear_n = fmaxf(shear_n, 0.02f);
     const float doubt = 0.45f * half_n / grip.slip_shear_n;
     grip.power = 1 / (1 + doubt * doubt);
-    grip.least_n = fmaxf(grip.least_n, (RESERVE + 0.5f * (1 - grip.power)) * grip.normal_n);
+    grip.least_n = fmaxf(grip.least_n, (RESERVE + 0.65f * (1 - grip.power)) * grip.normal_n);
     grip.pending_until = 0, grip.reflex_until = grip.round + 8, grip.slips++;
 }
 

@@ -15,7 +15,7 @@ CALM = 6.0, 5.0, SMOOTH  # squeeze with so many N/s for each N that is missing, 
 REFLEX, REFLEX_ROUNDS = (40.0, 40.0, 1.0), 8  # the same after a slip, and for how long
 SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
 LATE, UNLIKELY = 0.9, 1.12  # of what is needed: pressed when a slip is felt; with so much, another is unlikely
-DOUBT, BLIND_RESERVE = 0.45, 0.5  # of shear's half width; of what pressed, on top where shear says nothing
+DOUBT, BLIND_RESERVE = 0.45, 0.65  # of shear's half width; of what pressed, on top where shear says nothing
 
 
 class Grip:
