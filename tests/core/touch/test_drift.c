@@ -203,6 +203,8 @@ TEST(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it)
             assert_true(fabs(moved - 10 * finger.drift_per_s) < 0.6);
         }
         assert_true(fabs(shared_error(&finger) - before) < 0.5); // of 2.5
+        run_seconds(&finger, 3);
+        assert_true(fabs(shared_error(&finger) - before) < 0.5); // nor again later
     }
 }
 

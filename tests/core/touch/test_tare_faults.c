@@ -222,22 +222,24 @@ TEST(what_the_host_has_set_is_lost_if_it_was_wrong)
     assert_false(finger.tare.tared);
 }
 
-// One that was met at rest goes back with the others, to what it first read.
-TEST(an_electrode_that_came_late_is_rolled_back_too)
+// What was met at rest goes back with the others, to what it first read.
+TEST(an_electrode_and_a_pressure_that_came_late_are_rolled_back_too)
 {
     emulated_finger finger;
     finger_init(&finger);
+    finger.has_pdc = false;
     for (int k = 0; k < 200; k++) {
         bt_round frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
         (void)feed(&finger, &frame);
     }
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    finger.has_pdc = true;
     run_frames(&finger, 2);
     finger.load = 400;
     finger.pdc_load = 100;
     (void)run_until(&finger, BT_TARE_STATE_CONTACT, 20);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_ROLL_BACK);
-    assert_true(tare_error(&finger) < 1);
+    assert_true(tare_error(&finger) < 1 && finger.tare.base.pdc_q16 == PDC_REST << 16);
 }
 
 int main(void)
