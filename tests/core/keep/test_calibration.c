@@ -155,7 +155,8 @@ TEST(a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none)
     bt_sensors_answer(&session, 0, another);
     bt_sensors_answer(&session, 1, another);
     assert_int_equal(get(0).state, BT_CALIBRATION_STATE_OTHER_SENSOR);
-    assert_int_equal(get(1).state, BT_CALIBRATION_STATE_IN_FORCE); // for any sensor
+    assert_int_equal(get(1).state, BT_CALIBRATION_STATE_IN_FORCE);                 // for any sensor
+    assert_true(session.info[1].cpu_khz == 0 && session.info[1].sampling_hz == 0); // not yet read
     const uint8_t wanted = session.finger[0].quantities;
     assert_int_not_equal(wanted, 0);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
