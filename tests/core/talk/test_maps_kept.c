@@ -1,5 +1,60 @@
-// What is kept of wrench maps, over the slots of a small flash.
+// Uploads of wrench maps at their edges, and what is kept of maps, over the slots of a small flash.
 #include "map_board.h"
+
+TEST(parts_may_come_in_any_order_and_more_than_once)
+{
+    uint64_t seed = 1;
+    size_t bytes = make_big_map(blob, 1), parts = parts_of(bytes);
+    uint32_t crc32 = bt_crc32(blob, bytes);
+    assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK);
+    assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK); // its reply was lost
+    for (size_t k = 0; k < 20 * parts; k++) {
+        assert_int_equal(write_part(3, blob, bytes, (size_t)(random_u64(&seed) % parts)), BT_ERROR_OK);
+    }
+    for (size_t part = parts; part-- > 0;) { // whatever chance left out
+        assert_int_equal(write_part(3, blob, bytes, part), BT_ERROR_OK);
+    }
+    assert_int_equal(erases, BT_MAP_SLOT_BYTES / BT_FLASH_SECTOR_BYTES);
+    assert_int_equal(programs, parts); // once each
+    assert_int_equal(end(3, crc32), BT_ERROR_OK);
+    assert_false(session.upload.open);
+    assert_int_equal(end(3, crc32), BT_ERROR_OK); // its reply was lost
+    assert_int_equal(write_part(3, blob, bytes, 0), BT_ERROR_NOT_BEGUN);
+    assert_has(3, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+}
+
+TEST(what_is_out_of_range_is_refused)
+{
+    size_t bytes = make_map(blob, 1, 3, "");
+    assert_int_equal(begin(5, 24, 0), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(begin(0, 0, 0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(begin(0, BT_MAP_MAX_BYTES + 1, 0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(begin(0, UINT16_MAX, 0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(begin(0, (uint16_t)bytes, 0), BT_ERROR_OK);
+    static const uint16_t wrong[] = {1,         PART - 1, PART + 1, BT_MAP_MAX_BYTES, UINT16_MAX - PART + 1,
+                                     UINT16_MAX};
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        assert_int_equal(write_bytes(0, wrong[k], blob, PART), BT_ERROR_OUT_OF_RANGE);
+    }
+    uint16_t behind = (uint16_t)(parts_of(bytes) * PART);
+    assert_int_equal(write_bytes(0, behind, blob, PART), BT_ERROR_OUT_OF_RANGE);
+    assert_true(erases == 0 && programs == 0);
+}
+
+TEST(a_map_is_not_whole_until_its_last_byte_has_come)
+{
+    memset(blob, 0xFF, sizeof blob); // as flash reads where nothing was written: the CRC cannot tell
+    for (size_t over = 1; over < PART; over++) { // bytes of the last part
+        size_t bytes = 2 * PART + over;
+        uint32_t crc32 = bt_crc32(blob, bytes);
+        assert_int_equal(begin(0, (uint16_t)bytes, crc32), BT_ERROR_OK);
+        assert_int_equal(write_part(0, blob, bytes, 0), BT_ERROR_OK);
+        assert_int_equal(write_part(0, blob, bytes, 1), BT_ERROR_OK);
+        assert_int_equal(end(0, crc32), BT_ERROR_NOT_WHOLE);
+        assert_int_equal(write_part(0, blob, bytes, 2), BT_ERROR_OK);
+        assert_int_equal(end(0, crc32), BT_ERROR_OUT_OF_RANGE); // whole, and no map
+    }
+}
 
 TEST(a_record_that_cannot_be_is_no_map)
 {
