@@ -8,9 +8,9 @@
 // Listen, or go on with the descriptors of a process before. Returns the TCP port, or 0 with errno set.
 unsigned control_open(bt_emu_stream *stream);
 void control_resume(bt_emu_stream *stream, const int fds[2]);
-const int *control_fds(void); // of the program, -1: none; and where the next one comes
+void control_fds(int fds[2]); // of the program, -1: none; and where the next one comes, -1: nobody
 
-// Accept a program, or carry out what it sent.
+// Let a program in, or carry out what it sent; without a door, nothing.
 void control_poll(void);
 
 // Report to it that time stands still, once for each length of the tape.

@@ -1,4 +1,4 @@
-// The simulated board's flash for settings and maps: a file mapped into memory, without a name or with one.
+// The simulated board's flash for settings and maps: a file, without a name or with one.
 // Behaves as NOR flash does: erasing sets whole sectors to 0xFF, programming only clears bits.
 #ifndef BIOTAC_POSIX_FLASH_H
 #define BIOTAC_POSIX_FLASH_H
@@ -9,9 +9,9 @@
 // what went wrong.
 const char *flash_open(const char *path);
 
-// Go on with the flash of a process before.
-const char *flash_resume(int fd);
-int flash_fd(void);
+// Go on with the flash of a process before, by the number of its file there.
+const char *flash_resume(int number);
+int flash_inherit(void);
 
 // The slots for maps.
 const uint8_t *flash_maps(void);

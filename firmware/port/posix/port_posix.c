@@ -1,17 +1,19 @@
-// The board that is a process: emulated sensors on an emulated bus, the link on a pty, device time
-// that passes only as the firmware spends it.
+// The board that is a process: emulated sensors on an emulated bus, the link on a pty or a loopback socket,
+// device time that passes only as the firmware spends it.
 //
 //   biotac-sim --tape FILE | --live FINGERS
-//              [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
+//              [--socket] [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
 //
-// Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
+// Writes "pty PATH" or "socket PORT" to stdout, and "end" once the tape is played and all of it handed over.
 // --live: a program feeds the sensors round by round (control.h), and device time stands still until it has
 // sent
-//   the next round. Writes "control PORT" before "pty PATH".
+//   the next round. Writes "control PORT" before that.
+// --socket: a TCP port in place of a pty. Who connects there, or to the control port, says the token of
+// door.h first.
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
 // --flash: where saved settings and maps are kept; without it they are gone with the process.
 // --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a
-// host's command does. End of stdin ends the process.
+// host's command does; then it writes "restarted". End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "only_board.h"
 #include "spi_word_by_word.h"
@@ -20,20 +22,18 @@
 #include "clock.h"
 #include "control.h"
 #include "flash.h"
+#include "link.h"
 #include "map/store.h"
-#include "pty.h"
+#include "os.h"
 #include "restart.h"
 #include "stream.h"
 #include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -56,6 +56,7 @@ static bool link_due = true;
 static uint64_t link_ns;
 static uint32_t boot_id;
 static bool paced;
+static int tape = -1; // kept open for the board after a reset: its name may be gone by then
 
 static void die(const char *what, const char *why)
 {
@@ -66,19 +67,22 @@ static void die(const char *what, const char *why)
 static void load_tape(const char *path)
 {
     struct stat s;
-    int fd = open(path, O_RDONLY);
-    if (fd < 0 || fstat(fd, &s) != 0 || s.st_size == 0) {
-        die(path, fd < 0 ? strerror(errno) : "empty; expected a tape");
+    tape = restarted() != NULL ? os_inherited(restarted()->tape) : open(path, O_RDONLY | O_BINARY);
+    if (tape < 0 || fstat(tape, &s) != 0 || s.st_size == 0) {
+        die(path, tape < 0 ? strerror(errno) : "empty; expected a tape");
     }
-    void *bytes = mmap(NULL, (size_t)s.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
-    if (bytes == MAP_FAILED) {
-        die(path, strerror(errno));
+    const size_t size = (size_t)s.st_size;
+    uint8_t *bytes = malloc(size);
+    size_t got = 0;
+    long n = lseek(tape, 0, SEEK_SET) == 0 && bytes != NULL ? 1 : -1;
+    while (n > 0 && got < size) {
+        n = (long)read(tape, bytes + got, (unsigned)(size - got < 1u << 30 ? size - got : 1u << 30));
+        got += n > 0 ? (size_t)n : 0;
     }
-    const char *wrong = bt_emu_stream_open(&stream, bytes, (size_t)s.st_size);
+    const char *wrong = got == size ? bt_emu_stream_open(&stream, bytes, size) : strerror(errno);
     if (wrong != NULL) {
         die(path, wrong);
     }
-    (void)close(fd);
 }
 
 static void feed_live(const char *fingers)
@@ -112,19 +116,23 @@ static void resume(void)
     }
     boot_id += restarted()->times;
     held = false;
-    pty_resume(restarted()->pty, !paced);
+    link_resume(restarted()->link, !paced);
+    printf("restarted\n");
+    (void)fflush(stdout);
 }
 
 static void restart(void)
 {
-    restart_process(&(restart_state){
-        .pty = pty_fd(),
-        .flash = flash_fd(),
-        .control = {control_fds()[0], control_fds()[1]},
+    restart_state state = {
+        .flash = flash_inherit(),
+        .tape = tape >= 0 ? os_inherit(tape) : -1,
         .started = stream.started,
         .start_ns = stream.start_ns - clock_now_ns(), // a board's clock begins at 0
         .taken = stream.taken,
-    });
+    };
+    link_fds(state.link);
+    control_fds(state.control);
+    restart_process(&state);
     die("cannot restart", strerror(errno));
 }
 
@@ -135,11 +143,15 @@ bt_port *port_init(int argc, char **argv)
     double pace = 1.0;
     const char *serials = "";
     const char *flash_path = NULL;
+    bool by_socket = false;
+    os_begin();
     boot_id = (uint32_t)getpid();
     restart_init(argv);
     for (int k = 1; k < argc; k++) {
         if (strcmp(argv[k], "--hold") == 0) {
             held = true;
+        } else if (strcmp(argv[k], "--socket") == 0) {
+            by_socket = true;
         } else if (k + 1 == argc) {
             die(argv[k], "unknown option, or its value is missing");
         } else if (strcmp(argv[k], "--tape") == 0) {
@@ -171,26 +183,15 @@ bt_port *port_init(int argc, char **argv)
         die(flash_path, wrong);
     }
     bt_emu_bus_init(&bus, stream.fingers, serials, bt_emu_stream_by_clock, &stream);
-    (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
-    struct stat input;
-    if (fstat(STDIN_FILENO, &input) == 0 && S_ISFIFO(input.st_mode)) {
-        // A program's board ends with that pipe: a signal to all of a terminal's or a service's is not for
-        // it.
-        (void)signal(SIGINT, SIG_IGN);
-        (void)signal(SIGTERM, SIG_IGN);
-        (void)signal(SIGHUP, SIG_IGN);
-    }
     paced = pace > 0;
     clock_init(pace);
     if (restarted() != NULL) {
         resume();
         return ONLY_BOARD;
     }
-    const char *path = pty_open(!paced);
-    if (path == NULL) {
-        die("cannot open a pty", strerror(errno));
+    if (!link_open(by_socket, !paced)) {
+        die(by_socket ? "cannot listen on the loopback interface" : "cannot open a pty", strerror(errno));
     }
-    printf("pty %s\n", path);
     (void)fflush(stdout);
     return ONLY_BOARD;
 }
@@ -223,8 +224,8 @@ static uint64_t alarm_ns(void)
 static void read_control(void)
 {
     char text[64];
-    ssize_t n = read(STDIN_FILENO, text, sizeof text - 1);
-    if (n == 0) {
+    const int n = os_read_stdin(text, sizeof text - 1);
+    if (n < 0) {
         exit(0); // whoever started us is gone
     }
     text[n > 0 ? n : 0] = 0;
@@ -239,7 +240,7 @@ static void stand_still(void)
 {
     static bool reported;
     link_due = true;
-    pty_flush();
+    link_flush();
     if (live && !held) {
         control_report();
     }
@@ -248,16 +249,12 @@ static void stand_still(void)
         printf("end\n");
         (void)fflush(stdout);
     }
-    const int *control = control_fds();
-    switch (pty_wait(STDIN_FILENO, control[0] >= 0 ? control[0] : control[1], -1)) {
-    case PTY_WAITED_OTHER:
-        read_control();
-        break;
-    case PTY_WAITED_ANOTHER:
+    int control[2];
+    control_fds(control);
+    link_wait(control[0], live && control[0] < 0 ? 2000 : -1); // who comes may not have said its token yet
+    read_control();
+    if (!restart_due) { // what comes now is for the board after it
         control_poll();
-        break;
-    case PTY_WAITED:
-        break;
     }
 }
 
@@ -267,7 +264,7 @@ void port_idle(bt_port *port)
         return;
     }
     if (restart_due) {
-        pty_flush(); // with the reply to the command
+        link_drain(); // with the reply to the command
         restart();
     }
     uint64_t next_ns = alarm_ns();
@@ -281,12 +278,12 @@ void port_idle(bt_port *port)
         clock_catch_up(); // it says nothing ahead of its time, or the host would take its clock for another's
         link_ns = clock_now_ns();
         link_due = true;
-        pty_flush();
+        link_flush();
         read_control();
     }
     int64_t wait_us = clock_wait_us(next_ns);
     if (wait_us > 1000) { // shorter waits are caught up with: device time is exact either way
-        (void)pty_wait(-1, -1, wait_us);
+        link_wait(-1, wait_us);
     }
     if (next_ns > clock_now_ns()) {
         clock_advance_ns(next_ns - clock_now_ns());
@@ -320,7 +317,7 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 
 bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
 {
-    return link == 0 && pty_write(data, bytes);
+    return link == 0 && link_write(data, bytes);
 }
 
 size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
@@ -336,7 +333,7 @@ size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
         return 0;
     }
     put_off = 0;
-    size_t n = pty_read(data, bytes);
+    size_t n = link_read(data, bytes);
     if (runs && n > 0) {
         clock_follow(alarm_ns());
     }
@@ -350,8 +347,10 @@ uint32_t port_link_turns(bt_port *port, unsigned link)
     if (link != 0) {
         return 0;
     }
-    if (link_due && pty_up() != (turns & 1)) {
+    if (link_due && link_up() != (turns & 1)) {
         turns++;
+    } else if (link_due && (turns & 1) == 0) {
+        link_admit();
     }
     return turns;
 }

@@ -1,10 +1,10 @@
-#define _DEFAULT_SOURCE
 #include "restart.h"
+
+#include "os.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 #define NAME "BIOTAC_SIM_RESTARTED"
 
@@ -18,10 +18,10 @@ void restart_init(char **argv)
     int started = 0;
     arguments = argv;
     is_restarted = text != NULL
-                   && sscanf(text, "%d,%d,%d,%d,%u,%d,%" SCNu64 ",%" SCNu32, &before.pty, &before.flash,
-                             &before.control[0], &before.control[1], &before.times, &started,
-                             &before.start_ns, &before.taken)
-                          == 8;
+                   && sscanf(text, "%d,%d,%d,%d,%d,%d,%u,%d,%" SCNu64 ",%" SCNu32, &before.link[0],
+                             &before.link[1], &before.flash, &before.tape, &before.control[0],
+                             &before.control[1], &before.times, &started, &before.start_ns, &before.taken)
+                          == 10;
     before.started = started != 0;
 }
 
@@ -33,10 +33,8 @@ const restart_state *restarted(void)
 void restart_process(const restart_state *state)
 {
     char text[160];
-    (void)snprintf(text, sizeof text, "%d,%d,%d,%d,%u,%d,%" PRIu64 ",%" PRIu32, state->pty, state->flash,
-                   state->control[0], state->control[1], before.times + 1, state->started, state->start_ns,
-                   state->taken);
-    (void)setenv(NAME, text, 1);
-    (void)execv("/proc/self/exe", arguments);
-    (void)execvp(arguments[0], arguments); // where there is no /proc
+    (void)snprintf(text, sizeof text, "%d,%d,%d,%d,%d,%d,%u,%d,%" PRIu64 ",%" PRIu32, state->link[0],
+                   state->link[1], state->flash, state->tape, state->control[0], state->control[1],
+                   before.times + 1, state->started, state->start_ns, state->taken);
+    os_restart(NAME, text, arguments);
 }

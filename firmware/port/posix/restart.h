@@ -6,8 +6,8 @@
 #include <stdint.h>
 
 typedef struct {
-    int pty, flash, control[2]; // open descriptors, -1: none
-    unsigned times;             // it has been reset
+    int link[2], flash, tape, control[2]; // open files, by their numbers (os.h), -1: none
+    unsigned times;                       // it has been reset
     bool started;
     uint64_t start_ns; // of the sensors' first slot, by the new board's clock
     uint32_t taken;

@@ -26,8 +26,10 @@ ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times
 class SerialLink(Link):
     """A byte pipe over a serial port: a UART with its bit rate, or USB, where the bit rate means nothing."""
 
+    can_wait = os.name == "posix"  #: ``wait`` works; otherwise a read has to block on the first byte
+
     def __init__(self, path: str, bits_per_s: int | None = None) -> None:
-        self.port = path
+        self.port = path.partition("?token=")[0]  # which is nobody else's business
         self.bits_per_s = bits_per_s
         self._path = path
         self._serial: Any = None
@@ -62,7 +64,7 @@ class SerialLink(Link):
 
     def read(self, timeout_s: float) -> bytes:
         try:
-            if os.name != "posix":
+            if not self.can_wait:
                 return self._read_blocking(timeout_s)
             return self._drain() if self.wait(timeout_s) else b""
         except (serial.SerialException, OSError) as error:

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import shutil
 import subprocess
 import sys
-import tty
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -128,6 +126,9 @@ def new_pty() -> Iterator[tuple[int, str]]:
 
     The master cannot be read while nobody has the other side open; this serves as the board's DTR.
     """
+    import pty  # here, because Windows has neither
+    import tty
+
     master, slave = pty.openpty()
     try:
         tty.setraw(slave)  # from the start: an echoing terminal would send our own frames back to us

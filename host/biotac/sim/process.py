@@ -1,4 +1,5 @@
-"""The simulated board: the firmware as a process on a pty, playing a Source.
+"""The simulated board: the firmware as a process on a pty, playing a Source. Where there is no pty, on Windows, it has
+a loopback socket, on which only who knows a secret of this process is heard.
 
 The board has its own time. With pace 0 it runs as fast as this side reads, and loses nothing. A held board's time
 stands still until ``release``, so that frame 0 is the source's first row.
@@ -7,17 +8,18 @@ stands still until ``release``, so that frame 0 is the source's first row.
 from __future__ import annotations
 
 import os
+import secrets
 import select
 import shlex
 import socket
 import subprocess
 import tempfile
 import threading
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ..errors import DeviceLostError, PortError
-from ..link import Link
 from ..link.serial_port import SerialLink
 from ..link.url_port import UrlLink
 from ..wire.native import BUILT
@@ -25,9 +27,11 @@ from .sensor_board import SensorBoard
 from .source import Source
 from .tape import write_tape
 
+HEAR_S = 0.005  # another thread may hear it first
+
 
 class SimBoard:
-    """A running simulator process; ``path`` is a pty that any serial program can open."""
+    """A running simulator process; ``path`` is a pty that any serial program can open, or a PORT of a socket."""
 
     def __init__(
         self, source: Source, *, pace: float, hold: bool, live: bool = False, flash: Path | None = None
@@ -43,7 +47,10 @@ class SimBoard:
         self._heard = b""
         self._answers: list[str] = []
         self._hearing = threading.Lock()
-        self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
+        self._token = ""  # of the sockets of its process
+        self._stdout_socket: socket.socket | None = None
+        # Windows removes no file that is open; the second time the board is gone.
+        self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-", ignore_cleanup_errors=True)
         options = ["--pace", str(pace)]
         if live:
             options += ["--live", str(source.samples.shape[1])]
@@ -60,37 +67,64 @@ class SimBoard:
             raise
         try:
             if live:
-                self.sensors = SensorBoard(_loopback(int(self._announced("control"))))
+                self.sensors = SensorBoard(_Loopback(self._announced("control")))
                 self.sensors.listen()
                 self.sensors.put(source.samples)  # an emulated board samples as it boots
-            self.path = self._announced("pty")
+            self.path = self._announced("pty", "socket")
         except BaseException:
             self.close()
             raise
         #: Of the board's stdout: readable when it has something to say, or is gone.
         self.stdout_fd: int = self._process.stdout.fileno()
+        if "://" in self.path:
+            self._forward_stdout()
         # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()
 
-    def _announced(self, what: str) -> str:
-        """The value of the next line of its stdout, which says where ``what`` is."""
+    def _announced(self, *what: str) -> str:
+        """The port in the next line of its stdout, which says where one of ``what`` is."""
         words = self._process.stdout.readline().decode().split()
-        if len(words) != 2 or words[0] != what:
+        if len(words) != 2 or words[0] not in what:
             raise PortError(f"the simulator did not start: {self._last_lines() or 'no message'}")
-        return str(words[1])
+        query = f"?token={self._token}" if self._token else ""
+        return str(words[1]) if words[0] == "pty" else f"socket://127.0.0.1:{words[1]}{query}"
+
+    def _forward_stdout(self) -> None:
+        """Let ``stdout_fd`` be a socket that gets what the board says: Windows cannot wait for a pipe."""
+        self._stdout_socket, far_end = socket.socketpair()
+        self.stdout_fd = self._stdout_socket.fileno()
+
+        def run() -> None:
+            with suppress(OSError, ValueError), far_end:  # either end is closed
+                while line := self._process.stdout.readline():
+                    far_end.sendall(line.replace(b"\r", b""))
+
+        self._forwarder = threading.Thread(target=run, name="biotac simulator's stdout", daemon=True)
+        self._forwarder.start()
 
     def _start(self, options: list[str]) -> Any:
         """The board's process, with three pipes; the environment variable BIOTAC_SIM is the command of another one."""
-        if os.name != "posix":
-            raise PortError("the simulated board needs a pty, which Windows has not; run it in WSL")
-        command = shlex.split(os.environ.get("BIOTAC_SIM", "")) or [str(BUILT / "bin" / "biotac-sim")]
+        is_posix = os.name == "posix"
+        own = BUILT / "bin" / ("biotac-sim" if is_posix else "biotac-sim.exe")
+        command = shlex.split(os.environ.get("BIOTAC_SIM", ""), posix=is_posix) or [str(own)]
+        command += [] if is_posix else ["--socket"]
         if not Path(command[0]).is_file():
             raise PortError(
                 f"no simulator at {command[0]}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
             )
         pipe = subprocess.PIPE
+        # In the environment, which only this user's processes can read, as they can open its ptys.
+        self._token = secrets.token_hex(16)
         # A signal to a terminal's processes is not meant for the board, which ends with its stdin.
-        return subprocess.Popen([*command, *options], stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)
+        return subprocess.Popen(
+            [*command, *options],
+            stdin=pipe,
+            stdout=pipe,
+            stderr=pipe,
+            env={**os.environ, "BIOTAC_SIM_TOKEN": self._token},
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
 
     def hear(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
@@ -98,7 +132,9 @@ class SimBoard:
         with self._hearing:  # another thread may have read it meanwhile
             if not select.select([self.stdout_fd], [], [], 0)[0]:
                 return
-            text = os.read(self.stdout_fd, 65536)
+            text = (
+                self._stdout_socket.recv(65536) if self._stdout_socket is not None else os.read(self.stdout_fd, 65536)
+            )
             if not text:
                 raise DeviceLostError(f"the simulated board died: {self._last_lines() or 'no message'}")
             *lines, self._heard = (self._heard + text).split(b"\n")
@@ -117,12 +153,24 @@ class SimBoard:
         """Let a held board's time run."""
         self.say("run")
 
+    def restart(self) -> None:
+        """Reset the board, and wait until it runs again. What is sent to its sensors before may be lost."""
+        self.hear(0)
+        self._answers.clear()
+        self.say("restart")
+        while "restarted" not in self._answers:
+            self.hear(HEAR_S)
+
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
         if self.sensors is not None:
             self.sensors.close()
         with self._process:  # which then closes its pipes and waits
             self._process.kill()
+            if self._stdout_socket is not None:
+                self._forwarder.join()
+        if self._stdout_socket is not None:
+            self._stdout_socket.close()
         self._folder.cleanup()  # again, for a board that did not start
 
     def _last_lines(self) -> str:
@@ -131,19 +179,17 @@ class SimBoard:
         return " ".join(self._process.stderr.read().decode(errors="replace").split("\n")).strip()
 
 
-def _loopback(port: int) -> Link:
+class _Loopback(UrlLink):
     """The socket on which a board's sensors are fed."""
-    link = UrlLink(f"socket://127.0.0.1:{port}")
-    with socket.socket(fileno=os.dup(link.fd or 0)) as same:
-        same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    link.patience = SimLink.patience
-    return link
-
-
-class SimLink(SerialLink):
-    """A SerialLink to a simulated board, which it owns and closes."""
 
     patience = 60.0
+
+
+class SimLink(UrlLink):
+    """A link to a simulated board, which it owns and closes."""
+
+    patience = 60.0
+    room = 16384
 
     def __init__(self, port: str, board: SimBoard) -> None:
         self.board = board
@@ -159,12 +205,18 @@ class SimLink(SerialLink):
         self.keeps_time = board.pace == 1.0
 
     def ports(self) -> list[str]:
-        """The same pty: it stays while its board is unplugged or without power."""
+        """The same port: it stays while its board is unplugged or without power."""
         return [self.board.path]
 
     def reopen(self, port: str) -> None:
-        super().reopen(port)
+        if "://" in port:
+            super().reopen(port)
+        else:
+            SerialLink.reopen(self, port)
         self.fd = None  # the process must be watched as well
+
+    def _drain(self) -> bytes:
+        return UrlLink._drain(self) if "://" in self.board.path else SerialLink._drain(self)
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for bytes, or for the end of the source; return True if there are bytes to read."""

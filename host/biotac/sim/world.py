@@ -195,8 +195,7 @@ class LockStep(World):
     def _reset(self) -> None:
         if self._link is not None and not self._link.away:  # it hung until now
             self._pull(is_process=True)
-        self._board.say("restart")
-        self.sensors.status()  # which the new board answers
+        self._board.restart()
 
     def _reconnect(self) -> None:
         link, wanted, until_s = self._link, self.hand._stream.started, time.monotonic() + PATIENCE_S

@@ -38,6 +38,8 @@ def announce(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, 
     that of another simulator.
     """
     link: Path | None = args.link
+    if link is not None and "://" in board.path:
+        raise PortError(f"--link {link} needs a pty, which this board has not; drop it, and use the printed PORT")
     if link is not None and link.is_symlink():
         if link.exists():
             raise PortError(f"{link} leads to {os.readlink(link)}, which another program has; choose another --link")

@@ -9,7 +9,7 @@ from pathlib import Path
 from ...documents import write_new
 from ...errors import InputError
 from ...hand.opening import shake_hands
-from ...link.serial_port import SerialLink
+from ...link import open_link
 from ...recording.replay.playback import Playback
 from ...sim.live import LiveFingers, live_board
 from ...sim.load_server import LoadServer
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the pty's path once the board is ready; run for --seconds or until Ctrl-C. Or play on a sensor board."""
+    """Print the PORT once the board is ready; run for --seconds or until Ctrl-C. Or play on a sensor board."""
     if args.new is not None:
         write_new(args.new, bundled_scenario("verbs.toml").decode(), overwrite=args.force)
         say(args, {"scenario": str(args.new)}, f"{args.new}: change it, and play it with `biotac view sim:{args.new}`")
@@ -139,7 +139,7 @@ def play_recording(args: argparse.Namespace) -> int:
 
 def prepare(board: SimBoard) -> None:
     """Give the board its source's settings and tare, as biotac.open does, and start its time."""
-    link = SerialLink(board.path)
+    link = open_link(board.path)
     link.source = board.source
     shake_hands(link).close()
     board.release()

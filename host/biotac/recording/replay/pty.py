@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import pty
 import select
-import tty
 from contextlib import suppress
 
 from ...clock.host_clock import SystemClock
@@ -21,10 +19,13 @@ class ReplayPty:
         self._pacer = Pacer(playback, pace, SystemClock())
         self._out = b""
         try:
+            import pty  # here, because Windows has neither
+            import tty
+
             self._master, self._slave = pty.openpty()
-        except OSError as error:
+        except (ImportError, OSError) as error:
             raise PortError(
-                f"cannot open a pty for the recording ({error.strerror}); use replay:REC as the port instead"
+                f"cannot open a pty for the recording ({error}); use replay:REC as the port instead"
             ) from error
         # Kept open, so that the pty outlives the programs that open and close it. Raw, or it would echo our own bytes.
         tty.setraw(self._slave)
