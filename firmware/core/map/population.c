@@ -59,7 +59,8 @@ static inline uint32_t bounded(uint32_t size_q4)
 
 static touch touch_of(const int32_t e_q4[BT_ELECTRODES])
 {
-    touch sums = {.sum_q4 = 0};
+    touch sums; // whose x is not cleared first
+    sums.sum_q4 = sums.pressed_q4 = sums.sum = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t size = bounded(bt_abs32(e_q4[i]));
         sums.sum_q4 += size;

@@ -52,12 +52,9 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
 
 uint8_t bt_trust(uint32_t flags, uint16_t force_mn, uint16_t half_mn)
 {
-    if (!(flags & (BT_TRUST_FLAGS_NONE | BT_TRUST_FLAGS_HOLD | BT_TRUST_FLAGS_INTERVAL))) {
-        bool wide = half_mn > NARROW_MN && half_mn > force_mn / NARROW_SHARE; // as one that is unknown
-        return wide ? BT_TRUST_INTERVAL : BT_TRUST_ACT;
+    if (flags & (BT_TRUST_FLAGS_NONE | BT_TRUST_FLAGS_HOLD)) {
+        return flags & BT_TRUST_FLAGS_NONE ? BT_TRUST_NONE : BT_TRUST_HOLD;
     }
-    if (flags & BT_TRUST_FLAGS_NONE) {
-        return BT_TRUST_NONE;
-    }
-    return flags & BT_TRUST_FLAGS_HOLD ? BT_TRUST_HOLD : BT_TRUST_INTERVAL;
+    bool wide = half_mn > NARROW_MN && half_mn > force_mn / NARROW_SHARE; // as one that is unknown
+    return wide || flags & BT_TRUST_FLAGS_INTERVAL ? BT_TRUST_INTERVAL : BT_TRUST_ACT;
 }

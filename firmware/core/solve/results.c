@@ -123,11 +123,11 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     int32_t e_q4[BT_ELECTRODES];
     uint16_t completed[BT_ELECTRODES];
     const uint16_t *counts = round->electrode;
-    bt_uncertainty uncertainty = {
-        .margin = &bt_lin_margin,
-        .noise_q4 = tare->noise.sigma_q4,
-        .tare_unconfirmed = tare->unsure,
-    };
+    bt_uncertainty uncertainty; // field by field, which spares a memset
+    uncertainty.margin = &bt_lin_margin;
+    uncertainty.noise_q4 = tare->noise.sigma_q4;
+    uncertainty.tare_unconfirmed = tare->unsure;
+    uncertainty.out = uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;

@@ -52,62 +52,63 @@ BT_NOINLINE void bt_follow_resume(bt_tare *tare)
     }
 }
 
-static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
+static void serve_touched(bt_tare *tare, unsigned first, unsigned end)
 {
-    int32_t away_q4 = 2 * mean_q3 - tare->electrode_q4[i];
-    tare->energy_count2 += square(away_q4);
-    tare->sum_q4 += away_q4;
-    int32_t drift_q16 = tare->drift_q16;
-    bool watched = bt_watch_sees(&tare->watch, &tare->sweep);
-    uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
-    uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
-    if (tare->watch.wait_sweeps == 0) {
-        bt_watch_side(&tare->watch, mean_q16, watched_q16);
-    }
-    if (watched) {
-        drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, mean_q16, watched_q16);
-    }
-    tare->drift.moved_q16 += drift_q16;
-    drift_q16 += tare->thermal.step_q16;
-    if (drift_q16 != 0) {
-        shift_electrode(tare, i, drift_q16);
-        if (watched
-            && tare->watch.base.electrode_q16[i] != BT_TARE_UNKNOWN) { // or drift would look like motion
-            tare->sweep.settled_q3.lane[i] = (uint16_t)(tare->watch.base.electrode_q16[i] >> 13);
+    bt_watch *watch = &tare->watch;
+    const bool taken = watch->wait_sweeps == 0, watched = bt_watch_sees(watch, &tare->sweep);
+    for (unsigned i = first; i < end; i++) {
+        uint32_t mean_q3 = bt_sweep_close(&tare->sweep, i, BT_STILL_SPAN_Q3);
+        if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
+            continue;
+        }
+        int32_t away_q4 = (int32_t)(2 * mean_q3) - tare->electrode_q4[i];
+        int32_t drift_q16 = tare->drift_q16;
+        tare->energy_count2 += square(away_q4);
+        tare->sum_q4 += away_q4;
+        if (taken) {
+            bt_watch_side(watch, mean_q3 << 13, watch->base.electrode_q16[i]);
+        }
+        if (watched) {
+            drift_q16 = bt_watch_step_q16(watch, drift_q16, mean_q3 << 13, watch->base.electrode_q16[i]);
+        }
+        tare->drift.moved_q16 += drift_q16;
+        drift_q16 += tare->thermal.step_q16;
+        if (drift_q16 != 0) {
+            shift_electrode(tare, i, drift_q16);
+            uint32_t watched_q16 = watch->base.electrode_q16[i];
+            if (watched && watched_q16 != BT_TARE_UNKNOWN) { // or drift would look like motion
+                tare->sweep.settled_q3.lane[i] = (uint16_t)(watched_q16 >> 13);
+            }
         }
     }
 }
 
-static void serve_electrode(bt_tare *tare, unsigned i)
+static void serve_untouched(bt_tare *tare, unsigned first, unsigned end)
 {
-    uint16_t mean_q3 = bt_sweep_close(&tare->sweep, i, BT_STILL_SPAN_Q3);
-    uint32_t *base_q16 = &tare->base.electrode_q16[i];
-    if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
-        return;
+    bt_watch *watch = &tare->watch;
+    const bool resting = rests(tare), held = tare->held;
+    const int32_t drift_q16 = tare->drift_q16, shared_q16 = SHARED_TIMES * watch->shared_q16;
+    for (unsigned i = first; i < end; i++) {
+        uint32_t mean_q3 = bt_sweep_close(&tare->sweep, i, BT_STILL_SPAN_Q3);
+        if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
+            continue;
+        }
+        // The sum is used only if every round was below the threshold, so it stays far below 2^32.
+        int32_t away_q3 = 8 * tare->trigger.smooth.lane[i] - (int32_t)mean_q3;
+        tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
+        uint32_t mean_q16 = mean_q3 << 13, before_q16 = tare->base.electrode_q16[i];
+        bt_watch_side(watch, mean_q16, before_q16);
+        if (!resting) {
+            continue;
+        }
+        int32_t away_q16 = bt_clamp((int32_t)(mean_q16 - before_q16) + shared_q16, -BT_SLEW_Q16, BT_SLEW_Q16);
+        int32_t step_q16 = // of what is held only drift is followed
+            held ? bt_watch_step_q16(watch, drift_q16, mean_q16, before_q16) : drift_q16 + away_q16;
+        uint32_t base_q16 = bt_baseline_moved(before_q16, step_q16);
+        tare->base.electrode_q16[i] = base_q16;
+        tare->drift.moved_q16 += (int32_t)(base_q16 - before_q16);
+        bt_adopt_electrode(tare, i);
     }
-    if (bt_tare_touched(tare)) {
-        serve_touched(tare, i, mean_q3);
-        return;
-    }
-    // The sum is used only if every round was below the threshold, so it stays far below 2^32.
-    int32_t away_q3 = 8 * tare->trigger.smooth.lane[i] - mean_q3;
-    tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
-    uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
-    bt_watch_side(&tare->watch, mean_q16, *base_q16);
-    if (!rests(tare)) {
-        return;
-    }
-    int32_t step_q16 = tare->drift_q16;
-    if (tare->held) { // only drift is followed
-        step_q16 = bt_watch_step_q16(&tare->watch, step_q16, mean_q16, *base_q16);
-    } else {
-        int32_t away_q16 = (int32_t)(mean_q16 - *base_q16) + SHARED_TIMES * tare->watch.shared_q16;
-        step_q16 += bt_clamp(away_q16, -BT_SLEW_Q16, BT_SLEW_Q16);
-    }
-    uint32_t before_q16 = *base_q16;
-    *base_q16 = bt_baseline_moved(before_q16, step_q16);
-    tare->drift.moved_q16 += (int32_t)(*base_q16 - before_q16);
-    bt_adopt_electrode(tare, i);
 }
 
 static void serve_pressure(bt_tare *tare)
@@ -125,12 +126,14 @@ static void serve_pressure(bt_tare *tare)
 
 void bt_follow_turn(bt_tare *tare)
 {
-    unsigned end = bt_sweep_end(&tare->sweep);
-    for (unsigned lane = bt_sweep_first(&tare->sweep); lane < end; lane++) {
-        if (lane < BT_ELECTRODES) {
-            serve_electrode(tare, lane);
-        } else {
-            serve_pressure(tare);
-        }
+    const unsigned first = bt_sweep_first(&tare->sweep), end = bt_sweep_end(&tare->sweep);
+    const unsigned electrodes = end < BT_LANES ? end : BT_ELECTRODES;
+    if (first < electrodes && bt_tare_touched(tare)) {
+        serve_touched(tare, first, electrodes);
+    } else if (first < electrodes) {
+        serve_untouched(tare, first, electrodes);
+    }
+    if (first <= BT_LANE_PDC && end == BT_LANES) {
+        serve_pressure(tare);
     }
 }
