@@ -115,15 +115,6 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
     msg->trust = event == BT_EVENT_KIND_TRUST ? finger->trust : UINT8_MAX;
 }
 
-static void mark_silent(bt_finger *finger)
-{
-    finger->present = false;
-    finger->bands.begun = false; // samples before and after the gap do not belong together
-    if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
-        finger->silent_rounds++;
-    }
-}
-
 void bt_finger_forget(bt_finger *finger)
 {
     bt_tare_reset(&finger->tare);
@@ -132,18 +123,13 @@ void bt_finger_forget(bt_finger *finger)
     finger->answered = false;
 }
 
-static void close_round(bt_finger *finger)
+void bt_finger_pass(bt_finger *finger)
 {
     if (finger->next_slot < BT_SLOTS) {
         (void)fill(finger, BT_SLOTS);
     }
     finger->next_slot = 0; // a POINT between rounds belongs to the next, of which no word has come yet
     bt_pressure_add(&finger->pressure, finger->round.pdc);
-}
-
-void bt_finger_pass(bt_finger *finger)
-{
-    close_round(finger);
 }
 
 // Without pressure nothing touches, whatever the electrodes say, if presses have shown that they move it.
@@ -173,9 +159,12 @@ static void recover(bt_finger *finger)
 
 bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
 {
-    close_round(finger);
+    bt_finger_pass(finger);
     if (finger->round.good_words == 0) {
-        mark_silent(finger);
+        finger->present = false;
+        finger->bands.begun = false; // samples before and after the gap do not belong together
+        finger->silent_rounds =
+            (uint8_t)(finger->silent_rounds + (finger->silent_rounds < BT_UNPLUGGED_ROUNDS));
         return false;
     }
     finger->seq++;
@@ -231,12 +220,6 @@ static uint32_t health_flags(const bt_finger *finger)
 static uint16_t seq_of(const bt_finger *finger)
 {
     return (uint16_t)(finger->seq - 1);
-}
-
-static void fill_pressure(const bt_pressure *pressure, bool asked, bt_msg_frame *msg)
-{
-    msg->pdc_filtered_q4 = asked ? bt_pressure_filtered_q4(pressure) : BT_INVALID_COUNT;
-    msg->pressure_force_100un = bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, pressure->gain_nn);
 }
 
 uint32_t bt_finger_wrench_age(const bt_finger *finger, const bt_solve_settings *settings)
@@ -314,11 +297,14 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
     msg->flags |= health_flags(finger);
     msg->electrodes_out = finger->tare.trigger.without;
     msg->slip_level = finger->events.slip_level;
-    fill_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
+    bool asked = quantities & BT_QUANTITY_FLAG_PRESSURE;
+    msg->pdc_filtered_q4 = asked ? bt_pressure_filtered_q4(&finger->pressure) : BT_INVALID_COUNT;
+    msg->pressure_force_100un =
+        bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, finger->pressure.gain_nn);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     bool valid = msg->force_100un[2] != BT_INVALID_I32;
-    msg->trust = valid ? bt_trust(msg->flags, msg->normal_mn, msg->normal_half_mn) : BT_TRUST_NONE;
-    finger->trust = msg->trust;
+    finger->trust = valid ? bt_trust(msg->flags, msg->normal_mn, msg->normal_half_mn) : BT_TRUST_NONE;
+    msg->trust = finger->trust;
     finger->sent = finger->tare.trigger.smooth;
 }
 

@@ -13,9 +13,9 @@ import numpy as np
 from courses import Sensor
 
 from biotac import Finger, FrameFlags
-from biotac.core.geometry import Floats, normals_at, on_surface, tangents_at
+from biotac.core.geometry import ELECTRODE_MM, Floats, normals_at, on_surface, tangents_at
 from biotac.sim import physics, sampling
-from biotac.sim.faults import FAULTS, Fault, Faulty
+from biotac.sim.faults import FAULTS, Fault, Faulty, _electrodes
 from biotac.sim.gains import fit_gains
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire
@@ -138,6 +138,48 @@ def spoil(of: Press, lay: Fault, begin: int, rng: np.random.Generator) -> Words:
     return bad
 
 
+def _neighbours(electrode: int, n: int) -> np.ndarray:  # itself comes first
+    return np.argsort(np.linalg.norm(np.asarray(ELECTRODE_MM) - ELECTRODE_MM[electrode], axis=1))[:n]
+
+
+def stuck(n: int) -> Fault:
+    """So many neighbours."""
+
+    def stick(on: Faulty, counts: Floats, _: Floats) -> Floats:
+        some = _neighbours(on.electrode, n)
+        counts[:, some] = on.first(counts[0, some].copy())
+        return counts
+
+    return _electrodes(stick)
+
+
+def _copies(on: Faulty, counts: Floats, _: Floats) -> Floats:
+    other = _neighbours(on.electrode, 4)[3]
+    counts[:, on.electrode] = on.rest[on.electrode] + counts[:, other] - on.rest[other]
+    return counts
+
+
+def _two(on: Faulty, counts: Floats, t_s: Floats) -> Floats:
+    counts[:, _neighbours(on.electrode, 2)[1]] -= 50 * t_s
+    counts[:, on.electrode] = 4095
+    return counts
+
+
+#: Faults of more than one electrode.
+MORE: dict[str, Fault] = {
+    **{f"{word} neighbours stuck": stuck(n) for n, word in ((3, "three"), (4, "four"), (5, "five"))},
+    **{
+        f"all drift {rate} counts/s": _electrodes(lambda on, x, t, rate=rate: x - rate * t[:, None])
+        for rate in (2, -5, 8, 12, -20, 30)
+    },
+    "half drift up, half down": _electrodes(lambda on, x, t: x + 4 * t[:, None] * (-1) ** np.arange(19)),
+    "all aged by 0.7": _electrodes(lambda on, x, t: on.rest + 0.7 * (x - on.rest)),
+    "one copies another": _electrodes(_copies),
+    "all inverted": _electrodes(lambda on, x, t: 2 * on.rest - x),
+    "one open, its neighbour drifts": _electrodes(_two),
+}
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What a fault does: the largest error in N, what of it lasts over SILENT_ROUNDS without a new warning, and rounds.
@@ -161,9 +203,9 @@ def longest(mask: np.ndarray) -> int:
 
 
 def outcome(of: Press, name: str, when: str, model: str, seed: int = 0) -> Outcome:
-    """Run a fault of FAULTS."""
+    """Run a fault of FAULTS or MORE."""
     begin = of.begins(when)
-    bad = spoil(of, FAULTS[name], begin, np.random.default_rng([of.seed, seed, 7]))
+    bad = spoil(of, (FAULTS | MORE)[name], begin, np.random.default_rng([of.seed, seed, 7]))
     good, rows = of.healthy(model)[begin:], run(bad, of.settings(model))[begin:]
     new = rows["flags"] & WARNINGS & ~good["flags"]
     given = (rows["force_100un"] != wire.INVALID_I32).all(axis=1) & (good["force_100un"] != wire.INVALID_I32).all(

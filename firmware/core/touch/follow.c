@@ -55,7 +55,7 @@ BT_NOINLINE void bt_follow_resume(bt_tare *tare)
 static void serve_touched(bt_tare *tare, unsigned first, unsigned end)
 {
     bt_watch *watch = &tare->watch;
-    const bool taken = watch->wait_sweeps == 0, watched = bt_watch_sees(watch, &tare->sweep);
+    const bool taken = watch->wait_sweeps == 0 || watch->early, watched = bt_watch_sees(watch, &tare->sweep);
     for (unsigned i = first; i < end; i++) {
         uint32_t mean_q3 = bt_sweep_close(&tare->sweep, i, BT_STILL_SPAN_Q3);
         if (mean_q3 == BT_SWEEP_UNREAD_Q3) {

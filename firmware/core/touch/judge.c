@@ -7,10 +7,11 @@
 
 #include <stddef.h>
 
-#define FAINT_Q16              (1 << 16) // what all electrodes share and may be drift
-#define PATTERN_SHARE          4         // of a press's energy is not shared by all electrodes, at least
-#define DRIFTED_Q16            (2 << 16)
-#define DRIFTED_SWEEPS         64  // of rest, until drift counts as over
+#define FAINT_Q16      (1 << 16) // what all electrodes share and may be drift
+#define PATTERN_SHARE  4         // of a press's energy is not shared by all electrodes, at least
+#define DRIFTED_Q16    (2 << 16)
+#define ALIKE_Q16      (3 << 16)   // and for each quarter of a count that temperature moved them by, two more
+#define DRIFTED_SWEEPS 64          // of rest, until drift counts as over
 #define DRIFT_ROUNDS_PER_COUNT 400 // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
 
@@ -118,11 +119,9 @@ static bool fits(const bt_tare *tare)
 static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
 {
     bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
-    if (tare->watch.wait_sweeps > 1) {
-        tare->watch.wait_sweeps--;
-    }
+    bt_watch_wait(&tare->watch, &tare->sweep, tare->trigger.unknown);
     bool due = tare->watch.wait_sweeps == 1 && tare->sweep.still_sweeps >= BT_WATCH_SWEEPS;
-    if (bt_watch_crept(&tare->watch)) {
+    if (tare->watch.creeps == BT_CREEP_SWEEPS) {
         tare->drift.settled = 0;
     }
     if (due || tare->sweep.still_sweeps == BT_WATCH_SWEEPS) {
@@ -148,8 +147,8 @@ static void judge_drift(bt_tare *tare)
     bool level = valid && shown && !tare->partial && steady;
     bool creeps = touched && bt_watch_creeps(watch);
     uint32_t away_q16 = bt_abs32(watch->shared_q16);
-    bool alike =
-        (valid && watch->one_way && away_q16 > DRIFTED_Q16) || (watch->alike && away_q16 > 2 * DRIFTED_Q16);
+    uint32_t sure_q16 = ALIKE_Q16 + (bt_abs32(tare->thermal.step_q16) >> 14 << 17);
+    bool alike = (valid && watch->one_way && away_q16 > DRIFTED_Q16) || (watch->alike && away_q16 > sure_q16);
     if (alike) {
         tare->drifted_sweeps = DRIFTED_SWEEPS;
     } else if (!touched && tare->drifted_sweeps > 0) {

@@ -48,14 +48,6 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     bt_adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_ROLL_BACK);
 }
 
-static void follow_contact(bt_tare *tare)
-{
-    tare->contact_rounds++;
-    if (bt_tare_pdc_known(tare)) {
-        bt_release_pressure(&tare->release, bt_tare_pdc_above(tare));
-    }
-}
-
 // Nothing of a faulty round may reach a tare: the sweep goes on without it. It starts over if something else
 // had broken it before, such as another fault: what words that are often lost leave is no history.
 static BT_NOINLINE void fault(bt_tare *tare)
@@ -139,7 +131,10 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         bt_judge_inverted(tare);
     }
     if (bt_tare_touched(tare)) {
-        follow_contact(tare);
+        tare->contact_rounds++;
+        if (bt_tare_pdc_known(tare)) {
+            bt_release_pressure(&tare->release, bt_tare_pdc_above(tare));
+        }
     }
     tare->pressure_seen = tare->pressure_seen || tare->trigger.pressure_now;
     if (bt_silence_add(&tare->silence, t_us, &tare->trigger.smooth)) {

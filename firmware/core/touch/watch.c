@@ -7,10 +7,11 @@
 #define LEVEL_Q3     16             // two counts, four sigmas; a load of 0.02 N/s exceeds it within a second
 #define LEVEL_SWEEPS 32             // 2.6 s
 #define WAIT_SWEEPS  5              // until means are free of what came before
+#define EARLY_SWEEPS 3              // of these, left when most of them are
 #define ONE_WAY_Q2   26             // 13 electrodes one way and 6 the other: three sigmas of noise
 #define ALIKE_SIDE   17             // 18 electrodes one way and one the other
+#define ALIKE_TIMES  3              // their mean; a real press that moves all one way moves one by four
 #define CREEP_Q3     (5 * LEVEL_Q3) // at most in a silence: 13 s of skin creep at the limit of level
-#define CREEP_SWEEPS 250            // 20 s, two of its time constants
 #define MISSED_Q16   (BT_SLEW_Q16 / 2) // 15 counts/min, the worst drift measured, as so few rounds are noisy
 #define EACH_Q16     (8192 / BT_ELECTRODES) // the mean in q16, from a sum over all electrodes in 1/8 count
 
@@ -21,12 +22,7 @@ _Static_assert((int64_t)UINT16_MAX *BT_SLEW_Q16 <= INT32_MAX,
 
 bool bt_watch_creeps(const bt_watch *watch)
 {
-    return watch->creeps < CREEP_SWEEPS;
-}
-
-bool bt_watch_crept(const bt_watch *watch)
-{
-    return watch->creeps == CREEP_SWEEPS;
+    return watch->creeps < BT_CREEP_SWEEPS;
 }
 
 bool bt_watch_level(const bt_watch *watch)
@@ -37,6 +33,7 @@ bool bt_watch_level(const bt_watch *watch)
 void bt_watch_pause(bt_watch *watch)
 {
     watch->wait_sweeps = WAIT_SWEEPS;
+    watch->early = false;
     watch->one_way = false;
     watch->follows = false;
     watch->one_way_q2 = 0;
@@ -58,6 +55,7 @@ int32_t bt_watch_drifts_q16(const bt_watch *watch)
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
 {
     watch->wait_sweeps = 0;
+    watch->early = false;
     for (unsigned i = 0; i < BT_LANES; i++) {
         uint32_t mean_q16 = unknown >> i & 1 ? BT_TARE_UNKNOWN : (uint32_t)sweep->mean_q3.lane[i] << 13;
         if (i == BT_LANE_PDC) {
@@ -66,6 +64,16 @@ void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
             watch->base.electrode_q16[i] = mean_q16;
         }
     }
+}
+
+void bt_watch_wait(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
+{
+    uint8_t left = (uint8_t)(watch->wait_sweeps - (watch->wait_sweeps > 1));
+    if (left == EARLY_SWEEPS && watch->base.electrode_q16[0] == BT_TARE_UNKNOWN) {
+        bt_watch_take(watch, sweep, unknown);
+        watch->early = true;
+    }
+    watch->wait_sweeps = left;
 }
 
 void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, int span_q3)
@@ -79,11 +87,12 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
         sum_q3 += away_q3;
     }
     watch->wait_sweeps = 0;
-    if (farthest_q3 <= span_q3) {
+    if (farthest_q3 <= span_q3 && !watch->early) {
         return;
     }
+    bool crept = farthest_q3 <= 2 * span_q3 && !watch->early;
     bt_watch_take(watch, sweep, unknown);
-    for (unsigned i = 0; i < BT_ELECTRODES && farthest_q3 <= 2 * span_q3; i++) {
+    for (unsigned i = 0; i < BT_ELECTRODES && crept; i++) {
         watch->base.electrode_q16[i] = bt_baseline_moved(watch->base.electrode_q16[i], -sum_q3 * EACH_Q16);
     }
 }
@@ -106,9 +115,11 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
     watch->one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
     watch->shared_q16 = watch->away_q3 * EACH_Q16;
-    watch->alike = bt_abs32(watch->side) >= ALIKE_SIDE;
+    watch->alike = bt_abs32(watch->side) >= ALIKE_SIDE
+                   && watch->farthest_q3 * BT_ELECTRODES <= ALIKE_TIMES * bt_abs32(watch->away_q3);
     watch->side = 0;
     watch->away_q3 = 0;
+    watch->farthest_q3 = 0;
 }
 
 // True if pressure would have been level all along. *due: the sweeps in which drift would have been followed.

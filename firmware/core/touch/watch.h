@@ -13,11 +13,13 @@
 #include "signal/sweep.h"
 #include "touch/baseline.h"
 
-#define BT_WATCH_SWEEPS 5 // of still signals, after which they count as at rest
+#define BT_WATCH_SWEEPS 5   // of still signals, after which they count as at rest
+#define BT_CREEP_SWEEPS 250 // since the load changed: 20 s, two time constants of creep
 
 typedef struct {
     bt_baseline base;     // where the signals came to rest
     uint8_t wait_sweeps;  // until the present reading is taken as base; 0 once it was
+    bool early;           // until then base is what it was soon after pressure had moved, moving or not
     uint16_t level_q3;    // the pressure's mean when it last moved
     uint8_t level_sweeps; // sweeps it has stayed near that; saturates
     bool slow;            // it had stayed for long before it moved
@@ -25,9 +27,10 @@ typedef struct {
     int8_t side;          // electrodes with a mean of this sweep above the watched baseline, less those below
     int16_t one_way_q2;   // the same through a low-pass of four sweeps
     int32_t away_q3;      // sum of the distances of this sweep's means from the watched baseline
+    uint32_t farthest_q3; // the largest of these
     int32_t shared_q16;   // their mean in the last whole sweep
     bool one_way;         // in the last whole sweep nearly all had moved one way
-    bool alike;           // in the last whole sweep all but one had
+    bool alike;           // in the last whole sweep all but one had, and none by much more than the mean
     bool follows;         // each electrode follows drift at its own pace
 } bt_watch;
 
@@ -40,6 +43,10 @@ void bt_watch_pause(bt_watch *watch);
 // The signals have come to rest: their means are the baseline. Lanes in `unknown` have none.
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
 
+// After a sweep in contact. Soon after pressure has moved, the means are an early baseline, whether they have
+// come to rest or not: what moves them all alike from there, while pressure stays, is drift.
+void bt_watch_wait(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
+
 // The same for signals that may have come back to where they were. Within span_q3 of the baseline nothing
 // changes, so that drift is not lost. Within twice that, skin has crept: what all electrodes share is left
 // out of the new baseline, still to be followed.
@@ -50,7 +57,6 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3);
 
 // True if the load changed not long ago, so that skin still creeps by more than it drifts.
 bool bt_watch_creeps(const bt_watch *watch);
-bool bt_watch_crept(const bt_watch *watch); // true in the sweep in which that ends
 
 // True if pressure has stayed where it was for long enough to tell drift from a load.
 bool bt_watch_level(const bt_watch *watch);
@@ -77,7 +83,9 @@ static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t ba
         return;
     }
     watch->side = (int8_t)(watch->side + (mean_q16 > base_q16) - (mean_q16 < base_q16));
-    watch->away_q3 += (int32_t)(mean_q16 >> 13) - (int32_t)(base_q16 >> 13);
+    int32_t away_q3 = (int32_t)(mean_q16 >> 13) - (int32_t)(base_q16 >> 13);
+    watch->away_q3 += away_q3;
+    watch->farthest_q3 = bt_abs32(away_q3) > watch->farthest_q3 ? bt_abs32(away_q3) : watch->farthest_q3;
 }
 
 // An electrode's step of drift. If each goes at its own pace: a quarter more than step_q16 where it lags,

@@ -65,6 +65,37 @@ TEST(what_is_no_drift_is_not_followed)
     assert_int_equal(resumed(waits), 0);
 }
 
+// Sweeps after pressure has moved, in which all electrodes move by step_q3 and one by `times` that, until all
+// have moved alike by 3 counts; 0: never in three seconds.
+static int sweeps_until_alike(int step_q3, int times)
+{
+    bt_watch watch = {.level_q3 = REST_Q3};
+    bt_sweep sweep = {0};
+    const uint16_t pressure_q3 = REST_Q3;
+    bt_watch_begin(&watch);
+    for (int k = 1; k < 38; k++) {
+        for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+            sweep.mean_q3.lane[i] = (uint16_t)(8 * 2000 + k * step_q3 * (i == 5 ? times : 1));
+            if (watch.early) {
+                bt_watch_side(&watch, (uint32_t)sweep.mean_q3.lane[i] << 13, watch.base.electrode_q16[i]);
+            }
+        }
+        bt_watch_end(&watch, &pressure_q3);
+        bt_watch_wait(&watch, &sweep, 0);
+        if (watch.alike && bt_abs32(watch.shared_q16) > 3 * COUNT_Q16) {
+            return k;
+        }
+    }
+    return 0;
+}
+
+TEST(what_moves_all_alike_is_seen_before_it_comes_to_rest)
+{
+    assert_int_equal(sweeps_until_alike(19, 1), 4); // 30 counts/s, which never rests
+    assert_int_equal(sweeps_until_alike(-13, 2), 4);
+    assert_int_equal(sweeps_until_alike(13, 5), 0); // a press that moves all one way
+}
+
 int main(void)
 {
     return run_all(NULL, NULL);
