@@ -10,6 +10,7 @@
 #include <stddef.h>
 
 #define POC_LOW 4 // times the contact threshold
+#define LOST_MN 5 // what Lin's gains make of a count, at most 8, less what the interval has of it already
 
 // Energies of a round's signals, truncated to 1/2 count.
 typedef struct {
@@ -101,13 +102,6 @@ void bt_point_signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[B
     bt_signals_q4(counts, tare->electrode_q4, e_q4);
 }
 
-// What static pressure says that presses at least: no finger makes 1000 counts of a newton.
-static uint32_t pressed_mn(const bt_round *round, const bt_tare *tare)
-{
-    int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
-    return above_q4 == BT_INVALID_I32 || above_q4 < 0 ? 0 : (uint32_t)above_q4 >> 4;
-}
-
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg)
 {
@@ -128,12 +122,15 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     uncertainty.noise_q4 = tare->noise.sigma_q4;
     uncertainty.tare_unconfirmed = tare->unsure;
     uncertainty.out = uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
+    uint32_t lost = 0; // counts, from what electrodes that are out last read to what they are estimated to
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
-        for (uint32_t left = tare->trigger.without; left != 0; left &= left - 1) {
-            uncertainty.out++;
+        for (int i = 0; tare->trigger.without >> i != 0; i++) {
+            uncertainty.out += tare->trigger.without >> i & 1;
+            lost += tare->trigger.without >> i & 1 ? bt_abs32(counts[i] - tare->trigger.smooth.lane[i]) : 0;
         }
+        lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
     }
     signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
@@ -146,8 +143,12 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
-        uint32_t pressed = pressed_mn(round, tare);
+        int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
+        bool known = above_q4 != BT_INVALID_I32 && above_q4 > 0;
+        uint32_t pressed = known ? (uint32_t)above_q4 >> 4 : 0; // no finger makes 1000 counts of a newton
         uncertainty.guess_mn[0] = pressed > uncertainty.guess_mn[0] ? pressed : uncertainty.guess_mn[0];
+        uncertainty.guess_mn[0] += LOST_MN * lost;
+        uncertainty.guess_mn[1] += LOST_MN * lost / 2;
     }
     uint32_t warmed_q8 = bt_abs32(bt_thermal_warmed_q8(&tare->thermal));
     uint32_t limit_q8 = settings->map != NULL ? BT_DEGREE_Q8 : settings->warmed_max_q8;
