@@ -144,11 +144,11 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
         int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
-        bool known = above_q4 != BT_INVALID_I32 && above_q4 > 0;
-        uint32_t pressed = known ? (uint32_t)above_q4 >> 4 : 0; // no finger makes 1000 counts of a newton
-        uncertainty.guess_mn[0] = pressed > uncertainty.guess_mn[0] ? pressed : uncertainty.guess_mn[0];
-        uncertainty.guess_mn[0] += LOST_MN * lost;
-        uncertainty.guess_mn[1] += LOST_MN * lost / 2;
+        uint32_t pressed =
+            above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0; // no finger makes 1000 counts of a newton
+        uint32_t *guess_mn = uncertainty.guess_mn;
+        guess_mn[0] = (pressed > guess_mn[0] ? pressed : guess_mn[0]) + LOST_MN * lost;
+        guess_mn[1] += LOST_MN * lost / 2;
     }
     uint32_t warmed_q8 = bt_abs32(bt_thermal_warmed_q8(&tare->thermal));
     uint32_t limit_q8 = settings->map != NULL ? BT_DEGREE_Q8 : settings->warmed_max_q8;

@@ -66,7 +66,8 @@ static void serve_touched(bt_tare *tare, unsigned first, unsigned end)
         tare->energy_count2 += square(away_q4);
         tare->sum_q4 += away_q4;
         if (taken) {
-            bt_watch_side(watch, mean_q3 << 13, watch->base.electrode_q16[i]);
+            uint32_t size_q3 = bt_abs32(bt_watch_side(watch, mean_q3 << 13, watch->base.electrode_q16[i]));
+            watch->farthest_q3 = size_q3 > watch->farthest_q3 ? size_q3 : watch->farthest_q3;
         }
         if (watched) {
             drift_q16 = bt_watch_step_q16(watch, drift_q16, mean_q3 << 13, watch->base.electrode_q16[i]);
@@ -97,7 +98,7 @@ static void serve_untouched(bt_tare *tare, unsigned first, unsigned end)
         int32_t away_q3 = 8 * tare->trigger.smooth.lane[i] - (int32_t)mean_q3;
         tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
         uint32_t mean_q16 = mean_q3 << 13, before_q16 = tare->base.electrode_q16[i];
-        bt_watch_side(watch, mean_q16, before_q16);
+        (void)bt_watch_side(watch, mean_q16, before_q16);
         if (!resting) {
             continue;
         }

@@ -27,7 +27,7 @@ typedef struct {
     int8_t side;          // electrodes with a mean of this sweep above the watched baseline, less those below
     int16_t one_way_q2;   // the same through a low-pass of four sweeps
     int32_t away_q3;      // sum of the distances of this sweep's means from the watched baseline
-    uint32_t farthest_q3; // the largest of these
+    uint32_t farthest_q3; // the largest of these in a touch
     int32_t shared_q16;   // their mean in the last whole sweep
     bool one_way;         // in the last whole sweep nearly all had moved one way
     bool alike;           // in the last whole sweep all but one had, and none by much more than the mean
@@ -76,16 +76,16 @@ static inline bool bt_watch_sees(const bt_watch *watch, const bt_sweep *sweep)
     return watch->wait_sweeps == 0 && sweep->still_sweeps >= BT_WATCH_SWEEPS;
 }
 
-// Add an electrode's mean of this sweep, compared with its baseline.
-static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
+// Add an electrode's mean of this sweep, compared with its baseline. Returns its distance in 1/8 count.
+static inline int32_t bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
 {
     if (base_q16 == BT_TARE_UNKNOWN) {
-        return;
+        return 0;
     }
     watch->side = (int8_t)(watch->side + (mean_q16 > base_q16) - (mean_q16 < base_q16));
     int32_t away_q3 = (int32_t)(mean_q16 >> 13) - (int32_t)(base_q16 >> 13);
     watch->away_q3 += away_q3;
-    watch->farthest_q3 = bt_abs32(away_q3) > watch->farthest_q3 ? bt_abs32(away_q3) : watch->farthest_q3;
+    return away_q3;
 }
 
 // An electrode's step of drift. If each goes at its own pace: a quarter more than step_q16 where it lags,

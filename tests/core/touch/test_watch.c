@@ -77,7 +77,9 @@ static int sweeps_until_alike(int step_q3, int times)
         for (unsigned i = 0; i < BT_ELECTRODES; i++) {
             sweep.mean_q3.lane[i] = (uint16_t)(8 * 2000 + k * step_q3 * (i == 5 ? times : 1));
             if (watch.early) {
-                bt_watch_side(&watch, (uint32_t)sweep.mean_q3.lane[i] << 13, watch.base.electrode_q16[i]);
+                uint32_t mean_q16 = (uint32_t)sweep.mean_q3.lane[i] << 13;
+                uint32_t away_q3 = bt_abs32(bt_watch_side(&watch, mean_q16, watch.base.electrode_q16[i]));
+                watch.farthest_q3 = away_q3 > watch.farthest_q3 ? away_q3 : watch.farthest_q3;
             }
         }
         bt_watch_end(&watch, &pressure_q3);
