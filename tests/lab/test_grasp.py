@@ -111,7 +111,10 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_and_likely_sli
         assert grip.normal_n - frames[0].force_n[2] == pytest.approx(off_n, abs=0.01)
     blind = [replace(frame, trust=Trust.HOLD) for frame in frames]
     for none in ([None, None], blind, [replace(frame, force_n=np.full(3, math.nan)) for frame in frames]):
-        assert grip.step(none, False) == 0.0
+        grip.step(frames, False)
+        ways_mm = [0.01 * grip.step(none, False) for _ in range(40)]
+        assert ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
+        assert sum(ways_mm) * grip.stiffness == pytest.approx(0.4 * grip.normal_n, abs=0.05)  # harder, once
 
 
 def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,13 +5,14 @@
 
 void hand_send(uint8_t id, const void *msg); // example_bare.c
 void close_at(float mm_s);                   // the hand's own: both fingers; negative: open
-#define FINGERS         0x11u                // index and thumb, chip selects 0 and 4, which meet along z
-#define RESERVE         1.25f
-#define MARGIN(half_mn) ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
+#define FINGERS           0x11u              // index and thumb, chip selects 0 and 4, which meet along z
+#define RESERVE           1.25f
+#define NEEDED_N(shear_n) (grip.slip_n / 0.9f * powf((shear_n) / grip.slip_shear_n, grip.power))
+#define MARGIN(half_mn)   ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
 struct grip {
     float least_n, most_n, slip_n, slip_shear_n, power, stiffness, speed_mm_s, normal_n, shear_n, margin_n,
         way_mm, first_n;
-    int round, reflex_until, pending_until, holds, settled, slips;
+    int round, blind, reflex_until, pending_until, holds, settled, slips;
 } grip;
 static struct felt {
     float normal_n, shear_n, margin_n, half_n; // sums
@@ -50,11 +51,6 @@ void grip_end(void)
     close_at(-20);
 }
 
-static float needed_n(float shear_n)
-{
-    return grip.slip_n / 0.9f * powf(shear_n / grip.slip_shear_n, grip.power);
-}
-
 static void learn_from_slip(float shear_n, float half_n)
 {
     grip.slip_n = fmaxf(grip.normal_n, 0.05f), grip.slip_shear_n = fmaxf(shear_n, 0.02f);
@@ -75,9 +71,9 @@ static float step(float shear_n)
         grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
     grip.shear_n += 0.3f * (shear_n - grip.shear_n);
     if (grip.round >= grip.reflex_until && grip.round < grip.pending_until && felt.strong
-        && (!grip.slips || grip.power < 0.5f || grip.normal_n < 1.12f * needed_n(shear_n)))
+        && (!grip.slips || grip.power < 0.5f || grip.normal_n < 1.12f * NEEDED_N(shear_n)))
         learn_from_slip(shear_n, felt.half_n / (float)felt.frames);
-    const float wanted_n = fminf(fmaxf(grip.least_n, RESERVE * needed_n(grip.shear_n)), grip.most_n);
+    const float wanted_n = fminf(fmaxf(grip.least_n, RESERVE * NEEDED_N(grip.shear_n)), grip.most_n);
     const float before = grip.speed_mm_s * grip.stiffness; // N/s
     const float missing_n = wanted_n - grip.normal_n - 0.03f * before;
     const int reflex = grip.round < grip.reflex_until, near = fabsf(missing_n) <= 0.05f * wanted_n;
@@ -89,12 +85,15 @@ static float step(float shear_n)
 void grip_round(void)
 {
     const float frames = (float)felt.frames;
-    grip.round++;
-    if (frames > 0) {
+    grip.round++, grip.blind = felt.frames ? 0 : grip.blind + 1;
+    if (felt.frames) {
         grip.margin_n += 0.1f * (felt.margin_n / frames - grip.margin_n);
         grip.normal_n = felt.normal_n / frames + grip.margin_n;
         grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : grip.speed_mm_s;
+    } else { // after three rounds harder by two fifths, as it may get heavier; then it stays
+        const int harder = grip.holds && grip.blind >= 3 && (float)(grip.blind - 3) < 8 * grip.normal_n;
+        grip.speed_mm_s = harder ? 5 / grip.stiffness : 0;
     }
     felt = (struct felt){0};
-    close_at(grip.speed_mm_s = frames > 0 ? grip.speed_mm_s : 0); // nothing is known: stay
+    close_at(grip.speed_mm_s);
 }

@@ -2,20 +2,18 @@
 
 import numpy as np
 
-from biotac import EventKind, Trust
-from biotac import FrameFlags as F
+from biotac import EventKind, FrameFlags, Trust
 from biotac.sim import SimFinger, Touch, world
 
-ROUND_S, CLOSING_MM_S = 0.01, 10.0
-LAG_S = 0.03  # from a command to the motion that the next frame shows: the actuator's, and a round
+ROUND_S, LAG_S, CLOSING_MM_S = 0.01, 0.03, 10.0  # the lag is from a command to the motion that a frame shows
 RESERVE, FRICTION = 1.25, 0.6  # press that much harder than is needed; the friction that is assumed until a slip
-RELEASE_N_PER_S = 0.9  # a thing that begins to slip is not let go by much before that is reported
-SMOOTH = 0.3  # of a change of rate, or of shear, made in each round: what jumps to and fro shakes like a slip
+RELEASE_N_PER_S, SMOOTH = 0.9, 0.3  # what slips is not let go by much until it is reported; jumps shake like slips
 CALM = 6.0, 5.0, SMOOTH  # squeeze with so many N/s for each N that is missing, at most, and change it so smoothly
 REFLEX, REFLEX_ROUNDS = (40.0, 40.0, 1.0), 8  # the same after a slip, and for how long
 SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
 LATE, UNLIKELY = 0.9, 1.12  # of what is needed: pressed when a slip is felt; with so much, another is unlikely
-DOUBT, BLIND_RESERVE = 0.45, 0.65  # of shear's half width; of what pressed, on top where shear says nothing
+DOUBT, DOUBT_RESERVE = 0.45, 0.65  # of shear's half width; of what pressed, on top where shear says nothing
+BLIND_ROUNDS, BLIND_SHARE = 3, 0.4  # who feels nothing for so long presses harder by that, as it may get heavier
 
 
 class Grip:
@@ -32,7 +30,7 @@ class Grip:
         self.slip_n, self.slip_shear_n, self.power = LATE, FRICTION, 1.0  # of the latest slip: see needed_n
         self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = CLOSING_MM_S, 0.0, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
-        self._round = self._reflex_until = self._pending_until = self._way_mm = self._first_n = 0
+        self._round = self._blind = self._reflex_until = self._pending_until = self._way_mm = self._first_n = 0
 
     def step(self, frames, slipped: bool) -> float:
         """How fast the sides are to close until the next round, in mm/s; negative: open.
@@ -42,11 +40,13 @@ class Grip:
         self._round += 1
         sides = zip(frames, self.towards, self.shares, strict=True)
         known = [(f, to, w) for f, to, w in sides if f and f.trust >= Trust.INTERVAL and np.isfinite(f.force_n).all()]
-        self.speed_mm_s = self.speed_mm_s if known else 0.0  # where nothing is known it stays
-        if not known or (not self.holds and not all(f.flags & F.CONTACT for f, *_ in known)):
+        self._blind = 0 if known else self._blind + 1
+        if not known:
+            harder = 0 <= self._blind - BLIND_ROUNDS < BLIND_SHARE * self.normal_n / (CALM[1] * ROUND_S)
+            self.speed_mm_s = CALM[1] / self.stiffness if harder and self.holds else 0.0
+        if not known or (not self.holds and not all(f.flags & FrameFlags.CONTACT for f, *_ in known)):
             return self.speed_mm_s
-        parts = np.nan_to_num(np.mean([self._parts(*one) for one in known], axis=0))
-        normal_n, shear_n, margin_n, half_n = parts.tolist()
+        normal_n, shear_n, margin_n, half_n = np.nan_to_num(np.mean([self._parts(*k) for k in known], 0)).tolist()
         self.margin_n += 0.1 * (margin_n - self.margin_n)
         self.normal_n = normal_n + self.margin_n
         self._first_n, self.holds = self._first_n if self.holds else self.normal_n, True
@@ -73,7 +73,7 @@ class Grip:
     def _learn_from_slip(self, shear_n: float, half_n: float) -> None:
         self.slip_n, self.slip_shear_n = max(self.normal_n, 0.05), max(shear_n, 0.02)
         self.power = 1 / (1 + (DOUBT * half_n / self.slip_shear_n) ** 2)
-        self.least_n = max(self.least_n, (RESERVE + BLIND_RESERVE * (1 - self.power)) * self.normal_n)
+        self.least_n = max(self.least_n, (RESERVE + DOUBT_RESERVE * (1 - self.power)) * self.normal_n)
         self.slips, self._pending_until, self._reflex_until = self.slips + 1, 0, self._round + REFLEX_ROUNDS
 
     def _squeeze(self) -> float:
