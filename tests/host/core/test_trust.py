@@ -58,9 +58,10 @@ def test_a_wide_interval_is_to_be_kept_in_mind(force_mn: int, half_mn: int, want
         assert lib.bt_trust(1 << flag["bit"], force_mn, half_mn) == min(wanted, *levels(1 << flag["bit"]))
 
 
-def test_events_tell_falls_at_once_and_rises_that_last() -> None:
-    with biotac.open("sim:press.toml") as hand:
-        hand.stream("results", "events")
+@pytest.mark.parametrize("finger", [0, 1])
+def test_events_tell_falls_at_once_and_rises_that_last(finger: int) -> None:
+    with biotac.open("sim:press.toml?fingers=2") as hand:
+        hand.stream("results", "events", fingers=[finger])
         frames, events = [], []
         for batch in hand.batches():
             frames += [(int(row["t_us"]), Trust(row["trust"])) for row in batch.frames]
@@ -71,6 +72,7 @@ def test_events_tell_falls_at_once_and_rises_that_last() -> None:
         if trust < reported or higher >= RISE_ROUNDS:
             reported, higher = trust, 0
             wanted.append((t_us + 43 * 1_000_000 // 4400, trust))
+    assert {event.finger for event in events} == {finger}
     assert [(event.t_us, event.trust) for event in events] == wanted and len({trust for _, trust in wanted}) > 1
 
 
