@@ -24,13 +24,13 @@ from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, GATED, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap
 from ..map.margin import UNKNOWN, Margin
-from ..map.population import SHIPPED, Likeness, board_map, likeness, shipped
+from ..map.population import SHIPPED, Likeness, board_map, light_gain, likeness, shipped
 from ..version import __version__
 from ..wire.frames import FORCE_LSB_PER_N
 
 __all__ = [
-    "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps", "load",
-    "normals", "provenance_of",
+    "AXES", "COLUMNS", "ROWS_AT_ONCE", "SIGNAL_COUNTS", "Population", "Sums", "Trained", "columns", "dumps",
+    "light_gain", "load", "normals", "provenance_of",
 ]  # fmt: skip
 
 FORMAT = "biotac-population-map/1"

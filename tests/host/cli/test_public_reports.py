@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import os
 import pickle
 import resource
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +17,6 @@ import pytest
 import biotac
 from biotac.cli.main import main
 from biotac.errors import InputError
-from biotac.sim import process
 
 
 @pytest.fixture(scope="module")
@@ -85,9 +82,3 @@ def test_a_question_mark_may_be_part_of_a_name(recorded: Path, tmp_path: Path, c
 def test_an_age_that_shows_nothing_is_refused(age_s: float) -> None:
     with pytest.raises(InputError, match="max_age_s is"):
         biotac.open("sim:press.toml?seconds=1", max_age_s=age_s)
-
-
-def test_a_simulated_board_on_windows_says_what_it_needs(monkeypatch) -> None:
-    monkeypatch.setattr(process, "os", SimpleNamespace(name="nt", environ=os.environ))
-    with pytest.raises(biotac.PortError, match="needs a pty, which Windows has not; run it in WSL"):
-        biotac.open("sim:press.toml")

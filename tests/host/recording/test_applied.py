@@ -76,4 +76,4 @@ def test_list_says_what_a_scenario_applies(capsys) -> None:
     assert main(["list"]) == 0
     for line, name in zip(capsys.readouterr().out.splitlines()[-12:], bundled_scenarios(), strict=True):
         most_n = np.linalg.norm(load_source(name).truth.force_n, axis=-1).max()
-        assert line.startswith(f"sim:{name} ") and f" s, up to {most_n:.1f} N, felt by " in line
+        assert line.startswith(f"sim:{name} ") and f" s, up to {most_n:.1f} N: " in line

@@ -22,11 +22,11 @@ from biotac.calibrate.population import (
     Population,
     Sums,
     columns,
+    light_gain,
     normals,
 )
 from biotac.calibrate.wrench import DRIFT_NODES, Blocks, Lags, Run
 from biotac.core import geometry as surface
-from biotac.map.population import light_gain
 
 Floats = npt.NDArray[np.float64]
 
