@@ -115,6 +115,9 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_and_likely_sli
         ways_mm = [0.01 * grip.step(none, False) for _ in range(40)]
         assert ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
         assert sum(ways_mm) * grip.stiffness == pytest.approx(0.4 * grip.normal_n, abs=0.05)  # harder, once
+    grip.step(frames, False)
+    grip.most_n = grip.normal_n + 0.09
+    assert sum(0.01 * grip.step(blind, False) for _ in range(40)) * grip.stiffness == pytest.approx(0.09, abs=0.05)
 
 
 def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -91,7 +91,8 @@ void grip_round(void)
         grip.normal_n = felt.normal_n / frames + grip.margin_n;
         grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : grip.speed_mm_s;
     } else { // after three rounds harder by two fifths, as it may get heavier; then it stays
-        const int harder = grip.holds && grip.blind >= 3 && (float)(grip.blind - 3) < 8 * grip.normal_n;
+        const float more_n = fminf(0.4f * grip.normal_n, grip.most_n - grip.normal_n);
+        const int harder = grip.holds && grip.blind >= 3 && 0.05f * (float)(grip.blind - 3) < more_n;
         grip.speed_mm_s = harder ? 5 / grip.stiffness : 0;
     }
     felt = (struct felt){0};

@@ -37,17 +37,17 @@ class Grip:
 
         ``frames`` has each finger's Frame of this round, None where none came; ``slipped``: the board reported a SLIP.
         """
-        self._round += 1
+        self._round, self._blind = self._round + 1, self._blind + 1
         sides = zip(frames, self.towards, self.shares, strict=True)
         known = [(f, to, w) for f, to, w in sides if f and f.trust >= Trust.INTERVAL and np.isfinite(f.force_n).all()]
-        self._blind = 0 if known else self._blind + 1
         if not known:
-            harder = 0 <= self._blind - BLIND_ROUNDS < BLIND_SHARE * self.normal_n / (CALM[1] * ROUND_S)
-            self.speed_mm_s = CALM[1] / self.stiffness if harder and self.holds else 0.0
+            more_n = self.holds * min(BLIND_SHARE * self.normal_n, self.most_n - self.normal_n)
+            harder = 0 <= self._blind - BLIND_ROUNDS < more_n / (CALM[1] * ROUND_S)
+            self.speed_mm_s = CALM[1] / self.stiffness if harder else 0.0
         if not known or (not self.holds and not all(f.flags & FrameFlags.CONTACT for f, *_ in known)):
             return self.speed_mm_s
         normal_n, shear_n, margin_n, half_n = np.nan_to_num(np.mean([self._parts(*k) for k in known], 0)).tolist()
-        self.margin_n += 0.1 * (margin_n - self.margin_n)
+        self._blind, self.margin_n = 0, self.margin_n + 0.1 * (margin_n - self.margin_n)
         self.normal_n = normal_n + self.margin_n
         self._first_n, self.holds = self._first_n if self.holds else self.normal_n, True
         self._way_mm += self.speed_mm_s * ROUND_S
