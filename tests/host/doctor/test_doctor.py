@@ -366,7 +366,7 @@ def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, 
 )
 def test_what_cannot_be_played_is_not_healthy_but_told_as_stream_does(port: str, capsys, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with Writer("o.bag") as bag:  # a bag whose only topic is no BioTac's
+    with Writer("other.bag") as bag:  # a bag whose only topic is no BioTac's
         store = get_typestore(Stores.ROS1_NOETIC)
         topic = bag.add_connection("/other", "std_msgs/msg/Empty", typestore=store)
         bag.write(topic, 0, store.serialize_ros1(store.types["std_msgs/msg/Empty"](), "std_msgs/msg/Empty"))
