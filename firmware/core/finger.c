@@ -163,8 +163,9 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     if (finger->round.good_words == 0) {
         finger->present = false;
         finger->bands.begun = false; // samples before and after the gap do not belong together
-        finger->silent_rounds =
-            (uint8_t)(finger->silent_rounds + (finger->silent_rounds < BT_UNPLUGGED_ROUNDS));
+        if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
+            finger->silent_rounds++;
+        }
         return false;
     }
     finger->seq++;

@@ -126,9 +126,11 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
-        for (int i = 0; tare->trigger.without >> i != 0; i++) {
-            uncertainty.out += tare->trigger.without >> i & 1;
-            lost += tare->trigger.without >> i & 1 ? bt_abs32(counts[i] - tare->trigger.smooth.lane[i]) : 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            if (tare->trigger.without >> i & 1) {
+                uncertainty.out++;
+                lost += bt_abs32(counts[i] - tare->trigger.smooth.lane[i]);
+            }
         }
         lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
     }
@@ -143,9 +145,9 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
+        // Static pressure says how hard it is pressed at least: no finger makes 1000 counts of a newton.
         int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
-        uint32_t pressed =
-            above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0; // no finger makes 1000 counts of a newton
+        uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
         uint32_t *guess_mn = uncertainty.guess_mn;
         guess_mn[0] = (pressed > guess_mn[0] ? pressed : guess_mn[0]) + LOST_MN * lost;
         guess_mn[1] += LOST_MN * lost / 2;

@@ -78,8 +78,8 @@ void door_resume(door *d, const int fds[2])
     for (int k = 0; k < 2; k++) {
         if (fds[k] >= 0) {
             prepare(fds[k]);
-            (void)recv((SOCKET)fds[k], &next, 1,
-                       MSG_PEEK); // Wine learns of it before os_windows.c has a thread
+            // With this, resets under Wine succeed more often; why some still fail nobody knows.
+            (void)recv((SOCKET)fds[k], &next, 1, MSG_PEEK);
         }
     }
 }
@@ -104,8 +104,8 @@ bool door_admit(door *d)
         if (n < 0 && IS_LATER) {
             return false;
         }
-        d->wrong |=
-            (uint8_t)(n == 1 ? byte ^ token[d->heard] : 1); // all of it is compared, whatever was wrong
+        // All of it is compared, whatever was wrong: the time says nothing about the token.
+        d->wrong |= (uint8_t)(n == 1 ? byte ^ token[d->heard] : 1);
         d->heard++;
         if (n != 1 || (d->heard == expected && d->wrong != 0)) {
             hang_up(&d->pending);

@@ -7,8 +7,8 @@
 #include <string.h>
 
 #define RING_BYTES 16384
-#define SEND_BYTES                                                                                           \
-    4096 // of what the system keeps, as a pty does: or a board that waits for its host would be far ahead
+// Of what the system keeps, as a pty does: or a board that waits for its host would be far ahead.
+#define SEND_BYTES 4096
 
 static door host = DOOR_CLOSED; // a pty is one without a socket to listen on
 static bool wait_for_host;

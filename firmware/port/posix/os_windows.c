@@ -56,7 +56,7 @@ void os_begin(void)
 int os_read_stdin(char *text, size_t bytes)
 {
     static HANDLE thread;
-    if (thread == NULL) { // not before: Wine confuses descriptors that two threads first use at once
+    if (thread == NULL) { // not before, as under Wine more resets fail then
         thread = CreateThread(NULL, 0, read_stdin, NULL, 0, NULL);
     }
     const size_t waiting = (size_t)line_bytes, n = waiting < bytes ? waiting : bytes;
