@@ -29,7 +29,7 @@ class SerialLink(Link):
     can_wait = os.name == "posix"  #: ``wait`` works; otherwise a read has to block on the first byte
 
     def __init__(self, path: str, bits_per_s: int | None = None) -> None:
-        self.port = path.partition("?token=")[0]  # which is nobody else's business
+        self.port = path
         self.bits_per_s = bits_per_s
         self._path = path
         self._serial: Any = None

@@ -20,6 +20,10 @@ class UrlLink(SerialLink):
 
     room: int | None = None  #: see TcpPort
 
+    def __init__(self, port: str) -> None:
+        super().__init__(port)
+        self.port = port.partition("?token=")[0]  # the token is the business of nobody else
+
     def reopen(self, port: str) -> None:
         SerialLink.close(self)
         self.can_wait = port.startswith("socket:")
