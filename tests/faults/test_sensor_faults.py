@@ -256,10 +256,12 @@ def test_the_interval_says_what_an_electrode_that_opens_in_a_hold_costs(fault: s
         force_n, share, angle = rng.uniform(1, 6), rng.uniform(0, 0.5), rng.uniform(0, 2 * np.pi)
         shear = {"shear_x_n": force_n * share * np.cos(angle), "shear_y_n": force_n * share * np.sin(angle)}
         pose = Pose(float(rng.uniform(-11, 2)), float(rng.uniform(-2.5, 2.5)), tip_mm=2.0, **shear)
-        of = sensor_faults.press(seed, "worn" if seed % 2 else "new", pose, force_n)
-        begin, held = of.begins("hold"), slice(of.begins("hold") + 50, of.free)
-        rows = sensor_faults.run(sensor_faults.spoil(of, FAULTS[fault], begin, rng), of.settings("fitted"))[held]
-        off = {k: np.abs(rows[f"{k}_mn"] - of.healthy("fitted")[held][f"{k}_mn"].astype(float)) for k in PARTS}
+        pressed = sensor_faults.press(seed, "worn" if seed % 2 else "new", pose, force_n)
+        begin, held = pressed.begins("hold"), slice(pressed.begins("hold") + 50, pressed.free)
+        rows = sensor_faults.run(sensor_faults.spoil(pressed, FAULTS[fault], begin, rng), pressed.settings("fitted"))[
+            held
+        ]
+        off = {k: np.abs(rows[f"{k}_mn"] - pressed.healthy("fitted")[held][f"{k}_mn"].astype(float)) for k in PARTS}
         within.append([float(np.median(off[k] - rows[f"{k}_half_mn"])) <= 0 for k in PARTS])
     print(f"\n{fault}: within {np.mean(within, axis=0)} of normal and shear")
     assert (np.mean(within, axis=0) >= 0.95).all()

@@ -15,7 +15,7 @@ from courses import Sensor
 from biotac import Finger, FrameFlags
 from biotac.core.geometry import ELECTRODE_MM, Floats, normals_at, on_surface, tangents_at
 from biotac.sim import physics, sampling
-from biotac.sim.faults import FAULTS, Fault, Faulty, _electrodes
+from biotac.sim.faults import FAULTS, Fault, Faulty, electrode_fault
 from biotac.sim.gains import fit_gains
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire
@@ -150,7 +150,7 @@ def stuck(n: int) -> Fault:
         counts[:, some] = on.first(counts[0, some].copy())
         return counts
 
-    return _electrodes(stick)
+    return electrode_fault(stick)
 
 
 def _copies(on: Faulty, counts: Floats, _: Floats) -> Floats:
@@ -169,14 +169,14 @@ def _two(on: Faulty, counts: Floats, t_s: Floats) -> Floats:
 MORE: dict[str, Fault] = {
     **{f"{word} neighbours stuck": stuck(n) for n, word in ((3, "three"), (4, "four"), (5, "five"))},
     **{
-        f"all drift {rate} counts/s": _electrodes(lambda on, x, t, rate=rate: x - rate * t[:, None])
+        f"all drift {rate} counts/s": electrode_fault(lambda on, x, t, rate=rate: x - rate * t[:, None])
         for rate in (2, -5, 8, 12, -20, 30)
     },
-    "half drift up, half down": _electrodes(lambda on, x, t: x + 4 * t[:, None] * (-1) ** np.arange(19)),
-    "all aged by 0.7": _electrodes(lambda on, x, t: on.rest + 0.7 * (x - on.rest)),
-    "one copies another": _electrodes(_copies),
-    "all inverted": _electrodes(lambda on, x, t: 2 * on.rest - x),
-    "one open, its neighbour drifts": _electrodes(_two),
+    "half drift up, half down": electrode_fault(lambda on, x, t: x + 4 * t[:, None] * (-1) ** np.arange(19)),
+    "all aged by 0.7": electrode_fault(lambda on, x, t: on.rest + 0.7 * (x - on.rest)),
+    "one copies another": electrode_fault(_copies),
+    "all inverted": electrode_fault(lambda on, x, t: 2 * on.rest - x),
+    "one open, its neighbour drifts": electrode_fault(_two),
 }
 
 

@@ -242,8 +242,8 @@ class Recording:
         named = [label for label in self.labels if label.text == text]
         if at_s is not None:
             at_us = self.begin_us + at_s * 1e6
-            placed = [label for label in named if label.t_us is not None]
-            named = [label for label in placed if abs(max(label.t_us or 0, self.begin_us) - at_us) <= 10_000]
+            placed = ((label, label.t_us) for label in named if label.t_us is not None)
+            named = [label for label, t_us in placed if abs(max(t_us, self.begin_us) - at_us) <= 10_000]
         if not named:
             texts = ", ".join(sorted({repr(label.text) for label in self.labels if label.text}))
             seen = f"no label {text!r}{'' if at_s is None else f' at {at_s:g} s'}: "

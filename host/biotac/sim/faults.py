@@ -52,7 +52,7 @@ class Faulty:
 Fault = Callable[[Faulty, Words, Words], Words]
 
 
-def _electrodes(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
+def electrode_fault(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
     """A fault of the electrodes' counts (n, 19), given and returned as float64; ``t_s`` (n,) is the time."""
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
@@ -71,7 +71,7 @@ def _one(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
         counts[:, on.electrode] = change(on, counts[:, on.electrode].copy(), t_s)
         return counts
 
-    return _electrodes(electrodes)
+    return electrode_fault(electrodes)
 
 
 def _walks(on: Faulty, x: Floats, _: Floats) -> Floats:
@@ -160,12 +160,12 @@ FAULTS: dict[str, Fault] = {
     "electrode drifts 10 counts/s": _one(lambda on, x, t: x - 10 * t),
     "electrode drifts 50 counts/s": _one(lambda on, x, t: x - 50 * t),
     "electrode drifts 200 counts/s": _one(lambda on, x, t: x - 200 * t),
-    "all electrodes drift 1 count/s": _electrodes(lambda on, x, t: x - 1 * t[:, None]),
-    "all electrodes drift 5 counts/s": _electrodes(lambda on, x, t: x - 5 * t[:, None]),
-    "all electrodes drift 20 counts/s": _electrodes(lambda on, x, t: x - 20 * t[:, None]),
-    "all electrodes jump by 50": _electrodes(lambda on, x, t: x - 50),
-    "noise of 30 counts on all electrodes": _electrodes(lambda on, x, t: x + on.rng.normal(0, 30, x.shape)),
-    "two electrodes' wires exchanged": _electrodes(_exchange),
+    "all electrodes drift 1 count/s": electrode_fault(lambda on, x, t: x - 1 * t[:, None]),
+    "all electrodes drift 5 counts/s": electrode_fault(lambda on, x, t: x - 5 * t[:, None]),
+    "all electrodes drift 20 counts/s": electrode_fault(lambda on, x, t: x - 20 * t[:, None]),
+    "all electrodes jump by 50": electrode_fault(lambda on, x, t: x - 50),
+    "noise of 30 counts on all electrodes": electrode_fault(lambda on, x, t: x + on.rng.normal(0, 30, x.shape)),
+    "two electrodes' wires exchanged": electrode_fault(_exchange),
     "the same words for ever": _freeze(range(SLOTS_PER_FRAME)),
     "electrodes frozen, pressure alive": _freeze(ELECTRODE_SLOT),
     "channels shifted by a slot": _shifted,

@@ -48,7 +48,7 @@ def link_is(page: Any, link: str) -> None:
 
 
 def await_text(page: Any, words: str) -> None:
-    until(page, "w => told.textContent.includes(w)", words)
+    until(page, "w => reply.textContent.includes(w)", words)
 
 
 def numbers(texts: list[str]) -> list[float]:
@@ -203,7 +203,7 @@ def test_a_refused_command_says_why_and_moves_nothing(make_player, view_of, open
     before = page.locator("main").bounding_box()
     page.keyboard.press("t")
     await_text(page, "NOT_STILL")
-    assert page.get_attribute("#told", "data-kind") == "bad"
+    assert page.get_attribute("#reply", "data-kind") == "bad"
     assert page.locator("main").bounding_box() == before
     assert player.commands == [("tare", 1)]
 
@@ -219,7 +219,7 @@ def test_recording_starts_and_stops_by_key_and_is_whole(view, open_page, tmp_pat
     await_text(page, "Recorded to ")
     page.wait_for_selector("#record[aria-pressed=false]")
     (path,) = tmp_path.glob("biotac-*.mcap")
-    assert path.name in page.text_content("#told")
+    assert path.name in page.text_content("#reply")
     recording = biotac.Recording(path)
     assert recording.problems == []
     # no frame is missing; how many come in a second of the page's is a matter of the computer

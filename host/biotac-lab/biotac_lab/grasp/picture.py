@@ -25,7 +25,8 @@ def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts]
     above.axhline(things(1, case.seed + case.pair)[0].limit_n, color="tab:red", label="crushes")
     above.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, frameon=False)
     for name in reversed(names):
-        rows = [row for (one, _), row in outcomes.items() if one in cases and one.controller == name and not one.fault]
+        tried = [case for case in cases if case.controller == name and not case.fault]
+        rows = [row for (case, _), row in outcomes.items() if case in tried]
         left = 0.0
         for kind, colour in (("dropped", "C0"), ("crushed", "C3")):
             percent = 100.0 * float(np.mean([row[kind] for row in rows]))
@@ -37,8 +38,8 @@ def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts]
 
 
 def _grasp(axes: Any, trace: list[Any], felt_by: str) -> None:
-    t_s, applied, felt, need, _, told = (np.array(column) for column in zip(*trace, strict=True))
+    t_s, applied, felt, need, _, reported = (np.array(column) for column in zip(*trace, strict=True))
     for label, values, style in ((f"felt: {felt_by}", felt, "-"), ("applied", applied, "-"), ("needed", need, "--")):
         axes.plot(t_s, values, style, label=label, linewidth=1.2)
-    axes.vlines(t_s[told], 0, 0.5, color="tab:purple", linewidth=2, label="SLIP reported")
+    axes.vlines(t_s[reported], 0, 0.5, color="tab:purple", linewidth=2, label="SLIP reported")
     axes.set(xlabel="time [s]", ylabel="force on each side [N]")

@@ -127,9 +127,8 @@ def _long_held(pac: Any) -> tuple[Any, Any, Any]:
     return counts, pdc, np.concatenate([quiet, pac]).astype(np.uint16)
 
 
-def _held_times(pac: Any) -> list[Any]:
-    """When, in s from the beginning of ``pac``, such a finger reports SLIP and STUCK."""
-    counts, pdc, pac = _long_held(pac)
+def _held_times(counts: Any, pdc: Any, pac: Any) -> list[Any]:
+    """When, in s after HELD_S, such a finger reports SLIP and STUCK."""
     return [times - HELD_S for times in _times(Finger().events(counts, pdc, pac=pac))]
 
 
@@ -139,8 +138,8 @@ def _real_slides(data: Any) -> list[tuple[str, Any]]:
         t_s, at_s = data[f"{trial}t"], data[f"{trial}cv_t"]
         speed_m_s = np.linalg.norm(data[f"{trial}cv"][:, :3], axis=1)
         pac = data[f"{trial}frame"][:, 3:25]
-        begin_s, end_s = _held_times(pac)
         counts, pdc, words = _long_held(pac)
+        begin_s, end_s = _held_times(counts, pdc, words)
         level = Finger(quantities=messages.QuantityFlags.EVENTS).feed(counts, pdc, pac=words)["slip_level"][-len(pac) :]
         levels += [int(level[round_ : round_ + 3].max()) for round_ in (begin_s * 100).astype(int)]
         ends_s = (np.arange(len(t_s)) + 1) / 100
@@ -158,7 +157,7 @@ def _real_slides(data: Any) -> list[tuple[str, Any]]:
 def _real_taps(data: Any) -> list[tuple[str, Any]]:
     pac = np.concatenate([data[name] for name in data.files if name.endswith("_signals")])[:, :594].astype(int)
     first_s = np.array(
-        [min(_held_times(np.clip(2038 + one.reshape(-1, 22), 0, 4095))[0], default=np.inf) for one in pac]
+        [min(_held_times(*_long_held(np.clip(2038 + tap.reshape(-1, 22), 0, 4095)))[0], default=np.inf) for tap in pac]
     )
     shares = [100 * float(np.mean(first_s < before_s)) for before_s in (np.inf, TAPPED / 2200)]
     return [("handovers", len(pac)), ("with a SLIP, %", shares[0]), ("before the tap, %", shares[1])]

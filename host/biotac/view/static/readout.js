@@ -190,7 +190,7 @@ export function showLink(link, words, isSilent = false) {
 }
 
 export function tell(words, good = true) {
-  const place = byId("told");
+  const place = byId("reply");
   place.dataset.kind = good ? "good" : "bad";
   write(place, words);
 }

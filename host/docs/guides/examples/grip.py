@@ -25,7 +25,7 @@ class Grip:
 
     def __init__(self, towards=((0, 0, 1), (0, 0, 1)), shares=(1.0, 1.0), least_n=0.8, most_n=12.0) -> None:
         self.towards, self.shares = [np.asarray(to, float) for to in towards], shares
-        self.least_n, self.most_n, self.wanted_n = least_n, most_n, least_n
+        self.least_n, self.most_n = least_n, most_n
         self.stiffness = 0.8  # N/mm in front of the fingers, until it is felt
         self.slip_n, self.slip_shear_n, self.power = LATE, FRICTION, 1.0  # of the latest slip: see needed_n
         self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = CLOSING_MM_S, 0.0, 0.0, 0.0
@@ -77,12 +77,12 @@ class Grip:
         self.slips, self._pending_until, self._reflex_until = self.slips + 1, 0, self._round + REFLEX_ROUNDS
 
     def _squeeze(self) -> float:
-        self.wanted_n = min(max(self.least_n, RESERVE * self.needed_n(self.shear_n)), self.most_n)
+        wanted_n = min(max(self.least_n, RESERVE * self.needed_n(self.shear_n)), self.most_n)
         before_n_s = self.speed_mm_s * self.stiffness
-        missing_n = self.wanted_n - self.normal_n - LAG_S * before_n_s
-        self.settled = self.settled + 1 if abs(missing_n) < 0.15 * self.wanted_n else 0
+        missing_n = wanted_n - self.normal_n - LAG_S * before_n_s
+        self.settled = self.settled + 1 if abs(missing_n) < 0.15 * wanted_n else 0
         gain, most, smooth = REFLEX if self._round < self._reflex_until else CALM
-        wanted_n_s = min(max(gain * missing_n * (abs(missing_n) > 0.05 * self.wanted_n), -RELEASE_N_PER_S), most)
+        wanted_n_s = min(max(gain * missing_n * (abs(missing_n) > 0.05 * wanted_n), -RELEASE_N_PER_S), most)
         self.speed_mm_s = (before_n_s + smooth * (wanted_n_s - before_n_s)) / self.stiffness
         return self.speed_mm_s
 
