@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.writer import MCAP0_MAGIC
 from record_all import blocks_of, record_all
 
 import biotac
@@ -94,11 +95,12 @@ def structure(data: bytes) -> list[int]:
 
 
 def test_a_flipped_bit_is_told(tmp_path: Path, recorded: bytes) -> None:
-    """Drawn from all of the file, and one in the head of every record."""
+    """Drawn from all of the file, one in the head of every record, and all of the file's last bytes."""
     draw = random.Random(17)
     bits = [8 * begin + draw.randrange(8 * HEAD.size) for _, begin, _ in records(recorded)]
     bits += [8 * byte + draw.randrange(8) for byte in draw.sample(structure(recorded), 60)]
     bits += [draw.randrange(8 * len(recorded)) for _ in range(60)]
+    bits += [8 * byte + draw.randrange(8) for byte in range(len(recorded) - len(MCAP0_MAGIC), len(recorded))]
     counts = tried(tmp_path, recorded, bits)
     assert counts["harmless"] == 0
 

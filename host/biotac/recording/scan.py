@@ -42,8 +42,7 @@ _CHUNK_INDEX = struct.Struct("<QQQQIH")
 _METADATA_INDEX = struct.Struct("<QQ")
 _FOOTER_RECORD = struct.Struct("<BQQQI")
 # As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
-_CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
-_FOOTER = int(Opcode.FOOTER)
+_CHUNK, _MESSAGE_INDEX, _FOOTER = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX), int(Opcode.FOOTER)
 _FOOTER_BYTES = _HEAD.size + 16  # the part of the footer that its checksum covers, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
@@ -225,14 +224,15 @@ class Scan:
                 self.share = good_until / self._size
                 stream.seek(good_until)
             self.cut_off = not whole or self._size - at - length < len(MCAP0_MAGIC)
+            magic = _content(stream, self._size - len(MCAP0_MAGIC), len(MCAP0_MAGIC)).read(len(MCAP0_MAGIC))
         if self.cut_off:
             self.problems.append(
                 f"{self.path.name} ends without its index, as after a kill or a full disk: its last "
                 f"{self._size - good_until} bytes are incomplete or unreadable; everything before them was read"
             )
-        elif not self._counted or not self._data_end:
+        elif magic != MCAP0_MAGIC or not self._counted or not self._data_end:
             self.problems.append(
-                f"{self.path.name} is damaged: it lacks its statistics or end record, so losses may go unnoticed"
+                f"{self.path.name} is damaged: it lacks its statistics or end, so losses may go unnoticed"
             )
 
     def _by_index(self, stream: BinaryIO, index: Index) -> Iterator[Metadata | tuple[str, Message]]:
