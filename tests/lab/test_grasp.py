@@ -73,7 +73,7 @@ def test_slides_and_slips_are_counted() -> None:
     assert slides.facts() == expected
 
 
-def test_the_law_stays_where_nothing_is_known_and_believes_strong_and_likely_slips() -> None:
+def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> None:
     grip, plant, sense = law.load(law.EXAMPLE)(), Plant(THING), TrueForce(2)
     speed = 10.0
     for _ in range(150):
@@ -95,9 +95,7 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_and_likely_sli
     for _ in range(10):
         grip.step(sheared(0.1, 0), False)
     grip.step(sheared(0.15, 60), True)
-    assert grip.slips == 1  # half of the shear at the slip
-    grip.step(sheared(0.3, 60), True)
-    assert grip.slips == 2
+    assert grip.slips == 2  # also at half of the shear at which it slipped: what was learnt may be wrong
     for half_n, more in ((0.0, 2.0), (0.3 / 0.45, 2**0.5), (20.0, 1.0)):  # what is hardly known says hardly anything
         doubted = [replace(f, shear_half_n=half_n) for f in sheared(0.3, 60)]
         for _ in range(10):

@@ -5,10 +5,9 @@
 
 void hand_send(uint8_t id, const void *msg); // example_bare.c
 void close_at(float mm_s);                   // the hand's own: both fingers; negative: open
-#define FINGERS           0x11u              // index and thumb, chip selects 0 and 4, which meet along z
-#define RESERVE           1.25f
-#define NEEDED_N(shear_n) (grip.slip_n / 0.9f * powf((shear_n) / grip.slip_shear_n, grip.power))
-#define MARGIN(half_mn)   ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
+#define FINGERS         0x11u                // index and thumb, chip selects 0 and 4, which meet along z
+#define RESERVE         1.25f
+#define MARGIN(half_mn) ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
 struct grip {
     float least_n, most_n, slip_n, slip_shear_n, power, stiffness, speed_mm_s, normal_n, shear_n, margin_n,
         way_mm, first_n;
@@ -70,10 +69,10 @@ static float step(float shear_n)
     if (grip.way_mm > 0.3f && grip.normal_n - grip.first_n > 0.3f)
         grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
     grip.shear_n += 0.3f * (shear_n - grip.shear_n);
-    if (grip.round >= grip.reflex_until && grip.round < grip.pending_until && felt.strong
-        && (!grip.slips || grip.power < 0.5f || grip.normal_n < 1.12f * NEEDED_N(shear_n)))
+    if (grip.round >= grip.reflex_until && grip.round < grip.pending_until && felt.strong)
         learn_from_slip(shear_n, felt.half_n / (float)felt.frames);
-    const float wanted_n = fminf(fmaxf(grip.least_n, RESERVE * NEEDED_N(grip.shear_n)), grip.most_n);
+    const float needed_n = grip.slip_n / 0.9f * powf(grip.shear_n / grip.slip_shear_n, grip.power);
+    const float wanted_n = fminf(fmaxf(grip.least_n, RESERVE * needed_n), grip.most_n);
     const float before = grip.speed_mm_s * grip.stiffness; // N/s
     const float missing_n = wanted_n - grip.normal_n - 0.03f * before;
     const int reflex = grip.round < grip.reflex_until, near = fabsf(missing_n) <= 0.05f * wanted_n;

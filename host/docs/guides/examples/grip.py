@@ -11,7 +11,7 @@ RELEASE_N_PER_S, SMOOTH = 0.9, 0.3  # what slips is not let go by much until it 
 CALM = 6.0, 5.0, SMOOTH  # squeeze with so many N/s for each N that is missing, at most, and change it so smoothly
 REFLEX, REFLEX_ROUNDS = (40.0, 40.0, 1.0), 8  # the same after a slip, and for how long
 SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
-LATE, UNLIKELY = 0.9, 1.12  # of what is needed: pressed when a slip is felt; with so much, another is unlikely
+LATE = 0.9  # of what is needed: pressed when a slip is felt
 DOUBT, DOUBT_RESERVE = 0.45, 0.65  # of shear's half width; of what pressed, on top where shear says nothing
 BLIND_ROUNDS, BLIND_SHARE = 3, 0.4  # who feels nothing for so long presses harder by that, as it may get heavier
 
@@ -56,8 +56,7 @@ class Grip:
         self.shear_n += SMOOTH * (shear_n - self.shear_n)
         self._pending_until = self._round + PENDING_ROUNDS if slipped else self._pending_until
         if self._reflex_until <= self._round < self._pending_until:
-            likely = not self.slips or self.power < 0.5 or self.normal_n < UNLIKELY * self.needed_n(shear_n)
-            if likely and any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in known):
+            if any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in known):
                 self._learn_from_slip(shear_n, half_n)
         return self._squeeze()
 
