@@ -10,11 +10,11 @@ from typing import TypeAlias
 import numpy as np
 
 from ..core import geometry as surface
-from ..core.geometry import Floats
 from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from .physics import REST_CELSIUS, States
 from .scenario import FLAT_MM, FORCE_MAX_N, SHEAR_MAX_N, SLIP_MAX_MM_S, TORSION_MAX_NMM
+from .timeline import states_of
 
 Place: TypeAlias = str | tuple[float, float]
 
@@ -49,7 +49,7 @@ class Touch:
         for name, value, low, high in limits:
             if not low <= value <= high:  # NaN too
                 raise InputError(f"Touch: {name} is {value:g}, expected {low:g} to {high:g}; correct what computes it")
-        _place(self.at)
+        _place_mm(self.at)
 
 
 class Course(tuple["Touch | Sequence[Touch]", ...]):
@@ -61,22 +61,20 @@ Load: TypeAlias = "Touch | Sequence[Touch] | Course | None"
 
 
 @lru_cache(maxsize=256)
-def _place(at: Place) -> tuple[Floats, Floats, Floats]:
-    """The point on the surface (3,) in mm, and the unit tangents (3,) to the tip and to E11's side."""
+def _place_mm(at: Place) -> tuple[float, float]:
+    """The point's x and y in mm."""
     if isinstance(at, str):
         if at not in _sensor.ELECTRODE_NAMES:
             raise InputError(f"Touch: at is {at!r}, expected an electrode, E1 to E19, or (x_mm, y_mm)")
-        x_mm, y_mm = surface.project(surface.ELECTRODE_MM[[_sensor.ELECTRODE_NAMES.index(at)]])[0][:2]
-    else:
-        x_mm, y_mm = at
-        if not surface.is_on_surface(x_mm, y_mm):
-            raise InputError(
-                f"Touch: at is ({x_mm:g}, {y_mm:g}) mm, expected a point on the ventral surface: x from "
-                f"{surface.PROXIMAL_END_MM:g}, |y| up to {surface.RADIUS_MM:g}"
-            )
-    point = surface.on_surface(np.array([[x_mm, y_mm]]))
-    to_tip, to_side = surface.tangents_at(surface.normals_at(point))
-    return point[0], to_tip[0], to_side[0]
+        over = surface.project(surface.ELECTRODE_MM[[_sensor.ELECTRODE_NAMES.index(at)]])[0]
+        return float(over[0]), float(over[1])
+    x_mm, y_mm = at
+    if not surface.is_on_surface(x_mm, y_mm):
+        raise InputError(
+            f"Touch: at is ({x_mm:g}, {y_mm:g}) mm, expected a point on the ventral surface: x from "
+            f"{surface.PROXIMAL_END_MM:g}, |y| up to {surface.RADIUS_MM:g}"
+        )
+    return x_mm, y_mm
 
 
 def states(load: Load) -> tuple[States, ...]:
@@ -84,26 +82,14 @@ def states(load: Load) -> tuple[States, ...]:
     parts = [_contacts(part) for part in (load if isinstance(load, Course) else (load,))]
     most = max(len(part) for part in parts)
     columns = [[part[k] if k < len(part) else Touch(celsius=part[0].celsius) for part in parts] for k in range(most)]
-    return tuple(_column(column) for column in columns)
+    return tuple(states_of(np.array([_pose(touch) for touch in column], float)) for column in columns)
 
 
 def _contacts(load: Touch | Sequence[Touch] | None) -> tuple[Touch, ...]:
     return (Touch(),) if not load else (load,) if isinstance(load, Touch) else tuple(load)
 
 
-def _column(touches: list[Touch]) -> States:
-    places = [_place(touch.at) for touch in touches]
-    return States(
-        contact_mm=np.array([point for point, _, _ in places]),
-        force_n=np.array([touch.normal_n for touch in touches], float),
-        shear_n=np.array(
-            [
-                (touch.shear_n[0] * to_tip + touch.shear_n[1] * to_side) * (touch.normal_n > 0.0)
-                for touch, (_, to_tip, to_side) in zip(touches, places, strict=True)
-            ]
-        ),
-        torsion_nmm=np.array([touch.torsion_nmm * (touch.normal_n > 0.0) for touch in touches]),
-        tip_radius_mm=np.array([touch.tip_mm / 2.0 for touch in touches]),
-        warm_c=np.array([touch.celsius - REST_CELSIUS for touch in touches]),
-        slip_mm_s=np.array([touch.slip_mm_s * (touch.normal_n > 0.0) for touch in touches], float),
-    )
+def _pose(touch: Touch) -> tuple[float, ...]:
+    """The fields of timeline.Pose in order."""
+    where = *_place_mm(touch.at), touch.normal_n, *touch.shear_n
+    return *where, touch.torsion_nmm, touch.tip_mm, touch.celsius, touch.slip_mm_s
