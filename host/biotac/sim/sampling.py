@@ -6,7 +6,6 @@ host/docs/reference/sensor_model.md has the formulas and where the numbers are f
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -51,62 +50,39 @@ def sample(finger: Finger, states: States, rows: npt.NDArray[np.int64] | None = 
     same words, and a longer run begins with the words of a shorter one.
     """
     rows = np.arange(len(states)) if rows is None else rows
-    sampler, effects = Sampler(finger), Effects.of(finger, states)
+    effects = effects_of(finger, states)
+    sampler = Sampler(finger, slips=bool(effects["slip_mm_s"].any()))
     words: Words = np.empty((len(rows) - 1, SLOTS_PER_FRAME), dtype=np.uint16)
     for first in range(0, len(words), _BLOCK):
-        words[first : first + _BLOCK] = sampler.read(effects.at(rows[first : first + _BLOCK + 1]))
+        words[first : first + _BLOCK] = sampler.read(effects[rows[first : first + _BLOCK + 1]])
     return words
 
 
-@dataclass(frozen=True)
-class Effects:
-    """What states do to one finger at n instants, before time and noise: each attribute has n rows.
+#: What states do to one finger at an instant, before time and noise: ``exact`` are counts, ``pressed`` those above
+#: rest, ``force_n`` is the normal force, ``load`` and ``tdc`` are counts, ``slip_mm_s`` is a speed.
+EFFECTS_DTYPE = np.dtype(
+    [(name, np.float64, (len(ELECTRODE_SLOT),)) for name in ("exact", "pressed")]
+    + [(name, np.float64, ()) for name in ("force_n", "load", "tdc", "slip_mm_s")]
+)
 
-    ``exact`` (n, 19) are counts, ``pressed`` (n, 19) those above rest, ``force_n`` (n,) the normal force, ``load`` (n,)
-    and ``tdc`` (n,) are counts, ``slip_mm_s`` (n,) is a speed; None where nothing ever slides.
-    """
 
-    exact: Floats
-    pressed: Floats
-    force_n: Floats
-    load: Floats
-    tdc: Floats
-    slip_mm_s: Floats | None
-
-    @classmethod
-    def of(cls, finger: Finger, states: States, *more: States, slips: bool = False) -> Effects:
-        """Those of one contact, or of several at once, whose temperature is the first one's.
-
-        ``slips``: keep the speeds even if nothing slides here.
-        """
-        contacts = (states, *more)
-        if more:
-            compression, bulge = (sum(part) for part in zip(*(one.deformation for one in contacts), strict=True))
-            exact = finger.counts_of(compression, bulge, states.warm_c)
-        else:
-            exact = finger.counts(states)
-        speeds = [one.slip_mm_s for one in contacts if one.slip_mm_s is not None]
-        speed = np.max(speeds, axis=0) if speeds else np.zeros(len(states))
-        return cls(
-            exact,
-            exact - finger.rest_counts(states.warm_c),
-            np.sum([one.force_n for one in contacts], axis=0),
-            np.sum([spring_load(one) for one in contacts], axis=0),
-            tdc_counts(REST_CELSIUS + states.warm_c),
-            speed if slips or speed.any() else None,
-        )
-
-    def _columns(self) -> tuple[Floats | None, ...]:
-        return self.exact, self.pressed, self.force_n, self.load, self.tdc, self.slip_mm_s
-
-    def at(self, rows: Any) -> Effects:
-        """Those at some instants, a NumPy index."""
-        return Effects(*(None if column is None else column[rows] for column in self._columns()))  # type: ignore[arg-type]
-
-    def then(self, later: Effects) -> Effects:
-        """These, and ``later`` ones behind them."""
-        pairs = zip(self._columns(), later._columns(), strict=True)
-        return Effects(*(None if a is None or b is None else np.concatenate([a, b]) for a, b in pairs))  # type: ignore[arg-type]
+def effects_of(finger: Finger, states: States, *more: States) -> npt.NDArray[np.void]:
+    """EFFECTS_DTYPE (n,) of one contact, or of several at once, whose temperature is the first one's."""
+    contacts = (states, *more)
+    if more:
+        compression, bulge = (sum(part) for part in zip(*(one.deformation for one in contacts), strict=True))
+        exact = finger.counts_of(compression, bulge, states.warm_c)
+    else:
+        exact = finger.counts(states)  # which another model may override
+    effects = np.empty(len(states), EFFECTS_DTYPE)
+    effects["exact"] = exact
+    effects["pressed"] = exact - finger.rest_counts(states.warm_c)
+    effects["force_n"] = np.sum([one.force_n for one in contacts], axis=0)
+    effects["load"] = np.sum([spring_load(one) for one in contacts], axis=0)
+    effects["tdc"] = tdc_counts(REST_CELSIUS + states.warm_c)
+    speeds = [one.slip_mm_s for one in contacts if one.slip_mm_s is not None]
+    effects["slip_mm_s"] = np.max(speeds, axis=0) if speeds else 0.0
+    return effects
 
 
 class Sampler:
@@ -119,16 +95,17 @@ class Sampler:
     (44,)
     """
 
-    def __init__(self, finger: Finger) -> None:
+    def __init__(self, finger: Finger, *, slips: bool = True) -> None:
+        """``slips``: something may slide over the skin; where nothing ever does, this may be False, which is faster."""
         self._finger = finger
         # one random stream per kind, drawn frame by frame, so that a shorter run is a prefix of a longer one
         rngs = [np.random.default_rng([finger.seed, kind]) for kind in (1, 2, 3, 4, 5)]
         self._electrode_rng, self._glitch_rng, self._pac_rng, self._slow_rng, slip_rng = rngs
-        self._ringing = Ringing(slip_rng)
+        self._ringing = Ringing(slip_rng) if slips else None
         self._creep, self._pressure, self._high_pass = Lag(CREEP_S), Pressure(), _HighPass()
         self._hit = np.zeros((1, len(ELECTRODE_SLOT)), np.bool_)
         self._frame = 0
-        self._last: Effects | None = None
+        self._last: npt.NDArray[np.void] | None = None
 
     def step(self, states: States, *more: States) -> Words:
         """Read the next round, (44,), at whose end are ``states`` of one contact, or ``more`` at once, each (1,).
@@ -141,18 +118,21 @@ class Sampler:
 
     def steps(self, rounds: int, states: States, *more: States) -> Words:
         """As many steps with the same states, (rounds, 44)."""
-        now = Effects.of(self._finger, states, *more, slips=True)
-        before = now.at(slice(0, 1)) if self._last is None else self._last
-        self._last = now.at(slice(-1, None))
-        return self.read(before.then(now.at(np.tile(np.arange(len(states)), rounds))), len(states))
+        now = effects_of(self._finger, states, *more)
+        before = now[:1] if self._last is None else self._last
+        self._last = now[-1:]
+        return self.read(np.concatenate([before, np.tile(now, rounds)]), len(states))
 
-    def read(self, effects: Effects, pieces: int = 1) -> Words:
-        """The next n rounds, (n, 44), between n * ``pieces`` + 1 instants; the first is the last of the call before."""
-        finger, frames = self._finger, (len(effects.load) - 1) // pieces
+    def read(self, effects: npt.NDArray[np.void], pieces: int = 1) -> Words:
+        """The next n rounds, (n, 44), between n * ``pieces`` + 1 instants; the first is the last of the call before.
+
+        ``effects`` are EFFECTS_DTYPE.
+        """
+        finger, frames = self._finger, (len(effects) - 1) // pieces
         words = np.empty((frames, SLOTS_PER_FRAME))
 
-        crept = _within(self._creep(effects.pressed[::pieces]), pieces)
-        clean = effects.exact + finger.creep_share * crept
+        crept = _within(self._creep(effects["pressed"][::pieces]), pieces)
+        clean = effects["exact"] + finger.creep_share * crept
         elapsed_s = (self._frame + np.arange(frames * pieces + 1) / pieces) * FRAME_S
         clean += finger.drift_per_min / 60.0 * elapsed_s[:, None]
         self._frame += frames
@@ -162,18 +142,18 @@ class Sampler:
             electrodes -= self._glitches(frames)
         words[:, ELECTRODE_SLOT] = electrodes
 
-        pdc = self._pressure(effects.load, pieces)
+        pdc = self._pressure(effects["load"], pieces)
         slow_noise = self._slow_rng.normal(0.0, (PDC_NOISE, TAC_NOISE, TDC_NOISE), (frames, 3))
         at_slot = np.array([PDC_SLOT, TAC_SLOT, TDC_SLOT]) / SLOTS_PER_FRAME
-        slow = np.column_stack([finger.pdc_rest + pdc, np.full(len(pdc), TAC_REST), effects.tdc])
+        slow = np.column_stack([finger.pdc_rest + pdc, np.full(len(pdc), TAC_REST), effects["tdc"]])
         words[:, [PDC_SLOT, TAC_SLOT, TDC_SLOT]] = _between(slow, at_slot, pieces) + slow_noise
 
-        rattle = finger.rattle_per_n_s * np.abs(np.diff(effects.force_n)) * pieces / FRAME_S
+        rattle = finger.rattle_per_n_s * np.abs(np.diff(effects["force_n"])) * pieces / FRAME_S
         pac = PAC_REST + self._high_pass(PAC_PER_PDC * pdc, pieces)
         noise = PAC_NOISE + rattle.reshape(frames, pieces)[:, _piece_of(PAC_SLOT, pieces)]
         pac += self._pac_rng.normal(0.0, 1.0, pac.shape) * noise
-        if effects.slip_mm_s is not None:
-            pac += self._ringing(effects.slip_mm_s[:-1:pieces])
+        if self._ringing is not None:
+            pac += self._ringing(effects["slip_mm_s"][:-1:pieces])
         words[:, PAC_SLOT] = pac
 
         return np.clip(np.rint(words), 0, _sensor.FULL_SCALE_COUNT).astype(np.uint16)
