@@ -141,8 +141,7 @@ def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str |
 def find_board(port: str | None) -> tuple[Target, list[Loader]]:
     """The board, and the ways to reach its boot loader."""
     if port is not None and port.startswith(("emu:", "sim:")):
-        from ...flash.loader_emulated import EmulatedLoader
-        from ...flash.target_emulated import EmulatedTarget
+        from ...flash.emulated import EmulatedLoader, EmulatedTarget
 
         emulated = EmulatedTarget(port)
         return emulated, [EmulatedLoader(emulated.board)]

@@ -1,6 +1,12 @@
-"""An emulated board: its process outlives a restart, and its port keeps its name."""
+"""An emulated board and its loader, this project's model of the real one (tools/emulator/loader.mjs).
+
+Its process outlives a restart, and its port keeps its name.
+"""
 
 from __future__ import annotations
+
+import tempfile
+from pathlib import Path
 
 from ..errors import InputError
 from ..hand.hand import Hand
@@ -8,9 +14,11 @@ from ..link.serial_port import SerialLink
 from ..sim.emulated import EmulatedBoard
 from ..sim.loading import load_source
 from ..sim.ports import parse_sim
-from .interfaces import Target
+from .image import Image
+from .interfaces import Loader, Show, Target
 
 BACK_S = 10.0  # of emulated time
+WRITE_S = 5.0  # likewise; an image of 48 KiB takes 0.7 s
 WORLD_S = 600.0  # the tape must outlast everything done here: time stands still after its end
 
 
@@ -41,3 +49,28 @@ class EmulatedTarget(Target):
 
     def close(self) -> None:
         self.board.close()
+
+
+class EmulatedLoader(Loader):
+    """Passes files to the emulator instead of writing them to a drive."""
+
+    name = "emulated loader"
+
+    def __init__(self, board: EmulatedBoard) -> None:
+        self._board = board
+
+    def ready(self) -> bool:
+        return self._board.counters()["loader"] is not None
+
+    def cure(self) -> str:
+        return "the emulated board did not enter its loader: check that its image is this gateway's"
+
+    def write(self, image: Image, show: Show) -> None:
+        show(0, len(image.blocks))
+        before = self._board.counters()["images"]
+        with tempfile.TemporaryDirectory(prefix="biotac-flash-") as folder:
+            path = Path(folder) / "image.uf2"
+            path.write_bytes(b"".join(image.boot_last()))
+            self._board.say(f"write uf2 {path}")
+            self._board.until(WRITE_S, images=before + 1)
+        show(len(image.blocks), len(image.blocks))
