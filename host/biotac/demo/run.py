@@ -145,7 +145,6 @@ def expected_frames(source: Source) -> int:
 
 
 def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
-    """When, where and why the tare changed."""
     return [
         {"finger": m.finger, "seq": m.seq, "reason": wire.TareReason(m.reason).name}
         for m in messages

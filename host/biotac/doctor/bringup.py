@@ -77,7 +77,6 @@ class Bringup:
         return self.rates | self.slow
 
     def of(self, finger: int) -> StructArray:
-        """A finger's frames."""
         rows: StructArray = self.frames[self.frames["finger"] == finger]
         return rows
 

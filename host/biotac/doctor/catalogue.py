@@ -9,8 +9,6 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Entry:
-    """One kind of finding."""
-
     severity: Literal["error", "warning"]  # data must not be trusted; or something else is not as it should be
     meaning: str
     cure: str

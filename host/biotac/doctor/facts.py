@@ -83,8 +83,6 @@ class PairFacts:
 
 @dataclass(frozen=True)
 class Facts:
-    """All facts about one port."""
-
     port: str | None  #: None: there is nothing to open
     system: SystemFacts = field(default_factory=SystemFacts)
     error: BiotacError | None = None  #: why the port could not be opened, or was lost

@@ -169,5 +169,4 @@ def check_boot2(payload: bytes) -> None:
 
 
 def note_text(note: Note) -> str:
-    """A note as text for users."""
     return f"{board_text(note.board)}, firmware {note.version}, wire {'.'.join(map(str, note.wire))}"

@@ -21,12 +21,9 @@ FILE = "BIOTAC.UF2"
 
 
 class DriveLoader(Loader):
-    """Loader on a USB drive."""
-
     name = f"drive {LABEL}"
 
     def drives(self) -> list[Path]:
-        """Mounted drives of boards in their loader."""
         return [folder for folder in mounted_folders() if is_loader(folder)]
 
     def ready(self) -> bool:

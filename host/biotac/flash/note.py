@@ -29,7 +29,6 @@ class Note:
 
     @property
     def version(self) -> str:
-        """Firmware release."""
         return ".".join(map(str, self.firmware))
 
 

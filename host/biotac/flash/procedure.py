@@ -97,7 +97,6 @@ def flash(
 
 
 def first_ready(loaders: Sequence[Loader]) -> Loader | None:
-    """The first loader that reaches a board now; None if there is none."""
     return next((loader for loader in loaders if loader.ready()), None)
 
 
@@ -137,7 +136,6 @@ def leave(
 
 
 def firmware(hello: wire.Hello) -> tuple[int, int, int]:
-    """The board's firmware release, for comparison."""
     return hello.firmware_major, hello.firmware_minor, hello.firmware_patch
 
 

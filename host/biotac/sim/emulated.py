@@ -27,8 +27,6 @@ LISTEN_S = 0.005
 
 @dataclass(frozen=True)
 class Tools:
-    """Files that an emulated board needs."""
-
     node: str
     program: Path
     sensors: Path

@@ -62,7 +62,6 @@ class SensorBoard:
             self._board.ask(wire.EmuPlug(0, finger, finger < fingers, padded), wire.EmuStatus)
 
     def status(self) -> wire.EmuStatus:
-        """The board's status."""
         return self._board.ask(wire.EmuGetStatus(0), wire.EmuStatus)
 
     def fault(self, finger: int, fault: wire.EmuFault) -> wire.EmuStatus:

@@ -90,7 +90,6 @@ class Table:
         return key in self.values
 
     def error(self, key: str, seen: str, expected: str, cure: str = "correct the value") -> ScenarioError:
-        """The error to raise about ``key``."""
         line = self._lines.key(self._start, key)
         label = f"{self._label}: " if self._label else ""
         return ScenarioError(f"{self._file}:{line}: {label}key '{key}' {seen}: expected {expected}; {cure}")

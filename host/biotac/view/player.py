@@ -57,7 +57,6 @@ class Player:
             yield batch
 
     def stats(self) -> LinkStats:
-        """Health of the link."""
         return self._hand.stats
 
     def recording(self) -> dict[str, Any] | None:

@@ -111,8 +111,6 @@ class ViewServer(ThreadingHTTPServer):
 
 
 class Handler(BaseHTTPRequestHandler):
-    """One request."""
-
     server: ViewServer
     server_version = "biotac"
     sys_version = ""

@@ -35,7 +35,6 @@ class Ring:
         self.end = 0
 
     def extend(self, texts: list[str]) -> None:
-        """Append texts, dropping the oldest ones."""
         self._texts.extend(texts)
         self.end += len(texts)
 
@@ -123,7 +122,6 @@ class State:
             self._arrived.clear()
 
     def take(self, batch: Batch, player: Player) -> None:
-        """Add a batch."""
         frames, pac = frame_rows(batch, player.applied_n(batch.wire["finger"], batch.t_us)), pac_rows(batch)
         now_s = time.monotonic()
         with self._news:

@@ -144,7 +144,6 @@ def measured(facts: Facts) -> dict[str, Any]:
 
 
 def as_text(facts: Facts, findings: list[Finding]) -> str:
-    """The result for people."""
     lines = []
     for finding in findings:
         lines.append(f"{finding.entry.severity} {finding.code}: {finding.seen}")

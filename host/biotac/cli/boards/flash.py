@@ -160,7 +160,6 @@ def find_board(port: str | None) -> tuple[Target, list[Loader]]:
 
 
 def usb_loaders() -> list[Loader]:
-    """The ways to reach a board that is in its boot loader on USB."""
     from ...flash.loader_drive import DriveLoader
     from ...flash.loader_picotool import PicotoolLoader
 

@@ -118,7 +118,6 @@ def describe(port: ListPortInfo, *, ask: bool) -> dict[str, Any]:
 
 
 def as_line(facts: dict[str, Any]) -> str:
-    """A port as one line for people."""
     if "problem" in facts:
         return f"{facts['port']}  {facts['problem']}"
     if "firmware" not in facts:

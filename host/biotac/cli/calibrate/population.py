@@ -24,7 +24,6 @@ EXAMPLE = "biotac calibrate population /dev/ttyACM0 --finger index --population 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the board, the finger and the map."""
     parser.add_argument("port", metavar="PORT", help="a board")
     values.add_finger(parser)
     parser.add_argument(

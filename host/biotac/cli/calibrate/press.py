@@ -43,7 +43,6 @@ EXAMPLE = "biotac calibrate press sim:scale.toml --scale --finger index"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what the finger is pressed against, the forces, and where the result goes."""
     parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
     against = parser.add_mutually_exclusive_group(required=True)
     against.add_argument(
@@ -91,7 +90,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Calibrate on a board or from a recording."""
     recorded = Path(args.where).is_file() or args.where.endswith(".mcap")
     if recorded and args.save:
         raise InputError("--save needs a board, not a recording: drop --save, or name a PORT")

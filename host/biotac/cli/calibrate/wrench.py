@@ -49,7 +49,6 @@ EXAMPLE = "biotac calibrate wrench thumb.mcap --reference thumb.csv --finger thu
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to fit, and from which files."""
     parser.add_argument("files", metavar="FILE", nargs="*", type=Path, help="one finger each, fitted on its own")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="report (.md, .png) and map (.wrench.json) go here")
     parser.add_argument(
@@ -79,7 +78,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Calibrate from every file, or the finger of a board."""
     if (args.live is None) != bool(args.files):
         raise InputError("expected either FILE... or --live PORT")
     if args.live is not None:
