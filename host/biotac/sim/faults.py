@@ -52,16 +52,21 @@ class Faulty:
 Fault = Callable[[Faulty, Words, Words], Words]
 
 
-def electrode_fault(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
-    """A fault of the electrodes' counts (n, 19), given and returned as float64; ``t_s`` (n,) is the time."""
+def _at(slots: Any, change: Callable[[Faulty, Floats, Floats], Any]) -> Fault:
+    """A fault of these slots alone, an index; ``change`` gets and gives their counts, of any size, as float64."""
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
         bad: Words = words.copy()
-        counts = change(on, words[:, ELECTRODE_SLOT].astype(float), on.time_s(len(words)))
-        bad[:, ELECTRODE_SLOT] = np.clip(np.rint(counts), 0, _sensor.FULL_SCALE_COUNT)
+        counts = change(on, words[:, slots].astype(float), other[:, slots].astype(float))
+        bad[:, slots] = np.clip(np.rint(counts), 0, _sensor.FULL_SCALE_COUNT)
         return bad
 
     return fault
+
+
+def electrode_fault(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
+    """A fault of the electrodes' counts (n, 19), given and returned as float64; ``t_s`` (n,) is the time."""
+    return _at(ELECTRODE_SLOT, lambda on, counts, _: change(on, counts, on.time_s(len(counts))))
 
 
 def _one(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
@@ -88,12 +93,6 @@ def _exchange(on: Faulty, counts: Floats, _: Floats) -> Floats:
     return counts
 
 
-def _half_gain(on: Faulty, x: Floats, _: Floats) -> Floats:
-    rest = on.rest[on.electrode]
-    half: Floats = rest + (x - rest) / 2
-    return half
-
-
 def _freeze(slots: Iterable[int]) -> Fault:
     columns = np.array(list(slots))
 
@@ -105,30 +104,11 @@ def _freeze(slots: Iterable[int]) -> Fault:
     return fault
 
 
-def _channel(slot: int, value: Callable[[Faulty, Floats], Floats | float]) -> Fault:
-    def fault(on: Faulty, words: Words, other: Words) -> Words:
-        bad: Words = words.copy()
-        bad[:, slot] = np.clip(value(on, words[:, slot].astype(float)), 0, _sensor.FULL_SCALE_COUNT)
-        return bad
-
-    return fault
-
-
 def _shifted(on: Faulty, words: Words, other: Words) -> Words:
     line = words.reshape(-1)
     before = line[0] if on.kept is None else on.kept
     on.kept = line[-1]
     return np.concatenate([[before], line[:-1]]).astype(words.dtype).reshape(words.shape)
-
-
-def _cross_talk(share: float) -> Fault:
-    def fault(on: Faulty, words: Words, other: Words) -> Words:
-        bad: Words = words.copy()
-        felt = words[:, ELECTRODE_SLOT] + share * (other[:, ELECTRODE_SLOT] - on.other_rest)
-        bad[:, ELECTRODE_SLOT] = np.clip(np.rint(felt), 0, _sensor.FULL_SCALE_COUNT)
-        return bad
-
-    return fault
 
 
 _PARITY = np.array([bin(byte).count("1") & 1 for byte in range(256)], bool)
@@ -156,7 +136,7 @@ FAULTS: dict[str, Fault] = {
     "electrode floating: uniform noise": _one(lambda on, x, t: on.rng.uniform(1, 4089, len(x))),
     "electrode with noise of 200 counts": _one(lambda on, x, t: x + on.rng.normal(0, 200, len(x))),
     "electrode stuck": _one(lambda on, x, t: np.full_like(x, on.first(x[0]))),
-    "electrode at half gain": _one(_half_gain),
+    "electrode at half gain": _one(lambda on, x, t: on.rest[on.electrode] + (x - on.rest[on.electrode]) / 2),
     "electrode drifts 10 counts/s": _one(lambda on, x, t: x - 10 * t),
     "electrode drifts 50 counts/s": _one(lambda on, x, t: x - 50 * t),
     "electrode drifts 200 counts/s": _one(lambda on, x, t: x - 200 * t),
@@ -170,14 +150,14 @@ FAULTS: dict[str, Fault] = {
     "electrodes frozen, pressure alive": _freeze(ELECTRODE_SLOT),
     "channels shifted by a slot": _shifted,
     "two fingers exchanged": lambda on, words, other: other.copy(),
-    "cross-talk of 30 % between fingers": _cross_talk(0.3),
-    "cross-talk of 100 % between fingers": _cross_talk(1.0),
+    "cross-talk of 30 % between fingers": _at(ELECTRODE_SLOT, lambda on, x, other: x + 0.3 * (other - on.other_rest)),
+    "cross-talk of 100 % between fingers": _at(ELECTRODE_SLOT, lambda on, x, other: x + 1.0 * (other - on.other_rest)),
     "noisy line, 1e-3 a bit": noisy_line(1e-3),
     "noisy line, 3e-3 a bit": noisy_line(3e-3),
-    "TDC jumps by 300 counts": _channel(TDC_SLOT, lambda on, x: x + 300),
-    "PDC stuck": _channel(PDC_SLOT, lambda on, x: on.first(x[0])),
-    "PDC 0": _channel(PDC_SLOT, lambda on, x: 0.0),
-    "PDC 4095": _channel(PDC_SLOT, lambda on, x: 4095.0),
+    "TDC jumps by 300 counts": _at(TDC_SLOT, lambda on, x, other: x + 300),
+    "PDC stuck": _at(PDC_SLOT, lambda on, x, other: on.first(x[0])),
+    "PDC 0": _at(PDC_SLOT, lambda on, x, other: 0.0),
+    "PDC 4095": _at(PDC_SLOT, lambda on, x, other: 4095.0),
 }
 
 #: What a sensor or its lead does on the bus, in place of counts.
