@@ -177,13 +177,15 @@ IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
 def fault_named(name: str, channel: str | None = None) -> Fault:
     """A fault of FAULTS, with or without its leading "electrode", or of BUS_FAULTS, on ``channel`` or all.
 
-    A bus fault gives tape codes in place of counts. Raises InputError for an unknown name.
+    A bus fault gives tape codes in place of counts. Raises InputError for an unknown name, or channel of the bus.
     """
     for known in (name, f"electrode {name}"):
         if known in FAULTS:
             return FAULTS[known]
     if name not in BUS_FAULTS:
         raise InputError(f"no fault {name!r}, expected one of: {', '.join(EVERY_FAULT)}")
+    if channel is not None and channel not in IS_CHANNEL:
+        raise InputError(f"channel is {channel!r}, expected one of: {', '.join(IS_CHANNEL)}")
     code, hit = BUS_FAULTS[name], np.ones(SLOTS_PER_FRAME, bool) if channel is None else IS_CHANNEL[channel]
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:

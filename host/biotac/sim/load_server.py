@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
+from ..documents import parse_json
 from ..errors import BiotacError, DeviceLostError, InputError
 from .live import LiveFingers
 from .process import SimBoard
@@ -52,7 +52,7 @@ class LoadServer:
 
     def _answer(self, line: bytes) -> dict[str, Any]:
         try:
-            request = json.loads(line)
+            request = parse_json(line)
             if not isinstance(request, dict):
                 raise InputError("expected an object with a load for each finger")
             if "fault" in request:
@@ -61,7 +61,7 @@ class LoadServer:
             words = self._fingers.read({name: _load(value) for name, value in request.items()})
         except DeviceLostError:
             raise
-        except (BiotacError, KeyError, TypeError, ValueError, AttributeError) as error:
+        except (BiotacError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
             return {"error": str(error.args[0] if error.args else error)}
         self._sensors.put(words)
         self._sensors.wait_still()
@@ -83,5 +83,5 @@ def _load(value: Any) -> Load:
 def _touch(value: Any) -> Touch:
     if not isinstance(value, dict) or not value.keys() <= set(_KEYS):
         raise InputError(f"a touch is {json.dumps(value)}, expected an object with some of: {', '.join(_KEYS)}")
-    pairs: Callable[[Any], Any] = lambda one: tuple(one) if isinstance(one, list) else one  # noqa: E731
-    return Touch(**{name: pairs(one) for name, one in value.items()})
+    given: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in value.items()}
+    return Touch(**given)

@@ -38,6 +38,8 @@ class Touch:
     celsius: float = REST_CELSIUS
 
     def __post_init__(self) -> None:
+        if len(self.shear_n) != 2:
+            raise InputError(f"Touch: shear_n is {self.shear_n}, expected two numbers, to the tip and to E11's side")
         limits = (
             ("normal_n", self.normal_n, 0.0, FORCE_MAX_N),
             ("shear_n", max(map(abs, self.shear_n)), 0.0, SHEAR_MAX_N),

@@ -82,7 +82,7 @@ def test_several_contacts_add_as_in_the_model() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"normal_n": -1.0}, {"normal_n": float("nan")}, {"at": "E20"}, {"at": (9.0, 9.0)}, {"shear_n": (30.0, 0.0)}],
+    [{"normal_n": -1.0}, {"normal_n": np.nan}, {"at": "E20"}, {"at": (9, 9)}, {"shear_n": (30, 0)}, {"shear_n": (1,)}],
 )
 def test_a_touch_that_cannot_be_is_refused_in_words(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"Touch: .*expected"):
@@ -149,6 +149,8 @@ def test_what_a_program_gets_wrong_costs_no_time(biotac_world: Callable[..., Any
         w.step(thumb=Touch(1.0))
     with pytest.raises(InputError, match="no fault 'loose'"):
         w.fault("index", "loose")
+    with pytest.raises(InputError, match="channel is 'E77'"):
+        w.fault("index", "unplugged", channel="E77")
     assert w.step().seq == 1
     with pytest.raises(InputError, match="expected 1 to 5"):
         LiveFingers({str(k): SimFinger(k) for k in range(6)})
