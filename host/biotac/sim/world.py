@@ -17,7 +17,7 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import DeviceLostError, InputError
 from ..hand.hand import Hand
@@ -42,6 +42,7 @@ AT_ONCE_ROUNDS = 50  # while the load stays; their frames fit the link's buffers
 CHECK_ROUNDS = 20  # after which a tape's message that was lost is sent again
 ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
 STREAMS = ("results", "events")
+AnyWorld = TypeVar("AnyWorld", bound="World")
 
 
 class World:
@@ -59,7 +60,7 @@ class World:
         self._last: Round | None = None
         self._steps = 0
 
-    def __enter__(self) -> World:
+    def __enter__(self: AnyWorld) -> AnyWorld:
         return self
 
     def __exit__(self, *_: object) -> None:
