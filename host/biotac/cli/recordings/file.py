@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("cut", "write some seconds of REC, to whole blocks of about a second, as a recording"),
         ("recover", "write what is readable of a damaged or cut-off REC as a recording with an index"),
     ):
-        verb = verbs.add_parser(name, help=text, description=text)
+        verb = values.add_subverb(verbs, name, run_cut, text)
         verb.add_argument("recording", metavar="REC", type=Path)
         verb.add_argument("out", metavar="OUT", type=Path)
         if name == "cut":
@@ -31,9 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             )
             verb.add_argument("--to", dest="to_s", type=values.moment, help="seconds since its first row")
         verb.add_argument("--force", action="store_true", help="overwrite OUT")
-        verb.set_defaults(run=run_cut, from_s=0.0, to_s=None)
+        verb.set_defaults(from_s=0.0, to_s=None)
     text = "add a label to REC, in a file beside it, or remove one; without TEXT, list them"
-    verb = verbs.add_parser("label", help=text, description=text)
+    verb = values.add_subverb(verbs, "label", run_label, text)
     verb.add_argument("recording", metavar="REC", type=Path)
     verb.add_argument("text", metavar="TEXT", nargs="?")
     verb.add_argument(
@@ -43,7 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     verb.add_argument("--finger", help="name or number (default: all)")
     verb.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
     verb.add_argument("--remove", action="store_true", help="the labels of this TEXT; with --at, the one there")
-    verb.set_defaults(run=run_label)
 
 
 def run_cut(args: argparse.Namespace) -> int:
