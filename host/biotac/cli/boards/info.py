@@ -19,7 +19,7 @@ from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_name, maps_text, serial_text, setting_text, version_text
 from .. import values
 from ..outputs import say
-from ..recordings.loading import code, load
+from ..recordings.loading import code, is_recording, load
 
 NO_BUS = "no bus, rounds come as messages"
 EXAMPLE = "biotac info /dev/ttyACM0"
@@ -30,8 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    port = args.port or ""
-    if Path(port).is_file() or (port.lower().endswith(".mcap") and not port.startswith("replay:")):
+    if is_recording(args.port or ""):
         return of_recording(args)
     with biotac.open(args.port) as hand:
         hello = hand.info

@@ -31,7 +31,7 @@ from ...recording.reader import Recording
 from ...wire.identity import ascii_text
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import outputs, values
-from ..recordings.loading import load
+from ..recordings.loading import is_recording, load
 
 NAME = "press"
 HELP = (
@@ -90,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    recorded = Path(args.where).is_file() or args.where.endswith(".mcap")
+    recorded = is_recording(args.where)
     if recorded and args.save:
         raise InputError("--save needs a board, not a recording: drop --save, or name a PORT")
     if args.pressure is not None:

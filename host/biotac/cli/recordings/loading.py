@@ -10,6 +10,11 @@ from ..outputs import note
 from ..progress import Progress
 
 
+def is_recording(where: str) -> bool:
+    """Whether it is a recording's file, not a PORT, as replay:REC is."""
+    return Path(where).is_file() or (where.lower().endswith(".mcap") and not where.startswith("replay:"))
+
+
 def load(path: Path, *, quiet: bool = False) -> Recording:
     """The recording at ``path``; ``quiet`` leaves its problems to the caller."""
     with Progress() as progress:
