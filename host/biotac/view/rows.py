@@ -84,12 +84,8 @@ def map_um(frames: StructArray) -> list[list[int] | None]:
 
 
 def with_null(values: NDArray[Any], invalid: int) -> Any:
-    """``values`` as nested lists, with None for ``invalid``; fast if nothing is invalid."""
-    if not np.any(values == invalid):
-        return values.tolist()
-    out = values.astype(object)
-    out[values == invalid] = None
-    return out.tolist() if isinstance(out, np.ndarray) else out
+    """``values`` as nested lists, or one of them as a number, with None for ``invalid``."""
+    return np.where(values == invalid, None, values).tolist()  # type: ignore[call-overload]
 
 
 def compact(value: Any) -> str:

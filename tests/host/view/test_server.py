@@ -265,8 +265,9 @@ def test_heartbeats_are_frames_without_signals() -> None:
     with biotac.open("sim:press.toml?seconds=3") as hand:
         hand.stream("force", rest=False)
         batch = hand.read_batch(10)
-    assert len(batch.idle)
+    batch.idle["pdc"][0] = wire.INVALID_COUNT
     rows = [dict(zip(FRAME_ROW, json.loads(text), strict=True)) for text in frame_rows(batch)]
+    assert [row["pdc"] for row in rows if row["seq"] == batch.idle["seq"][0]] == [None]
     assert len(rows) == len(batch.frames) + len(batch.idle)
     assert [r["t_us"] for r in rows] == sorted(r["t_us"] for r in rows)
     assert {r["seq"] for r in rows if r["signal_q4"] is None} == set(batch.idle["seq"].tolist())
