@@ -76,6 +76,7 @@ class Stm32Loader(Loader):
         connection = uart.SerialConnection(self._device, LOADER_BAUD, "E")
         connection.connect()
         connection.timeout = 0.5
+        self._error: type[Exception] = bootloader.Stm32LoaderError
         board = bootloader.Stm32Bootloader(connection, device_family="F4", verbosity=0)
         self._board = board
         board.write(board.Command.SYNCHRONIZE)
@@ -113,16 +114,11 @@ class Stm32Loader(Loader):
                 show(k + 1, len(image.blocks))
             self._put(known.flash_at, data[:FIRST_WORDS])
             self._board.go(known.flash_at)
-        except (OSError, ValueError, IndexError, self._error()) as error:
+        except (OSError, ValueError, IndexError, self._error) as error:
             cure = "reset the board with BOOT0 high, and flash again"
             raise FlashError(f"{self.name} stopped: {error}; {cure}") from error
         finally:
             self.close()
-
-    def _error(self) -> type[Exception]:
-        from stm32loader.bootloader import Stm32LoaderError
-
-        return Stm32LoaderError  # type: ignore[no-any-return]
 
     def _put(self, address: int, data: bytes) -> None:
         self._board.write_memory_data(address, data)
