@@ -12,7 +12,6 @@ from ..link.serial_port import SerialLink
 from ..wire.messages_gen import EmuStatus
 from ..wire.sensor_gen import MAX_SENSORS
 from . import touch
-from .emulated import EmulatedBoard
 from .faults import begin
 from .physics import Finger
 from .process import SimBoard, SimLink
@@ -66,17 +65,6 @@ class LiveFingers:
         rest, other_rest = self._rest[number], self._rest[(number + 1) % len(self._rest)]
         seed = [self._fingers[number].seed, 7]
         self._faults[number, f"{kind} {channel}"] = begin(kind, channel, rest, other_rest, seed)
-
-
-def live_board(fingers: LiveFingers, board: str, image: str | None = None) -> SimBoard:
-    """Start a board whose time stands still until the next round of its fingers has come to its ``sensors``.
-
-    ``board`` is "posix", the firmware as a process, or "pico", its flash image in the emulator. Nothing touches in its
-    first round, which runs when it is released. Raises PortError when it does not start.
-    """
-    if board == "posix":
-        return SimBoard(fingers.at_rest(), pace=0.0, hold=True, live=True)
-    return EmulatedBoard(board, fingers.at_rest(), pace=0.0, hold=True, live=True, image=image)
 
 
 class LiveLink(SimLink):

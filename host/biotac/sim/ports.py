@@ -63,12 +63,13 @@ def open_sim(port: str, pace: float) -> SimLink:
 
 
 def start_board(
-    board: str, source: Source, *, pace: float, image: str | None = None, verbs: Sequence[str] = ()
+    board: str, source: Source, *, pace: float, live: bool = False, image: str | None = None, verbs: Sequence[str] = ()
 ) -> SimBoard:
-    """Start a simulated board, held until released: ``posix`` or an emulated one.
+    """Start a simulated board, held until released: ``posix``, the firmware as a process, or an emulated one.
 
+    ``live``: ``source`` has the first rounds, and time stands still until the next ones have come to its ``sensors``.
     Raises PortError naming what is missing and how to get it.
     """
     if board == "posix":
-        return SimBoard(source, pace=pace, hold=True)
-    return EmulatedBoard(board, source, pace=pace, hold=True, image=image, verbs=verbs)
+        return SimBoard(source, pace=pace, hold=True, live=live)
+    return EmulatedBoard(board, source, pace=pace, hold=True, live=live, image=image, verbs=verbs)

@@ -27,8 +27,9 @@ from ..hand.rounds import FingerRound, Round, Rounds
 from ..link import open_link
 from ..wire.messages_gen import Setting
 from ..wire.slots import FRAME_HZ
-from .live import LiveFingers, LiveLink, live_board
+from .live import LiveFingers, LiveLink
 from .physics import Finger
+from .ports import start_board
 from .process import SimBoard
 from .sensor_board import SensorBoard
 from .touch import Load
@@ -244,7 +245,7 @@ def world(
     """
     feed = LiveFingers(fingers)
     with ExitStack() as closes:
-        live = live_board(feed, board, image)
+        live = start_board(board, feed.at_rest(), pace=0.0, live=True, image=image)
         closes.callback(live.close)
         opened = None
         if hand:

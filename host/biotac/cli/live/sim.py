@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...hand.opening import shake_hands
 from ...link import open_link
 from ...recording.replay.playback import Playback
-from ...sim.live import LiveFingers, live_board
+from ...sim.live import LiveFingers
 from ...sim.load_server import LoadServer
 from ...sim.loading import bundled_scenario, load_source
 from ...sim.physics import Finger
@@ -114,7 +114,7 @@ def serve_loads(args: argparse.Namespace) -> int:
     """Run a board whose fingers another program loads, until Ctrl-C."""
     names = [name for name in args.live.split(",") if name]
     fingers = LiveFingers({name: Finger(1 + number) for number, name in enumerate(names)})
-    board = live_board(fingers, args.board or "posix", args.image)
+    board = start_board(args.board or "posix", fingers.at_rest(), pace=0.0, live=True, image=args.image)
     with until_ctrl_c(board, args.link):
         server = LoadServer(fingers, board)
         announce(board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
