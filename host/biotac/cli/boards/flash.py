@@ -12,7 +12,6 @@ from typing import Any
 from ...errors import FlashError, InputError, PortError
 from ...flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
 from ...flash.image import find_image, note_text
-from ...flash.interfaces import Show as ShowBlocks
 from ...flash.procedure import flash_every
 from ...wire.identity import serial_text, version_text
 from .. import ending, outputs, values
@@ -57,16 +56,15 @@ def run(args: argparse.Namespace) -> int:
     if args.all:
         return run_all(image, args)
     target, loaders = find_board(EMULATED if args.emulated else port)
-    with closing(target), Progress() as progress, whole_blocks(args, progress) as show:
-        given = how(args, show)
+    with closing(target), Progress() as progress, options(args, progress) as given:
         outcome = flash(image, target, loaders, backup_path=args.backup, restore_from=kept, **given)
     outputs.say(args, facts(image, outcome), summary(outcome))
     return 0
 
 
 @contextmanager
-def whole_blocks(args: argparse.Namespace, progress: Progress) -> Iterator[ShowBlocks]:
-    """What a loader shows its blocks to: a signal ends it after one, and says how to go on."""
+def options(args: argparse.Namespace, progress: Progress) -> Iterator[dict[str, Any]]:
+    """What any board is flashed with. While blocks are written a signal ends it after one, and says how to go on."""
     with ExitStack() as writing:
         looks: list[Callable[[], None]] = []
 
@@ -80,24 +78,14 @@ def whole_blocks(args: argparse.Namespace, progress: Progress) -> Iterator[ShowB
                 looks.clear()
                 writing.close()
 
+        given = {"keep": not args.no_backup, "downgrade": args.downgrade, "take_link": args.take_link}
         try:
-            yield show
+            yield given | {"say": outputs.step, "show": show}
         except KeyboardInterrupt:
             again = "run it again: a board whose image is not whole waits in its loader"
             if not args.no_backup:
                 again += "; settings that were not saved are in the backup that was named (--restore)"
             raise KeyboardInterrupt(again) from None
-
-
-def how(args: argparse.Namespace, show: ShowBlocks) -> dict[str, Any]:
-    """What one board and every board are flashed with."""
-    return {
-        "keep": not args.no_backup,
-        "downgrade": args.downgrade,
-        "take_link": args.take_link,
-        "say": outputs.step,
-        "show": show,
-    }
 
 
 def run_all(image: Image, args: argparse.Namespace) -> int:
@@ -107,10 +95,9 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
     targets = [SerialTarget(port) for port in sorted(gateway_ports())]
     if not targets:
         raise PortError("no board is plugged in; `biotac list` shows what is there")
-    progress = Progress()
     results = []
-    with whole_blocks(args, progress) as show:
-        for result in flash_every(image, targets, usb_loaders(), **how(args, show)):
+    with Progress() as progress, options(args, progress) as given:
+        for result in flash_every(image, targets, usb_loaders(), **given):
             progress.done()
             results.append(result)
             if result.error is not None:
