@@ -130,8 +130,7 @@ def _live(args: argparse.Namespace) -> int:
 
 def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | None = None) -> dict[str, Any]:
     """Fit, and write the files first: they are safe whatever happens on the board afterwards. All findings as JSON."""
-    progress = Progress()
-    try:
+    with Progress() as progress:
         run, others = loaded.run, None
         if args.population != "none":
             trained = population.load(None if args.population is None else Path(args.population))
@@ -141,8 +140,6 @@ def _calibrate(args: argparse.Namespace, loaded: Loaded, hand: biotac.Hand | Non
         align = not args.as_recorded and not run.by_clocks
         windows = (1,) if args.as_recorded else WINDOWS_ROWS
         validation = validate(run, align=align, windows=windows, others=others, show=progress.show)
-    finally:
-        progress.done()
     origin = loaded.provenance(int(time.time()))
     facts = figures.summary(validation) | loaded.facts() | {key: origin[key] for key in ("serial", "data_sha256")}
     bare = biotac.compute(np.rint(run.counts).astype(np.uint16), run.tare)["force_n"]
@@ -180,13 +177,12 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
     path = args.out / f"{serial or f'finger{finger}'}.mcap"
     recorded = f"the recorded data is in {path} and {path.with_suffix('.csv')}"
-    progress = Progress()
+    with _reader(args, hand, finger) as (reader, mounting), Progress() as progress:
 
-    def show(event: str) -> None:
-        progress.done()
-        outputs.note(event)
+        def show(event: str) -> None:
+            progress.done()
+            outputs.note(event)
 
-    with _reader(args, hand, finger) as (reader, mounting):
         outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
@@ -195,8 +191,6 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
             if path.exists():
                 outputs.note(recorded)
             raise
-        finally:
-            progress.done()
     if procedure.zero is None:
         raise KeyboardInterrupt(f"ended while {procedure.last_step.value.partition(':')[0]}; {recorded}")
     return path, procedure.coverage.missing()

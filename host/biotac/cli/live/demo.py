@@ -26,11 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Return 0 if everything arrived and every result is within its bound, else 1."""
-    progress = Progress()
-    demo = run_demo(
-        args.source.removeprefix("sim:"), args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show
-    )
-    progress.done()
+    source = args.source.removeprefix("sim:")
+    with Progress() as progress:
+        demo = run_demo(source, args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show)
     facts, check = demo.facts, demo.facts["crosscheck"]
     own_n = np.linalg.norm(facts["calibration_rmse_n"] or [])
     made = f"; own map as by `biotac calibrate wrench --live`, off by {own_n:.2f} N held out" if own_n else ""
