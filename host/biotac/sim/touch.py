@@ -81,7 +81,8 @@ def _place_mm(at: Place) -> tuple[float, float]:
 
 def states(load: Load) -> tuple[States, ...]:
     """The states of each contact of a load, one row for each part of a course, else one."""
-    parts = [_contacts(part) for part in (load if isinstance(load, Course) else (load,))]
+    course = load if isinstance(load, Course) else (load,)
+    parts = [_contacts(part) for part in course or (None,)]
     most = max(len(part) for part in parts)
     columns = [[part[k] if k < len(part) else Touch(celsius=part[0].celsius) for part in parts] for k in range(most)]
     return tuple(states_of(np.array([_pose(touch) for touch in column], float)) for column in columns)

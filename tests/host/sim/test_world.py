@@ -63,6 +63,7 @@ def test_a_course_goes_through_a_round_in_equal_parts() -> None:
     still = silent.step(*touch.states(Touch(2.0)))
     blow = Sampler(SimFinger(1))
     blow.step(*touch.states(Touch(2.0)))
+    assert touch.states(Course())[0].force_n.tolist() == [0.0]  # which is no load
     struck = blow.step(*touch.states(Course([Touch(2.0), Touch(6.0), Touch(2.0), Touch(2.0)])))
     assert np.abs(struck[slots.PAC_SLOT].astype(int) - still[slots.PAC_SLOT]).max() > 500
     middle = [slot for slot in slots.ELECTRODE_SLOT if 15 <= slot <= 25]
