@@ -38,9 +38,8 @@ from .tables import Table, parse_toml
 from .timeline import Pose, Track
 
 RELEASE_S = 0.1
-FLAT_MM = (
-    7.0  # a flat surface presses as far as the model goes, 3.5 mm to each side (host/docs/reference/sensor_model.md)
-)
+# A flat surface presses as far as the model goes, 3.5 mm to each side (host/docs/reference/sensor_model.md).
+FLAT_MM = 7.0
 FORCE_MAX_N = 50.0
 SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0
@@ -104,7 +103,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     top = Table(values, file, "", lines, 0)
     top.only(("name", "about", "seed", "fingers", "finger", "step", "fault"))
     name = top.text("name", r"[^\x00-\x1f]{1,64}", "1 to 64 printable characters")
-    seed = top.integer("seed", 0, SEED_MAX) if "seed" in top else 1
+    seed = top.integer("seed", 0, SEED_MAX, default=1)
     specs = _fingers(top, seed)
     steps = top.tables("step")
     if not steps:
@@ -115,7 +114,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     faults = tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault"))
     if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
         raise top.error("fault", "lasts too long", f"at most {FAULTS_MAX_S:g} s in total", "remove some")
-    about = top.text("about", r"[^\x00-\x1f]{1,120}", "1 to 120 printable characters") if "about" in top else ""
+    about = top.text("about", r"[^\x00-\x1f]{1,120}", "1 to 120 printable characters", default="")
     return Scenario(name, specs, tracks, faults, tracks[0].seconds, about)
 
 
@@ -141,12 +140,11 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
     specs = []
     for index, table in enumerate(tables):
         table.only(("seed", "profile", "serial"))
-        own = table.integer("seed", 0, SEED_MAX) if "seed" in table else seed + index
-        word = table.choice("profile", PROFILES) if "profile" in table else "new"
+        own = table.integer("seed", 0, SEED_MAX, default=seed + index)
+        word = table.choice("profile", PROFILES, default="new")
         profile = next(known for known in PROFILES if known == word)  # narrows str to Profile
-        serial = default_serial(own)
-        if "serial" in table:
-            serial = table.text("serial", r"BT[0-9A-Za-z]{14}", "16 letters and digits that begin with BT")
+        expected = "16 letters and digits that begin with BT"
+        serial = table.text("serial", r"BT[0-9A-Za-z]{14}", expected, default=default_serial(own))
         specs.append(FingerSpec(own, profile, serial))
     return tuple(specs)
 
@@ -159,7 +157,7 @@ def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
     if tracks[0].seconds + seconds > most_s:
         expected = f"at most {most_s:g} s in total with {len(tracks)} finger(s)"
         raise step.error("seconds", "makes the scenario too long", expected, "shorten it, and repeat it with ?seconds=")
-    acting = step.indices("fingers", len(tracks)) if "fingers" in step else tuple(range(len(tracks)))
+    acting = step.indices("fingers", len(tracks), default=range(len(tracks)))
     for index, track in enumerate(tracks):
         if index not in acting or do == "hold":
             track.ramp(seconds, track.pose)
@@ -194,7 +192,7 @@ def _press(step: Table, track: Track, seconds: float) -> None:
     if force_n == 0.0:
         raise step.error("force_n", "is 0 but nothing touches", "more than 0 N to start a contact")
     x_mm, y_mm = _point_mm(step, "at", "at_mm")
-    tip_mm = step.number("tip_mm", 0.5, 10.0, "mm") if "tip_mm" in step else FLAT_MM
+    tip_mm = step.number("tip_mm", 0.5, 10.0, "mm", default=FLAT_MM)
     start = Pose(x_mm=x_mm, y_mm=y_mm, tip_mm=tip_mm, celsius=track.pose.celsius)
     track.ramp(seconds, replace(start, force_n=force_n), start=start)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .. import documents
@@ -74,7 +74,7 @@ def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
 
 
 class Table:
-    """A TOML table: reads keys with type and range checks, and refuses unknown keys.
+    """A TOML table: reads keys with type and range checks, and refuses unknown keys; one with a default may be missing.
 
     Every method raises ScenarioError ``file:LINE: label: key 'k' seen: expected ...; cure``.
     """
@@ -102,61 +102,58 @@ class Table:
                 cure = f"did you mean '{near[0]}'?" if near else "remove it"
                 raise self.error(key, "is unknown" + what, "one of " + ", ".join(allowed), cure)
 
-    def _value(self, key: str, expected: str) -> Any:
-        if key not in self.values:
+    def _checked(self, key: str, is_good: Callable[[Any], object], expected: str, default: Any = None) -> Any:
+        if key in self.values and is_good(self.values[key]):
+            return self.values[key]
+        if key in self.values:
+            raise self.error(key, f"is {_show(self.values[key])}", expected)
+        if default is None:
             raise self.error(key, "is missing", expected, "add it")
-        return self.values[key]
+        return default
 
-    def number(self, key: str, low: float, high: float, unit: str) -> float:
+    def number(self, key: str, low: float, high: float, unit: str, default: float | None = None) -> float:
         """A finite number in low..high."""
         expected = f"a number {low:g} to {high:g} {unit}".rstrip()
-        value = self._value(key, expected)
-        if not _is_number(value) or not low <= value <= high:
-            raise self.error(key, f"is {_show(value)}", expected)
-        return float(value)
+        return float(self._checked(key, lambda value: _is_number(value) and low <= value <= high, expected, default))
 
-    def integer(self, key: str, low: int, high: int) -> int:
+    def integer(self, key: str, low: int, high: int, default: int | None = None) -> int:
         """A whole number in low..high."""
         expected = f"a whole number {low} to {high}"
-        value = self._value(key, expected)
-        if type(value) is not int or not low <= value <= high:
-            raise self.error(key, f"is {_show(value)}", expected)
-        return value
+        return int(self._checked(key, lambda value: type(value) is int and low <= value <= high, expected, default))
 
     def pair(self, key: str, limit: float, unit: str) -> tuple[float, float]:
         """Two finite numbers in -limit..limit."""
-        expected = f"[x, y], each -{limit:g} to {limit:g} {unit}"
-        value = self._value(key, expected)
-        good = isinstance(value, list) and len(value) == 2
-        if not good or not all(_is_number(part) and abs(part) <= limit for part in value):
-            raise self.error(key, f"is {_show(value)}", expected)
-        return float(value[0]), float(value[1])
 
-    def choice(self, key: str, choices: Sequence[str]) -> str:
+        def is_good(value: Any) -> bool:
+            is_pair = isinstance(value, list) and len(value) == 2
+            return is_pair and all(_is_number(part) and abs(part) <= limit for part in value)
+
+        x, y = self._checked(key, is_good, f"[x, y], each -{limit:g} to {limit:g} {unit}")
+        return float(x), float(y)
+
+    def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """One of the given words."""
         expected = "one of " + ", ".join(choices)
-        value = self._value(key, expected)
+        value = self._checked(key, lambda value: True, expected, default)
         if not isinstance(value, str) or value not in choices:
             near = difflib.get_close_matches(str(value), choices, 1)
             cure = f"did you mean '{near[0]}'?" if near else "correct the value"
             raise self.error(key, f"is {_show(value)}", expected, cure)
         return value
 
-    def text(self, key: str, pattern: str, expected: str) -> str:
+    def text(self, key: str, pattern: str, expected: str, default: str | None = None) -> str:
         """Text that matches ``pattern`` as a whole."""
-        value = self._value(key, expected)
-        if not isinstance(value, str) or re.fullmatch(pattern, value) is None:
-            raise self.error(key, f"is {_show(value)}", expected)
-        return value
+        matches = re.compile(pattern).fullmatch
+        return str(self._checked(key, lambda value: isinstance(value, str) and matches(value), expected, default))
 
-    def indices(self, key: str, count: int) -> tuple[int, ...]:
+    def indices(self, key: str, count: int, default: Any = None) -> tuple[int, ...]:
         """A list of distinct indices below ``count``."""
-        expected = f"a list of distinct finger indices 0 to {count - 1}"
-        value = self._value(key, expected)
-        good = isinstance(value, list) and all(type(part) is int and 0 <= part < count for part in value)
-        if not good or not value or len(set(value)) != len(value):
-            raise self.error(key, f"is {_show(value)}", expected)
-        return tuple(value)
+
+        def is_good(value: Any) -> bool:
+            is_list = isinstance(value, list) and all(type(part) is int and 0 <= part < count for part in value)
+            return is_list and 0 < len(value) == len(set(value))
+
+        return tuple(self._checked(key, is_good, f"a list of distinct finger indices 0 to {count - 1}", default))
 
     def tables(self, key: str) -> list[Table]:
         """The ``[[key]]`` tables; none when there are none."""
