@@ -52,8 +52,11 @@ class Faulty:
 Fault = Callable[[Faulty, Words, Words], Words]
 
 
-def _at(slots: Any, change: Callable[[Faulty, Floats, Floats], Any]) -> Fault:
-    """A fault of these slots alone, an index; ``change`` gets and gives their counts, of any size, as float64."""
+def _slot_fault(slots: Any, change: Callable[[Faulty, Floats, Floats], Any]) -> Fault:
+    """A fault of these slots alone, an index, by their counts and the other finger's, float64.
+
+    ``change`` returns counts of any size: they are rounded, and held within the converter's range.
+    """
 
     def fault(on: Faulty, words: Words, other: Words) -> Words:
         bad: Words = words.copy()
@@ -66,7 +69,7 @@ def _at(slots: Any, change: Callable[[Faulty, Floats, Floats], Any]) -> Fault:
 
 def electrode_fault(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
     """A fault of the electrodes' counts (n, 19), given and returned as float64; ``t_s`` (n,) is the time."""
-    return _at(ELECTRODE_SLOT, lambda on, counts, _: change(on, counts, on.time_s(len(counts))))
+    return _slot_fault(ELECTRODE_SLOT, lambda on, counts, _: change(on, counts, on.time_s(len(counts))))
 
 
 def _one(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
@@ -150,14 +153,14 @@ FAULTS: dict[str, Fault] = {
     "electrodes frozen, pressure alive": _freeze(ELECTRODE_SLOT),
     "channels shifted by a slot": _shifted,
     "two fingers exchanged": lambda on, words, other: other.copy(),
-    "cross-talk of 30 % between fingers": _at(ELECTRODE_SLOT, lambda on, x, other: x + 0.3 * (other - on.other_rest)),
-    "cross-talk of 100 % between fingers": _at(ELECTRODE_SLOT, lambda on, x, other: x + 1.0 * (other - on.other_rest)),
+    "cross-talk of 30 % between fingers": _slot_fault(ELECTRODE_SLOT, lambda on, x, y: x + 0.3 * (y - on.other_rest)),
+    "cross-talk of 100 % between fingers": _slot_fault(ELECTRODE_SLOT, lambda on, x, y: x + (y - on.other_rest)),
     "noisy line, 1e-3 a bit": noisy_line(1e-3),
     "noisy line, 3e-3 a bit": noisy_line(3e-3),
-    "TDC jumps by 300 counts": _at(TDC_SLOT, lambda on, x, other: x + 300),
-    "PDC stuck": _at(PDC_SLOT, lambda on, x, other: on.first(x[0])),
-    "PDC 0": _at(PDC_SLOT, lambda on, x, other: 0.0),
-    "PDC 4095": _at(PDC_SLOT, lambda on, x, other: 4095.0),
+    "TDC jumps by 300 counts": _slot_fault(TDC_SLOT, lambda on, x, y: x + 300),
+    "PDC stuck": _slot_fault(PDC_SLOT, lambda on, x, y: on.first(x[0])),
+    "PDC 0": _slot_fault(PDC_SLOT, lambda on, x, y: 0.0),
+    "PDC 4095": _slot_fault(PDC_SLOT, lambda on, x, y: 4095.0),
 }
 
 #: What a sensor or its lead does on the bus, in place of counts.
