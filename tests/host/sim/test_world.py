@@ -237,7 +237,7 @@ def test_a_program_that_dies_in_the_middle_of_a_step_takes_its_board_along() -> 
 
 
 def test_the_next_round_has_all_fingers_of_one_time_and_every_event_once() -> None:
-    with biotac.open("sim:grasp.toml?fingers=3&pace=4") as hand:
+    with biotac.open("sim:grasp.toml?fingers=3&pace=4&seconds=120") as hand:
         hand.stream("results", "events")
         kinds, now = [], None
         for _ in range(300):
