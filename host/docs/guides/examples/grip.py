@@ -55,9 +55,9 @@ class Grip:
             self.stiffness = min(max((self.normal_n - self._first_n) / self._way_mm, 0.2), 3.0)
         self.shear_n += SMOOTH * (shear_n - self.shear_n)
         self._pending_until = self._round + PENDING_ROUNDS if slipped else self._pending_until
-        if self._reflex_until <= self._round < self._pending_until:
-            if any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in known):
-                self._learn_from_slip(shear_n, half_n)
+        strong = any(SLIPS_FROM <= f.slip_level < 255 for f, *_ in known)
+        if strong and self._reflex_until <= self._round < self._pending_until:
+            self._learn_from_slip(shear_n, half_n)
         return self._squeeze()
 
     def _parts(self, frame, to, share):  # of its side: what presses, shear, what else may press, shear's half width
