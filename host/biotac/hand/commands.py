@@ -22,11 +22,10 @@ Answer = TypeVar("Answer")
 TAKEN_S = 10.0
 
 
-class Commands:
-    """Each command raises CommandRefusedError with the board's reason, or DeviceLostError.
+class Requests:
+    """Commands to ``board`` from a hand and its parts.
 
-    A finger is a name or a chip select; an unknown name raises KeyError. What has failed since the last call (a
-    callback, a recording) is raised once the command is done.
+    What has failed since the last call (a callback, a recording) is raised once the command is done.
     """
 
     def __init__(self, board: Board, latest: Latest) -> None:
@@ -47,13 +46,24 @@ class Commands:
         # Numbers are not checked here: the board knows which ones there are.
         return finger_index(self.names, finger) if isinstance(finger, str) else operator.index(finger)
 
+
+class Commands:
+    """Each command raises CommandRefusedError with the board's reason, or DeviceLostError.
+
+    A finger is a name or a chip select; an unknown name raises KeyError.
+    """
+
+    _board: Board
+    _latest: Latest
+    _requests: Requests
+
     def ping(self) -> None:
         """Wait for the board; when this returns, everything it sent before its reply has arrived."""
-        self.command(wire.Ping(0))
+        self._requests.command(wire.Ping(0))
 
     def status(self) -> wire.Status:
         """Counters of the board and its link. The round trip also feeds ``clock``."""
-        return self.ask(wire.GetStatus(0), wire.Status)
+        return self._requests.ask(wire.GetStatus(0), wire.Status)
 
     def sync(self, round_trips: int = 5) -> None:
         """Feed ``clock`` with round trips: they give it the bound on its error, and later ones the drift."""
@@ -65,15 +75,15 @@ class Commands:
 
         Both are told, and the other is refused (LINK_BUSY) until this hand stops, or has said nothing for TAKEN_S.
         """
-        self.command(wire.TakeLink(0, round(1000 * TAKEN_S)))
+        self._requests.command(wire.TakeLink(0, round(1000 * TAKEN_S)))
 
     def sensor_status(self, finger: Finger) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""
-        return self.ask(wire.GetSensorStatus(0, self.index(finger)), wire.SensorStatus)
+        return self._requests.ask(wire.GetSensorStatus(0, self._requests.index(finger)), wire.SensorStatus)
 
     def sensor_info(self, finger: Finger) -> wire.SensorInfo:
         """What the sensor says about itself."""
-        return self.ask(wire.GetSensorInfo(0, self.index(finger)), wire.SensorInfo)
+        return self._requests.ask(wire.GetSensorInfo(0, self._requests.index(finger)), wire.SensorInfo)
 
     def point(self, finger: Finger) -> wire.Point:
         """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
@@ -81,14 +91,14 @@ class Commands:
         Noise gives an untouched finger a point too: whether it is touched is in its frames. All INVALID_I16 without a
         tare, or while no electrode has a weight. Raises CommandRefusedError when no sensor answers there.
         """
-        return self.ask(wire.GetPoint(0, self.index(finger)), wire.Point)
+        return self._requests.ask(wire.GetPoint(0, self._requests.index(finger)), wire.Point)
 
     def tare(self, finger: Finger) -> None:
         """Tare now; what pressure shows to be a press is tared, too, but flagged TARE_UNSURE.
 
         Raises CommandRefusedError while the signals move, KeyError for a finger that is not there.
         """
-        self.command(wire.TareNow(0, self._latest.present(finger)))
+        self._requests.command(wire.TareNow(0, self._latest.present(finger)))
 
     def set_tare(
         self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None, *, age_s: float | None = None
@@ -105,7 +115,7 @@ class Commands:
             raise ValueError(f"tare_counts has shape {tare.shape}, expected (19,)")
         tare_q4 = tuple(tare_to_q4(tare).tolist())
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else int(tare_to_q4(np.float64(pdc_counts)))
-        self.command(wire.TareSet(0, self.index(finger), tare_q4, pdc_q4, age_ms(age_s)))
+        self._requests.command(wire.TareSet(0, self._requests.index(finger), tare_q4, pdc_q4, age_ms(age_s)))
 
     def hold(self, *fingers: Finger) -> None:
         """Say that these fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
@@ -124,7 +134,7 @@ class Commands:
         """Say that these fingers hold nothing any more, so that a press's residue is tared. See ``hold``."""
         mask = self._mask(fingers)
         self._board.reader.gaps.held &= ~mask
-        self.command(wire.Release(0, mask))
+        self._requests.command(wire.Release(0, mask))
 
     @contextmanager
     def grasp(self, *fingers: Finger) -> Iterator[None]:

@@ -12,7 +12,7 @@ from ..map.board_map import BoardMap
 from ..wire import messages_gen as wire
 from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
-from .commands import Commands, Finger
+from .commands import Finger, Requests
 from .faults import Faults, faults_of
 
 RESTART_S = 10.0  # by a patient link's measure longer
@@ -21,41 +21,41 @@ RESTART_S = 10.0  # by a patient link's measure longer
 class Configuration:
     """Settings, calibrations and maps of a board, and its faults; each method is a command, and raises as Hand's do."""
 
-    def __init__(self, board: Board, commands: Commands) -> None:
+    def __init__(self, board: Board, requests: Requests) -> None:
         self._board = board
-        self._commands = commands
+        self._requests = requests
 
     def faults(self) -> Faults:
         """What went wrong on the board since ``clear_faults`` or its start, even if only for one round.
 
         The board keeps faults until they are cleared; reading does not clear them.
         """
-        return faults_of(self._commands.status(), self._commands.names)
+        return faults_of(self._requests.ask(wire.GetStatus(0), wire.Status), self._requests.names)
 
     def clear_faults(self) -> Faults:
         """Like ``faults``, and clears those on the board. A fault that is new meanwhile stays for the next call."""
         latched = self.faults()
-        self._commands.command(wire.ClearFaults(0, int(latched.board), latched.by_index))
+        self._requests.command(wire.ClearFaults(0, int(latched.board), latched.by_index))
         return latched
 
     def setting(self, setting: wire.Setting | int) -> int:
         """The value of a setting, in the unit that wire.SETTINGS names."""
-        return self._commands.ask(wire.GetSetting(0, setting), wire.SettingValue).value
+        return self._requests.ask(wire.GetSetting(0, setting), wire.SettingValue).value
 
     def set_setting(self, setting: wire.Setting | int, value: int) -> None:
         """Change a setting until the next reboot; refused while streaming."""
-        self._commands.command(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
+        self._requests.command(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
 
     def save_settings(self) -> None:
         """Save the settings, calibrations and maps in force, so that they survive reboots.
 
         Not while streaming: the board loses slots meanwhile.
         """
-        self._commands.command(wire.SaveSettings(0))
+        self._requests.command(wire.SaveSettings(0))
 
     def reboot_bootloader(self) -> None:
         """Send the board to its bootloader; it disconnects and comes back as a drive."""
-        self._commands.command(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
+        self._requests.command(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def restart(self) -> None:
         """Restart the board as a reset would, and wait until it is back. What was not saved is lost.
@@ -63,7 +63,7 @@ class Configuration:
         Raises DeviceLostError unless this hand reconnects, or if the board does not come back within ten seconds.
         """
         reader, before = self._board.reader, self._board.info.boot_id
-        self._commands.command(wire.RebootBootloader(0, wire.RESTART_MAGIC))
+        self._requests.command(wire.RebootBootloader(0, wire.RESTART_MAGIC))
         lost = DeviceLostError(f"{self._board.link.port} restarts, and has not come back; open it again")
         until_s = time.monotonic() + RESTART_S * self._board.link.patience
         while self._board.info.boot_id == before:  # it may answer once more before it goes
@@ -74,14 +74,14 @@ class Configuration:
 
     def measure(self) -> wire.BoardFacts:
         """What the board measures of itself: supply, temperature, clock against USB. Unknown where it cannot."""
-        return self._commands.ask(wire.GetBoardFacts(0), wire.BoardFacts)
+        return self._requests.ask(wire.GetBoardFacts(0), wire.BoardFacts)
 
     def try_bus_rate(self, khz: int) -> wire.BoardFacts:
         """Clock the sensors' bus at up to this rate until the next stream; 0 is the usual one.
 
         Values read meanwhile mean nothing; count the sensors' bad words. Refused while streaming.
         """
-        return self._commands.ask(wire.SetBusRate(0, khz), wire.BoardFacts)
+        return self._requests.ask(wire.SetBusRate(0, khz), wire.BoardFacts)
 
     def settings(self) -> dict[wire.Setting, int]:
         """All settings. For one that the board's firmware does not have, the default."""
@@ -112,16 +112,16 @@ class Configuration:
         Refused while streaming, and when its serial number is not that of the sensor that answered there when the
         board started; ``serial=""`` fits any.
         """
-        number = self._commands.index(finger)
+        number = self._requests.index(finger)
         request = wire.SetCalibration(
             0, number, calibration.wire_serial(), calibration.made_s, calibration.wire_values()
         )
-        self._commands.command(request, lasting=("calibration", number))
+        self._requests.command(request, lasting=("calibration", number))
 
     def clear_calibration(self, finger: Finger) -> None:
         """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
-        number = self._commands.index(finger)
-        self._commands.command(wire.ClearCalibration(0, number), lasting=("calibration", number))
+        number = self._requests.index(finger)
+        self._requests.command(wire.ClearCalibration(0, number), lasting=("calibration", number))
 
     def calibrations(self) -> dict[int, Calibration]:
         """The calibrations in force, by finger."""
@@ -139,11 +139,11 @@ class Configuration:
 
         Raises PortError when it does not arrive intact.
         """
-        return transfer.read(self._board, self._commands.index(finger))
+        return transfer.read(self._board, self._requests.index(finger))
 
     def map_state(self, finger: Finger) -> wire.CalibrationState:
         """Whether the finger has a map, and whether it is in force or belongs to another sensor."""
-        return wire.CalibrationState(transfer.info(self._board, self._commands.index(finger)).state)
+        return wire.CalibrationState(transfer.info(self._board, self._requests.index(finger)).state)
 
     def set_map(self, finger: Finger, new: bytes | BoardMap, *, force: bool = False) -> None:
         """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
@@ -154,7 +154,7 @@ class Configuration:
         board takes (20 KiB), and PortError when other bytes read back.
         """
         blob = maps.for_any_sensor(maps.as_blob(new)) if force else maps.as_blob(new)
-        number = self._commands.index(finger)
+        number = self._requests.index(finger)
         transfer.write(self._board, number, blob)
         self._board.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
 
@@ -163,8 +163,8 @@ class Configuration:
 
         Its force then comes from the setting force_model and the gains again.
         """
-        number = self._commands.index(finger)
-        self._commands.command(wire.ClearMap(0, number), lasting=("map", number))
+        number = self._requests.index(finger)
+        self._requests.command(wire.ClearMap(0, number), lasting=("map", number))
 
     def maps(self) -> dict[int, bytes]:
         """The maps in force, by finger."""
@@ -173,7 +173,7 @@ class Configuration:
         return {finger: blob for finger, blob in held.items() if blob is not None}
 
     def _calibration(self, finger: Finger) -> wire.Calibration:
-        return self._commands.ask(wire.GetCalibration(0, self._commands.index(finger)), wire.Calibration)
+        return self._requests.ask(wire.GetCalibration(0, self._requests.index(finger)), wire.Calibration)
 
 
 def _known(answer: wire.Calibration) -> Calibration:

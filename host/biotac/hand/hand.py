@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, suppress
-from functools import wraps
 from pathlib import Path
-from typing import Any, Concatenate, NoReturn, ParamSpec, SupportsIndex, TypeVar, cast
+from typing import Any, NoReturn, SupportsIndex, cast
 
 from ..board import handshake
 from ..board.board import Board
 from ..board.consumers import Callbacks, DeferredErrors
+from ..board.gap import Gap
 from ..board.handshake import HandWarning
 from ..board.reader import THREADS
 from ..board.stream import ALL_FINGERS, Stream
 from ..board.watch import StreamWatch
 from ..clock import DeviceClock
 from ..clock.host_clock import HostClock
-from ..errors import DeviceLostError, InputError
+from ..errors import DeviceLostError, InputError, ReadWarning
 from ..link import Link
 from ..markdown import html_table
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
-from ..wire.frames import Frame
+from ..wire.frames import Frame, StructArray
 from ..wire.sensor_gen import MAX_SENSORS
-from .commands import Commands
+from .commands import Commands, Requests
 from .configuration import Configuration
 from .reading import Reading
 from .record import Mark, Recorder
@@ -35,36 +36,11 @@ from .rounds import Round, Rounds
 from .subscriptions import Subscriptions
 from .views import Fingers, FingerView, Latest, checked_names, finger_index
 
-P = ParamSpec("P")
-R = TypeVar("R")
-T = TypeVar("T")
 #: Values older than this are not shown as a finger's latest.
 MAX_AGE_S = 0.25
 
 
-def _of(part: Callable[[Hand], T], method: Callable[Concatenate[T, P], R]) -> Callable[Concatenate[Hand, P], R]:
-    """A method of Hand that calls the same method of one of its parts; a type checker sees its own types."""
-
-    @wraps(method)
-    def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        return method(part(self), *args, **kwargs)
-
-    return call
-
-
-def _commands(hand: Hand) -> Commands:
-    return hand._commands
-
-
-def _reading(hand: Hand) -> Reading:
-    return hand._reading
-
-
-def _subscriptions(hand: Hand) -> Subscriptions:
-    return hand._subscriptions
-
-
-class Hand:
+class Hand(Commands, Subscriptions):
     """A board with its fingers. Made by ``biotac.open``; use it as a context manager."""
 
     def __init__(
@@ -84,13 +60,12 @@ class Hand:
         self._troubles = DeferredErrors()
         self._latest = Latest(reader, names, max_age_s=max_age_s, troubles=self._troubles)
         reader.add(self._latest)  # before every queue: who takes a batch finds its frames here, too
-        self._commands = Commands(board, self._latest)
+        self._requests = Requests(board, self._latest)
         #: Settings, calibrations and wrench maps that the board keeps, and its faults.
-        self.board = Configuration(board, self._commands)
+        self.board = Configuration(board, self._requests)
         self._stream = Stream(board)
         self._callbacks = Callbacks(reader, self._troubles)
-        self._reading = Reading(board, self._stream, self._commands, self._latest)
-        self._subscriptions = Subscriptions(reader, self._stream, self._callbacks, self._reading, self._latest)
+        self._reading = Reading(board, self._stream, self._latest)
         self._recorders: list[Recorder] = []  # the open one last
         self._rounds: Rounds | None = None  # once a program asks for rounds
         self._watch = StreamWatch(board, self._stream, reconnect=reconnect, tares=self._latest.tares)
@@ -226,21 +201,6 @@ class Hand:
         """
         self._latest.report()
 
-    # ---- commands (commands.py) ----------------------------------------------------------------
-
-    ping = _of(_commands, Commands.ping)
-    status = _of(_commands, Commands.status)
-    sync = _of(_commands, Commands.sync)
-    take_link = _of(_commands, Commands.take_link)
-    sensor_status = _of(_commands, Commands.sensor_status)
-    sensor_info = _of(_commands, Commands.sensor_info)
-    point = _of(_commands, Commands.point)
-    tare = _of(_commands, Commands.tare)
-    set_tare = _of(_commands, Commands.set_tare)
-    hold = _of(_commands, Commands.hold)
-    release = _of(_commands, Commands.release)
-    grasp = _of(_commands, Commands.grasp)
-
     # ---- what arrives --------------------------------------------------------------------------
 
     def stream(
@@ -287,9 +247,26 @@ class Hand:
             for row in batch.frames:
                 yield Frame.from_row(row)
 
-    _go = _of(_reading, Reading.go)
-    read = _of(_reading, Reading.read)
-    read_batch = _of(_reading, Reading.read_batch)
+    def _go(self) -> None:
+        self._reading.go()
+
+    def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
+        """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
+
+        They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
+        reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
+        discarded. A ReadWarning tells of a Gap among them. Where a simulated source or a replay ends first, the array
+        is shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
+        ValueError unless seconds is a number above 0.
+        """
+        batch = self.read_batch(seconds, fresh=fresh)
+        for gap in (m for m in batch.messages if isinstance(m, Gap)):
+            warnings.warn(gap.line(), ReadWarning, stacklevel=2)
+        return batch.frames
+
+    def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
+        """Like ``read``, but returns the Batch: also the wire messages, PAC, events and Gaps of the same time."""
+        return self._reading.read_batch(seconds, fresh)
 
     def next_round(self, after: Round | None = None, timeout_s: float = 1.0) -> Round:
         """The frames of all fingers of one round and the events up to its end, starting the stream if need be.
@@ -305,17 +282,6 @@ class Hand:
             self._rounds = Rounds(self._reader, self._latest)
         self._go()
         return self._rounds.wait(after, timeout_s)
-
-    # ---- callbacks (subscriptions.py) ----------------------------------------------------------
-
-    on_batch = _of(_subscriptions, Subscriptions.on_batch)
-    on_event = _of(_subscriptions, Subscriptions.on_event)
-    on_slip = _of(_subscriptions, Subscriptions.on_slip)
-    on_touch = _of(_subscriptions, Subscriptions.on_touch)
-    on_bands = _of(_subscriptions, Subscriptions.on_bands)
-    on_tare = _of(_subscriptions, Subscriptions.on_tare)
-    on_status = _of(_subscriptions, Subscriptions.on_status)
-    on_gap = _of(_subscriptions, Subscriptions.on_gap)
 
     # ---- recording -----------------------------------------------------------------------------
 
@@ -354,7 +320,7 @@ class Hand:
             if not recorder.closed:
                 raise InputError(f"this hand is being recorded to {recorder.path}; close that recorder first")
         how = {"overwrite": overwrite, "mid_stream": self._stream.on}
-        recorder = Recorder(self._board, self._commands, self.board, self._troubles, Path(path), **how)
+        recorder = Recorder(self._board, self._requests, self.board, self._troubles, Path(path), **how)
         self._recorders[:] = [recorder]
         if note or facts:
             recorder.mark(note, None, facts, timed=False)

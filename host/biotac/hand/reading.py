@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import threading
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from ..board.board import Board
 from ..board.consumers import Queue
-from ..board.gap import Gap
 from ..board.stream import Stream
 from ..board.watch import SILENCE_S
-from ..errors import InputError, ReadWarning
+from ..errors import InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join, split
-from ..wire.frames import StructArray
-from .commands import Commands
 from .views import Latest
 
 
 class Reading:
     """``Hand.batches``, ``frames`` and ``read``, which share one queue."""
 
-    def __init__(self, board: Board, stream: Stream, commands: Commands, latest: Latest) -> None:
+    def __init__(self, board: Board, stream: Stream, latest: Latest) -> None:
         self._board = board
         self._reader = board.reader
         self._stream = stream
-        self._commands = commands
         self._latest = latest
         self._queue = Queue(self._reader, is_taken=False)
         self._thread: threading.Thread | None = None  # that takes
@@ -91,29 +86,12 @@ class Reading:
         finally:
             self._thread = before
 
-    def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
-        """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
-
-        They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
-        reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
-        discarded. A ReadWarning tells of a Gap among them. Where a simulated source or a replay ends first, the array
-        is shorter, and empty when it had ended before. It is empty too when no sensor answered in that time. Raises
-        ValueError unless seconds is a number above 0.
-        """
-        batch = self._read(seconds, fresh)
-        for gap in (m for m in batch.messages if isinstance(m, Gap)):
-            warnings.warn(gap.line(), ReadWarning, stacklevel=3)
-        return batch.frames
-
-    def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
-        """Like ``read``, but returns the Batch: also the wire messages, PAC, events and Gaps of the same time."""
-        return self._read(seconds, fresh)
-
-    def _read(self, seconds: float, fresh: bool) -> Batch:
+    def read_batch(self, seconds: float, fresh: bool) -> Batch:
+        """See Hand.read_batch."""
         if not 0 < seconds < float("inf"):
             raise ValueError(f"seconds is {seconds}, expected a number above 0")
         if fresh and self._stream.on:
-            self._commands.ping()  # a barrier: its reply comes after everything made before
+            self._board.command(wire.Ping(0))  # a barrier: its reply comes after everything made before
             self._queue.clear()
         taken: list[Batch] = []
         end_us: int | None = None

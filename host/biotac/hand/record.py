@@ -15,9 +15,10 @@ from ..board.board import Board
 from ..board.consumers import DeferredErrors
 from ..board.gap import Gap
 from ..errors import BiotacError, DeviceLostError, InputError
+from ..wire import messages_gen as wire
 from ..wire.batches import Batch
 from ..wire.sensor_gen import MAX_SENSORS
-from .commands import Commands
+from .commands import Requests
 from .configuration import Configuration
 
 if TYPE_CHECKING:  # otherwise imported where it is used: not every reader records
@@ -47,12 +48,12 @@ class Recorder:
     frames_lost: int = _of_writer("frames_lost", "How many frames are missing in the files, by their sequence numbers.")
     closed: bool = _of_writer("closed", "Whether nothing more is written.")
 
-    def __init__(self, board: Board, commands: Commands, kept: Configuration, troubles: DeferredErrors, path: Path, *,
+    def __init__(self, board: Board, requests: Requests, kept: Configuration, troubles: DeferredErrors, path: Path, *,
                  overwrite: bool, mid_stream: bool) -> None:  # fmt: skip
         from ..recording.writer import Writer
 
         self._board = board
-        self._commands = commands
+        self._requests = requests
         self._kept = kept
         self._troubles = troubles
         self._known = self._facts()
@@ -182,11 +183,12 @@ class Recorder:
         """What a recording says about the board."""
         from ..recording.facts import Facts
 
-        commands, kept, hello = self._commands, self._kept, self._board.info
-        sensors = [commands.sensor_info(f) for f in range(MAX_SENSORS) if hello.fingers_present >> f & 1]
+        requests, kept, hello = self._requests, self._kept, self._board.info
+        present = [finger for finger in range(MAX_SENSORS) if hello.fingers_present >> finger & 1]
+        sensors = [requests.ask(wire.GetSensorInfo(0, finger), wire.SensorInfo) for finger in present]
         settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
         zero_ns = self._board.link.zero_ns
-        return Facts(hello, sensors, settings, calibrations, maps, dict(commands.names), zero_ns)
+        return Facts(hello, sensors, settings, calibrations, maps, dict(requests.names), zero_ns)
 
     def _note(self) -> None:
         """Label the recording with what was found about another driver's rounds since the last call."""

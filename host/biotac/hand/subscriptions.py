@@ -17,14 +17,13 @@ from .views import Latest
 
 
 class Subscriptions:
-    """What Hand's ``on_...`` do: ask the board for the messages, and leave out what is too old to react to."""
+    """Each asks the board for the messages, and leaves out what is too old to react to."""
 
-    def __init__(self, reader: Reader, stream: Stream, callbacks: Callbacks, reading: Reading, latest: Latest) -> None:
-        self._reader = reader
-        self._stream = stream
-        self._callbacks = callbacks
-        self._reading = reading
-        self._latest = latest
+    _reader: Reader
+    _stream: Stream
+    _callbacks: Callbacks
+    _reading: Reading
+    _latest: Latest
 
     def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
         """Call ``fn`` with every batch; returns a function that ends this.
