@@ -3,44 +3,25 @@
 #include "signal/signals.h"
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
-                      const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
-                      int32_t *torque_mnmm, uint32_t *flags)
-{
-    for (int64_t k = 0; k < n; k++) {
-        int32_t e_q4[BT_ELECTRODES];
-        uint32_t guess_mn[2];
-        int16_t *poc = poc_um + 3 * k;
-        int32_t *force = force_100un + 3 * k, *torque = torque_mnmm + 3 * k;
-        bt_signals_q4(counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, e_q4);
-        flags[k] = settings->population
-                       ? bt_solve_uncalibrated(e_q4, settings, BT_WANT_ALL, poc, force, torque, guess_mn)
-                       : bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque);
-    }
-}
-
-void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4, const uint16_t *pdc,
-                      const uint16_t *pdc_tare_q4, const bt_solve_settings *settings, int16_t *poc_um,
+                      const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags)
 {
     for (int64_t k = 0; k < n; k++) {
         int32_t e_q4[BT_ELECTRODES];
-        bt_map_input frame = {counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES,
-                              bt_pdc_above_rest_q4(pdc[k], pdc_tare_q4[k])};
+        uint32_t guess_mn[2];
+        bt_map_input frame = {counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, pdc_above_rest_q4[k]};
+        int16_t *poc = poc_um + 3 * k;
+        int32_t *force = force_100un + 3 * k, *torque = torque_mnmm + 3 * k;
         bt_signals_q4(frame.counts, frame.tare_q4, e_q4);
-        flags[k] = bt_solve_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k,
-                                   torque_mnmm + 3 * k, torsion_mnmm + k);
-    }
-}
-
-void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
-                   const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm,
-                   int32_t *torsion_mnmm)
-{
-    for (int64_t k = 0; k < n; k++) {
-        torque_mnmm[3 * k] = torque_mnmm[3 * k + 1] = torque_mnmm[3 * k + 2] = torsion_mnmm[k] =
-            BT_INVALID_I32;
-        bt_map_wrench(map, counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, pdc_above_rest_q4[k],
-                      force_100un + 3 * k, torque_mnmm + 3 * k, torsion_mnmm + k);
+        torsion_mnmm[k] = BT_INVALID_I32; // only a map gives it
+        if (settings->map != NULL) {
+            flags[k] =
+                bt_solve_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc, force, torque, torsion_mnmm + k);
+        } else if (settings->population) {
+            flags[k] = bt_solve_uncalibrated(e_q4, settings, BT_WANT_ALL, poc, force, torque, guess_mn);
+        } else {
+            flags[k] = bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque);
+        }
     }
 }
 

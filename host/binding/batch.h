@@ -8,23 +8,12 @@
 #include "solve/results.h"
 #include "solve/solve.h"
 
-// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID,
-// POPULATION and OUTSIDE only. Every row goes through bt_signals_q4 and bt_solve, or bt_solve_uncalibrated,
-// as on the board.
+// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). pdc_above_rest_q4, which a map may need,
+// torsion_mnmm, flags: (n,); of flags POC_INVALID, POPULATION and OUTSIDE only. Every row goes through
+// bt_signals_q4, and bt_solve_mapped, bt_solve_uncalibrated or bt_solve, as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
-                      const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
-                      int32_t *torque_mnmm, uint32_t *flags);
-
-// The same with the settings' map in force, through bt_solve_mapped; pdc, pdc_tare_q4, torsion_mnmm: (n,).
-void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4, const uint16_t *pdc,
-                      const uint16_t *pdc_tare_q4, const bt_solve_settings *settings, int16_t *poc_um,
+                      const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags);
-
-// A map alone: pdc_above_rest_q4, torsion_mnmm (n,), force_100un and torque_mnmm (n, 3); marked invalid what
-// the map does not have.
-void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
-                   const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm,
-                   int32_t *torsion_mnmm);
 
 // The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,

@@ -12,7 +12,7 @@ from biotac.wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to
 
 def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
     """The board's integer kernels: counts (n, 19) or (19,), tare of that shape or (19,), rounded as the board does."""
-    poc_um, force_100un, torque_mnmm, _ = on_board_q4(*_rows(counts, tare), settings or default_settings())
+    poc_um, force_100un, torque_mnmm, *_ = on_board_q4(*_rows(counts, tare), settings or default_settings())
     return Results(
         to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
     )

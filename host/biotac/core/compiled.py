@@ -18,6 +18,7 @@ from ..wire.sensor_gen import ELECTRODE_NAMES, FULL_SCALE_COUNT
 NN_PER_N = 1e9
 ELECTRODES = len(ELECTRODE_NAMES)
 Settings = dict[wire.Setting, int]
+BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
 
 class Results(NamedTuple):
@@ -34,22 +35,30 @@ def default_settings() -> Settings:
 
 
 def on_board_q4(
-    counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings
-) -> tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]:
+    counts: NDArray[np.uint16],
+    tare_q4: NDArray[np.uint16],
+    settings: Settings,
+    own_map: Any = ffi.NULL,
+    pdc_above_rest_q4: NDArray[np.int32] | None = None,
+) -> BoardResults:
     """Run the on-board integer kernels on the integers of FRAME messages, both (n, 19).
 
-    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and the kernel's flags (n,).
+    ``own_map``, a struct bt_map, is in force; it may need ``pdc_above_rest_q4`` (n,), -2^31 where missing. Returns
+    poc_um, force_100un, torque_mnmm, each (n, 3), torsion_mnmm, which only a map gives, and the kernel's flags (n,).
     Raises ValueError for other shapes or ranges.
     """
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
-    tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
-    board = board_settings(settings)
-    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
     n = len(raw)
+    tare_q4 = integers("tare_q4", tare_q4, np.uint16, n, ELECTRODES)
+    missing = np.full(n, wire.INVALID_I32, np.int32)
+    pdc = missing if pdc_above_rest_q4 is None else integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, n)
+    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
+    kernel.map = own_map
+    poc_um, torsion_mnmm, flags = np.empty((n, 3), np.int16), np.empty(n, np.int32), np.empty(n, np.uint32)
     force_100un, torque_mnmm = np.empty((2, n, 3), np.int32)
-    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
-    lib.bt_kernel_frames(n, *c_pointers(raw, tare_q4), kernel, *c_pointers(poc_um, force_100un, torque_mnmm, flags))
-    return poc_um, force_100un, torque_mnmm, flags
+    results = c_pointers(poc_um, force_100un, torque_mnmm, torsion_mnmm, flags)
+    lib.bt_kernel_frames(n, *c_pointers(raw, tare_q4, pdc), kernel, *results)
+    return poc_um, force_100un, torque_mnmm, torsion_mnmm, flags
 
 
 def pressure_force_100un(

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import ELECTRODES, Settings, board_settings, c_pointers, integers
+from ..core import compiled
+from ..core.compiled import BoardResults, Settings, default_settings, integers
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
@@ -25,7 +26,6 @@ from ..wire.native import ffi, lib
 from .margin import UNKNOWN, Margin
 
 Integers = NDArray[np.int64]
-BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
 _HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI4H")
 _BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
@@ -120,13 +120,11 @@ class BoardMap:
         A result is -2^31 where invalid: if the map does not have it, and in rows where the map needs pressure and that
         is missing (-2^31). Raises ValueError for other shapes or ranges.
         """
-        raw = integers("counts", counts, np.uint16, None, ELECTRODES)
-        tare = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
-        pdc = integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, len(raw))
-        n = len(raw)
-        force, torque, torsion = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
-        lib.bt_map_frames(n, self.handle, *c_pointers(raw, tare, pdc, force, torque, torsion))
-        return force, torque, torsion
+        given = counts, tare_q4, default_settings(), self.handle, pdc_above_rest_q4
+        _, force_100un, torque_mnmm, torsion_mnmm, _ = compiled.on_board_q4(*given)
+        if self.axes == _map.AXES_FORCE:
+            torque_mnmm[:] = wire.INVALID_I32
+        return force_100un, torque_mnmm, torsion_mnmm
 
 
 def from_blob(blob: bytes) -> BoardMap:
@@ -195,18 +193,10 @@ def part(blob: bytes, offset: int) -> tuple[int, ...]:
 # ---- on a board --------------------------------------------------------------------------------
 
 
-def on_board_q4(frames: StructArray, settings: Settings, board_map: BoardMap) -> BoardResults:
-    """compiled.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; adds torsion_mnmm."""
-    raw, tare_q4 = (integers(name, frames[name], np.uint16, len(frames), ELECTRODES) for name in ("counts", "tare_q4"))
-    pdc, pdc_tare_q4 = (integers(name, frames[name], np.uint16, len(frames)) for name in ("pdc", "pdc_tare_q4"))
-    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
-    kernel.map = board_map.handle
-    n = len(frames)
-    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
-    force_100un, torque_mnmm, torsion_mnmm = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
-    results = c_pointers(poc_um, force_100un, torque_mnmm, torsion_mnmm, flags)
-    lib.bt_mapped_frames(n, *c_pointers(raw, tare_q4, pdc, pdc_tare_q4), kernel, *results)
-    return poc_um, force_100un, torque_mnmm, torsion_mnmm, flags
+def on_board_q4(frames: StructArray, settings: Settings, own_map: BoardMap | None) -> BoardResults:
+    """compiled.on_board_q4() on FRAME messages (n,), with a map in force or without."""
+    handle = ffi.NULL if own_map is None else own_map.handle
+    return compiled.on_board_q4(frames["counts"], frames["tare_q4"], settings, handle, pdc_above_rest_q4(frames))
 
 
 def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:

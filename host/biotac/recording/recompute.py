@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
-from ..core.compiled import completed, grip_mn, on_board_q4, pressure_force_100un, trust_of
+from ..core.compiled import completed, grip_mn, pressure_force_100un, trust_of
 from ..core.finger import ROUND_US, Finger
 from ..errors import CommandRefusedError, InputError
 from ..keep.calibration import own_settings
@@ -112,17 +112,13 @@ def _with_kept_tares(
 
 def _recomputed(frames: StructArray, settings: Settings, own_map: BoardMap | None) -> StructArray:
     used = completed(frames)
-    if own_map is None:
-        poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(used["counts"], used["tare_q4"], settings)
-        frames["torsion_mnmm"] = wire.INVALID_I32
-    else:
-        poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(used, settings, own_map)
-        frames["torsion_mnmm"] = torsion_mnmm
+    poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(used, settings, own_map)
     # The half widths depend on the noise, too, which a frame does not hold: they stay with what they were made for.
     changed = ((frames["poc_um"] != poc_um) | (frames["force_100un"] != force_100un)).any(axis=1)
     for name in ("normal_half_mn", "shear_half_mn"):
         frames[name][changed] = wire.INVALID_COUNT
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
+    frames["torsion_mnmm"] = torsion_mnmm
     frames["normal_mn"], frames["shear_mn"] = grip_mn(poc_um, force_100un).T
     frames["pressure_force_100un"] = pressure_force_100un(
         frames["pdc_filtered_q4"], frames["pdc_tare_q4"], settings[wire.Setting.PRESSURE_GAIN_NN]
