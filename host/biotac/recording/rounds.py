@@ -42,6 +42,11 @@ class Rounds:
     wrench_map: BoardMap | None = None
     foreign: bool = False
 
+    def fresh(self, settings: dict[wire.Setting, int]) -> Finger:
+        """The finger before its first round."""
+        own_map, foreign = self.wrench_map, self.foreign
+        return Finger(settings, index=self.finger, quantities=self.quantities, wrench_map=own_map, foreign=foreign)
+
 
 def with_silence(rounds: Rounds) -> Rounds:
     """``rounds`` with an empty round inserted wherever time jumps: the sensor did not answer, or was being identified.
@@ -50,22 +55,11 @@ def with_silence(rounds: Rounds) -> Rounds:
     """
     late = np.flatnonzero(np.diff(rounds.t_us) > 3 * ROUND_US // 2) + 1
 
-    def filled(words: NDArray[np.uint16]) -> NDArray[np.uint16]:
-        return np.insert(words, late, np.uint16(wire.INVALID_COUNT), axis=0)
-
-    def at(row: int) -> int:
-        return row + int(np.searchsorted(late, row, "right"))
-
-    return replace(
-        rounds,
-        counts=filled(rounds.counts),
-        pdc=filled(rounds.pdc),
-        tac=filled(rounds.tac),
-        tdc=filled(rounds.tdc),
-        pac=filled(rounds.pac),
-        t_us=np.insert(rounds.t_us, late, rounds.t_us[late] - ROUND_US),
-        commands={at(row): commands for row, commands in rounds.commands.items()},
-    )
+    words = {name: getattr(rounds, name) for name in ("counts", "pdc", "tac", "tdc", "pac")}
+    filled = {name: np.insert(own, late, np.uint16(wire.INVALID_COUNT), axis=0) for name, own in words.items()}
+    t_us = np.insert(rounds.t_us, late, rounds.t_us[late] - ROUND_US)
+    rows = {row: row + int(np.searchsorted(late, row, "right")) for row in rounds.commands}
+    return replace(rounds, **filled, t_us=t_us, commands={rows[row]: own for row, own in rounds.commands.items()})
 
 
 def frames_and_tares(
@@ -75,8 +69,7 @@ def frames_and_tares(
 
     ``show`` is called with the number of rounds just run; at most twice their number are run in all.
     """
-    own_map, foreign = rounds.wrench_map, rounds.foreign
-    finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities, wrench_map=own_map, foreign=foreign)
+    finger = rounds.fresh(settings)
     rows = np.concatenate(list(run(rounds, finger, [], show)))
     changed = np.flatnonzero((rows["flags"] & wire.FrameFlags.TARE_CHANGED).astype(bool) & (rows["present"] != 0))
     # Rows do not hold the tare in 1/65536 count: a second run stops at each change to read it.

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core.finger import Finger
 from ..keep.calibration import own_settings
 from ..wire.fields import INVALID_U32, Field
 from ..wire.frames import StructArray
@@ -51,13 +50,7 @@ def trace(recording: Recording, show: Callable[[float], None] = lambda share: No
     out: dict[int, StructArray] = {}
     done = 0
     for at, rounds in machine_rounds(recording, recording.maps, []):
-        finger = Finger(
-            own.get(rounds.finger, recording.settings),
-            index=rounds.finger,
-            quantities=rounds.quantities,
-            wrench_map=rounds.wrench_map,
-            foreign=rounds.foreign,
-        )
+        finger = rounds.fresh(own.get(rounds.finger, recording.settings))
         rows: list[tuple[Any, ...]] = []
         before, since = finger.tare_machine(), 0
         for k, part in enumerate(run(rounds, finger, range(len(rounds.counts)))):
