@@ -13,9 +13,6 @@ class HostClock(Protocol):
     def monotonic_s(self) -> float:
         """Time since some fixed moment; never steps."""
 
-    def unix_ns(self) -> int:
-        """Time since 1970 UTC."""
-
     def sleep(self, seconds: float) -> None:
         """Let time pass, until ``wake`` at most."""
 
@@ -30,7 +27,6 @@ class SystemClock:
         self._awake = threading.Event()
 
     monotonic_s = staticmethod(time.monotonic)  # not a method: it is called thousands of times a second
-    unix_ns = staticmethod(time.time_ns)
 
     def sleep(self, seconds: float) -> None:
         self._awake.wait(seconds)

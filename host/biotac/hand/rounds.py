@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from ..board.gap import Gap
+from ..board.gap import FINGERS_IN, Gap
 from ..board.reader import Reader
 from ..wire.batches import ROUND_US, Batch
 from ..wire.frames import Frame
@@ -121,7 +121,7 @@ class Rounds:
                 self._rows = {at: row for at, row in self._rows.items() if newest is not None and at > newest}
         frames = {finger: Frame.from_row(batch.frames[row]) for finger, (batch, row) in rows.items()}
         fingers = {}
-        for finger in sorted({*frames, *(event.finger for event in taken), *self._present()}):
+        for finger in sorted({*frames, *(event.finger for event in taken), *FINGERS_IN[self._reader.present]}):
             own = tuple(event for event in taken if event.finger == finger)
             fingers[self._latest.name(finger)] = FingerRound(frames.get(finger), own)
         seq = next((frame.seq for frame in frames.values()), -1)
@@ -130,6 +130,3 @@ class Rounds:
         missed = round((newest - self._given_us) / ROUND_US) - 1 if self._given_us >= 0 else 0
         self._given_us = newest
         return Round(seq, newest, missed, fingers, tuple(taken))
-
-    def _present(self) -> list[int]:
-        return [finger for finger in range(self._reader.present.bit_length()) if self._reader.present >> finger & 1]

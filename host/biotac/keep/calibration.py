@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..wire import messages_gen as wire
-from ..wire.identity import ascii_text
+from ..wire.identity import SENSOR_SERIAL_BYTES, ascii_text
 
-SERIAL_BYTES = 16
 _DEFAULT = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
 
 
@@ -53,8 +52,8 @@ class Calibration:
         if not 0 <= self.made_s < 2**32:
             raise ValueError(f"made_s is {self.made_s}, expected seconds since 1970, or 0 when unknown")
         plain = isinstance(self.serial, str) and self.serial.isascii() and self.serial.isprintable()
-        if not plain or len(self.serial) > SERIAL_BYTES:
-            raise ValueError(f"serial is {self.serial!r}, expected up to {SERIAL_BYTES} ASCII characters")
+        if not plain or len(self.serial) > SENSOR_SERIAL_BYTES:
+            raise ValueError(f"serial is {self.serial!r}, expected up to {SENSOR_SERIAL_BYTES} ASCII characters")
 
     def settings(self) -> dict[wire.Setting, int]:
         """The per-finger settings with these values."""
@@ -67,7 +66,7 @@ class Calibration:
 
     def wire_serial(self) -> tuple[int, ...]:
         """The serial number as messages and records hold it: 16 bytes, padded with zeros."""
-        return tuple(self.serial.encode("ascii").ljust(SERIAL_BYTES, b"\0"))
+        return tuple(self.serial.encode("ascii").ljust(SENSOR_SERIAL_BYTES, b"\0"))
 
     def changed(self, changes: Mapping[wire.Setting, int]) -> Calibration:
         """A copy with other values for some settings; ``changes`` to settings that are not per-finger are ignored."""

@@ -18,7 +18,6 @@ class Played(Protocol):
     """What a simulated board plays, and what its user would know about it; sim/source.py has the details."""
 
     @property
-    @property
     def tare_q4(self) -> NDArray[np.uint16] | None:
         """The tare (fingers, 19) to give the board before streaming, in 1/16 count, or None."""
 

@@ -10,9 +10,6 @@ from . import sensor_gen as sensor
 
 SENSOR_SERIAL_BYTES = 16
 
-# HELLO's image_crc32 where there is no image, or one from before that field.
-NO_IMAGE = 0xFFFFFFFF
-
 # A Pico's serial number has 8 bytes; HELLO has room for 12, padded with zeros.
 SERIAL_BYTES = 8
 

@@ -38,9 +38,6 @@ class FakeClock:
     def monotonic_s(self) -> float:
         return self.now
 
-    def unix_ns(self) -> int:
-        return round(self.now * 1e9)
-
     def wake(self) -> None:
         pass
 
