@@ -30,23 +30,15 @@ struct bt_port {
     _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 };
 
-bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id)
+bt_sbc *bt_sbc_new(void *python, uint8_t devices, bool timed, uint32_t boot_id)
 {
     bt_sbc *sbc = calloc(1, sizeof *sbc);
     if (sbc != NULL) {
         sbc->python = python;
         sbc->devices = (uint8_t)((1u << devices) - 1);
-        sbc->boot_id = boot_id;
-    }
-    return sbc;
-}
-
-bt_sbc *bt_sbc_new_of_rounds(void *python, bool timed, uint32_t boot_id)
-{
-    bt_sbc *sbc = bt_sbc_new(python, 0, boot_id);
-    if (sbc != NULL) {
-        sbc->no_bus = true;
+        sbc->no_bus = devices == 0;
         sbc->untimed = !timed;
+        sbc->boot_id = boot_id;
     }
     return sbc;
 }

@@ -11,11 +11,10 @@
 
 typedef struct bt_port bt_sbc; // port.h's board
 
-// devices: how many sensors are wired, fingers 0 to devices - 1. python: handed to every function below.
-// NULL without memory. Several may live at once, each on a thread of its own.
-bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id);
-// A board without a bus, whose rounds come whole; timed: with the times of their slots.
-bt_sbc *bt_sbc_new_of_rounds(void *python, bool timed, uint32_t boot_id);
+// devices: how many sensors are wired, fingers 0 to devices - 1; none: a board without a bus, whose rounds come
+// whole. timed: with the times of their slots. python: handed to every function below. NULL without memory.
+// Several may live at once, each on a thread of its own.
+bt_sbc *bt_sbc_new(void *python, uint8_t devices, bool timed, uint32_t boot_id);
 void bt_sbc_free(bt_sbc *sbc);
 
 // main.c, taken apart, since Python has the loop: start once, then poll, and alarm whenever bt_sbc_due_us()

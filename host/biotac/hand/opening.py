@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import NotAGatewayError
 from ..keep import Calibration, harness
 from ..link import Link, open_link
-from ..link.discovery import SERIAL_PREFIX, choose
+from ..link.discovery import choose
 from ..wire import messages_gen as wire
 from ..wire.frames import Q4_PER_COUNT
 from .hand import MAX_AGE_S, Hand
@@ -47,9 +47,7 @@ def open(
     Raises PortError, NotAGatewayError or WireVersionError; InputError for a source or a recording that cannot be
     played, or an EEPROM without a calibration; CommandRefusedError for a calibration of another sensor.
     """
-    text = None if port is None else os.fspath(port)
-    if text is None or text.startswith(SERIAL_PREFIX):
-        text = choose(text and text.removeprefix(SERIAL_PREFIX))
+    text = choose() if port is None else os.fspath(port)
     if text.startswith("spidev:"):
         bare, own = harness.load(text)
         return shake_hands(open_link(bare, pace=pace), fingers=fingers, max_age_s=max_age_s, calibrations=own)

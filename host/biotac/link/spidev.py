@@ -99,7 +99,7 @@ class SpidevLink(InProcessLink):
         self._devices = open_devices(port)
         self._clock = MonotonicClock()
         self._start_ns = self._clock.now_ns()
-        self.begin(lib.bt_sbc_new(self._handle, len(self._devices), secrets.randbits(32)))
+        self.begin(lib.bt_sbc_new(self._handle, len(self._devices), True, secrets.randbits(32)))
 
     def close(self) -> None:
         super().close()

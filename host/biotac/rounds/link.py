@@ -59,7 +59,7 @@ class MessagesLink(InProcessLink):
         self._now_us, self._last_us, self._last_s = 0, -ROUND_US, time.monotonic()
         self._wrong = 0  # stamps in a row
         self._said: dict[int, tuple[bytes, bool]] = {}  # to the board, of each finger's sensor
-        self.begin(lib.bt_sbc_new_of_rounds(self._handle, self._rounds.timed, secrets.randbits(32)))
+        self.begin(lib.bt_sbc_new(self._handle, 0, self._rounds.timed, secrets.randbits(32)))
 
     @property
     def zero_ns(self) -> int:
