@@ -14,9 +14,9 @@ import numpy as np
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...hand.rounds import Round
+from ...recording.pressure_check import usable
 from ...wire.frames import StructArray
-from ...wire.messages_gen import FrameFlags
-from ...wire.sensor_gen import FULL_SCALE_COUNT
+from ...wire.messages_gen import INVALID_COUNT, FrameFlags
 from .detector import Phase, Procedure
 from .force_source import ROW_DTYPE
 from .pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Calibrated, fit, verify
@@ -91,6 +91,6 @@ def _rows(now: Round, plate_n: Callable[[], float]) -> StructArray:
     for k, frame in enumerate(frames):
         touched = bool(frame.flags & (FrameFlags.CONTACT | FrameFlags.FAULT))
         numbers = frame.pdc_filtered, frame.pdc_tare, frame.pressure_force_n, plate_n()
-        railed = not 0 < frame.pdc < FULL_SCALE_COUNT
+        railed = frame.pdc != INVALID_COUNT and not usable(np.uint16(frame.pdc))
         out[k] = (frame.finger, frame.t_us, *numbers, frame.counts, frame.tare, touched, railed)
     return out
