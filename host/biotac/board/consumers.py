@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import CallbackError
 from ..wire.batches import Batch
 from .gap import Gap
-from .reader import Reader
+from .reader import Consumer, Reader
 
 # Ten to twenty seconds of five fingers with PAC; a few tens of megabytes.
 LIMIT_ROWS = 16_384
@@ -25,8 +25,8 @@ BACKLOG_S = 1.0
 Unsubscribe = Callable[[], None]
 
 
-class Queue:
-    """A reader.Consumer: batches on their way to one who may be slow, first in, first out.
+class Queue(Consumer):
+    """Batches on their way to one who may be slow, first in, first out.
 
     A full queue drops its oldest batches and counts them; their Gaps are kept, and a Gap says what is missing. A board
     whose time waits for its reader waits instead. While nobody takes from it yet, what it drops is nobody's loss.
@@ -48,7 +48,6 @@ class Queue:
         self._kept: list[Gap] = []  # of batches that were dropped
 
     def put(self, batch: Batch) -> None:
-        """Add the newest batch."""
         self._waiting.put(batch)
         self._put_rows += weight(batch)
         self._has_rows |= bool(len(batch.wire) or len(batch.pac) or len(batch.idle))
@@ -99,6 +98,7 @@ class Queue:
     def leave(self) -> None:
         """Discard what waits and count it as skipped: the consumer has no more time for it."""
         self._reader.batches_skipped += len(self._back)
+        self._reader.frames_skipped += sum(len(batch.wire) for batch in self._back)
         while not self._waiting.empty():
             self._skip()
 
@@ -145,7 +145,6 @@ class DeferredErrors:
         self._more = 0
 
     def keep(self, error: BaseException) -> None:
-        """Keep an error for the next ``report``."""
         with self._lock:
             if self._first is None:
                 self._first = error

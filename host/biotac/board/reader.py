@@ -42,9 +42,11 @@ class Consumer(Protocol):
 
     def wake(self) -> None:
         """Look again: the stream has ended, or the board is lost."""
+        return
 
     def is_full(self) -> bool:
         """Whether a board whose time waits for its reader has to wait for this consumer."""
+        return False
 
 
 @runtime_checkable

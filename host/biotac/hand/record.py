@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ..board.board import Board
 from ..board.consumers import DeferredErrors
 from ..board.gap import Gap
+from ..board.reader import Tap
 from ..errors import BiotacError, DeviceLostError, InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
@@ -36,7 +37,7 @@ def _of_writer(name: str, doc: str) -> Any:
     return property(lambda recorder: getattr(recorder._writer, name), doc=doc)
 
 
-class Recorder:
+class Recorder(Tap):
     """An open recording, made by ``Hand.record``: everything that arrives, until it or the hand is closed.
 
     ``path`` is the file being written; ``paths`` lists all files so far: when the board restarts, a new one is begun.
@@ -113,7 +114,7 @@ class Recorder:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
 
-    # ---- as a reader.Tap, on the reading thread ------------------------------------------------
+    # ---- on the reading thread -----------------------------------------------------------------
 
     def put_raw(self, chunk: bytes) -> None:
         if self._put_bytes - self._taken_bytes > LIMIT_BYTES:
@@ -139,9 +140,6 @@ class Recorder:
             self._put_bytes += len(what)
             if self.is_full():
                 self._due.set()
-
-    def wake(self) -> None:
-        """See reader.Consumer."""
 
     def is_full(self) -> bool:
         return self._put_bytes - self._taken_bytes > WRITE_BYTES

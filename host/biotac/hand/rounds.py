@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from ..board.gap import FINGERS_IN, Gap
-from ..board.reader import Reader
+from ..board.reader import Consumer, Reader
 from ..wire.batches import ROUND_US, Batch
 from ..wire.frames import Frame
 from ..wire.messages_gen import Event
@@ -46,8 +46,8 @@ class Round:
         return iter(self.fingers)
 
 
-class Rounds:
-    """A reader.Consumer that puts rows and events of a round together, for one program that takes them."""
+class Rounds(Consumer):
+    """Puts rows and events of a round together, for one program that takes them."""
 
     def __init__(self, reader: Reader, latest: Latest) -> None:
         self._reader = reader
@@ -77,9 +77,6 @@ class Rounds:
     def wake(self) -> None:
         with self._news:
             self._news.notify_all()
-
-    def is_full(self) -> bool:
-        return False
 
     # ---- the program ---------------------------------------------------------------------------
 

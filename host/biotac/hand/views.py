@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..board.consumers import DeferredErrors
 from ..board.gap import FINGERS_IN
-from ..board.reader import Reader
+from ..board.reader import Consumer, Reader
 from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.fields import FRAME_FIELDS
@@ -54,8 +54,8 @@ def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
     raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
 
 
-class Latest:
-    """A reader.Consumer: the newest frame or heartbeat of each finger, and how old it is.
+class Latest(Consumer):
+    """The newest frame or heartbeat of each finger, and how old it is.
 
     The reading thread only notes the batch: searching it costs as much as decoding, and most are never looked at.
     ``max_age_s`` is the age beyond which values are not shown any more.
@@ -118,9 +118,6 @@ class Latest:
     def wake(self) -> None:
         with self._news:
             self._news.notify_all()
-
-    def is_full(self) -> bool:
-        return False
 
     def state(self, finger: int) -> tuple[StructArray, float, str]:
         """The latest row, FRAME_DTYPE (1,), its age in s, and why it may not be used; empty when it may.

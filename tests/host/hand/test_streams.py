@@ -64,6 +64,14 @@ def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(queue: Queue
     assert (queue.take(), queue._reader.batches_skipped) == (None, 0)
 
 
+def test_a_batch_that_was_put_back_is_skipped_with_its_frames(queue: Queue) -> None:
+    queue.put(batch_of(*(frame(n) for n in range(3))))
+    queue.put(batch_of(frame(3)))
+    queue.put_back(queue.take())
+    queue.leave()
+    assert (queue._reader.batches_skipped, queue._reader.frames_skipped) == (2, 4)
+
+
 def test_messages_alone_do_not_fill_memory_either(queue: Queue) -> None:
     for _ in range(50):
         queue.put(batch_of(packed(wire.Touch(1, 1, 0, 1, 1))))
