@@ -90,7 +90,6 @@ class Points:
         return np.array(self._x[cut]) - x0, np.array(self._y[cut])
 
     def forget_before(self, x: float) -> None:
-        """Drop the points before x."""
         n = bisect.bisect_left(self._x, x)
         del self._x[:n], self._y[:n]
 

@@ -10,7 +10,7 @@ from ..wire import messages_gen as wire
 
 @dataclass(frozen=True)
 class Faults:
-    """Faults since ``Hand.clear_faults``, or the board's start. False when there are none; as text, a line for each."""
+    """Faults since ``clear_faults``, or the board's start. False when there are none; as text, a line for each."""
 
     board: wire.FaultFlags
     fingers: Mapping[str, wire.FrameFlags]  #: by name, only fingers that have faults

@@ -47,7 +47,6 @@ def _write(board: Board, finger: int, blob: bytes) -> None:
 
 
 def info(board: Board, finger: int) -> wire.MapInfo:
-    """Which map a finger has."""
     return board.ask(wire.GetMap(0, finger), wire.MapInfo)
 
 

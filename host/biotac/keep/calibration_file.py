@@ -56,7 +56,6 @@ def from_dict(tree: Any) -> Calibration:
 
 
 def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str:
-    """The text of a file."""
     return json.dumps(sealed(to_dict(calibration, provenance)), indent=2) + "\n"
 
 

@@ -30,7 +30,6 @@ def serial_ports(entries: Iterable[ListPortInfo] | None = None) -> list[ListPort
 
 
 def boards(entries: Iterable[ListPortInfo] | None = None) -> list[ListPortInfo]:
-    """The ports with our USB ids."""
     return [port for port in serial_ports(entries) if is_board(port)]
 
 

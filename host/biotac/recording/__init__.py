@@ -1,10 +1,9 @@
-"""Recordings: MCAP files that hold the raw wire bytes, so that nothing the board sent is lost.
+"""Recordings: MCAP files that hold every message the board sent.
 
-There is one block per second. It is split by finger and field, in a form that can be reassembled byte for byte, and
-each part is a chunk of its own: a killed recorder loses at most its last second. Thinned JSON and ROS 2 messages for
-Foxglove and PlotJuggler are stored beside it (plots.py). The metadata record ``biotac`` names the board, its sensors
-and the settings in force; the wire's schema record holds protocol/schema.json as it was at the time of recording.
-host/docs/guides/recording.md describes the format.
+There is one block per second. It is split by finger and field, and each part is a chunk of its own: a killed recorder
+loses at most its last second. Thinned ROS 2 messages for Foxglove and PlotJuggler are stored beside it (plots.py). The
+metadata record ``biotac`` names the board, its sensors and the settings in force; the wire's schema record holds
+protocol/schema.json as it was at the time of recording. host/docs/guides/recording.md describes the format.
 """
 
 from __future__ import annotations

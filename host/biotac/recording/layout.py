@@ -59,7 +59,6 @@ def finger_of(finger: int | str, names: Mapping[str, int]) -> int:
 
 
 def with_checksum(facts: Mapping[str, str]) -> dict[str, str]:
-    """Metadata with its checksum."""
     return {**facts, CHECKSUM: _checksum(facts)}
 
 

@@ -33,7 +33,7 @@ PAC_DTYPE = dtype_of(PAC_FIELDS)
 #: How strongly dynamic pressure vibrated in a round, in six octaves, the lowest first; ``t_us`` is that of PAC.
 BANDS_DTYPE = dtype_of(BANDS_FIELDS)
 
-#: Heartbeats of untouched fingers (Hand.subscribe): a row stands for ``frames`` rounds for which no FRAME was sent;
+#: Heartbeats of untouched fingers (``rest=False``): a row stands for ``frames`` rounds for which no FRAME was sent;
 #: ``seq`` is that of the last one. ``energy_count2`` is the sum of the squared signals, in count^2.
 IDLE_DTYPE = dtype_of(IDLE_FIELDS)
 

@@ -62,7 +62,6 @@ class Sums:
         )
 
     def axes(self, which: Sequence[int]) -> Sums:
-        """Sums of some axes of the truth."""
         return Sums(self.gram, self.cross[..., list(which)], self.square[..., list(which)])
 
     def part(self, index: Rows) -> Sums:
@@ -119,7 +118,6 @@ def smoothed(run: Run, window_rows: int) -> Signals:
 
 
 def at(signals: Signals, rows: Rows) -> Signals:
-    """The signals of some rows."""
     return Signals(signals.e[rows], signals.tare, None if signals.pdc is None else signals.pdc[rows])
 
 
@@ -158,7 +156,6 @@ def strip_sums(
 
 
 def stacked(strips: Iterable[Sums]) -> Sums:
-    """The sums of all strips stacked into one."""
     every = list(strips)
     return Sums(*(np.stack([getattr(one, name) for one in every]) for name in ("gram", "cross", "square")))
 
