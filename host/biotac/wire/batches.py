@@ -11,6 +11,8 @@ import os
 import threading
 import time
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import numpy as np
@@ -296,4 +298,5 @@ def join(batches: list[Batch]) -> Batch:
     names, last = ("wire", "seq", "t_us", "pac", "idle"), batches[-1]
     sent, seq, t_us, pac, idle = (np.concatenate([getattr(b, name) for b in batches]) for name in names)
     messages = [m for b in batches for m in b.messages]
-    return Batch(sent, seq, t_us, pac, idle, messages, arrived_s=last.arrived_s, taken_s=last.taken_s)
+    fingers = reduce(or_, (b.fingers for b in batches))
+    return Batch(sent, seq, t_us, pac, idle, messages, fingers, last.arrived_s, last.taken_s)

@@ -10,7 +10,7 @@ import pytest
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
-from biotac.wire.decoder import STREAMED
+from biotac.wire.decoder import ONE_STEP_BYTES, STREAMED
 from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
 from biotac.wire.native import ffi, lib
@@ -248,6 +248,11 @@ def test_a_status_tells_who_did_not_listen_how_long_that_was(hours: float) -> No
     assert decoder.lost == 100 * (1 + seconds) - 2
     restarted = decoder.feed(status(3) + frame(0, 300, 3 * 10**6) + status(4) + frame(0, 400, 4 * 10**6))
     assert np.diff(restarted.t_us).tolist() == [10**6]
+
+
+def test_many_bytes_at_once_say_whose_rows_they_have() -> None:
+    sent = b"".join(frame(1 + k % 2, k, 10_000 * k) for k in range(1000))
+    assert len(sent) > ONE_STEP_BYTES and StreamDecoder().feed(sent).fingers == 0b110
 
 
 def test_threads_cannot_share_a_decoder() -> None:
