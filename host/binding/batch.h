@@ -2,14 +2,15 @@
 #ifndef BIOTAC_BATCH_H
 #define BIOTAC_BATCH_H
 
+#include "keep/calibration.h"
 #include "map/map.h"
 #include "signal/round.h"
 #include "solve/pressure.h"
 #include "solve/results.h"
 #include "solve/solve.h"
 
-// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). pdc_above_rest_q4, which a map may need,
-// torsion_mnmm, flags: (n,); of flags POC_INVALID, POPULATION and OUTSIDE only. Every row goes through
+// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). pdc_above_rest_q4, which a map may
+// need, torsion_mnmm, flags: (n,); of flags POC_INVALID, POPULATION and OUTSIDE only. Every row goes through
 // bt_signals_q4, and bt_solve_mapped, bt_solve_uncalibrated or bt_solve, as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
@@ -20,10 +21,11 @@ void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *
                         int32_t *force_100un);
 
 // Macros of the core, which cffi does not see.
-enum bt_thresholds {
+enum bt_macros {
     BT_THRESHOLD_RAIL_COUNT = BT_RAIL_COUNT,
     BT_THRESHOLD_ACTIVE_Q4 = BT_ACTIVE_Q4,
     BT_THRESHOLD_ACTIVE_FOR_TORSION = BT_ACTIVE_FOR_TORSION,
+    BT_CALIBRATION_VERSION = BT_CALIBRATION_RECORD_VERSION,
 };
 
 // Compared with host/biotac/wire/messages_gen.py when the module is imported.

@@ -11,9 +11,9 @@
 
 typedef struct bt_port bt_sbc; // port.h's board
 
-// devices: how many sensors are wired, fingers 0 to devices - 1; none: a board without a bus, whose rounds come
-// whole. timed: with the times of their slots. python: handed to every function below. NULL without memory.
-// Several may live at once, each on a thread of its own.
+// devices: how many sensors are wired, fingers 0 to devices - 1; none: a board without a bus, whose rounds
+// come whole. timed: with the times of their slots. python: handed to every function below. NULL without
+// memory. Several may live at once, each on a thread of its own.
 bt_sbc *bt_sbc_new(void *python, uint8_t devices, bool timed, uint32_t boot_id);
 void bt_sbc_free(bt_sbc *sbc);
 

@@ -13,6 +13,7 @@ import zlib
 
 from ..errors import InputError, PortError
 from ..wire.native import ffi, lib
+from ..wire.sensor_gen import MAX_SENSORS
 from .calibration import Calibration
 from .chip import Chip
 
@@ -20,13 +21,8 @@ SLOT_BYTES = 128
 SLOTS = 2
 CRC = GENERATION = struct.Struct("<I")
 RECORD_BYTES = 256
-_WHY = {
-    lib.BT_RECORD_DAMAGED: "holds no intact record: its CRC is wrong; store the calibration again",
-    lib.BT_RECORD_OF_SOMETHING: "holds a record other than a calibration; store the calibration again",
-    lib.BT_RECORD_OTHER_VERSION: "holds a calibration in a newer format; install a newer biotac-gateway",
-    lib.BT_RECORD_CLEARED: "holds a cleared calibration; store one again",
-    lib.BT_RECORD_OUT_OF_RANGE: "holds a calibration with a value out of range; store a valid one",
-}
+_HEADER = struct.Struct("<4xHHI4x")  # of a page in flash (firmware/core/keep/storage.c): id, version, size of its data
+_FIRST_ID, _VERSION = lib.BT_RECORD_CALIBRATION, lib.BT_CALIBRATION_VERSION
 
 
 def pack(calibration: Calibration) -> bytes:
@@ -36,8 +32,10 @@ def pack(calibration: Calibration) -> bytes:
     record.serial = calibration.wire_serial()
     record.made_s = calibration.made_s
     record.value = calibration.wire_values()
-    page = ffi.new("uint8_t[]", RECORD_BYTES)
-    return bytes(ffi.buffer(page, lib.bt_record_pack(record, page)))
+    data, page = ffi.new("uint8_t[]", RECORD_BYTES), ffi.new("uint8_t[]", RECORD_BYTES)
+    size = lib.bt_calibration_pack(record, data)
+    lib.bt_storage_make_page(page, _FIRST_ID, _VERSION, data, size)
+    return bytes(ffi.buffer(page, _HEADER.size + size))
 
 
 def unpack(data: bytes, where: str) -> Calibration:
@@ -45,10 +43,20 @@ def unpack(data: bytes, where: str) -> Calibration:
 
     Raises InputError that begins with ``where`` and says why there is none that can be used.
     """
+    page = data[:RECORD_BYTES].ljust(RECORD_BYTES, b"\xff")
+    number, version, size = _HEADER.unpack_from(page)
+    if not lib.bt_storage_page_is(page, number):
+        raise InputError(f"{where} holds no intact record: its CRC is wrong; store the calibration again")
+    if not 0 <= number - _FIRST_ID < MAX_SENSORS:
+        raise InputError(f"{where} holds a record other than a calibration; store the calibration again")
+    if version != _VERSION:
+        raise InputError(f"{where} holds a calibration in a newer format; install a newer biotac-gateway")
     record = ffi.new("bt_calibration *")
-    judgement = lib.bt_record_unpack(record, data, len(data))
-    if judgement != lib.BT_RECORD_GOOD:
-        raise InputError(f"{where} {_WHY[judgement]}")
+    lib.bt_calibration_unpack(record, version, page[_HEADER.size :], size)
+    if size == 0:
+        raise InputError(f"{where} holds a cleared calibration; store one again")
+    if not record.present:
+        raise InputError(f"{where} holds a calibration with a value out of range; store a valid one")
     try:
         return Calibration.from_wire(list(record.serial), record.made_s, list(record.value))
     except ValueError as error:
