@@ -66,13 +66,6 @@ def test_settings_that_there_are_not_are_refused(key) -> None:
             compute(counts, tare, {key: 1})
 
 
-def test_before_anything_has_arrived_no_value_is_zero(live: Live) -> None:
-    with live.hand as hand:
-        nothing = hand[0].frame
-    assert np.isnan([*nothing.tare, nothing.pdc_tare, *nothing.force_n, nothing.normal_half_n]).all()
-    assert {*nothing.counts.tolist(), nothing.pdc} == {wire.INVALID_COUNT} and nothing.slip_level == 255
-
-
 def test_names_of_fingers_work_in_every_command(live: Live) -> None:
     hand, firmware = live.hand, live.firmware
     hand.tare("middle")
