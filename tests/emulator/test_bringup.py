@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "hil"))
-
-from rig import all_rigs, in_ci, prepare
 
 import biotac
 from biotac.doctor import bringup, bringup_report, judge
@@ -33,11 +28,7 @@ DEFECTS = {
 }
 
 
-@pytest.fixture(autouse=True, scope="module")
-def emulator() -> None:
-    why = prepare(all_rigs()["pico_emulated"])
-    if why is not None:
-        pytest.fail(why) if in_ci() else pytest.skip(why)
+pytestmark = pytest.mark.usefixtures("emulated_pico")
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -39,12 +38,9 @@ console.log(JSON.stringify(at))
 """
 
 
+@pytest.mark.usefixtures("emulated_pico")
 def test_a_channel_goes_by_its_timers_ticks_and_stands_still_on_hold() -> None:
-    if shutil.which("node") is None:
-        pytest.skip("node is missing; tools/test installs it")
     js = ROOT / "tools/node_modules/rp2040js/dist/esm/index.js"
-    if not js.is_file():
-        pytest.skip("rp2040js is missing; tools/emulator/prepare fetches it")
     words = ["node", "--input-type=module", "-e", TIMER, str(js), str(MODEL)]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     # clk_sys * X / Y (data sheet 2.5.5.1): 125 MHz / 125; the timer runs on before the first and over the hold.

@@ -8,16 +8,11 @@ from __future__ import annotations
 
 import inspect
 import re
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "hil"))
-
-from rig import all_rigs, in_ci, prepare
 
 import biotac
 from biotac import FaultFlags
@@ -57,9 +52,8 @@ class Board:
 @pytest.fixture
 def board(request: pytest.FixtureRequest) -> Iterator[Board]:
     image = request.config.getoption("--image")
-    why = None if image else prepare(all_rigs()["pico_emulated"])
-    if why is not None:
-        pytest.fail(why) if in_ci() else pytest.skip(why)
+    if image is None:
+        request.getfixturevalue("emulated_pico")
     made = Board(image)
     yield made
     for hand in made.hands:

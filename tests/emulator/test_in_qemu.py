@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from kept_board import kept_board
+from rig import all_rigs, require
 
 import biotac
 from biotac import Calibration, PocWeights
@@ -19,10 +19,6 @@ from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
 from biotac.wire import messages_gen as wire
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "hil"))
-
-from rig import all_rigs, in_ci, prepare
-
 BOARDS = {name: rig for name, rig in all_rigs().items() if "qemu_gateway" in rig.get("command", "")}
 
 
@@ -30,8 +26,7 @@ BOARDS = {name: rig for name, rig in all_rigs().items() if "qemu_gateway" in rig
 def board(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """While a test runs, sim: is this image in QEMU."""
     facts = BOARDS[request.param]
-    if why := prepare(facts):
-        pytest.fail(why) if in_ci() else pytest.skip(why)
+    require(facts)
     monkeypatch.setenv("BIOTAC_SIM", facts["command"])
     return facts
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,18 +12,8 @@ from two_picos import TwoPicos
 
 from biotac.sim import SimFinger, Touch, wired_world, world
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "hil"))
-
-from rig import all_rigs, in_ci, prepare
-
 FINGERS = {"index": SimFinger(1), "thumb": SimFinger(2, "worn")}
 SETTINGS = {"force_model": 0}
-
-
-def need(name: str) -> None:
-    why = prepare(all_rigs()[name])
-    if why is not None:
-        pytest.fail(why) if in_ci() else pytest.skip(why)
 
 
 def frames(board: str, rounds: int) -> list[np.ndarray]:
@@ -42,15 +30,14 @@ def frames(board: str, rounds: int) -> list[np.ndarray]:
     return rows
 
 
+@pytest.mark.usefixtures("emulated_pico")
 @pytest.mark.parametrize("rounds", [60, pytest.param(1000, marks=pytest.mark.nightly)])
 def test_the_emulated_pico_computes_what_the_process_computes(rounds: int) -> None:
-    need("pico_emulated")
     np.testing.assert_array_equal(frames("pico", rounds), frames("posix", rounds))
 
 
 @pytest.fixture
-def pair() -> Iterator[TwoPicos]:
-    need("two_picos")
+def pair(two_picos: None) -> Iterator[TwoPicos]:
     with closing(TwoPicos(None, pace=0.0, hold=False)) as board:
         yield board
 

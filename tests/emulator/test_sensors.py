@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import struct
 import subprocess
 from pathlib import Path
@@ -18,19 +16,13 @@ from biotac.wire import sensor_gen as _sensor
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 FIRMWARE = ROOT / "firmware"
-TOOLS = ("cc", "node", "npm", "clang", "wasm-ld")
 SLOTS = 20_000
 FRAMES = 100  # the course goes on behind the last
 LISTEN = _sensor.LISTEN_WORD
 
 
 @pytest.fixture(scope="session")
-def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    missing = [tool for tool in TOOLS if shutil.which(tool) is None]
-    if missing:
-        assert "BIOTAC_CI" not in os.environ, f"{missing} missing"
-        pytest.skip(f"{', '.join(missing)} missing; tools/test installs what the emulated rig needs")
-    subprocess.run([ROOT / "tools/emulator/prepare"], check=True)
+def native(emulated_pico: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     program = tmp_path_factory.mktemp("native") / "course"
     sources = [FIRMWARE / "emu" / f"{name}.c" for name in ("bus", "device", "stream", "by_clock")]
     words = ["cc", "-std=c11", "-O1", f"-I{FIRMWARE / 'emu'}", f"-I{FIRMWARE / 'core'}", HERE / "course.c"]

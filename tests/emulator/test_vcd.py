@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tools/make"), str(ROOT / "tests/hil")]
-
-from rig import all_rigs, in_ci, prepare  # noqa: E402
-
-from biotac.wire.decoder import Decoder  # noqa: E402
-from bus_picture import BITS_PER_S, draw, read_vcd, record, slots_ns  # noqa: E402
+from biotac.wire.decoder import Decoder
+from bus_picture import BITS_PER_S, draw, read_vcd, record, slots_ns
 
 PRODUCT_MANUAL_SETTLE_NS = 50_000
 PINS_SETUP_NS, PINS_HOLD_NS = 1800, 230  # firmware/boards/pico/pins.h
@@ -26,10 +20,8 @@ def sigrok(path: Path, *options: str) -> bytes:
     return subprocess.run(command, check=True, capture_output=True).stdout
 
 
+@pytest.mark.usefixtures("emulated_pico")
 def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> None:
-    why = prepare(all_rigs()["pico_emulated"])
-    if why is not None:
-        pytest.fail(why) if in_ci() else pytest.skip(why)
     path = tmp_path / "bus.vcd"
     frames = record(path, fingers=2)
     for finger in range(2):

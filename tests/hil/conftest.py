@@ -3,17 +3,12 @@ boards. --rig NAME picks one."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
+from rig import Rig, all_rigs, in_ci, prepare
 
 import biotac
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from rig import Rig, all_rigs, in_ci, prepare
 
 RIGS = all_rigs()
 READY: dict[str, str | None] = {}

@@ -129,5 +129,11 @@ def prepare(facts: dict[str, Any]) -> str | None:
     return None
 
 
+def require(facts: dict[str, Any]) -> None:
+    """Build what the rig needs; where it cannot be used the test is skipped, and fails in CI."""
+    if why := prepare(facts):
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+
+
 def in_ci() -> bool:
     return bool(os.environ.get("BIOTAC_CI"))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from rig import ROOT, all_rigs, in_ci, prepare
+from rig import ROOT, all_rigs, require
 
 from bench import MID_COUNT, OTHERS_ROUNDS, SETTLED_ROUNDS, staged
 from biotac.cli.main import main
@@ -37,9 +37,7 @@ LEADS = {
 
 @pytest.fixture
 def boards() -> Iterator[Callable[..., Ports]]:
-    why = prepare(all_rigs()["two_picos"])
-    if why is not None:
-        pytest.fail(why) if in_ci() else pytest.skip(why)
+    require(all_rigs()["two_picos"])
     running: list[subprocess.Popen[str]] = []
 
     def start(*leads: str) -> Ports:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from rig import all_rigs, in_ci, prepare
+from rig import all_rigs, require
 from two_picos import TwoPicos
 
 import biotac
@@ -29,9 +29,7 @@ Open = Callable[[float], tuple[biotac.Hand, TwoPicos]]
 def opened(request: pytest.FixtureRequest) -> Iterator[Open]:
     if RIG not in (request.config.getoption("--rig") or [RIG]):
         pytest.skip(f"--rig names others than {RIG}")
-    why = prepare(all_rigs()[RIG])
-    if why is not None:
-        pytest.fail(why) if in_ci() else pytest.skip(why)
+    require(all_rigs()[RIG])
     hands = []
 
     def open_pair(seconds: float) -> tuple[biotac.Hand, TwoPicos]:
