@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
 import io
 import json
 import random
@@ -12,6 +11,7 @@ import sys
 import zlib
 from pathlib import Path
 
+import fake_smbus
 import pytest
 
 from biotac import Calibration
@@ -21,11 +21,6 @@ from biotac.keep import calibration_file as file
 from biotac.keep import chip as chips
 from biotac.keep import eeprom, harness
 from biotac.keep.chip import KINDS, Chip
-
-_spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).parents[2] / "support" / "fake_smbus.py")
-assert _spec is not None and _spec.loader is not None
-fake_smbus = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(fake_smbus)
 
 USABLE = sorted(set(KINDS) - {"24c01"})
 OLD = Calibration(serial="BTEMU00000000001", made_s=1, force_gain_nn=(-1, 2, -3))
