@@ -177,29 +177,6 @@ TEST(what_rattles_must_shake_more)
     }
 }
 
-TEST(what_was_told_of_shakes_on_until_it_is_over)
-{
-    static const struct {
-        bool jolt_raised, landing, touched, one;
-    } cases[] = {{true, true, true, true},
-                 {true, false, true, false},
-                 {true, false, false, true},
-                 {false, true, true, false},
-                 {false, false, false, false}};
-    for (int k = 0; k < 5; k++) {
-        (void)held(NULL);
-        tare.state = BT_TARE_STATE_REST;
-        events.touch_began = events.now;
-        events.jolt_raised = cases[k].jolt_raised;
-        events.landing = cases[k].landing;
-        events.touched = cases[k].touched;
-        events.risen_count2 = events.fallen_count2 = 10000;
-        (void)stretch();
-        assert_int_equal(events.risen_count2, cases[k].one ? 20000 - 3 * LEVEL : 10000 - TOLL);
-        assert_int_equal(events.fallen_count2, cases[k].one ? 0 : 10000 - TOLL);
-    }
-}
-
 // For a tenth of a second after a touch, and as long as it shakes for a second, it lands.
 TEST(what_has_just_been_touched_lands)
 {
@@ -252,26 +229,6 @@ TEST(noise_is_eleven_sixteenths_of_a_level)
     assert_int_equal(events.shake_began, 100000 + 2);
 }
 
-// Of a round that was begun late only the latest four pairs are looked at, which have nothing to be compared
-// with.
-TEST(a_first_stretch_that_was_missed_is_no_change)
-{
-    for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
-        pac[k] = (uint16_t)(k < 14 ? 3000 : 3050);
-    }
-    events.pairs_done = 7; // of the round before
-    (void)bt_events_pac(&events, &tare, pac, 15);
-    assert_true(events.shaken_count2 == 0 && events.now == 100014);
-    (void)bt_events_pac(&events, &tare, pac, BT_PAC_PER_FRAME);
-    assert_int_equal(events.now, 100022);
-    assert_int_equal(events.round_count2, 0); // its end
-    (void)held(NULL);
-    (void)bt_events_pac(&events, &tare, pac, 8);
-    (void)bt_events_pac(&events, &tare, pac, BT_PAC_PER_FRAME); // seven pairs at once
-    assert_int_equal(events.now, 100022);
-    assert_int_equal(events.pairs_done, 0);
-}
-
 // Two changes' share of a round's noise, as a mean over many rounds at rest, within limits.
 TEST(the_level_is_the_noise_at_rest)
 {
@@ -291,57 +248,6 @@ TEST(the_level_is_the_noise_at_rest)
         }
         const uint32_t level = k % STATES == AT_REST ? cases[k / STATES].level_count2 : LEVEL;
         assert_in_range(events.level_count2, level - level / 100, level + level / 100);
-    }
-}
-
-// ---- touches ---------------------------------------------------------------------------------------
-
-static uint8_t slot_of(unsigned electrode)
-{
-    for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
-        if (bt_slot_channel[slot] == BT_CHANNEL_E1 + electrode) {
-            return slot;
-        }
-    }
-    return BT_SLOTS;
-}
-
-TEST(the_strongest_electrode_is_watched_until_half_is_gone)
-{
-    for (unsigned strong = 0; strong < BT_ELECTRODES; strong++) {
-        (void)held(NULL);
-        events.touched = false;
-        tare.threshold_count2 = 200;
-        for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-            tare.trigger.rest.lane[i] = 3000;
-            tare.trigger.smooth.lane[i] =
-                (uint16_t)(i == strong ? 3000 - 10 : 3000 + (i == (strong + 1) % 19));
-        }
-        tare.trigger.rest.lane[BT_LANE_PDC] = tare.trigger.smooth.lane[BT_LANE_PDC] = 1000;
-        assert_int_equal(bt_events_touch(&events, &tare), TOLD(TOUCH));
-        assert_int_equal(bt_events_touch(&events, &tare), 0); // told once
-        assert_true(events.touched && events.landing && events.touch_began == events.now);
-        assert_int_equal(events.energy_count2, 101);
-        assert_int_equal(events.watched, slot_of(strong));
-        assert_int_equal(bt_events_watch(&events, &tare), 0); // one more than half
-        tare.trigger.smooth.lane[(strong + 1) % 19] = 3000;
-        tare.trigger.smooth.lane[BT_LANE_PDC] = 1007;
-        assert_int_equal(bt_events_watch(&events, &tare), 0); // still pressed
-        tare.trigger.smooth.lane[BT_LANE_PDC] = 1006;
-        assert_int_equal(bt_events_watch(&events, &tare), TOLD(LIFT));
-        assert_false(events.touched);
-        assert_int_equal(events.watched, BT_EVENTS_NO_SLOT);
-        // The tare machine calls it a contact still: touched again above the threshold.
-        tare.threshold_count2 = 100;
-        assert_int_equal(stretch(), 0);
-        assert_int_equal(events.watched, BT_EVENTS_NO_SLOT);
-        tare.threshold_count2 = 99;
-        assert_int_equal(stretch(), TOLD(TOUCH));
-        assert_int_equal(events.watched, slot_of(strong));
-        tare.trigger.smooth.lane[BT_LANE_PDC] = 2000;
-        tare.trigger.rest.lane[BT_LANE_PDC] = 0; // unknown
-        tare.threshold_count2 = 200;
-        assert_int_equal(bt_events_watch(&events, &tare), TOLD(LIFT));
     }
 }
 
