@@ -242,7 +242,7 @@ def test_the_specification_written_once_more_gives_the_same_bits() -> None:
     kinds = (Kind.OFFSET, Kind.SIGNAL, Kind.COMPRESSION, Kind.BULGE, Kind.SIGNAL_PAIRS, Kind.PRESSURE)
     blocks = tuple(
         BoardBlock(k, gate, (9, 7, 9, 8, 10, 12, 11), rng.integers(-2400, 2400, (_map.KINDS[k].columns, 7)))
-        for gate in list(Gate)[1:5]
+        for gate in list(Gate)[1:]
         for k in kinds
     )
     stored = BoardMap(7, blocks)
