@@ -88,26 +88,6 @@ TEST(are_what_six_smoothers_take_away)
     }
 }
 
-TEST(are_octaves)
-{
-    static const double hz[BT_BANDS] = {18, 36, 72, 147, 309, 800};
-    for (int band = 0; band < BT_BANDS; band++) {
-        (void)anew(NULL);
-        sine(hz[band], 400);
-        run();
-        for (int other = 0; other < BT_BANDS; other++) {
-            double in_band = 0, others = 0;
-            for (int k = ROUNDS / 2; k < ROUNDS; k++) {
-                in_band += energy_q4[k][band];
-                others += energy_q4[k][other];
-            }
-            assert_true(other == band || others < in_band);
-        }
-    }
-}
-
-// ---- ends of the range -------------------------------------------------------------------------
-
 // ---- lost words --------------------------------------------------------------------------------
 
 TEST(hold_the_last_good_word_for_a_lost_one)
