@@ -189,6 +189,7 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
 @pytest.mark.long
 def test_a_press_brings_its_tare_and_contact_events(board) -> None:
     batch = board("press.toml?fingers=2").read_batch(20)
+    assert {m.finger for m in batch.messages if isinstance(m, wire.SensorStatus)} == {0, 1}  # with each STATUS
     for finger in range(2):
         frames = batch.frames[batch.frames["finger"] == finger]
         tares = [m for m in batch.messages if isinstance(m, wire.Tare) and m.finger == finger]

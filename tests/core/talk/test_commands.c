@@ -1,4 +1,4 @@
-// What commands do: to settings, which keep their ranges, and to the board, which saves, restarts and tries a
+// What commands do: to settings, which keep their ranges, and to the board, which saves and tries a
 // bus rate.
 #include "fake_board.h"
 #include "fake_host.h"
@@ -32,7 +32,7 @@ TEST(settings_hold_their_ranges_and_refused_values_change_nothing)
 }
 
 static bt_settings saved;
-static int saves, reboots, into_bootloader;
+static int saves;
 
 static uint8_t save(void *context, const bt_settings *settings)
 {
@@ -42,25 +42,9 @@ static uint8_t save(void *context, const bt_settings *settings)
     return BT_ERROR_OK;
 }
 
-static uint8_t reboot(void *context, bool bootloader)
-{
-    (void)context;
-    reboots++;
-    into_bootloader = bootloader;
-    return BT_ERROR_OK;
-}
-
 static uint8_t save_error(void)
 {
     return host_error(&session, BT_SAVE_SETTINGS_ID, "\5", 1);
-}
-
-static uint8_t reboot_error(uint32_t magic)
-{
-    uint8_t payload[BT_REBOOT_BOOTLOADER_BYTES];
-    bt_msg_reboot_bootloader msg = {.req_id = 1, .magic = magic};
-    bt_msg_reboot_bootloader_pack(&msg, payload);
-    return host_error(&session, BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload);
 }
 
 TEST(a_board_saves_all_or_says_that_it_cannot)
@@ -77,21 +61,6 @@ TEST(a_board_saves_all_or_says_that_it_cannot)
         assert_int_equal(save_error(), missing == 0 ? BT_ERROR_OK : BT_ERROR_NOT_HERE);
     }
     assert_true(saves == 1 && bt_settings_get(&saved, BT_SETTING_IDLE_PERIOD_MS) == 250);
-}
-
-TEST(a_board_leaves_for_a_magic_number_alone)
-{
-    static const bt_board_actions actions = {.reboot = reboot};
-    assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_NOT_HERE);
-    bt_session_use_board(&session, &actions);
-    reboots = 0;
-    assert_int_equal(reboot_error(0), BT_ERROR_OUT_OF_RANGE);
-    assert_int_equal(reboot_error(0xB0071DE4), BT_ERROR_OUT_OF_RANGE);
-    assert_int_equal(reboots, 0);
-    assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_OK);
-    assert_true(reboots == 1 && into_bootloader);
-    assert_int_equal(reboot_error(BT_RESTART_MAGIC), BT_ERROR_OK);
-    assert_true(reboots == 2 && !into_bootloader);
 }
 
 static uint16_t bus_khz = 4464;
@@ -144,22 +113,6 @@ TEST(a_hold_lapses_after_so_many_milliseconds_of_silence)
     assert_int_equal(host_error(&session, BT_HOLD_ID, "\1\4", 2), BT_ERROR_OK);
     bt_session_tick(&session, 2000000000);
     assert_true(session.finger[2].tare.held);
-}
-
-TEST(a_tare_from_the_host_is_told_as_it_was_sent)
-{
-    uint8_t payload[BT_TARE_SET_BYTES];
-    bt_msg_tare_set sent = {.req_id = 1, .finger = 2, .pdc_tare_q4 = 20001};
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        sent.tare_q4[i] = (uint16_t)(40003 + 7 * i);
-    }
-    bt_msg_tare_set_pack(&sent, payload);
-    assert_int_equal(host_error(&session, BT_TARE_SET_ID, payload, sizeof payload), BT_ERROR_OK);
-    const bt_tare *tare = &session.finger[2].tare;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        assert_int_equal(bt_tare_q4(tare->base.electrode_q16[i]), sent.tare_q4[i]);
-    }
-    assert_int_equal(bt_tare_q4(tare->base.pdc_q16), sent.pdc_tare_q4);
 }
 
 int main(void)

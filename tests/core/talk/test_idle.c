@@ -103,23 +103,6 @@ TEST(a_start_is_answered_with_a_frame_at_every_phase)
     }
 }
 
-TEST(a_finger_without_a_tare_is_idle_too)
-{
-    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
-    host_forget();
-    play_level(16, 2000); // two still sweeps make the first tare
-    assert_int_equal(frame_seq_at(0), 0);
-    assert_int_equal(idle_at(1).seq, 10);
-    assert_int_equal(idle_at(1).tare_state, BT_TARE_STATE_INIT);
-    assert_true(idle_at(1).flags & BT_FRAME_FLAG_UNTARED);
-    assert_int_equal(idle_at(2).seq, 14);
-    assert_int_equal(idle_at(2).frames, 4);
-    assert_int_equal(idle_at(2).tare_state, BT_TARE_STATE_REST);
-    assert_int_equal(host.message[3].id, BT_TARE_ID);
-    assert_int_equal(frame_seq_at(4), 15);
-    assert_int_equal(host.count, 5);
-}
-
 // ---- what ends the silence -------------------------------------------------------------------------
 
 TEST(a_rest_that_has_moved_beyond_noise_is_shown)
@@ -156,64 +139,6 @@ TEST(a_rest_that_has_moved_beyond_noise_is_shown)
     assert_int_equal(frames, 1 + 40 / 8);
 }
 
-TEST(the_energy_of_a_heartbeat_is_that_of_its_round)
-{
-    uint64_t seed = 91;
-    uint16_t electrode[BT_ELECTRODES];
-    play_level(50, 2000);
-    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
-    play_level(1, 2000);
-    for (int k = 0; k < 100; k++) {
-        uint32_t energy = 0;
-        host_forget();
-        play_level(9, 2000);
-        assert_int_equal(host.count, 0);
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            int e = (int)random_range(&seed, -6, 6); // 684 at most: no touch; and the tare moves little
-            electrode[i] = (uint16_t)(2000 + e);
-            energy += (uint32_t)(e * e);
-        }
-        play(electrode);
-        assert_int_equal(idle_at(0).energy_count2, energy);
-        assert_int_equal(session.finger[0].tare.trigger.rest.lane[3], 2000);
-    }
-}
-
-TEST(asking_for_frames_at_rest_ends_the_silence_with_its_account)
-{
-    for (int phase = 1; phase < 10; phase++) {
-        (void)an_idle_session(NULL);
-        play_level(50, 2000);
-        assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
-        play_level(1 + phase, 2000);
-        assert_int_equal(subscribe(1, BT_QUANTITY_FLAG_REST_FRAMES), BT_ERROR_OK);
-        host_forget();
-        play_level(2, 2000);
-        assert_int_equal(idle_at(0).frames, phase);
-        assert_int_equal(idle_at(0).seq, 50 + phase);
-        assert_int_equal(frame_seq_at(1), 50 + phase + 1);
-        assert_int_equal(frame_seq_at(2), 50 + phase + 2);
-        assert_int_equal(host.count, 3);
-    }
-}
-
-TEST(a_lost_heartbeat_is_a_gap)
-{
-    play_level(50, 2000);
-    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
-    host_forget();
-    play_level(11, 2000);
-    host.room = 0;
-    play_level(10, 2000);
-    host.room = SIZE_MAX;
-    play_level(10, 2000);
-    assert_int_equal(host.count, 3);
-    assert_int_equal(idle_at(1).seq, 60);
-    assert_int_equal(idle_at(2).seq, 80);
-    assert_int_equal(idle_at(2).frames, 10); // 61 to 70 are not told of twice
-    assert_int_equal(session.messages_dropped, 1);
-}
-
 // ---- subscriptions ---------------------------------------------------------------------------------
 
 TEST(unknown_fingers_are_refused_and_change_nothing)
@@ -233,22 +158,6 @@ TEST(unknown_fingers_are_refused_and_change_nothing)
             }
         }
     }
-}
-
-TEST(at_first_everything_but_touches_is_sent)
-{
-    (void)new_session(NULL);
-    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
-    host_forget();
-    play_level(40, 2000);
-    play_level(20, 1900);
-    assert_int_equal(host_count(BT_FRAME_ID), 60);
-    assert_int_equal(host_count(BT_IDLE_ID) + host_count(BT_TOUCH_ID), 0);
-    bt_msg_frame frame;
-    bt_msg_frame_unpack(&frame, host.message[host.count - 1].payload);
-    assert_false(frame.flags & BT_FRAME_FLAG_NOT_ASKED);
-    assert_true(frame.poc_um[0] != INT16_MIN && frame.force_100un[2] != INT32_MIN);
-    assert_true(frame.torque_mnmm[0] != INT32_MIN && frame.normal_half_mn != 0xFFFF);
 }
 
 // Noise and glitches of the worst sensor there is.
