@@ -54,9 +54,6 @@ def make_image(folder: Path, code: bytes | None = None, name: str = "new.uf2") -
     return path
 
 
-NEW_SETTING = max(wire.Setting) + 1  # to this library
-
-
 class FakeBoard:
     """Answers on a pty while it runs; takes an image while it is in its loader. What happens is listed in order."""
 
