@@ -146,18 +146,6 @@ TEST(one_sample_is_never_answered_twice)
     assert_int_equal(transfer16(&device, BT_LISTEN_WORD, 3064000), BT_ERROR_WORD_NO_DATA);
 }
 
-TEST(the_sample_is_taken_at_the_command_and_a_new_one_replaces_it)
-{
-    (void)transfer(0xA200, 0);
-    next_count = 17;
-    assert_int_equal(transfer(BT_LISTEN_WORD, 60000) >> 9, 2048 >> 5);
-    (void)transfer(0xA200, 100000);
-    next_count = 3000;
-    uint16_t count;
-    (void)bt_word_decode(sample(0xA4, 200000), &count); // the first was never read
-    assert_int_equal(count, 3000);
-}
-
 TEST(only_odd_command_bytes_are_obeyed)
 {
     for (unsigned command = 0x80; command <= 0xFF; command++) {
@@ -225,104 +213,12 @@ TEST(nothing_can_be_written)
     assert_int_equal(transfer(BT_LISTEN_WORD, 50000), 0xA552);
 }
 
-TEST(a_mute_sensor_says_zeros_until_it_is_asked_for_a_property)
-{
-    device.mute = true;
-    for (unsigned k = 0; k < 100; k++) {
-        assert_int_equal(sample(0xA2, k * 1000000), 0x0000);
-    }
-    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x13, 200000000);
-    assert_int_equal(sample(0xA2, 201000000) >> 9, 2048 >> 5);
-}
-
-TEST(a_sensor_without_power_forgets_and_may_come_back_as_another)
-{
-    static const struct {
-        uint16_t fault;
-        const char *serial;
-    } table[] = {{BT_EMU_FAULT_UNPLUGGED, "BT0123456789ABCD"}, {BT_EMU_FAULT_SWAPPED, "BT0123456789ABCX"}};
-    for (size_t k = 0; k < 2; k++) {
-        (void)new_device(NULL);
-        next_count = table[k].fault;
-        for (unsigned n = 0; n < 5; n++) {
-            assert_int_equal(sample(0xA2, n * 1000000), 0x0000);
-        }
-        (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 6000000); // there is nobody to hear it
-        assert_int_equal(transfer(BT_LISTEN_WORD, 6060000), 0x0000);
-        next_count = 2048;
-        assert_int_equal(sample(0xA2, 7000000), 0x0000); // mute
-        assert_int_equal(strcmp(device.serial, table[k].serial), 0);
-        (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 8000000);
-        assert_int_not_equal(sample(0xA2, 9000000), 0x0000);
-    }
-}
-
-TEST(every_fault_shows_on_the_bus_as_itself)
-{
-    static const struct {
-        uint16_t fault, word;
-        enum bt_word kind;
-    } table[] = {
-        {BT_EMU_FAULT_TOO_EARLY, 0xA52D, BT_WORD_ERROR},
-        {BT_EMU_FAULT_STUCK_HIGH, 0xFFFF, BT_WORD_STUCK},
-        {BT_EMU_FAULT_STUCK_LOW, 0x0000, BT_WORD_STUCK},
-        {BT_EMU_FAULT_NO_CHANNEL, 0xA558, BT_WORD_ERROR},
-    };
-    uint16_t count;
-    for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
-        next_count = table[k].fault;
-        uint16_t word = sample(0xA2, k * 1000000);
-        assert_int_equal(word, table[k].word);
-        assert_int_equal(bt_word_decode(word, &count), table[k].kind);
-        assert_int_equal(count, BT_INVALID_COUNT);
-    }
-    next_count = BT_EMU_FAULT_BAD_PARITY;
-    assert_int_equal(bt_word_decode(sample(0xA2, 9000000), &count), BT_WORD_PARITY);
-    device.present = false;
-    assert_int_equal(sample(0xA2, 10000000), 0x0000);
-}
-
-static void read_property(uint8_t selector, uint8_t *out, int bytes)
-{
-    (void)transfer((uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | selector), 0);
-    bt_emu_select(&device, true, 60000);
-    for (int k = 0; k < bytes; k += 2) {
-        uint16_t word = transfer16(&device, BT_LISTEN_WORD, 60000 + 4000u * (unsigned)k);
-        out[k] = (uint8_t)(word >> 8);
-        out[k + 1] = (uint8_t)word;
-    }
-    bt_emu_select(&device, false, 200000);
-}
-
-TEST(properties_are_plain_bytes_padded_with_zeros)
-{
-    uint8_t out[20];
-    read_property(0x15, out, 20);
-    assert_memory_equal(out, "BT0123456789ABCD\0\0\0\0", 20);
-    read_property(0x10, out, 4);
-    assert_true(out[0] != 0 && out[1] != 0 && out[2] == 0 && out[3] == 0);
-    read_property(0x13, out, 4);
-    assert_true(out[0] >= '0' && out[0] <= '9' && out[3] >= '0' && out[3] <= '9');
-    read_property(0x70, out, 2);
-    assert_int_equal(out[0] * 256 + out[1], 4400);
-    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 0);
-    assert_int_equal(transfer(BT_LISTEN_WORD, 49999), 0xA52E); // too early, by another word
-}
-
 static uint8_t one_byte(uint64_t t_ns)
 {
     bt_emu_select(&device, true, t_ns);
     uint8_t miso = bt_emu_transfer8(&device, 0, t_ns);
     bt_emu_select(&device, false, t_ns);
     return miso;
-}
-
-TEST(property_bytes_may_come_one_by_one)
-{
-    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 0);
-    for (unsigned k = 0; k < 18; k++) {
-        assert_int_equal(one_byte(50000 + 10000 * k), k < 16 ? "BT0123456789ABCD"[k] : 0);
-    }
 }
 
 TEST(the_list_of_channels_is_pairs_and_an_end)
