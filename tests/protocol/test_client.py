@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -29,7 +28,6 @@ MOST_BYTES = 4096
 FRAMES = 150
 
 
-@pytest.mark.skipif(not shutil.which("arm-none-eabi-gcc"), reason="no arm-none-eabi-gcc to build for a Cortex-M0+ with")
 @pytest.mark.parametrize("speed", ["-Os", "-O2"])
 def test_it_is_small_and_needs_nothing(tmp_path: Path, speed: str) -> None:
     target = ["-std=c11", "-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", speed, *WARNINGS]
@@ -103,8 +101,6 @@ def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) 
 
 @pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)
 def test_it_compiles_wherever_a_hands_controller_does(tmp_path: Path, compiler: list[str]) -> None:
-    if shutil.which(compiler[0]) is None:
-        pytest.skip(f"{compiler[0]} is missing")
     in_c = [] if "c++" in compiler else [CLIENT.parents[1] / "host/docs/guides/examples/grip.c"]
     for source in (CLIENT / "biotac_client.c", CLIENT / "example_bare.c", *in_c):
         command = [*compiler, *WARNINGS, f"-I{CLIENT}", "-c", str(source), "-o", str(tmp_path / "x.o")]
@@ -131,9 +127,9 @@ def test_a_program_in_cpp_links_it(tmp_path: Path) -> None:
     subprocess.run([str(tmp_path / "main")], check=True)
 
 
-@pytest.mark.skipif(not shutil.which("qemu-system-arm"), reason="no qemu-system-arm to run a controller in")
 def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -> None:
     """example_bare.c on an STM32F405 in QEMU; its UART leads to a simulated board."""
+    subprocess.run(["arm-none-eabi-gcc", "--version"], check=True, capture_output=True)  # CMake says less
     for words in (["-S", "firmware", "--preset", "f405"], ["--build", "build/f405"]):
         subprocess.run(["cmake", *words], cwd=CLIENT.parents[1], check=True, capture_output=True)
     # Slowly: QEMU keeps this computer's time, however busy, and gives up a board that is silent for 500 ms of it.

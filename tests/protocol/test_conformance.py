@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 import zlib
@@ -17,6 +19,8 @@ LIBRARY = [sys.executable, str(CONFORMING / "library.py")]
 
 
 def verdict(*command: str) -> subprocess.CompletedProcess[str]:
+    if "node" in command and not shutil.which("node"):
+        raise FileNotFoundError(2, "which the other process would meet", "node")  # see tests/conftest.py
     run = [sys.executable, str(ROOT / "protocol/conformance"), *command]
     return subprocess.run(run, capture_output=True, text=True, check=False)
 
@@ -100,3 +104,11 @@ def test_the_schemas_hash_is_what_the_spec_says() -> None:
     report = schema.pop("schema_hash")
     del schema["link"]["enum"]["board"]
     assert zlib.crc32(json.dumps(without_doc(schema), sort_keys=True, separators=(",", ":")).encode()) == report
+
+
+@pytest.mark.parametrize("ci", ["", "1"])
+def test_without_its_program_a_test_is_left_out_in_words_but_not_in_ci(ci: str) -> None:
+    one = f"{__file__}::test_one_that_shares_no_code_conforms"
+    run = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-rs", f"--rootdir={ROOT}", one]
+    done = subprocess.run(run, capture_output=True, text=True, cwd=ROOT, env=os.environ | {"PATH": "", "BIOTAC_CI": ci})
+    assert (done.returncode, "no node on the PATH" in done.stdout) == ((1, False) if ci else (0, True)), done.stdout
