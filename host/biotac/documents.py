@@ -145,7 +145,7 @@ def read_text(path: Path, limit_bytes: int) -> str:
         data = file.read(limit_bytes + 1)
     if len(data) > limit_bytes:
         raise ValueError(f"it is larger than {limit_bytes >> 20} MiB")
-    return data.decode("utf-8")
+    return data.decode("utf-8-sig")  # Windows' editors begin a file with a mark
 
 
 def parse_json(text: str | bytes, object_hook: Callable[[dict[str, Any]], Any] | None = None) -> Any:

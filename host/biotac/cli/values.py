@@ -25,7 +25,7 @@ def facts(given: list[str]) -> dict[str, str]:
     """Facts of a label. Raises InputError for what is none, and for names that mean something else there."""
     made = {name: value for name, _, value in (fact.partition("=") for fact in given)}
     for name, value in made.items():
-        if not value or name in ("path", "overwrite", "note", "self", "text", "at_s", "until_s", "finger"):
+        if not value or name in ("", "path", "overwrite", "note", "self", "text", "at_s", "until_s", "finger"):
             raise InputError(f"--fact {name}={value}: expected NAME=VALUE, such as subject=S07")
     return made
 

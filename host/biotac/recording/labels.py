@@ -45,9 +45,10 @@ class Label:
         if self.end_us is not None and (self.t_us is None or self.end_us < self.t_us):
             raise InputError(f"label {self.text!r} ends before it begins")
         try:
-            " ".join(f"{name}={value}" for name, value in self.facts.items()).encode()
+            " ".join([self.text, *(f"{name}={value}" for name, value in self.facts.items())]).encode()
         except UnicodeEncodeError as error:
-            raise InputError(f"the facts {dict(self.facts)!r} are not UTF-8 ({error.reason}); write them so") from None
+            what = f"the label {self.text!r} with the facts {dict(self.facts)!r} is"
+            raise InputError(f"{what} not UTF-8 ({error.reason}); write it so") from None
         object.__setattr__(self, "text", printable(self.text))
 
     def line(self) -> str:

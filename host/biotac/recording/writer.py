@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import stat
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, cast
 
 from ..board.gap import Gap
 from ..errors import InputError, exists_error, printable
@@ -189,6 +190,21 @@ def _own(stream: BinaryIO, path: Path) -> None:
         stream.truncate()
 
 
+class _File(io.FileIO):
+    """Names itself when it cannot be written, as on a full disk."""
+
+    def __init__(self, fd: int, path: Path) -> None:
+        super().__init__(fd, "r+")
+        self._path = path
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            error.filename = str(self._path)
+            raise
+
+
 def create(path: Path, *, overwrite: bool) -> BinaryIO:
     """Open ``path`` for writing. Raises InputError when it is a folder, exists, or cannot be written."""
     if path.is_dir():
@@ -200,7 +216,11 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
         )
     try:
         fd = os.open(path, os.O_RDWR | os.O_CREAT | (0 if overwrite else os.O_EXCL) | getattr(os, "O_BINARY", 0), 0o666)
-        stream = os.fdopen(fd, "r+b")
+        file = _File(fd, path)
+        if not file.seekable():
+            file.close()
+            raise InputError(f"{path} is a pipe or a terminal; expected a file, to which an index can be written")
+        stream = cast("BinaryIO", io.BufferedRandom(file))
         _own(stream, path)
         return stream
     except FileExistsError as error:

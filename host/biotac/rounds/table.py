@@ -40,7 +40,7 @@ class Table:
             )
         try:
             facts = parse_toml(read_text(Path(columns), 1 << 16))
-            lines = read_text(path, MAX_BYTES).lstrip("\ufeff").splitlines()
+            lines = read_text(path, MAX_BYTES).splitlines()
             self._head = [name.strip(' "') for name in lines[0].split(",")]
             rate_hz, time, fingers = facts.get("rate_hz"), facts.get("time"), facts.get("finger")
             if time is None and not (isinstance(rate_hz, (int, float)) and 0 < rate_hz <= 1e6):

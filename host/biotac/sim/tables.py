@@ -53,7 +53,7 @@ class Lines:
 def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
     """Parse TOML. Raises ScenarioError, with the parser's line number, for invalid TOML."""
     try:
-        text = data.decode("utf-8")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise ScenarioError(f"{file}:{line}: not UTF-8 text: expected a TOML scenario; save it as UTF-8") from None

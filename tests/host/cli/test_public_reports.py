@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import os
 import pickle
 import resource
 import shutil
@@ -16,7 +17,9 @@ import pytest
 
 import biotac
 from biotac.cli.main import main
+from biotac.documents import read_text
 from biotac.errors import InputError
+from biotac.sim.loading import load_source
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +41,11 @@ def test_a_part_of_a_recording_can_be_pickled_and_given_to_another_process(recor
 
 
 @pytest.mark.parametrize("fact", ["subject=Zo\udceb", "s\udcffbject=Zoe"])
-def test_a_fact_that_is_not_utf8_is_refused(recorded: Path, tmp_path: Path, capsys, fact: str) -> None:
+def test_a_label_that_is_not_utf8_is_refused(recorded: Path, tmp_path: Path, capsys, fact: str) -> None:
     rec = shutil.copy(recorded, tmp_path)
-    assert main(["file", "label", str(rec), "x", "--at", "1", "--fact", fact]) == 2
-    assert "not UTF-8" in capsys.readouterr().err
+    for words in (["x", "--at", "1", "--fact", fact], [fact, "--at", "1"]):
+        assert main(["file", "label", str(rec), *words]) == 2
+        assert "not UTF-8" in capsys.readouterr().err
     assert main(["record", "sim:press.toml?seconds=1", str(tmp_path / "b.mcap"), "--fact", fact]) == 2
 
 
@@ -82,3 +86,29 @@ def test_a_question_mark_may_be_part_of_a_name(recorded: Path, tmp_path: Path, c
 def test_an_age_that_shows_nothing_is_refused(age_s: float) -> None:
     with pytest.raises(InputError, match="max_age_s is"):
         biotac.open("sim:press.toml?seconds=1", max_age_s=age_s)
+
+
+@pytest.mark.parametrize("words", [["", "--at", "1"], ["x", "--fact", "=y"]])
+def test_a_label_or_a_fact_without_a_name_is_refused(recorded: Path, tmp_path: Path, capsys, words: list[str]) -> None:
+    rec = shutil.copy(recorded, tmp_path)
+    assert main(["file", "label", str(rec), *words]) == 2
+    assert "expected" in capsys.readouterr().err and not list(tmp_path.glob("*.jsonl"))
+
+
+def test_a_text_as_windows_editors_write_it_is_read(tmp_path: Path) -> None:
+    """With the mark of UTF-8 before it and CR LF: foxglove and many others were told of the first."""
+    (tmp_path / "a.csv").write_bytes("time_s,fx\r\n0,1\r\n".encode("utf-8-sig"))
+    assert read_text(tmp_path / "a.csv", 99) == "time_s,fx\r\n0,1\r\n"
+    text = (Path(biotac.__file__).parent / "sim/scenarios/press.toml").read_text()
+    (tmp_path / "a.toml").write_bytes(text.replace("\n", "\r\n").encode("utf-8-sig"))
+    assert load_source(str(tmp_path / "a.toml")).samples.shape == load_source("press.toml").samples.shape
+
+
+def test_a_pipe_is_no_recording_and_a_full_disk_has_a_name(tmp_path: Path, capsys) -> None:
+    os.mkfifo(tmp_path / "a.mcap")
+    assert main(["record", "sim:press.toml?seconds=1", str(tmp_path / "a.mcap"), "--force"]) == 2
+    assert "is a pipe" in capsys.readouterr().err
+    with pytest.raises(OSError, match="No space left on device: '/dev/full'"), biotac.open("sim:press.toml") as hand:
+        hand.record("/dev/full", overwrite=True)
+        hand.stream("results")
+        hand.read(5.0)

@@ -61,6 +61,8 @@ def run_label(args: argparse.Namespace) -> int:
         facts = labels(recording)
         say(args, facts, "\n".join(printable(label_line(fact)) for fact in facts) or f"{args.recording}: no labels")
         return 0
+    if not args.text and not args.fact:
+        raise InputError("a label without a word: expected TEXT or --fact NAME=VALUE")
     if args.remove:
         recording.unmark(args.text, args.at_s)
     else:
