@@ -30,13 +30,12 @@ OFF_UNSEEN = {
     ),
     "warmth and skin that creeps do as much, until it has lasted": (
         "all electrodes drift 1 count/s", "all electrodes drift 5 counts/s", "all electrodes drift 20 counts/s",
-        "electrode drifts 10 counts/s", "electrode drifts 50 counts/s", "electrode drifts 200 counts/s",
+        "electrode drifts 10 counts/s", "electrode drifts 200 counts/s",
         "electrode floating: walks 20 counts a round",
     ),
     "the few frames before it is found": (
-        "electrode floating: uniform noise", "electrode with noise of 200 counts", "electrode stuck",
-        "noise of 30 counts on all electrodes", "channels shifted by a slot", "the same words for ever",
-        "electrodes frozen, pressure alive",
+        "electrode with noise of 200 counts", "noise of 30 counts on all electrodes", "channels shifted by a slot",
+        "the same words for ever", "electrodes frozen, pressure alive",
     ),
 }  # fmt: skip
 
@@ -108,7 +107,7 @@ def test_frames_to_act_on_are_right_whatever_breaks() -> None:
     act, off = np.sum([*found.values()], axis=0)
     print(f"all {3 * len(FAULTS)} cases: ACT {act}, off {off}, {off / act:.1%}")
     assert {fault for fault, (act, off) in found.items() if off > act / 50} == {*sum(OFF_UNSEEN.values(), ())}
-    assert off / act <= 0.075
+    assert off / act <= 0.07
 
 
 @pytest.mark.parametrize("fault", KNOWN)

@@ -62,6 +62,7 @@ uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count)
     } else if (jump < -BT_TRIGGER_JUMP) {
         trigger->down |= bit;
     }
+    trigger->leapt |= jump > BT_TRIGGER_LEAP || jump < -BT_TRIGGER_LEAP ? bit : 0;
     return trigger->far_before & bit ? count : trigger->smooth.lane[lane];
 }
 

@@ -42,6 +42,7 @@ typedef struct {
     uint32_t far_before;
     uint32_t up; // lanes whose word of this round jumped by more than BT_TRIGGER_JUMP from the filter's value
     uint32_t down;
+    uint32_t leapt; // likewise, by more than BT_TRIGGER_LEAP either way
     uint32_t
         usable; // counts from 1 on that are used unseen: all but the rails, or none while electrodes are out
     uint32_t out;      // electrodes whose words are not to be used: those that health.h has condemned
@@ -64,6 +65,7 @@ static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
     trigger->far = 0;
     trigger->up = 0;
     trigger->down = 0;
+    trigger->leapt = 0;
     trigger->without = 0;
     trigger->pressure_now = false;
 }
@@ -79,6 +81,7 @@ void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes);
 
 #define BT_TRIGGER_FAR  24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
 #define BT_TRIGGER_JUMP 48
+#define BT_TRIGGER_LEAP 72 // more than any glitch
 
 #ifndef BT_CDEF // called in every slot, hence inline
 static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uint16_t count, uint16_t from)

@@ -11,6 +11,7 @@
 
 #define POC_LOW 4 // times the contact threshold
 #define LOST_MN 5 // what Lin's gains make of a count, at most 8, less what the interval has of it already
+#define LOST_BY_MAP_MN 3 // the same of an own map, of normal and shear alike
 
 // Energies of a round's signals, truncated to 1/2 count.
 typedef struct {
@@ -122,14 +123,16 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     uncertainty.noise_q4 = tare->noise.sigma_q4;
     uncertainty.tare_unconfirmed = tare->unsure;
     uncertainty.out = uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
-    uint32_t lost = 0; // counts, from what electrodes that are out last read to what they are estimated to
+    uint32_t lost = 0; // counts by which electrodes that are out last read more than they are estimated to
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
         for (int i = 0; i < BT_ELECTRODES; i++) {
             if (tare->trigger.without >> i & 1) {
+                const int32_t rest = tare->trigger.rest.lane[i];
+                const int32_t was = tare->trigger.smooth.lane[i] - rest, is = counts[i] - rest;
                 uncertainty.out++;
-                lost += bt_abs32(counts[i] - tare->trigger.smooth.lane[i]);
+                lost += bt_abs32(was) > bt_abs32(is) ? bt_abs32(was - is) : 0;
             }
         }
         lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
@@ -137,6 +140,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
         uncertainty.margin = &settings->map->margin;
+        uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = LOST_BY_MAP_MN * lost;
         flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg);
     } else if (settings->population) {
         uncertainty.margin = &bt_population.margin;
