@@ -17,6 +17,7 @@ import pytest
 import random_courses
 import sensor_faults
 import wrong_by
+from maps import make_map
 from sensor_faults import MODELS, SILENT_ROUNDS, WHEN, outcome
 
 from biotac import Finger, FrameFlags
@@ -265,6 +266,22 @@ def test_the_interval_says_what_an_electrode_that_opens_in_a_hold_costs(fault: s
         within.append([float(np.median(off[k] - rows[f"{k}_half_mn"])) <= 0 for k in PARTS])
     print(f"\n{fault}: within {np.mean(within, axis=0)} of normal and shear")
     assert (np.mean(within, axis=0) >= 0.95).all()
+
+
+def test_a_maps_interval_widens_by_what_is_lost_with_an_electrode() -> None:
+    """By 3 mN a count that it read beyond its estimate, if it opens in a hold; by none, if it was at rest."""
+    pressed, half_mn = PRESSES[0], {}
+    held = slice(pressed.begins("hold") + 50, pressed.free)
+    for when in ("rest", "hold"):
+        bad = sensor_faults.spoil(pressed, FAULTS["electrode open"], pressed.begins(when), np.random.default_rng(1))
+        rows = Finger(wrench_map=make_map(3, axes=3)).feed(bad[:, slots.ELECTRODE_SLOT], pdc=bad[:, slots.PDC_SLOT])
+        half, normal, shear = (rows[name][held].astype(float) for name in ("normal_half_mn", "normal_mn", "shear_mn"))
+        half_mn[when] = np.median(half - (24 + 16) / 256 * (normal + shear))  # the map's share, and an electrode's
+    signals, begin = pressed.words[:, slots.ELECTRODE_SLOT].astype(float), pressed.begins("hold")
+    rest, last = (signals[k - 8 : k].mean(axis=0) for k in (pressed.squeeze, begin))
+    lost = float(np.abs(last - rest).max())
+    # Of the most pressed electrode the estimate is at most a third, either way.
+    assert 2 * lost <= half_mn["hold"] - half_mn["rest"] <= 4 * lost
 
 
 def test_an_estimate_is_the_sum_of_the_others() -> None:
