@@ -1,4 +1,4 @@
-"""A minute of presses by hand on a force plate, through the board, and what `biotac calibrate wrench` makes of it."""
+"""Two minutes of presses by hand on a force plate, by the board, and what `biotac calibrate wrench` makes of it."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from biotac.core import geometry as surface
 from biotac.map import load_fitted
 from biotac.sim import SimFinger, Touch, fit_gains, world
 
-REST_S, MINUTE_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 60.0, 0.9, 0.3, 0.3
-PAD_MM, ROLL_MM = ((-8.0, -3.0), (1.0, 3.0)), 3.0  # where a hand meets things, and how far a press rolls
+REST_S, PRESSES_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 120.0, 0.9, 0.3, 0.3
+PAD_MM, ROLL_MM = ((-12.0, -3.0), (2.5, 3.0)), 3.0  # where a hand meets things, and how far a press rolls
 FORCE_N, PULL, MOST_PULL_N = (0.5, 10.0), (0.2, 0.9), 2.5
 PLATE_N = 1 / 320  # its resolution; its noise is .7 of that
 
 
 def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
-    """What touches in each round of a minute, and the force (n, 3) on the finger in N that the plate measures.
+    """What touches in each round of two minutes, and the force (n, 3) on the finger in N that the plate measures.
 
-    Each press is on the pad, of .5 to 10 N, rolls by up to 3 mm, and is drawn once around by .2 to .9 of its force and
-    by 2.5 N at most. Drawn by less, or to one side alone, it leaves shear unlearnt, which then reads half to two thirds
-    of what it is. Drawn by more, as skin yields less to a strong pull, it doubles the shear felt in a firm grip.
+    They lie all over the pad: a map is blind where it was not taught. Each press, of .5 to 10 N, rolls by some mm and
+    is drawn once around by .2 to .9 of its force, 2.5 N at most. Drawn by less, or to one side alone, it leaves shear
+    unlearnt, which then reads half to two thirds of what it is. Drawn by more, as skin yields less to a strong pull,
+    it doubles the shear felt in a firm grip.
     """
     rng, touches, forces = np.random.default_rng([seed, 45]), list[Touch](), []
-    while len(touches) < MINUTE_S * 100:
+    while len(touches) < PRESSES_S * 100:
         begin_mm = rng.uniform(*PAD_MM)
         end_mm = np.clip(begin_mm + rng.uniform(-ROLL_MM, ROLL_MM, 2), *PAD_MM)
         peak_n, pull = FORCE_N[0] * (FORCE_N[1] / FORCE_N[0]) ** rng.random(), rng.uniform(*PULL)
