@@ -475,7 +475,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.FORCE_GAIN_X_NN: SettingSpec(
         "nN/count", -100000000, 100000000, 1063440,
-        "S_x of Lin Eq 3; default: fitted to one real finger, by least squares without offset; calibrate yours",
+        "S_x of Lin Eq 3; default: fitted to one real finger (host/NOTICE), by least squares without offset; calibrate yours",
     ),
     Setting.FORCE_GAIN_Y_NN: SettingSpec(
         "nN/count", -100000000, 100000000, 252325,
@@ -527,7 +527,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.UART_BITS_PER_S: SettingSpec(
         "bit/s", 0, 3000000, 0,
-        "bit rate of a UART for this protocol, beside USB: 8 data bits, no parity, one stop bit; below 1200: off, or 921600 on a board that has no other link. Used from the board's next start if saved; only a Pico has one",
+        "bit rate of a UART for this protocol, beside USB: 8 data bits, no parity, one stop bit; below 1200: off, or 921600 on a board that has no other link. Used from the board's next start if saved; a Pico and an F405 have one",
     ),
     Setting.LOADER_BY_TOUCH: SettingSpec(
         "bool", 0, 1, 1,
