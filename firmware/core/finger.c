@@ -213,10 +213,12 @@ uint8_t bt_finger_sensor_fault(const bt_finger *finger)
 // Of the sensor as a whole.
 static uint32_t health_flags(const bt_finger *finger)
 {
-    // Judged from several rounds; before, a leap by more than any glitch while nothing else is far off.
-    uint32_t alone = finger->health.alone | (finger->health.out & ~finger->tare.trigger.without);
-    uint32_t leapt = finger->tare.trigger.leapt & BT_ALL_ELECTRODES;
-    alone |= bt_usable_without(leapt) && !(finger->tare.trigger.far & ~leapt) ? leapt : 0;
+    const bt_trigger *trigger = &finger->tare.trigger;
+    // One that several rounds have shown, or that is condemned in this one; and before any round can show it,
+    // one that leaps by more than any glitch while no other is far off.
+    uint32_t leapt = trigger->leapt & BT_ALL_ELECTRODES;
+    bool narrow = bt_usable_without(leapt) && (trigger->far & ~leapt) == 0;
+    uint32_t alone = finger->health.alone | (finger->health.out & ~trigger->without) | (narrow ? leapt : 0);
     return finger->sensor_flags | (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
            | (alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }

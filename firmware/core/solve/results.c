@@ -130,9 +130,9 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         for (int i = 0; i < BT_ELECTRODES; i++) {
             if (tare->trigger.without >> i & 1) {
                 const int32_t rest = tare->trigger.rest.lane[i];
-                const int32_t was = tare->trigger.smooth.lane[i] - rest, is = counts[i] - rest;
+                const int32_t last = tare->trigger.smooth.lane[i] - rest, estimate = counts[i] - rest;
                 uncertainty.out++;
-                lost += bt_abs32(was) > bt_abs32(is) ? bt_abs32(was - is) : 0;
+                lost += bt_abs32(last) > bt_abs32(estimate) ? bt_abs32(last - estimate) : 0;
             }
         }
         lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
