@@ -166,7 +166,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
 #define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
-#define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
+#define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault
 #define BT_FRAME_FLAGS 0xFFFFFBFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.

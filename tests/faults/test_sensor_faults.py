@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import courses
 import numpy as np
@@ -27,6 +28,7 @@ from biotac.sim.faults import FAULTS, noisy_line
 from biotac.sim.loading import load_source
 from biotac.sim.timeline import Pose
 from biotac.wire import slots
+from biotac.wire.messages_gen import INVALID_COUNT
 from biotac.wire.native import ffi, lib
 
 PARTS = ("normal", "shear")
@@ -282,6 +284,17 @@ def test_a_maps_interval_widens_by_what_is_lost_with_an_electrode() -> None:
     lost = float(np.abs(last - rest).max())
     # Of the most pressed electrode the estimate is at most a third, either way.
     assert 2 * lost <= half_mn["hold"] - half_mn["rest"] <= 4 * lost
+
+
+@pytest.mark.parametrize("settings", [PRESSES[0].settings("fitted"), None])
+def test_an_interval_is_wide_where_too_many_electrodes_are_out(settings: dict[Any, int] | None) -> None:
+    """By Lin's gains and by a map: three of which no word comes are not estimated."""
+    words = PRESSES[0].words.copy()
+    words[PRESSES[0].begins("hold") :, slots.ELECTRODE_SLOT[[3, 9, 16]]] = INVALID_COUNT
+    finger = Finger(settings, wrench_map=None if settings else make_map(3, axes=3))
+    rows = finger.feed(words[:, slots.ELECTRODE_SLOT], pdc=words[:, slots.PDC_SLOT])
+    held = rows[PRESSES[0].begins("hold") + 50 : PRESSES[0].free]
+    assert (held["flags"] & FrameFlags.FAULT).all() and held["normal_half_mn"].min() >= 3 * 4095
 
 
 def test_an_estimate_is_the_sum_of_the_others() -> None:

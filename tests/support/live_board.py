@@ -167,7 +167,6 @@ class Clock:
         self.while_away: Callable[[int], None] = lambda n: None
 
     monotonic_s = staticmethod(time.monotonic)
-    unix_ns = staticmethod(time.time_ns)
 
     def sleep(self, seconds: float) -> None:
         self.pauses += 1

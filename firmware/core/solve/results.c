@@ -123,7 +123,9 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     uncertainty.noise_q4 = tare->noise.sigma_q4;
     uncertainty.tare_unconfirmed = tare->unsure;
     uncertainty.out = uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
-    uint32_t lost = 0; // counts by which electrodes that are out last read more than they are estimated to
+    // Of electrodes that are out, together: the counts by which they last read further from rest than they
+    // are estimated to, and what condemned ones are estimated to, which are taken to have been at rest.
+    uint32_t lost = 0, condemned = 0;
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
@@ -132,10 +134,14 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
                 const int32_t rest = tare->trigger.rest.lane[i];
                 const int32_t last = tare->trigger.smooth.lane[i] - rest, estimate = counts[i] - rest;
                 uncertainty.out++;
+                condemned += tare->trigger.out >> i & 1 ? bt_abs32(estimate) : 0;
                 lost += bt_abs32(last) > bt_abs32(estimate) ? bt_abs32(last - estimate) : 0;
+                lost += rest == BT_TRIGGER_UNREAD ? BT_FULL_SCALE_COUNT : 0; // neither known nor estimated
             }
         }
-        lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
+        if (!bt_usable_without(tare->trigger.without) || lost > BT_FULL_SCALE_COUNT) {
+            lost = BT_FULL_SCALE_COUNT; // too many are out to estimate any
+        }
     }
     signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
@@ -153,6 +159,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
         uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
         uint32_t *guess_mn = uncertainty.guess_mn;
+        lost = lost + condemned < BT_FULL_SCALE_COUNT ? lost + condemned : BT_FULL_SCALE_COUNT;
         guess_mn[0] = (pressed > guess_mn[0] ? pressed : guess_mn[0]) + LOST_MN * lost;
         guess_mn[1] += LOST_MN * lost / 2;
     }

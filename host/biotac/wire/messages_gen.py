@@ -193,7 +193,7 @@ class FrameFlags(NamedFlag):
     PDC_FLAT = 1 << 28  # a press did not move static pressure as it should: contact is judged by the electrodes alone
     ELECTRODE_OUT = 1 << 29  # results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
     SENSOR_FAULT = 1 << 30  # the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
-    ELECTRODE_ALONE = 1 << 31  # in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault
+    ELECTRODE_ALONE = 1 << 31  # one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault
 
 
 class FaultFlags(NamedFlag):
@@ -387,7 +387,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     268435456: "a press did not move static pressure as it should: contact is judged by the electrodes alone",
     536870912: "results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'",
     1073741824: "the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results",
-    2147483648: "in a touch, one electrode or two moved and the rest of the skin did not: an edge as narrow as an electrode, or a fault",
+    2147483648: "one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault",
 }
 
 

@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "--pace is 0, expected above 0 for a board on a pty; only biotac.open and biotac demo run unpaced"
         )
-    if args.source.endswith(".mcap"):
+    if args.source.lower().endswith(".mcap"):
         values.refuse(args, ("fingers", "seconds", "board", "image", "fault"), "is for a simulated board; drop it")
         return play_recording(args)
     if args.image is not None and args.board != "pico":

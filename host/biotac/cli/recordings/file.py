@@ -61,7 +61,7 @@ def run_label(args: argparse.Namespace) -> int:
         facts = labels(recording)
         say(args, facts, "\n".join(printable(label_line(fact)) for fact in facts) or f"{args.recording}: no labels")
         return 0
-    if not args.text and not args.fact:
+    if not args.text and not args.fact and not args.remove:
         raise InputError("a label without a word: expected TEXT or --fact NAME=VALUE")
     if args.remove:
         recording.unmark(args.text, args.at_s)

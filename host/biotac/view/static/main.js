@@ -6,7 +6,7 @@ import { Fingertip } from "./fingertip.js";
 import { HandRow } from "./hand.js";
 import { Model, SPECTRUM_SAMPLES, zoom } from "./model.js";
 import { SpectrogramPlot, TimePlot, drawSpectrum } from "./plots.js";
-import { Flags, Link, Results, byId, number, showLink, showFaults, showTare, tell } from "./readout.js";
+import { Flags, Link, Results, byId, number, showLink, showFaults, showTare, showReply } from "./readout.js";
 import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
 import { Timeline, savePicture } from "./timeline.js";
@@ -57,7 +57,7 @@ class Page {
   // ---- the stream --------------------------------------------------------------------------
 
   onAbout(about) {
-    if (this.model) tell("Reconnected to the viewer program.");
+    if (this.model) showReply("Reconnected to the viewer program.");
     this.model = new Model(about);
     this.tip = new Fingertip(byId("fingertip-canvas"), about.electrodes, { large: true });
     this.hand = new HandRow(byId("fingers"), about, (index) => this.pick(index));
@@ -78,7 +78,7 @@ class Page {
     if (health.link === "lost") this.lost = true;
     else if (this.lost && health.link === "live") {
       this.lost = false;
-      tell("The board is connected again.");
+      showReply("The board is connected again.");
     }
     this.showState();
   }
@@ -91,7 +91,7 @@ class Page {
 
   async command(name, finger = null, value = null) {
     const { good, words } = await this.stream.command(name, finger, value);
-    tell(words.charAt(0).toUpperCase() + words.slice(1) + (good ? "." : ""), good);
+    showReply(words.charAt(0).toUpperCase() + words.slice(1) + (good ? "." : ""), good);
     return good;
   }
 

@@ -189,7 +189,7 @@ export function showLink(link, words, isSilent = false) {
   document.body.toggleAttribute("data-stale", stale);
 }
 
-export function tell(words, good = true) {
+export function showReply(words, good = true) {
   const place = byId("reply");
   place.dataset.kind = good ? "good" : "bad";
   write(place, words);
