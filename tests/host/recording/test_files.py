@@ -106,3 +106,5 @@ def test_each_label_is_a_line_and_one_before_the_first_row_is_at_0(tmp_path: Pat
     early, late = capsys.readouterr().out.splitlines()
     assert early == "label, 0.00 s: early" and late.endswith("late")
     assert main(["file", "label", str(path), "early", "--at", "0", "--remove"]) == 0
+    assert main(["file", "label", str(path), "", "--fact", "subject=S07"]) == 0
+    assert main(["file", "label", str(path), "", "--remove"]) == 0
