@@ -157,7 +157,7 @@ def test_a_flipped_bit_is_never_read_as_another_value(tmp_path: Path, kind: str,
     assert refused > 0.5 * flips
 
 
-@pytest.mark.parametrize("text", ["[" * 200_000, '{"a":' * 200_000, "1e999", "9" * 100_000, "", "\0", "\ufeff{}"])
+@pytest.mark.parametrize("text", ["[" * 200_000, '{"a":' * 200_000, "1e999", "9" * 100_000, "", "\0", "\ufeff"])
 @pytest.mark.parametrize("kind", JSON)
 def test_json_made_to_hurt_is_refused(tmp_path: Path, kind: str, text: str) -> None:
     path = tmp_path / "file.json"
