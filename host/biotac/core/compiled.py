@@ -50,8 +50,9 @@ def on_board_q4(
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
     n = len(raw)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, n, ELECTRODES)
-    missing = np.full(n, wire.INVALID_I32, np.int32)
-    pdc = missing if pdc_above_rest_q4 is None else integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, n)
+    if pdc_above_rest_q4 is None:
+        pdc_above_rest_q4 = np.full(n, wire.INVALID_I32, np.int32)
+    pdc = integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, n)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
     kernel.map = own_map
     poc_um, torsion_mnmm, flags = np.empty((n, 3), np.int16), np.empty(n, np.int32), np.empty(n, np.uint32)

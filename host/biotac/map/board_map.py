@@ -195,8 +195,8 @@ def part(blob: bytes, offset: int) -> tuple[int, ...]:
 
 def on_board_q4(frames: StructArray, settings: Settings, own_map: BoardMap | None) -> BoardResults:
     """compiled.on_board_q4() on FRAME messages (n,), with a map in force or without."""
-    handle = ffi.NULL if own_map is None else own_map.handle
-    return compiled.on_board_q4(frames["counts"], frames["tare_q4"], settings, handle, pdc_above_rest_q4(frames))
+    by_map = () if own_map is None else (own_map.handle, pdc_above_rest_q4(frames))
+    return compiled.on_board_q4(frames["counts"], frames["tare_q4"], settings, *by_map)
 
 
 def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:

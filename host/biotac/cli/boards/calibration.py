@@ -25,6 +25,7 @@ from ...wire.identity import serial_text, setting_text
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
 from ..outputs import say
+from ..recordings.loading import is_named_as_recording
 
 EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
 EEPROM = "i2c:"
@@ -199,8 +200,7 @@ def _in_eeprom(where: str) -> Calibration:
 
 
 def _port(where: str) -> str:
-    recording = where.lower().endswith(".mcap") and not where.startswith("replay:")
-    return f"replay:{where}" if recording else where
+    return f"replay:{where}" if is_named_as_recording(where) else where
 
 
 def _load(path: Path) -> tuple[Kind, Any]:

@@ -12,7 +12,12 @@ from ..progress import Progress
 
 def is_recording(where: str) -> bool:
     """Whether it is a recording's file, not a PORT, as replay:REC is."""
-    return Path(where).is_file() or (where.lower().endswith(".mcap") and not where.startswith("replay:"))
+    return Path(where).is_file() or is_named_as_recording(where)
+
+
+def is_named_as_recording(where: str) -> bool:
+    """Whether it is one by its name, where other files may be meant, too."""
+    return where.lower().endswith(".mcap") and not where.startswith("replay:")
 
 
 def load(path: Path, *, quiet: bool = False) -> Recording:
