@@ -261,9 +261,8 @@ def test_the_interval_says_what_an_electrode_that_opens_in_a_hold_costs(fault: s
         pose = Pose(float(rng.uniform(-11, 2)), float(rng.uniform(-2.5, 2.5)), tip_mm=2.0, **shear)
         pressed = sensor_faults.press(seed, "worn" if seed % 2 else "new", pose, force_n)
         begin, held = pressed.begins("hold"), slice(pressed.begins("hold") + 50, pressed.free)
-        rows = sensor_faults.run(sensor_faults.spoil(pressed, FAULTS[fault], begin, rng), pressed.settings("fitted"))[
-            held
-        ]
+        bad = sensor_faults.spoil(pressed, FAULTS[fault], begin, rng)
+        rows = sensor_faults.run(bad, pressed.settings("fitted"))[held]
         off = {k: np.abs(rows[f"{k}_mn"] - pressed.healthy("fitted")[held][f"{k}_mn"].astype(float)) for k in PARTS}
         within.append([float(np.median(off[k] - rows[f"{k}_half_mn"])) <= 0 for k in PARTS])
     print(f"\n{fault}: within {np.mean(within, axis=0)} of normal and shear")
@@ -289,11 +288,12 @@ def test_a_maps_interval_widens_by_what_is_lost_with_an_electrode() -> None:
 @pytest.mark.parametrize("settings", [PRESSES[0].settings("fitted"), None])
 def test_an_interval_is_wide_where_too_many_electrodes_are_out(settings: dict[Any, int] | None) -> None:
     """By Lin's gains and by a map: three of which no word comes are not estimated."""
-    words = PRESSES[0].words.copy()
-    words[PRESSES[0].begins("hold") :, slots.ELECTRODE_SLOT[[3, 9, 16]]] = INVALID_COUNT
+    pressed = PRESSES[0]
+    words = pressed.words.copy()
+    words[pressed.begins("hold") :, slots.ELECTRODE_SLOT[[3, 9, 16]]] = INVALID_COUNT
     finger = Finger(settings, wrench_map=None if settings else make_map(3, axes=3))
     rows = finger.feed(words[:, slots.ELECTRODE_SLOT], pdc=words[:, slots.PDC_SLOT])
-    held = rows[PRESSES[0].begins("hold") + 50 : PRESSES[0].free]
+    held = rows[pressed.begins("hold") + 50 : pressed.free]
     assert (held["flags"] & FrameFlags.FAULT).all() and held["normal_half_mn"].min() >= 3 * 4095
 
 

@@ -60,7 +60,7 @@ class ScriptedPlayer:
         self.commands.append((command, finger))
         if self.refusal is not None:
             raise self.refusal
-        return "done as told"
+        return "done as asked"
 
     def close(self) -> None:
         self.closed = True

@@ -300,7 +300,7 @@ def test_a_missing_board_is_told_and_found_again(make_player, view_of, open_page
     link_is(page, "live")
     await_text(page, "The board is connected again.")
     page.keyboard.press("a")
-    await_text(page, "Done as told.")
+    await_text(page, "Done as asked.")
     assert players[1].commands == [("tare", None)]
 
 

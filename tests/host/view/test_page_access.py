@@ -83,5 +83,5 @@ def test_keys_are_listed_and_do_nothing_behind_the_list(make_player, view_of, op
     page.keyboard.press("Escape")
     page.wait_for_selector("#keys", state="hidden")
     page.keyboard.press("a")
-    page.wait_for_function("() => reply.textContent.includes('Done as told.')")
+    page.wait_for_function("() => reply.textContent.includes('Done as asked.')")
     assert player.commands == [("tare", None)]

@@ -71,7 +71,7 @@ def test_commands_need_the_secret_the_origin_and_sense(make_player, view_of) -> 
     assert ask(viewing, "POST", "/command", {"do": "seek", "value": 3}, **good)[0] == 409  # not in a board's time
     assert player.commands == []
     status, body = ask(viewing, "POST", "/command", tare, **good, Origin=viewing.server.url.rstrip("/"))
-    assert (status, json.loads(body)) == (200, {"words": "done as told"})
+    assert (status, json.loads(body)) == (200, {"words": "done as asked"})
     assert player.commands == [("tare", 3)]
 
 
