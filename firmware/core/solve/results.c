@@ -96,6 +96,32 @@ static uint32_t by_map(const bt_round *round, const uint16_t counts[BT_ELECTRODE
                              msg->torque_mnmm, &msg->torsion_mnmm);
 }
 
+// What electrodes that are out took with them: how many they are; the counts by which they last read further
+// from rest than they are estimated to, together; and what condemned ones are estimated to, which are taken
+// to have been at rest.
+typedef struct {
+    uint32_t electrodes, lost, condemned;
+} losses;
+
+static losses losses_of(const bt_trigger *trigger, const uint16_t completed[BT_ELECTRODES])
+{
+    losses out = {0, 0, 0};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        if (trigger->without >> i & 1) {
+            const int32_t rest = trigger->rest.lane[i];
+            const int32_t last = trigger->smooth.lane[i] - rest, estimate = completed[i] - rest;
+            out.electrodes++;
+            out.condemned += trigger->out >> i & 1 ? bt_abs32(estimate) : 0;
+            out.lost += bt_abs32(last) > bt_abs32(estimate) ? bt_abs32(last - estimate) : 0;
+            out.lost += rest == BT_TRIGGER_UNREAD ? BT_FULL_SCALE_COUNT : 0; // neither known nor estimated
+        }
+    }
+    if (!bt_usable_without(trigger->without) || out.lost > BT_FULL_SCALE_COUNT) {
+        out.lost = BT_FULL_SCALE_COUNT; // too many are out to estimate any
+    }
+    return out;
+}
+
 void bt_point_signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES])
 {
     uint16_t counts[BT_ELECTRODES];
@@ -122,31 +148,18 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     uncertainty.margin = &bt_lin_margin;
     uncertainty.noise_q4 = tare->noise.sigma_q4;
     uncertainty.tare_unconfirmed = tare->unsure;
-    uncertainty.out = uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
-    // Of electrodes that are out, together: the counts by which they last read further from rest than they
-    // are estimated to, and what condemned ones are estimated to, which are taken to have been at rest.
-    uint32_t lost = 0, condemned = 0;
+    uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
+    losses out = {0, 0, 0};
     if (tare->trigger.without != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            if (tare->trigger.without >> i & 1) {
-                const int32_t rest = tare->trigger.rest.lane[i];
-                const int32_t last = tare->trigger.smooth.lane[i] - rest, estimate = counts[i] - rest;
-                uncertainty.out++;
-                condemned += tare->trigger.out >> i & 1 ? bt_abs32(estimate) : 0;
-                lost += bt_abs32(last) > bt_abs32(estimate) ? bt_abs32(last - estimate) : 0;
-                lost += rest == BT_TRIGGER_UNREAD ? BT_FULL_SCALE_COUNT : 0; // neither known nor estimated
-            }
-        }
-        if (!bt_usable_without(tare->trigger.without) || lost > BT_FULL_SCALE_COUNT) {
-            lost = BT_FULL_SCALE_COUNT; // too many are out to estimate any
-        }
+        out = losses_of(&tare->trigger, completed);
     }
+    uncertainty.out = out.electrodes;
     signal_shape shape = signals(counts, tare, e_q4);
     if (settings->map != NULL) {
         uncertainty.margin = &settings->map->margin;
-        uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = LOST_BY_MAP_MN * lost;
+        uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = LOST_BY_MAP_MN * out.lost;
         flags |= by_map(round, counts, tare, e_q4, settings, quantities, msg);
     } else if (settings->population) {
         uncertainty.margin = &bt_population.margin;
@@ -159,7 +172,8 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));
         uint32_t pressed = above_q4 > 0 ? (uint32_t)above_q4 >> 4 : 0;
         uint32_t *guess_mn = uncertainty.guess_mn;
-        lost = lost + condemned < BT_FULL_SCALE_COUNT ? lost + condemned : BT_FULL_SCALE_COUNT;
+        uint32_t lost = out.lost + out.condemned;
+        lost = lost < BT_FULL_SCALE_COUNT ? lost : BT_FULL_SCALE_COUNT;
         guess_mn[0] = (pressed > guess_mn[0] ? pressed : guess_mn[0]) + LOST_MN * lost;
         guess_mn[1] += LOST_MN * lost / 2;
     }
