@@ -328,6 +328,18 @@ CATALOGUE: dict[str, Entry] = {
         "Two electrodes moved, and said the same all the while: their traces touch. Each is a mean of both.",
         "Reseat the flex connector. If it stays, do not trust forces of this sensor, and have it repaired.",
     ),
+    "channel_copied": error(
+        "Two electrodes moved, and kept the same distance to the count all the while: one channel repeats the other's "
+        "moves, as a multiplexer that does not switch, or software in between that mixed up columns.",
+        "Look at both in `biotac view` while you press beside one of them. If it stays, do not trust forces of this "
+        "sensor.",
+    ),
+    "electrodes_inverted": warning(
+        "In a touch, an electrode's count rose by more than skin can bulge: counts fall where skin is compressed. "
+        "Something inverts the counts, or the tare was taken while the finger was pressed.",
+        "Let go of the finger for some seconds, and press its pad firmly again. If counts then rise where you press, "
+        "do not trust forces: look for what inverts them between sensor and board.",
+    ),
     "electrodes_shifted": error(
         "All electrodes moved alike and faster than anything warms, without pressure: their supply or reference "
         "dropped. Forces are off by it until the next tare.",

@@ -86,6 +86,21 @@ def shorted(rows: np.ndarray) -> None:
     rows["counts"][:, 8] = rows["counts"][:, 1] + np.arange(len(rows)) % 3
 
 
+def copied(rows: np.ndarray) -> None:
+    rows["counts"][:, 1] -= np.arange(len(rows)).astype(np.uint16) // 4
+    rows["counts"][:, 8] = rows["counts"][:, 1] - 217
+
+
+def lifted(counts: int, rounds: int) -> Callable[[np.ndarray], None]:
+    """A touch in which E5 is so many counts above its tare for so many rounds."""
+
+    def change(rows: np.ndarray) -> None:
+        rows["tare_state"], rows["tare"] = wire.TareState.CONTACT, rows["counts"]
+        rows["counts"][:rounds, 4] += counts
+
+    return change
+
+
 def mark(name: str, value: int, column: int | None = None) -> Callable[[np.ndarray], None]:
     def change(rows: np.ndarray) -> None:
         if column is None:
@@ -208,6 +223,8 @@ CASES: list[tuple[str, Facts, str]] = [
     ("electrodes_shifted", state(sensor_fault=wire.SensorFault.TOGETHER), "finger 1"),
     ("sensor_exchanged", state(sensor_fault=wire.SensorFault.EXCHANGED), "finger 1"),
     ("electrodes_shorted", frames(shorted), "finger 1: E2 and E9"),
+    ("channel_copied", frames(copied), "finger 1: E2 and E9"),
+    ("electrodes_inverted", frames(lifted(1000, 25)), "finger 1: E5 rises by 1000 counts"),
     ("pressure_flat", pressed(20), "finger 1: static pressure moves by 20 counts per newton"),
     ("pressure_flat", pressed(2), "finger 1: static pressure moves by 2 counts per newton"),
     ("pressure_flat", frames(mark("flags", int(wire.FrameFlags.PDC_FLAT))), "finger 1: static pressure did not follow"),
@@ -230,6 +247,11 @@ def test_half_a_second_of_mirror_images_is_no_short() -> None:
     few = rows[rows["t_us"] < rows["t_us"].min() + 500_000]
     assert {f.code for f in judge(facts)} == {"electrodes_shorted"}  # of so many that it is one
     assert judge(dataclasses.replace(facts, board=dataclasses.replace(facts.board, frames=few))) == []
+
+
+@pytest.mark.parametrize("change", [lifted(999, 300), lifted(1095, 24)])
+def test_skin_that_bulges_is_not_inverted(change: Callable[[np.ndarray], None]) -> None:
+    assert judge(frames(change)) == []
 
 
 def test_pressure_of_a_healthy_finger_is_no_finding() -> None:
