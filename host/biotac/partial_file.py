@@ -19,10 +19,12 @@ def whole(path: Path, *, overwrite: bool, made_of: Iterable[Path] = ()) -> Itera
     """Give a place beside ``path`` to write to, file or folder; it becomes ``path`` when all went well.
 
     Otherwise it is removed, and what was at ``path`` before is untouched. A KeyboardInterrupt goes on with
-    words that say so. Raises InputError when ``path`` exists and may not be overwritten, or is one of the files that
-    it is ``made_of``.
+    words that say so. Raises InputError when ``path`` exists and may not be overwritten, is neither file nor folder, or
+    is one of the files that it is ``made_of``.
     """
     refuse_source(path, made_of)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path} is a pipe or a device, which a file would replace; choose another name")
     if path.exists() and not overwrite:
         raise exists_error(path)
     if path.is_dir() and not (path / ROS2_METADATA).is_file():

@@ -20,6 +20,14 @@ def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[
     return what, options
 
 
+def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
+    """As options_of, of a file: raises PortError also where none is named."""
+    path, options = options_of(port, known, form)
+    if not path:
+        raise PortError(f"{port} names no file; expected {form}")
+    return path, options
+
+
 def file_and_query(text: str) -> tuple[str, str]:
     """What is before a question mark and behind it; one that belongs to the name of a file is not that."""
     longest, _, rest = text.rpartition("?")

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import imported
-from ..link.port_text import options_of
+from ..link.port_text import file_and_options
 from .link import MessagesLink
 
 
 def open_bag(port: str) -> MessagesLink:
     """``bag:FILE?topic=T``, of ROS 1 or ROS 2."""
-    path, options = options_of(port, ("topic",), "bag:FILE?topic=/rh/tactile")
+    path, options = file_and_options(port, ("topic",), "bag:FILE?topic=/rh/tactile")
     bag = imported("biotac.rounds.bag", port, "robot")
     return MessagesLink(port, bag.Bag(Path(path), options.get("topic", "")))
 
@@ -20,7 +20,7 @@ def open_csv(port: str) -> MessagesLink:
     """``csv:FILE?columns=FILE.toml``."""
     from .table import Table
 
-    path, options = options_of(port, ("columns",), "csv:FILE?columns=FILE.toml")
+    path, options = file_and_options(port, ("columns",), "csv:FILE?columns=FILE.toml")
     return MessagesLink(port, Table(Path(path), options.get("columns")))
 
 

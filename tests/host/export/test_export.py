@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -332,6 +333,14 @@ def test_a_folder_that_is_no_bag_is_never_replaced(recorded, tmp_path, capsys) -
         assert export(recorded, folder, "--force") == 2
         assert "is a folder" in capsys.readouterr().err
         assert (folder / "precious").read_text() == "x"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_is_never_replaced(recorded, tmp_path, capsys) -> None:
+    os.mkfifo(pipe := tmp_path / "a.csv")
+    assert export(recorded, pipe, "--force") == 2
+    assert "is a pipe or a device" in capsys.readouterr().err
+    assert pipe.is_fifo()
 
 
 def test_a_missing_extra_is_named(recorded, tmp_path) -> None:

@@ -145,6 +145,12 @@ def test_a_calibration_hold_and_tare_work_as_on_any_board(tmp_path: Path) -> Non
         assert (rows["flags"] & wire.FrameFlags.HELD).any() and (rows["flags"] & wire.FrameFlags.TARE_CHANGED).any()
 
 
+@pytest.mark.parametrize("port", ["bag:", "bag:?topic=/rh/tactile", "csv:", "replay:"])
+def test_a_port_without_a_file_asks_for_one(port: str) -> None:
+    with pytest.raises(PortError, match="names no file; expected"):
+        biotac.open(port)
+
+
 @pytest.mark.parametrize("name", ["a.bag", "folder"])
 def test_what_is_no_bag_is_refused_in_words(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="does not exist"):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...clock.host_clock import HostClock, SystemClock
 from ...errors import CommandRefusedError, DeviceLostError, PortError
 from ...link.base import Link
-from ...link.port_text import options_of, parse_pace
+from ...link.port_text import file_and_options, parse_pace
 from ...wire.identity import command_name
 from ..reader import Recording
 from .playback import Playback
@@ -24,9 +24,7 @@ def open_replay(port: str, pace: float = 0.0, *, clock: HostClock | None = None)
 
     Raises PortError, RecordingError or InputError.
     """
-    path, options = options_of(port, ("pace", "from", "to"), FORM)
-    if not path:
-        raise PortError(f"{port}: no recording named; expected {FORM}")
+    path, options = file_and_options(port, ("pace", "from", "to"), FORM)
     try:
         pace = parse_pace(options["pace"]) if "pace" in options else pace
         from_s = float(options.get("from", 0.0))
