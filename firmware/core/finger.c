@@ -100,10 +100,16 @@ uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched)
     if (slot == events->watched) {
         return bt_events_watch(events, &finger->tare);
     }
-    if (ends_pac(slot)) {
-        return bt_events_pac(events, &finger->tare, finger->round.pac, bt_slot_pac[slot] + 1u);
+    if (!ends_pac(slot)) {
+        return 0;
     }
-    return 0;
+    uint16_t none[BT_PAC_PER_FRAME];
+    const uint16_t *pac = finger->round.pac;
+    if (finger->health.leap.pending || bt_finger_sensor_fault(finger) != BT_SENSOR_FAULT_NONE) {
+        memset(none, 0xFF, sizeof none); // another channel's words shake more than any slip
+        pac = none;
+    }
+    return bt_events_pac(events, &finger->tare, pac, bt_slot_pac[slot] + 1u);
 }
 
 void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us, bt_msg_event *msg)
@@ -220,6 +226,7 @@ static uint32_t health_flags(const bt_finger *finger)
     bool narrow = bt_usable_without(leapt) && (trigger->far & ~leapt) == 0;
     uint32_t alone = finger->health.alone | (finger->health.out & ~trigger->without) | (narrow ? leapt : 0);
     return finger->sensor_flags | (bt_finger_sensor_fault(finger) != 0 ? BT_FRAME_FLAG_SENSOR_FAULT : 0)
+           | (finger->health.leap.pending ? BT_FRAME_FLAG_LEAP_PENDING : 0)
            | (alone != 0 ? BT_FRAME_FLAG_ELECTRODE_ALONE : 0);
 }
 

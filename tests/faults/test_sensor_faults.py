@@ -369,14 +369,15 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     ),
     "a channel repeats the moves of another": (
         ("one copies another",), "ELECTRODE_ALONE if it begins in a hold, else none",
-        "presses and looks, before a grasp",
+        "presses while `biotac doctor` listens",
     ),
-    "all electrodes are inverted": (("all inverted",), "none", "presses and looks, before a grasp"),
+    "all electrodes are inverted": (("all inverted",), "none", "presses while `biotac doctor` listens"),
     "a sensor repeats its words for ever": (
         ("the same words for ever", "electrodes frozen, pressure alive"), "FAULT, SENSOR_FAULT", "holds its actuators",
     ),
     "noise on all electrodes, or channels shifted by a slot": (
-        ("noise of 30 counts on all electrodes", "channels shifted by a slot"), "FAULT, SENSOR_FAULT",
+        ("noise of 30 counts on all electrodes", "channels shifted by a slot"),
+        "FAULT, SENSOR_FAULT; before these LEAP_PENDING, if shifted",
         "holds its actuators",
     ),
     "a bit in 300 to 1000 flips on the line": (

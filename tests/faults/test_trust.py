@@ -34,8 +34,8 @@ OFF_UNSEEN = {
         "electrode floating: walks 20 counts a round",
     ),
     "the few frames before it is found": (
-        "electrode with noise of 200 counts", "noise of 30 counts on all electrodes", "channels shifted by a slot",
-        "the same words for ever", "electrodes frozen, pressure alive",
+        "electrode with noise of 200 counts", "noise of 30 counts on all electrodes", "the same words for ever",
+        "electrodes frozen, pressure alive",
     ),
 }  # fmt: skip
 

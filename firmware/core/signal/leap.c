@@ -84,7 +84,8 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
     leap->read = (BT_ALL_ELECTRODES & ~trigger->without) | (uint32_t)trigger->pressure_now << BT_LANE_PDC;
     leap->swing = 0;
     leap->alike = false;
-    if (!bt_usable_without(far & BT_ALL_ELECTRODES) && leap->rounds == BT_LEAP_ROUNDS) {
+    const bool leapt = !bt_usable_without(far & BT_ALL_ELECTRODES) && leap->rounds == BT_LEAP_ROUNDS;
+    if (leapt) {
         measure(leap, round, &trigger->smooth, far);
         if (pac_swings(leap->pac, leap->swing) || pac_swings(round->pac, leap->swing)) {
             leap->swing = 0;
@@ -95,6 +96,7 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
     leap->heard = leap->heard || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
     const uint16_t pdc = trigger->smooth.lane[BT_LANE_PDC];
     bool leaps = tdc_leaps(leap, round->tdc, pdc);
+    leap->pending = leap->alike || leap->swing != 0 || (leap->off != 0 && (leapt || leap->pending));
     if ((leaps && bt_abs32(pdc - leap->pdc) > PDC_ALIKE) || exchanged) {
         return BT_SENSOR_FAULT_EXCHANGED;
     }

@@ -5,7 +5,8 @@
 // round that moved them one way so far, one moved by over four times the mean.
 //
 // The next round has to confirm what electrodes do, because a glitch is one round's, and seven more what TDC
-// does, because nobody else does. What moved while nothing was read did not leap.
+// does, because nobody else does. Until then the leap is pending, one of TDC only together with electrodes:
+// a glitch is one word's. What moved while nothing was read did not leap.
 //
 // Units: counts.
 #ifndef BIOTAC_LEAP_H
@@ -25,6 +26,7 @@ typedef struct {
     uint16_t pdc;    // static pressure with it
     uint8_t settled; // rounds in which it did not, less those without it; at most BT_LEAP_ROUNDS
     uint8_t off;     // rounds since
+    bool pending;    // the next rounds may confirm a leap
 } bt_leap;
 
 #define BT_LEAP_ROUNDS 8

@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0xEA108B10u
+#define BT_SCHEMA_HASH 0x0CE42ED2u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -156,6 +156,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
 #define BT_FRAME_FLAG_TARE_LIKELY (1u << 9) // the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since
+#define BT_FRAME_FLAG_LEAP_PENDING (1u << 10) // electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's
 #define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
@@ -177,7 +178,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
 #define BT_FRAME_FLAG_SENSOR_FAULT (1u << 30) // the electrodes say what no live sensor does (sensor_fault of SENSOR_STATUS): do not trust the results
 #define BT_FRAME_FLAG_ELECTRODE_ALONE (1u << 31) // one electrode or two moved or leapt and the rest of the skin did not, or one was condemned in this round: an edge as narrow as an electrode, or a fault
-#define BT_FRAME_FLAGS 0xFFFFFBFFu // all there are
+#define BT_FRAME_FLAGS 0xFFFFFFFFu // all there are
 
 // What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
 #define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
@@ -214,7 +215,7 @@ enum bt_event_kind {
 
 // Flags of a FRAME or IDLE that hold trust down to this level; LATCHED: that STATUS keeps.
 #define BT_TRUST_FLAGS_NONE 0x40008002u
-#define BT_TRUST_FLAGS_HOLD 0x09800000u
+#define BT_TRUST_FLAGS_HOLD 0x09800400u
 #define BT_TRUST_FLAGS_INTERVAL 0xB6292370u
 #define BT_TRUST_FLAGS_LATCHED 0x71E1A1F0u
 enum bt_setting {

@@ -15,7 +15,7 @@ from .named import NamedFlag
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0xEA108B10
+SCHEMA_HASH = 0x0CE42ED2
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -173,6 +173,7 @@ class FrameFlags(NamedFlag):
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
     TARE_LIKELY = 1 << 9  # the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since
+    LEAP_PENDING = 1 << 10  # electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's
     TORSION_OK = 1 << 11  # suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
     SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
     BASE_OLD = 1 << 13  # in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
@@ -367,6 +368,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     128: "no good thermal flux word",
     256: "no good temperature word",
     512: "the tare was given by the host, or taken of what a hold of 0.2 N would read, too; no release has confirmed it since",
+    1024: "electrodes leapt together as no touch moves them, or with the thermometer: the next rounds show whether the words are another channel's or sensor's",
     2048: "suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing",
     4096: "more than half of the signal energy is bulge: the PoC is probably biased",
     8192: "in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes",
@@ -431,7 +433,7 @@ QUANTITY_FLAG_DOC: dict[int, str] = {
 LATCHED_FLAGS = FrameFlags(0x71E1A1F0)
 TRUST_FLAGS: dict[Trust, FrameFlags] = {
     Trust.NONE: FrameFlags(0x40008002),
-    Trust.HOLD: FrameFlags(0x09800000),
+    Trust.HOLD: FrameFlags(0x09800400),
     Trust.INTERVAL: FrameFlags(0xB6292370),
 }
 

@@ -137,6 +137,40 @@ TEST(what_moved_while_nothing_was_read_or_heard_did_not_leap)
     }
 }
 
+// `words`: in each round, T: the thermometer leapt, E: electrodes did, B: both, -: neither. `pending`: what
+// is told after each.
+static void expect_pending(const leap_case *by, const char *words, const char *pending)
+{
+    const leap_case tdc = {.tdc = 300, .against = NEVER};
+    bool warm = false, moved = false;
+    begin(49);
+    for (int round = 0; words[round]; round++) {
+        bool is_warm = words[round] == 'T' || words[round] == 'B';
+        bool is_moved = words[round] == 'E' || words[round] == 'B';
+        move(&tdc, is_warm - warm);
+        move(by, is_moved - moved);
+        warm = is_warm;
+        moved = is_moved;
+        (void)end_round(QUIET);
+        if (leap.pending != (pending[round] == 'p')) {
+            fail_msg("%s, round %d", words, round);
+        }
+    }
+}
+
+TEST(a_leap_is_pending_until_it_is_confirmed_or_over)
+{
+    const leap_case touch = {.counts = 200, .against = 2}, supply = {.counts = -50, .against = NEVER};
+    const leap_case exchange = {.counts = 200, .against = 2, .pdc = 200};
+    expect_pending(&touch, "-BBBBBBBB--", "-ppppppp---");
+    expect_pending(&touch, "-BBB---", "-ppp---");
+    expect_pending(&touch, "-BTTT--", "-pppp--");
+    expect_pending(&touch, "-TTT--", "------");
+    expect_pending(&touch, "-EEE--", "------");
+    expect_pending(&supply, "-EEE", "-p--");
+    expect_pending(&exchange, "-EEE", "-p--");
+}
+
 // TDC's words, W: another temperature's, -: lost. The last is told to be a leap if `leaps`.
 static void expect_temperatures(const char *words, bool leaps)
 {
