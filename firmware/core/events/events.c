@@ -7,8 +7,9 @@
 // Of changes, which are of sums of four samples: noise of five counts, the worst in public recordings, gives
 // 200.
 #define LEVEL_MIN_COUNT2      800
-#define RATTLE_LEVELS         7 // white noise changes by four times what neighbouring samples differ by
-#define RATTLE_PAIRS_LOG2     5 // pairs that the rattle is averaged over: 30 ms
+#define BEGIN_MIN_COUNT2      1200 // until a slip is on: squeezes of 2 N/s shake by more than 800
+#define RATTLE_LEVELS         7    // white noise changes by four times what neighbouring samples differ by
+#define RATTLE_PAIRS_LOG2     5    // pairs that the rattle is averaged over: 30 ms
 // In levels; chosen on 100 real slides, 344 handovers, a real press, and simulated squeezes, slips and noise.
 #define CHANGE_CAP_LEVELS     12 // per change: a glitch, which is four changes, must be no event
 #define JOLT_LEVELS           22
@@ -149,7 +150,7 @@ static BT_NOINLINE uint32_t root_of(uint32_t square)
     return bt_root_u32(square);
 }
 
-// What one change must exceed to be evidence is some of this.
+// L of SPEC.md. What one change must exceed to be evidence is some of this.
 static BT_NOINLINE uint32_t unit_of(const bt_events *events)
 {
     const uint32_t rattle = RATTLE_LEVELS * events->rattle_count2;
@@ -348,13 +349,13 @@ static bool begins_to_slip(bt_events *events, uint32_t unit)
     return events->risen_count2 > each && events->fallen_count2 > each;
 }
 
-static inline uint32_t judge(bt_events *events, uint32_t unit)
+static inline uint32_t judge(bt_events *events, uint32_t level, uint32_t unit)
 {
     uint32_t raised = 0;
     if (!shakes(events)) {
         return end_shaking(events);
     }
-    if (!events->jolt_raised && events->risen_count2 + events->fallen_count2 > JOLT_LEVELS * unit) {
+    if (!events->jolt_raised && events->risen_count2 + events->fallen_count2 > JOLT_LEVELS * level) {
         events->jolt_raised = true;
         raised = EVENT(BT_EVENT_KIND_JOLT);
     }
@@ -380,7 +381,8 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     }
     const unsigned pairs = ended - events->pairs_done;
     follow(events, pac + 2 * events->pairs_done, pairs);
-    const uint32_t unit = unit_of(events);
+    const uint32_t level = unit_of(events);
+    const uint32_t unit = events->slipping || level > BEGIN_MIN_COUNT2 ? level : BEGIN_MIN_COUNT2;
     const bool shook = shakes(events);
     look(events, pairs, unit);
     for (unsigned k = 0; k < BT_EVENTS_APART; k++) {
@@ -389,7 +391,8 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     events->now += 2 * pairs;
     events->pairs_done = (uint8_t)(events->pairs_done + pairs);
     const bool goes_on = events->slipping && events->touched && shakes(events);
-    uint32_t raised = (shook || shakes(events) || events->landing) && !goes_on ? judge(events, unit) : 0;
+    uint32_t raised =
+        (shook || shakes(events) || events->landing) && !goes_on ? judge(events, level, unit) : 0;
     if (!events->touched && tare->state == BT_TARE_STATE_CONTACT) {
         raised |= touched_again(events, tare);
     }

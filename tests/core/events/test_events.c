@@ -244,7 +244,7 @@ TEST(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip)
 {
     hold();
     for (int i = 6; i < BT_PAC_PER_FRAME; i++) {
-        run.pac[i] = 36 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
+        run.pac[i] = 40 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
     }
     play(1);
     memset(run.pac, 0, sizeof run.pac);

@@ -4,7 +4,8 @@
 #include "events/events.h"
 
 #define LEVEL       800
-#define TOLL        (3 * (LEVEL * 11 / 16)) // that noise takes of each side in a stretch of three pairs
+#define BEGIN       1200                    // the least level until a slip is on
+#define TOLL        (3 * (BEGIN * 11 / 16)) // that noise takes of each side in a stretch of three pairs
 #define TOLD(event) (1u << BT_EVENT_KIND_##event)
 
 static bt_tare tare;
@@ -53,7 +54,7 @@ TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
 {
     static const struct {
         uint32_t risen, fallen, flagged;
-    } cases[] = {{13600, 13601, 0}, {13601, 13600, 0}, {13601, 13601, TOLD(SLIP)}};
+    } cases[] = {{20400, 20401, 0}, {20401, 20400, 0}, {20401, 20401, TOLD(SLIP)}};
     for (int k = 0; k < 3; k++) {
         (void)held(NULL);
         events.jolt_raised = true;
@@ -79,22 +80,23 @@ TEST(a_jolt_is_more_than_22_levels_and_told_once)
     assert_int_equal(shaken(17601, 0), TOLD(JOLT));
 }
 
-// Sums of two samples: 4000, 4100, 3800. The changes are 0, 100 and -100, of at most twelve levels each.
+// Sums of two samples: 4000, 4200, 3600. The changes are 0, 200 and -200, of at most twelve levels each.
 static void swing(void)
 {
-    static const uint16_t words[6] = {2000, 2000, 2050, 2050, 1900, 1900};
+    static const uint16_t words[6] = {2000, 2000, 2100, 2100, 1800, 1800};
     memcpy(pac + 8, words, sizeof words);
+    events.jolt_raised = true; // of before
 }
 
 TEST(a_side_begins_at_the_first_pair_that_moved_its_way)
 {
     swing();
     assert_int_equal(stretch(), 0);
-    assert_true(events.risen_count2 == 12 * LEVEL - TOLL && events.fallen_count2 == 12 * LEVEL - TOLL);
+    assert_true(events.risen_count2 == 12 * BEGIN - TOLL && events.fallen_count2 == 12 * BEGIN - TOLL);
     assert_int_equal(events.rise_began, 100000 + 2);
     assert_int_equal(events.fall_began, 100000 + 4);
     assert_int_equal(events.shake_began, 100000 + 2);
-    assert_int_equal(events.peak_count2, 10000);
+    assert_int_equal(events.peak_count2, 40000);
     (void)held(NULL);
     swing();
     pac[8] = BT_INVALID_COUNT; // and whatever it would be part of
@@ -114,7 +116,7 @@ TEST(while_it_slips_both_sides_are_one)
     assert_int_equal(events.risen_count2, 31000 + 2 * 12 * LEVEL - 3 * LEVEL);
     assert_int_equal(events.fallen_count2, 0);
     assert_int_equal(events.round_count2, 2 * 12 * LEVEL);
-    assert_int_equal(events.shaken_count2, 20000);
+    assert_int_equal(events.shaken_count2, 80000);
     for (uint32_t over = 0; over < 2; over++) {
         (void)held(NULL);
         events.slipping = events.jolt_raised = true;
@@ -191,7 +193,7 @@ TEST(what_has_just_been_touched_lands)
         (void)held(NULL);
         events.landing = true;
         events.touch_began = events.now + 6 - since;
-        assert_int_equal(shaken(13601, 13601), since < 2200 ? TOLD(JOLT) : TOLD(JOLT) | TOLD(SLIP));
+        assert_int_equal(shaken(20401, 20401), since < 2200 ? TOLD(JOLT) : TOLD(JOLT) | TOLD(SLIP));
         assert_int_equal(events.landing, since < 2200);
     }
 }
@@ -208,15 +210,15 @@ TEST(a_slip_began_with_its_vibration)
         events.jolt_raised = true;
         events.rise_began = 99000;
         events.fall_began = 99000 + (uint32_t)cases[k].fall_after_rise;
-        assert_int_equal(shaken(13601, 13601), TOLD(SLIP));
+        assert_int_equal(shaken(20401, 20401), TOLD(SLIP));
         assert_int_equal(events.slip_began, cases[k].with_rise ? events.rise_began : events.fall_began);
     }
 }
 
-// 550 a pair, all three together: two changes of 28 are below it, two of 29 above.
+// 825 a pair, all three together: two changes of 35 are below it, two of 36 above.
 TEST(noise_is_eleven_sixteenths_of_a_level)
 {
-    for (uint16_t change = 28; change <= 29; change++) {
+    for (uint16_t change = 35; change <= 36; change++) {
         (void)held(NULL);
         pac[10] = (uint16_t)(2000 + change);
         events.peak_count2 = 1000000; // of what shook before
