@@ -16,7 +16,6 @@ import pytest
 
 import biotac
 from biotac.errors import CommandRefusedError, DeviceLostError, PortError
-from biotac.view.serving import Viewing
 from biotac.wire import messages_gen as wire
 
 SUPPORT = Path(__file__).parents[2] / "support"
@@ -77,7 +76,9 @@ def tared(hand: biotac.Hand) -> bool:
 def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_path: Path, kind: str) -> None:
     robot = bridge(kind, 5)
     seen: list[np.ndarray] = []
-    view = Viewing(robot.port, port=0, folder=tmp_path)
+    words = [sys.executable, "-m", "biotac", "view", robot.port, "--port", "0", "--no-browser"]
+    view = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert view.stdout is not None and "http://" in view.stdout.readline()
     with biotac.open(robot.port) as hand, hand.record(tmp_path / "a.mcap"):
         assert hand.fingers == [0, 1, 2, 3, 4] and hand.info.board == wire.Board.MESSAGES
         hand.stream("results", "events")
@@ -93,7 +94,9 @@ def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_pa
         with hand.grasp():
             until(hand, lambda batch: bool((batch.frames["flags"] & wire.FrameFlags.HELD).any()))
         stats = hand.stats
-    view.close()
+    assert view.poll() is None
+    view.terminate()
+    view.communicate()
     frames = np.concatenate(seen)
     assert (stats.frames_lost, stats.crc_errors, stats.gaps) == (0, 0, 0)
     for finger in range(5):
