@@ -109,6 +109,7 @@ def _pressure(board: BoardFacts, finger: int) -> Iterator[Finding]:
 
 
 def _rises(board: BoardFacts, finger: int) -> Iterator[Finding]:
+    """Whether an electrode's count rises in a touch, further than skin bulges."""
     rows = board.frames[(board.frames["finger"] == finger) & (board.frames["tare_state"] == wire.TareState.CONTACT)]
     rise = np.where(rows["counts"] == wire.INVALID_COUNT, 0.0, rows["counts"] - rows["tare"])
     often = (rise >= RISE_COUNTS).sum(axis=0)

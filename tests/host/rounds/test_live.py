@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +55,19 @@ def bridge() -> Iterator[Callable[..., Bridge]]:
         one.end()
 
 
+@contextmanager
+def viewed(port: str, folder: Path) -> Iterator[None]:
+    """The live page meanwhile, in a process of its own, which a test that fails ends, too."""
+    words = [sys.executable, "-m", "biotac", "view", port, "--port", "0", "--no-browser"]
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as page:
+        try:
+            assert page.stdout is not None and "http://" in page.stdout.readline()
+            yield
+            assert page.poll() is None
+        finally:
+            page.terminate()
+
+
 def until(hand: biotac.Hand, wanted: Callable[[biotac.Batch], bool], limit_s: float = 30.0) -> biotac.Batch:
     end_s = time.monotonic() + limit_s
     for batch in hand.batches():
@@ -76,10 +89,7 @@ def tared(hand: biotac.Hand) -> bool:
 def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_path: Path, kind: str) -> None:
     robot = bridge(kind, 5)
     seen: list[np.ndarray] = []
-    words = [sys.executable, "-m", "biotac", "view", robot.port, "--port", "0", "--no-browser"]
-    view = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
-    assert view.stdout is not None and "http://" in view.stdout.readline()
-    with biotac.open(robot.port) as hand, hand.record(tmp_path / "a.mcap"):
+    with viewed(robot.port, tmp_path), biotac.open(robot.port) as hand, hand.record(tmp_path / "a.mcap"):
         assert hand.fingers == [0, 1, 2, 3, 4] and hand.info.board == wire.Board.MESSAGES
         hand.stream("results", "events")
         came_ms, zero_ns, count = [], hand.link.zero_ns, 0
@@ -94,9 +104,6 @@ def test_nothing_is_lost_with_page_recording_and_commands_at_once(bridge, tmp_pa
         with hand.grasp():
             until(hand, lambda batch: bool((batch.frames["flags"] & wire.FrameFlags.HELD).any()))
         stats = hand.stats
-    assert view.poll() is None
-    view.terminate()
-    view.communicate()
     frames = np.concatenate(seen)
     assert (stats.frames_lost, stats.crc_errors, stats.gaps) == (0, 0, 0)
     for finger in range(5):
