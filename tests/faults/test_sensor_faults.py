@@ -354,8 +354,12 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
         ("all electrodes drift 20 counts/s", "all electrodes jump by 50", *SQUEEZED_DRIFTS),
         "BASE_OLD, half a second late in a squeeze; of a jump SENSOR_FAULT", "lets go, to tare",
     ),
-    "half of the electrodes drift up by 4 counts/s, half down": (
-        ("half drift up, half down",), "DOUBT, after the hold", "lets go from time to time",
+    "half of the electrodes drift up by 4 or 12 counts/s, half down": (
+        tuple(f"half drift up by {rate} counts/s, half down" for rate in (4, 12)), "DOUBT, after the hold",
+        "lets go from time to time",
+    ),
+    "half of the electrodes drift up by 30 counts/s, half down": (
+        ("half drift up by 30 counts/s, half down",), "none", "lets go from time to time",
     ),
     "three to five neighbouring electrodes are stuck": (
         tuple(f"{n} neighbours stuck" for n in ("three", "four", "five")), "ELECTRODE_ALONE, then FAULT",
@@ -405,6 +409,18 @@ def test_the_page_says_what_a_broken_sensor_makes_of_a_calibrated_force(cause: s
     faults, flag, do = CAUSES[cause]
     seen = [outcome(of, fault, when, "fitted") for fault in faults for when in WHEN for of in PRESSES]
     wrong_by.row(cause, max(one.worst_n for one in seen), max(one.silent_n for one in seen), flag, do)
+
+
+def test_the_page_says_what_sticks_before_the_board_knows_its_sensor() -> None:
+    """A board learns in ten seconds how often a sensor's words repeat: these begin six after power-up, at rest."""
+    pressed = [sensor_faults.press(seed, rest_s=4.0) for seed in (1, 2, 3)]
+    faults = [f"{n} neighbours stuck" for n in ("three", "four", "five")]
+    stuck = [outcome(of, fault, "rest", "fitted") for of in pressed for fault in faults]
+    wrong_by.row(
+        "three to five neighbouring electrodes stick in the first ten seconds",
+        max(one.worst_n for one in stuck), max(one.silent_n for one in stuck),
+        "ELECTRODE_ALONE, then FAULT, once they are over", "waits ten seconds after power-up before it grips",
+    )  # fmt: skip
 
 
 def test_every_fault_has_its_row() -> None:

@@ -44,7 +44,8 @@ OFF_UNSEEN = {
 KNOWN = {
     "three neighbours stuck": 0.04, "four neighbours stuck": 0.04, "five neighbours stuck": 0.05,
     "all drift 2 counts/s": 0.02, "all drift -5 counts/s": 0.02, "all drift 8 counts/s": 0.3,
-    "half drift up, half down": 0.02, "all aged by 0.7": 0.02, "one copies another": 0.07, "all inverted": 0.14,
+    **{f"half drift up by {rate} counts/s, half down": 0.02 for rate in (4, 12, 30)},
+    "all aged by 0.7": 0.02, "one copies another": 0.07, "all inverted": 0.14,
 }  # fmt: skip
 
 

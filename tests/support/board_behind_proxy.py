@@ -23,7 +23,11 @@ ROWS = {wire.Frame.ID, wire.Pac.ID, wire.Idle.ID, wire.Bands.ID}
 
 
 class BoardBehindProxy:
-    """``path`` is a symbolic link to the proxy's pty. What came through is in ``passed``: (device time, finger)."""
+    """``path`` is a symbolic link to the proxy's pty. What came through is in ``passed``: (device time, finger).
+
+    The first board's time begins with the first START, however long a program takes to open the port: what a source
+    has at 5 s comes 5 s into the stream.
+    """
 
     def __init__(self, source: str, folder: Path, kind: str = "posix") -> None:
         self.path = folder / "ttyBOARD"
@@ -47,9 +51,9 @@ class BoardBehindProxy:
         board = start_board(self.kind, load_source(self._source, seconds=900), pace=1.0)
         port = os.open(board.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(port)
-        board.release()
         with self._changing:
             if before is not None:
+                board.release()
                 os.close(self._port)
                 before.close()
             self._board, self._port = board, port
@@ -95,8 +99,12 @@ class BoardBehindProxy:
                 time.sleep(0.001)
 
     def _hear(self, chunk: bytes) -> None:
-        self.starts += sum(message_id == wire.Start.ID for message_id, _ in self._from_host.feed(chunk))
+        starts = sum(message_id == wire.Start.ID for message_id, _ in self._from_host.feed(chunk))
         os.write(self._port, chunk)
+        if starts and not self.starts:
+            assert self._board is not None
+            self._board.release()
+        self.starts += starts
 
     def _pass_on(self, chunk: bytes) -> None:
         for message_id, payload in self._from_board.feed(chunk):

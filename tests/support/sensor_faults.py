@@ -65,18 +65,20 @@ class Press:
         return run(self.words, self.settings(model))
 
 
-def press(seed: int, profile: str = "new", pose: Pose | None = None, force_n: float = 5.0) -> Press:
-    """A press of ``force_n`` at ``pose``'s place, or at a random one of the pad."""
+def press(
+    seed: int, profile: str = "new", pose: Pose | None = None, force_n: float = 5.0, rest_s: float = REST_S
+) -> Press:
+    """A press of ``force_n`` at ``pose``'s place, or at a random one of the pad, ``rest_s`` after a lighter one."""
     rng = np.random.default_rng([seed, 4])
     pose = pose or Pose(x_mm=float(rng.uniform(-11, 2)), y_mm=float(rng.uniform(-2.5, 2.5)), tip_mm=2.0)
     sensor = Sensor(seed, profile)  # type: ignore[arg-type]
-    track = _track(Pose(**{**pose.__dict__, "force_n": force_n}))
+    track = _track(Pose(**{**pose.__dict__, "force_n": force_n}), rest_s)
     times: Floats = np.arange(round(track.seconds / slots.FRAME_S) + 1) * slots.FRAME_S
     states = track.states(times)
-    squeeze = round((PROOF_S + REST_S) / slots.FRAME_S)
+    squeeze = round((PROOF_S + rest_s) / slots.FRAME_S)
     hold = squeeze + round(force_n / SQUEEZE_N_PER_S / slots.FRAME_S)
     beside = Sensor(seed + 1000, profile)  # type: ignore[arg-type]
-    elsewhere = _track(Pose(x_mm=-4.0, y_mm=1.0, tip_mm=2.0, force_n=3.0, shear_y_n=1.5))
+    elsewhere = _track(Pose(x_mm=-4.0, y_mm=1.0, tip_mm=2.0, force_n=3.0, shear_y_n=1.5), rest_s)
     return Press(
         seed, profile, pose, sampling.sample(sensor, states), sampling.sample(beside, elsewhere.states(times)),
         _calibrated(sensor),
@@ -95,7 +97,7 @@ def _calibrated(sensor: physics.Finger) -> dict[wire.Setting, int]:
     return {wire.Setting[name.upper()]: gain for name, gain in fit_gains(signal, *states.wrench()).items()}
 
 
-def _track(pressed: Pose) -> Track:
+def _track(pressed: Pose, rest_s: float) -> Track:
     track, free = Track(), pressed.released()
     track.pose = free
     squeeze_s = pressed.force_n / SQUEEZE_N_PER_S
@@ -104,7 +106,7 @@ def _track(pressed: Pose) -> Track:
         (PROOF_S / 2, free),
         (PROOF_S / 4, light),
         (PROOF_S / 4, free),
-        (REST_S, free),
+        (rest_s, free),
         (squeeze_s, pressed),
         (HOLD_S, pressed),
         (squeeze_s, free),
@@ -172,7 +174,12 @@ MORE: dict[str, Fault] = {
         f"all drift {rate} counts/s": electrode_fault(lambda on, x, t, rate=rate: x - rate * t[:, None])
         for rate in (2, -5, 8, 12, -20, 30)
     },
-    "half drift up, half down": electrode_fault(lambda on, x, t: x + 4 * t[:, None] * (-1) ** np.arange(19)),
+    **{
+        f"half drift up by {rate} counts/s, half down": electrode_fault(
+            lambda on, x, t, rate=rate: x + rate * t[:, None] * (-1) ** np.arange(19)
+        )
+        for rate in (4, 12, 30)
+    },
     "all aged by 0.7": electrode_fault(lambda on, x, t: on.rest + 0.7 * (x - on.rest)),
     "one copies another": electrode_fault(_copies),
     "all inverted": electrode_fault(lambda on, x, t: 2 * on.rest - x),

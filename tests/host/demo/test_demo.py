@@ -33,10 +33,12 @@ def test_a_demo_leaves_recording_report_and_picture_and_says_what_was_felt(press
     assert len(biotac.load(folder / "demo.mcap")) == demo.facts["frames"]
     assert json.loads((folder / "report.json").read_text())["crosscheck"]["violations"] == 0
     own, lin = (demo.facts["felt"][name] for name in ("own wrench map", "Lin's scales"))
-    for ours, theirs in zip(own, lin, strict=True):  # of loads that it was not made of
+    # Of loads that it was not made of. In the band of 5 N, one press at one place, both are off by 1.1 N, the map
+    # along x and Lin's along z, and by how much each time depends on when the walk's tare was taken.
+    for ours, theirs in zip(own[:-1], lin[:-1], strict=True):
         assert ours["applied_n"] == theirs["applied_n"]
-        assert np.linalg.norm(ours["rmse_n"]) < np.linalg.norm(theirs["rmse_n"])
-    # in the band of 5 N, a press at one place, Lin's scales happen to be near
+        assert np.linalg.norm(ours["rmse_n"]) < np.linalg.norm(theirs["rmse_n"]) / 4
+    assert np.linalg.norm(own[-1]["rmse_n"]) < own[-1]["from_n"] / 4
     frames = np.array([[band["frames"]] for band in own])
     whole_n = [np.sqrt((frames * np.square([band["rmse_n"] for band in bands])).sum()) for bands in (own, lin)]
     assert whole_n[0] < whole_n[1] / 2
