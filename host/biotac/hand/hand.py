@@ -274,11 +274,12 @@ class Hand(Commands, Subscriptions):
         Waits for a round later than ``after``, or without it for one that is complete after this call; returns the
         newest, and says how many were passed over. A loop that gives its last round each time gets every event once,
         whatever it computes meanwhile. A finger that sends heartbeats (``rest=False``) has no frame. One thread at a
-        time may call this. Raises TimeoutError when no round comes in time, DeviceLostError when the board is lost for
-        good.
+        time may call this. Adds events to what is streamed. Raises TimeoutError when no round comes in time, also while
+        a board is away that ``reconnect`` looks for; DeviceLostError when it is lost for good.
         """
         self._reading.stop_buffering()
         if self._rounds is None:
+            self._stream.imply(wire.Event)
             self._rounds = Rounds(self._reader, self._latest)
         self._go()
         return self._rounds.wait(after, timeout_s)

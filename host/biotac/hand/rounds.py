@@ -56,7 +56,8 @@ class Rounds(Consumer):
         self._events: list[tuple[int, Event]] = []
         self._expected: set[int] = set()  # fingers of the round before: with them a round is complete
         self._news = threading.Condition()
-        self._given_us = -1
+        self._given_us = -1  # the latest round that was given
+        self._after_us = -1  # a later one is waited for
         self._is_new = True
         reader.add(self)
 
@@ -65,7 +66,7 @@ class Rounds(Consumer):
     def put(self, batch: Batch) -> None:
         with self._news:
             if any(type(m) is Gap and m.reason == "rebooted" for m in batch.messages):  # its clock began anew
-                self._rows, self._events, self._given_us = {}, [], -1
+                self._rows, self._events, self._given_us, self._after_us = {}, [], -1, -1
             for row, (t_us, finger) in enumerate(zip(batch.t_us.tolist(), batch.wire["finger"].tolist(), strict=True)):
                 self._rows.setdefault(t_us, {})[finger] = batch, row
             for old in sorted(self._rows)[:-2]:  # a program that is behind gets the newest
@@ -82,15 +83,18 @@ class Rounds(Consumer):
 
     def wait(self, after: Round | None, timeout_s: float) -> Round:
         """The newest complete round after ``after``, or after this call. Raises TimeoutError when none comes."""
-        # All that the first call finds has come since it was made.
-        before_us = -1 if self._is_new else max(self._rows, default=-1)
-        after_us, self._is_new, reader = before_us if after is None else after.t_us, False, self._reader
+        reader = self._reader
 
         def is_there() -> bool:
             gone = reader.failure is not None or reader.closing.is_set()
-            return gone or self._complete_us() > after_us
+            return gone or self._complete_us() > self._after_us
 
         with self._news:
+            # All that the first call finds has come since it was made. What was given before the board restarted is
+            # later by its old clock than anything that was given since.
+            before_us = -1 if self._is_new else max(self._rows, default=-1)
+            self._after_us = before_us if after is None else min(after.t_us, self._given_us)
+            self._is_new = False
             came = self._news.wait_for(is_there, timeout_s)
         if reader.closing.is_set():
             reader.raise_closed()

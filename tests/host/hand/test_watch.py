@@ -337,6 +337,30 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
     assert live.hand.stats.disordered == 0  # numbers that begin anew are no step back
 
 
+@pytest.mark.parametrize("waiting", [False, True])
+def test_the_next_round_after_a_reboot_comes_at_once(world, quick, waiting: bool) -> None:
+    """Whatever the clock said before, and whether or not a round was awaited meanwhile."""
+    live = world.opened(plugged := world.plug(boot_id=1), reconnect=True)
+    gaps = gaps_of(live.hand)
+    plugged.firmware.after[wire.Start] = frame(1000) + frame(1001)
+    last = live.hand.next_round(timeout_s=20)
+    plugged.firmware.wait_for_looks()
+    plugged.firmware.facts["boot_id"], plugged.firmware.streams = 2, 0
+    plugged.firmware.t_us = 0
+    plugged.firmware.after[wire.Start] = frame(1)
+    if not waiting:
+        until(gaps)
+    now = live.hand.next_round(last, timeout_s=20)
+    assert (now.seq, now.t_us, now.missed) == (1, 10_000, 0)
+
+
+def test_rounds_have_events_without_being_asked_for_them(world) -> None:
+    live = world.opened(plugged := world.plug(boot_id=1))
+    plugged.firmware.after[wire.Start] = frame(1) + frame(2)
+    live.hand.next_round(timeout_s=20)
+    assert plugged.firmware.of(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
+
+
 def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
     live = world.opened(plugged := world.plug(boot_id=1))
     live.hand.stream()
