@@ -34,7 +34,7 @@ enum bt_error {
     BT_ERROR_NO_SUCH_FINGER = 5, // the finger index is not 0 to 4, or no sensor answers there
     BT_ERROR_BUSY = 6, // not possible while streaming: send STOP first
     BT_ERROR_NOT_STILL = 7, // the signals are moving too much to tare: release the finger and try again
-    BT_ERROR_RAILED = 8, // more than two electrodes are railed or missing: check the sensor
+    BT_ERROR_RAILED = 8, // more than two electrodes are out (railed, missing or condemned): check the sensor
     BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
     BT_ERROR_NOT_STORED = 10, // not written to flash; what was stored before is intact
     BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
@@ -48,7 +48,7 @@ enum bt_tare_state {
     BT_TARE_STATE_INIT = 0, // no tare yet: waiting for still signals
     BT_TARE_STATE_REST = 1, // tared and untouched; the tare follows slow drift
     BT_TARE_STATE_CONTACT = 2, // touched; the tare follows only temperature and drift common to all electrodes
-    BT_TARE_STATE_FAULT = 3, // more than two electrodes railed or missing; the tare is frozen, and no new one is taken
+    BT_TARE_STATE_FAULT = 3, // more than two electrodes out; the tare is frozen, and no new one is taken
     BT_TARE_STATE_DOUBT = 4, // still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
 };
 
@@ -161,7 +161,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
 #define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
-#define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are railed or missing: do not trust the results
+#define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are out (railed, missing or condemned): do not trust the results
 #define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
 #define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion if the map has them, come from the finger's wrench map
@@ -757,7 +757,7 @@ typedef struct {
 void bt_msg_set_setting_pack(const bt_msg_set_setting *msg, uint8_t out[BT_SET_SETTING_BYTES]);
 void bt_msg_set_setting_unpack(bt_msg_set_setting *msg, const uint8_t in[BT_SET_SETTING_BYTES]);
 
-// Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed at any time.
+// Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed while the board streams, but not to the other port's host (LINK_BUSY).
 #define BT_REBOOT_BOOTLOADER_ID 0x8D
 #define BT_REBOOT_BOOTLOADER_BYTES 5
 typedef struct {

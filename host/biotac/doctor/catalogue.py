@@ -268,7 +268,7 @@ CATALOGUE: dict[str, Entry] = {
     "bus_margin": error(
         "The sensors' words come damaged at bus rates hardly above the usual one: warmth, another cable or a weaker "
         "supply will spoil them at the usual one, too.",
-        "Shorten the leads, put a ground beside SCK, or 33 to 100 Ohm in series with SCK and MOSI at the board.",
+        "Shorten the leads, put a ground beside SCK, or 33 to 68 Ohm in series with SCK and MOSI at the board.",
     ),
     "not_pressed": warning(
         "Nobody pressed the finger when asked to, so nothing is known of its static pressure.",

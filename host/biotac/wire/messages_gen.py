@@ -39,7 +39,7 @@ class Error(IntEnum):
     NO_SUCH_FINGER = 5  # the finger index is not 0 to 4, or no sensor answers there
     BUSY = 6  # not possible while streaming: send STOP first
     NOT_STILL = 7  # the signals are moving too much to tare: release the finger and try again
-    RAILED = 8  # more than two electrodes are railed or missing: check the sensor
+    RAILED = 8  # more than two electrodes are out (railed, missing or condemned): check the sensor
     NOT_HERE = 9  # this kind of board cannot do that
     NOT_STORED = 10  # not written to flash; what was stored before is intact
     OTHER_SENSOR = 11  # made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
@@ -54,7 +54,7 @@ class TareState(IntEnum):
     INIT = 0  # no tare yet: waiting for still signals
     REST = 1  # tared and untouched; the tare follows slow drift
     CONTACT = 2  # touched; the tare follows only temperature and drift common to all electrodes
-    FAULT = 3  # more than two electrodes railed or missing; the tare is frozen, and no new one is taken
+    FAULT = 3  # more than two electrodes out; the tare is frozen, and no new one is taken
     DOUBT = 4  # still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
 
 
@@ -178,7 +178,7 @@ class FrameFlags(NamedFlag):
     SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
     BASE_OLD = 1 << 13  # in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes
     TARE_CHANGED = 1 << 14  # first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
-    FAULT = 1 << 15  # more than two electrodes are railed or missing: do not trust the results
+    FAULT = 1 << 15  # more than two electrodes are out (railed, missing or condemned): do not trust the results
     TEMP = 1 << 16  # the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion if the map has them, come from the finger's wrench map
@@ -245,7 +245,7 @@ ERROR_DOC: dict[int, str] = {
     5: "the finger index is not 0 to 4, or no sensor answers there",
     6: "not possible while streaming: send STOP first",
     7: "the signals are moving too much to tare: release the finger and try again",
-    8: "more than two electrodes are railed or missing: check the sensor",
+    8: "more than two electrodes are out (railed, missing or condemned): check the sensor",
     9: "this kind of board cannot do that",
     10: "not written to flash; what was stored before is intact",
     11: "made for a sensor with another serial number: plug that sensor in, or send no serial number to force it",
@@ -259,7 +259,7 @@ TARE_STATE_DOC: dict[int, str] = {
     0: "no tare yet: waiting for still signals",
     1: "tared and untouched; the tare follows slow drift",
     2: "touched; the tare follows only temperature and drift common to all electrodes",
-    3: "more than two electrodes railed or missing; the tare is frozen, and no new one is taken",
+    3: "more than two electrodes out; the tare is frozen, and no new one is taken",
     4: "still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected",
 }
 
@@ -373,7 +373,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4096: "more than half of the signal energy is bulge: the PoC is probably biased",
     8192: "in contact for over 60 s, or all electrodes have moved alike by more than drift does: the tare has followed only temperature and drift common to all electrodes",
     16384: "first frame with a new tare, or after HOLD or RELEASE (see the TARE message)",
-    32768: "more than two electrodes are railed or missing: do not trust the results",
+    32768: "more than two electrodes are out (railed, missing or condemned): do not trust the results",
     65536: "the temperature has changed since the contact began, by so much that the force may be off by 0.12 N with the finger's gains, or by a degree: the tare is uncertain",
     131072: "some quantity is not subscribed to, and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion if the map has them, come from the finger's wrench map",
@@ -1864,7 +1864,7 @@ class SetSetting:
 
 @dataclass(frozen=True, slots=True)
 class RebootBootloader:
-    """Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed at any time."""
+    """Restart the board, as a reset would: it replies, leaves USB, and comes back as its boot loader's drive or as itself. Allowed while the board streams, but not to the other port's host (LINK_BUSY)."""
 
     req_id: int
     magic: int

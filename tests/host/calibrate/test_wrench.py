@@ -440,7 +440,7 @@ def test_calibrate_writes_report_picture_and_map(
 ) -> None:
     _, facts, out = calibrated
     assert sorted(Path(p).name for p in facts["written"]) == ["finger.md", "finger.png", "finger.wrench.json"]
-    assert facts["verdict"].startswith("usable: state " + "/".join(f"{n:.2f}" for n in facts["rmse_n"]))
+    assert facts["verdict"].startswith("usable: state an error of " + "/".join(f"{n:.2f}" for n in facts["rmse_n"]))
     page = (out / "finger.md").read_text(encoding="utf-8")
     for number in [*facts["rmse_n"], *facts["drift_rmse_n"][0], facts["worst_region"]["rmse_n"]]:
         assert f"{number:.3f} N" in page

@@ -276,7 +276,7 @@ def _verdict(rmse_n: list[float | None], default_n: list[float]) -> str:
     own, default = ("/".join("-" if v is None else f"{v:.2f}" for v in axes) for axes in (rmse_n, default_n))
     against = f"{own} N RMS in x/y/z, held out, against {default} N without a calibration on the same rows"
     if math.hypot(*(math.inf if v is None else v for v in rmse_n)) < math.hypot(*default_n):
-        return f"usable: state {against}"
+        return f"usable: state an error of {against}"
     return f"not worth using: {against}; load it in more places and directions, or leave the finger as it is"
 
 

@@ -1,4 +1,4 @@
-"""What the default map makes of 4 N on each electrode of five simulated fingers, as a Markdown table."""
+"""What the default map makes of loads on each electrode of five simulated fingers, as a Markdown table."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ REGIONS = {
     "the tip: E7 to E10": (7, 8, 9, 10),
     "the sides: E1 to E6, E11 to E16": (1, 2, 3, 4, 5, 6, 11, 12, 13, 14, 15, 16),
 }
-FORCE_N, FINGERS = 4.0, range(1, 6)
+LOADS_N, FINGERS = (1.0, 2.0, 4.0, 8.0), range(1, 6)
 
-felt = np.full((len(FINGERS), 20), np.nan)  # as a share of what was applied, by finger and electrode
+felt = np.full((len(LOADS_N), len(FINGERS), 20), np.nan)  # over what was applied, by load, finger and electrode
 outside = np.zeros_like(felt)
 for row, seed in enumerate(FINGERS):
     with world({"index": SimFinger(seed)}) as w:
         w.run(3.0)
         for electrode in range(1, 20):
-            for share in np.linspace(0.05, 1.0, 20):
-                w.step(index=Touch(share * FORCE_N, at=f"E{electrode}"))
-            for _ in range(15):
-                now = w.step(index=Touch(FORCE_N, at=f"E{electrode}"))
-            frame = now["index"].frame
-            felt[row, electrode] = np.linalg.norm(frame.force_n) / FORCE_N
-            outside[row, electrode] = biotac.FrameFlags.OUTSIDE in frame.flags
+            press_n = 0.0
+            for load, force_n in enumerate(LOADS_N):  # from one to the next at 20 N/s
+                for press_n in np.arange(press_n + 0.2, force_n + 0.01, 0.2):
+                    w.step(index=Touch(press_n, at=f"E{electrode}"))
+                now = w.run(0.15, index=Touch(press_n, at=f"E{electrode}"))
+                frame = now["index"].frame
+                felt[load, row, electrode] = np.linalg.norm(frame.force_n) / force_n
+                outside[load, row, electrode] = biotac.FrameFlags.OUTSIDE in frame.flags
             w.run(1.5)
 
-print("| 4 N on | felt, over applied: least | most | flagged `OUTSIDE` |\n| --- | --- | --- | --- |")
+print(f"| felt, over applied | {' | '.join(f'{n:g} N' for n in LOADS_N)} | flagged `OUTSIDE` |")
+print(f"|{' --- |' * (len(LOADS_N) + 2)}")
 for name, electrodes in REGIONS.items():
-    ratios = felt[:, electrodes]
-    print(f"| {name} | {ratios.min():.1f} | {ratios.max():.1f} | {100 * outside[:, electrodes].mean():.0f} % |")
+    spans = [f"{ratios.min():.1f} to {ratios.max():.1f}" for ratios in felt[:, :, electrodes]]
+    print(f"| {name} | {' | '.join(spans)} | {100 * outside[:, :, electrodes].mean():.0f} % |")
