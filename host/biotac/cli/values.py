@@ -131,8 +131,8 @@ def add_port(parser: argparse.ArgumentParser, more: str = "") -> None:
         "port",
         metavar="PORT",
         nargs="?",
-        help="device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE, emu:pico?source=SOURCE, replay:REC or "
-        f"bag:FILE (default: the only board on USB){more}",
+        help="device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE, emu:pico?source=SOURCE, replay:REC, "
+        f"bag:FILE, csv:FILE or foxglove://HOST:PORT/TOPIC (default: the only board on USB){more}",
     )
 
 

@@ -131,6 +131,16 @@ def test_stream_prints_events_between_the_frames(capsys) -> None:
     assert both and seen[:both] == expected[:both]
 
 
+def test_stream_prints_a_recordings_events_only_when_asked(tmp_path, capsys) -> None:
+    with biotac.open("sim:press.toml?seconds=4") as hand, hand.record(tmp_path / "a.mcap"):
+        hand.stream("results", "events")
+        hand.read(seconds=3.5)
+    for asked in (["--events"], []):
+        assert main(["stream", f"replay:{tmp_path}/a.mcap?pace=fast", "--json", *asked]) == 0
+        rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+        assert any("event" in row for row in rows) == bool(asked) and any("force_n" in row for row in rows)
+
+
 def test_stream_thins_out_for_people(capsys) -> None:
     assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "1", "--rate", "5"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 5

@@ -40,13 +40,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
     parser.add_argument("--sensor-port", metavar="SENSOR", help="port of a sensor board that is wired to PORT")
     parser.add_argument(
-        "--report", metavar="FILE", help="also write everything to one JSON file, to attach to a bug report"
+        "--report",
+        metavar="FILE",
+        help="also write everything to one JSON file, to attach to a bug report; with --bringup its report instead",
     )
     parser.add_argument(
         "--bringup",
         action="store_true",
         help="measure a new board, its sensors and this computer's USB for a minute, restart it ten times, and write "
-        "the report to FILE (default bringup.md), with a picture beside it",
+        "a report (--report FILE, default bringup.md), with a picture beside it",
     )
     parser.add_argument(
         "--udev-rule",

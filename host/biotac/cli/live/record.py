@@ -20,7 +20,10 @@ EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30 --fact subject=S03
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
+        "port",
+        metavar="PORT",
+        help="device path, spidev:BUS.DEVICE, sim:SOURCE, emu:pico?source=SOURCE, bag:FILE, "
+        "csv:FILE or foxglove://HOST:PORT/TOPIC",
     )
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
     parser.add_argument("--seconds", type=values.seconds, help="device time to record at least (default: until Ctrl-C)")

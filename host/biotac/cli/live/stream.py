@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         for warning in hand.warnings:
             note(warning.text)
         hand.stream("results", *(["events"] if args.events else []), rest=not args.touched)
-        show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
+        show(hand, rate=args.rate, seconds=args.seconds, events=args.events, as_json=args.json)
         tell_lost(hand)
     return 0
 
@@ -67,14 +67,14 @@ def tell_lost(hand: biotac.Hand) -> None:
         note(f"{hand.stats.frames_lost} frame(s) lost; close other programs, or use a faster computer")
 
 
-def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_json: bool = False) -> None:
-    """Print ``rate`` frames per second and finger."""
+def show(hand: biotac.Hand, *, rate: float, seconds: float | None, events: bool, as_json: bool) -> None:
+    """Print ``rate`` frames per second and finger, and ``events``, which a recording may have unasked."""
     due_us: dict[int, int] = {}
     step_us = int(1e6 / rate) if rate > 0 else 0
     end_us: int | None = None
     for batch in hand.batches():
         for event in batch.messages:
-            if isinstance(event, Event):
+            if events and isinstance(event, Event):
                 print(json.dumps(event_as_json(event)) if as_json else event_as_line(event))
         for frame in map(Frame.from_row, batch.frames):
             if end_us is None and seconds is not None:

@@ -20,11 +20,10 @@ for row, seed in enumerate(FINGERS):
     with world({"index": SimFinger(seed)}) as w:
         w.run(3.0)
         for electrode in range(1, 20):
-            press_n = 0.0
-            for load, force_n in enumerate(LOADS_N):  # from one to the next at 20 N/s
-                for press_n in np.arange(press_n + 0.2, force_n + 0.01, 0.2):
+            for load, (before_n, force_n) in enumerate(zip((0.0, *LOADS_N), LOADS_N, strict=False)):
+                for press_n in np.arange(before_n, force_n, 0.2):  # 20 N/s
                     w.step(index=Touch(press_n, at=f"E{electrode}"))
-                now = w.run(0.15, index=Touch(press_n, at=f"E{electrode}"))
+                now = w.run(0.15, index=Touch(force_n, at=f"E{electrode}"))
                 frame = now["index"].frame
                 felt[load, row, electrode] = np.linalg.norm(frame.force_n) / force_n
                 outside[load, row, electrode] = biotac.FrameFlags.OUTSIDE in frame.flags
