@@ -51,7 +51,7 @@ uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count)
     uint32_t bit = 1u << lane;
     if (trigger->unknown & bit) {
         trigger->unknown &= ~bit;
-        trigger->met |= bit;
+        trigger->first_words |= bit;
         trigger->rest.lane[lane] = count;
         return count;
     }

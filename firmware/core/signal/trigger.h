@@ -32,13 +32,13 @@ typedef union {
 #define BT_TRIGGER_UNREAD 8191
 
 typedef struct {
-    bt_lanes smooth;  // the filter's value
-    bt_lanes rest;    // what it is compared with
-    int32_t room;     // energy left until the trigger fires; negative once it has
-    int32_t limit;    // `room` at the start of the round
-    uint32_t unknown; // bit mask of lanes without a good word so far
-    uint32_t met;     // lanes whose first good word has come, until the owner takes note of it
-    uint32_t far;     // lanes whose word of this round was far off, held back or not
+    bt_lanes smooth;      // the filter's value
+    bt_lanes rest;        // what it is compared with
+    int32_t room;         // energy left until the trigger fires; negative once it has
+    int32_t limit;        // `room` at the start of the round
+    uint32_t unknown;     // bit mask of lanes without a good word so far
+    uint32_t first_words; // lanes whose first good word has come, until the owner takes note of it
+    uint32_t far;         // lanes whose word of this round was far off, held back or not
     uint32_t far_before;
     uint32_t up; // lanes whose word of this round jumped by more than BT_TRIGGER_JUMP from the filter's value
     uint32_t down;

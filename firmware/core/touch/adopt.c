@@ -26,7 +26,7 @@ void bt_adopt_aim(bt_tare *tare)
     bt_adopt_aim_pressure(tare);
 }
 
-void bt_adopt_tell(bt_tare *tare, uint8_t reason)
+void bt_adopt_report(bt_tare *tare, uint8_t reason)
 {
     tare->reason = reason;
     tare->changed = true;
@@ -38,14 +38,14 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     tare->base = *base;
     tare->state = state;
     tare->tared = true;
-    bt_adopt_tell(tare, reason);
+    bt_adopt_report(tare, reason);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         bt_adopt_electrode(tare, i);
     }
     bt_adopt_aim_pressure(tare);
     tare->hits = 0;
     tare->contact_rounds = 0;
-    tare->let_go = false;
+    tare->released = false;
     bt_release_begin(&tare->release);
     bt_thermal_begin(&tare->thermal);
     bt_watch_begin(&tare->watch);
@@ -95,7 +95,7 @@ void bt_adopt_shift(bt_tare *tare)
 
 void bt_adopt_doubt(bt_tare *tare)
 {
-    bt_watch_take(&tare->watch, &tare->sweep, tare->trigger.unknown);
+    bt_watch_store(&tare->watch, &tare->sweep, tare->trigger.unknown);
     tare->state = BT_TARE_STATE_DOUBT;
     tare->hits = 0;
     bt_adopt_aim(tare);
@@ -110,7 +110,7 @@ void bt_adopt_contact(bt_tare *tare)
 
 // A channel whose first word comes only now begins at rest, or it would look like a contact. Not if the host
 // has set its tare.
-static void take_first_word(bt_tare *tare, unsigned lane)
+static void adopt_first_word(bt_tare *tare, unsigned lane)
 {
     uint32_t first_q16 = (uint32_t)tare->trigger.smooth.lane[lane] << 16;
     bt_sweep_fill(&tare->sweep, lane, tare->trigger.smooth.lane[lane]);
@@ -131,17 +131,17 @@ static void take_first_word(bt_tare *tare, unsigned lane)
 
 BT_NOINLINE void bt_adopt_first_words(bt_tare *tare)
 {
-    for (unsigned lane = 0; tare->trigger.met >> lane != 0; lane++) {
-        if (tare->trigger.met >> lane & 1) {
-            take_first_word(tare, lane);
+    for (unsigned lane = 0; tare->trigger.first_words >> lane != 0; lane++) {
+        if (tare->trigger.first_words >> lane & 1) {
+            adopt_first_word(tare, lane);
         }
     }
-    tare->trigger.met = 0;
+    tare->trigger.first_words = 0;
 }
 
 void bt_adopt_none(bt_tare *tare)
 {
-    bt_adopt_tell(tare, BT_TARE_REASON_INVERTED);
+    bt_adopt_report(tare, BT_TARE_REASON_INVERTED);
     tare->state = BT_TARE_STATE_INIT;
     tare->tared = false;
     tare->inverted_rounds = 0;

@@ -32,7 +32,7 @@ void bt_adopt_aim(bt_tare *tare);
 void bt_adopt_aim_pressure(bt_tare *tare);
 
 // Report that the host or the machine changed something, with the reason.
-void bt_adopt_tell(bt_tare *tare, uint8_t reason);
+void bt_adopt_report(bt_tare *tare, uint8_t reason);
 
 void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t reason);
 

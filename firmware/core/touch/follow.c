@@ -55,7 +55,7 @@ BT_NOINLINE void bt_follow_resume(bt_tare *tare)
 static void serve_touched(bt_tare *tare, unsigned first, unsigned end)
 {
     bt_watch *watch = &tare->watch;
-    const bool taken = watch->wait_sweeps == 0 || watch->early, watched = bt_watch_sees(watch, &tare->sweep);
+    const bool based = watch->wait_sweeps == 0 || watch->early, watched = bt_watch_sees(watch, &tare->sweep);
     for (unsigned i = first; i < end; i++) {
         uint32_t mean_q3 = bt_sweep_close(&tare->sweep, i, BT_STILL_SPAN_Q3);
         if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
@@ -65,7 +65,7 @@ static void serve_touched(bt_tare *tare, unsigned first, unsigned end)
         int32_t drift_q16 = tare->drift_q16;
         tare->energy_count2 += square(away_q4);
         tare->sum_q4 += away_q4;
-        if (taken) {
+        if (based) {
             uint32_t size_q3 = bt_abs32(bt_watch_side(watch, mean_q3 << 13, watch->base.electrode_q16[i]));
             watch->farthest_q3 = size_q3 > watch->farthest_q3 ? size_q3 : watch->farthest_q3;
         }

@@ -76,7 +76,7 @@ static void judge_release(bt_tare *tare)
     // still hold what it was tared with; and if that goes, pressure will be far below, and the tare is lost.
     bool back = sweep.witness && tare->release.pdc_peak >= BT_PDC_PRESSED
                 && (int32_t)bt_abs32(sweep.above) <= bt_pdc_missing_max(tare->release.pdc_peak);
-    bool confirmed = verdict != BT_RELEASE_SHIFT && (back || tare->let_go);
+    bool confirmed = verdict != BT_RELEASE_SHIFT && (back || tare->released);
     bool light = verdict == BT_RELEASE_SHIFT && sweep.above > BT_QUIET_PDC; // may be, of 0.1 or 0.2 N
     tare->unsure = tare->unsure && !confirmed;
     tare->likely = (tare->likely && !confirmed) || light;
@@ -84,7 +84,7 @@ static void judge_release(bt_tare *tare)
         bt_adopt_shift(tare);
     } else if (verdict == BT_RELEASE_CLEAN) {
         bt_adopt_after_press(tare, BT_TARE_REASON_RELEASE);
-    } else if (verdict == BT_RELEASE_RESIDUE || tare->let_go) {
+    } else if (verdict == BT_RELEASE_RESIDUE || tare->released) {
         bt_adopt_after_press(tare, BT_TARE_REASON_RESIDUE);
     } else if (tare->state == BT_TARE_STATE_CONTACT) {
         bt_adopt_doubt(tare);
@@ -148,7 +148,7 @@ static void judge_drift(bt_tare *tare)
     bool creeps = touched && bt_watch_creeps(watch);
     uint32_t away_q16 = bt_abs32(watch->shared_q16);
     uint32_t sure_q16 = ALIKE_Q16 + (bt_abs32(tare->thermal.step_q16) >> 14 << 17);
-    bool alike = (valid && watch->one_way && away_q16 > DRIFTED_Q16) || (watch->alike && away_q16 > sure_q16);
+    bool alike = (valid && watch->aligned && away_q16 > DRIFTED_Q16) || (watch->alike && away_q16 > sure_q16);
     if (alike) {
         tare->drifted_sweeps = DRIFTED_SWEEPS;
     } else if (!touched && tare->drifted_sweeps > 0) {

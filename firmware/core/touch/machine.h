@@ -30,7 +30,7 @@ typedef struct {
     bool changed;           // by the last round, beyond drift tracking, or by the host
     bool tared;             // there is a tare
     bool held;              // the host says so: no new tare is taken
-    bool let_go;            // the host says so: what is in doubt is residue
+    bool released;          // the host says so: what is in doubt is residue
     uint8_t drifted_sweeps; // of rest, until all electrodes have long not moved alike by more than drift does
     bool unsure;            // no release has confirmed the tare: START's, or one that the reading contradicts
     bool likely;            // nor this one, of a host or a SHIFT; what the finger read does not contradict it

@@ -31,15 +31,15 @@ static bool moved_for(const bt_release *release, uint32_t count2_per_pdc2)
 
 // Counts of a press that cooling may have taken. It takes them slowly: what falls faster to a quarter was let
 // go, and only what cools from then on may take more.
-static int32_t taken_by_cold(bt_release *release, const bt_release_sweep *sweep)
+static int32_t cooling_loss(bt_release *release, const bt_release_sweep *sweep)
 {
     int32_t fell = release->slow_above - sweep->above;
     release->slow_above -= fell / SLOW_SWEEPS;
     if (fell > BT_MISSING_PDC && sweep->above < release->pdc_peak / BT_FALLEN_SHARE) {
         release->cold_then = sweep->cold;
     }
-    int32_t taken = sweep->cold - release->cold_then;
-    return taken > 0 && release->pdc_peak >= BT_PDC_PRESSED ? taken : 0;
+    int32_t loss = sweep->cold - release->cold_then;
+    return loss > 0 && release->pdc_peak >= BT_PDC_PRESSED ? loss : 0;
 }
 
 // Pressure above rest is a touch, whatever the finger; pressure at rest means no touch only if a touch would
@@ -51,8 +51,8 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     left = (left > BT_CALM_COUNT2 ? left : BT_CALM_COUNT2) + forgiven;
     int32_t rest = bt_clamp(release->pdc_peak / BT_REST_PDC_SHARE, BT_QUIET_PDC, BT_REST_PDC_MAX);
     bool back = sweep->witness ? sweep->uncooled < rest : release->quiet_sweeps >= BT_QUIET_SWEEPS;
-    bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < BT_EVEN_COUNT2 + forgiven;
-    return back && gone && sweep->still_sweeps >= BT_ENDED_SWEEPS;
+    bool calm = sweep->energy_count2 < left || sweep->uneven_count2 < BT_EVEN_COUNT2 + forgiven;
+    return back && calm && sweep->still_sweeps >= BT_ENDED_SWEEPS;
 }
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
@@ -109,7 +109,7 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     uint32_t energy = sweep->energy_count2, uneven = sweep->uneven_count2;
     release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
     release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
-    sweep->uncooled = sweep->pressure ? sweep->above + taken_by_cold(release, sweep) : 0;
+    sweep->uncooled = sweep->pressure ? sweep->above + cooling_loss(release, sweep) : 0;
     bool unmoved = release->uneven_peak >= BT_FIRM_COUNT2 && !moved_for(release, BT_FLAT_SHARE);
     if (sweep->pressure && pdc_moved(release) >= BT_PDC_PRESSED && moved_for(release, BT_MOVES_SHARE)) {
         *witness = (bt_witness){.moves = true};

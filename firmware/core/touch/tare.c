@@ -32,7 +32,7 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     if (++tare->hits < BT_CONTACT_ROUNDS) {
         return;
     }
-    tare->let_go = false;
+    tare->released = false;
     if (tare->state == BT_TARE_STATE_DOUBT) {
         bt_watch_pause(&tare->watch);
         bt_adopt_contact(tare); // against the tare that was in doubt
@@ -111,7 +111,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         fault(tare);
         return;
     }
-    if (tare->trigger.met != 0) {
+    if (tare->trigger.first_words != 0) {
         bt_adopt_first_words(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
@@ -214,7 +214,7 @@ void bt_tare_restore(bt_tare *tare, const bt_tare_kept *kept)
 
 void bt_tare_hold(bt_tare *tare)
 {
-    tare->let_go = false;
+    tare->released = false;
     if (tare->held) {
         return;
     }
@@ -222,29 +222,29 @@ void bt_tare_hold(bt_tare *tare)
     if (tare->state == BT_TARE_STATE_DOUBT) {
         bt_adopt_contact(tare);
     }
-    bt_adopt_tell(tare, BT_TARE_REASON_HOST_HOLD);
+    bt_adopt_report(tare, BT_TARE_REASON_HOST_HOLD);
 }
 
 // A whole sweep must judge what is no longer held: a verdict in the coming round would replace the reason
 // before it is sent, and the host's command would leave no trace.
-static void let_judge(bt_tare *tare, uint8_t reason)
+static void end_hold(bt_tare *tare, uint8_t reason)
 {
     tare->held = false;
     tare->partial = true;
-    bt_adopt_tell(tare, reason);
+    bt_adopt_report(tare, reason);
 }
 
 void bt_tare_release(bt_tare *tare)
 {
-    tare->let_go = true;
+    tare->released = true;
     if (tare->unsure && tare->state == BT_TARE_STATE_REST) {
         tare->unsure = false;
         tare->likely = true;
     }
-    let_judge(tare, BT_TARE_REASON_HOST_RELEASE);
+    end_hold(tare, BT_TARE_REASON_HOST_RELEASE);
 }
 
 void bt_tare_lapse(bt_tare *tare)
 {
-    let_judge(tare, BT_TARE_REASON_HOLD_LAPSED);
+    end_hold(tare, BT_TARE_REASON_HOLD_LAPSED);
 }

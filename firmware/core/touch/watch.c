@@ -8,7 +8,7 @@
 #define LEVEL_SWEEPS 32             // 2.6 s
 #define WAIT_SWEEPS  5              // until means are free of what came before
 #define EARLY_SWEEPS 3              // of these, left when most of them are
-#define ONE_WAY_Q2   26             // 13 electrodes one way and 6 the other: three sigmas of noise
+#define SIDE_MIN_Q2  26             // 13 electrodes one way and 6 the other: three sigmas of noise
 #define ALIKE_SIDE   17             // 18 electrodes one way and one the other
 #define ALIKE_TIMES  3              // their mean; a real press that moves all one way moves one by four
 #define CREEP_Q3     (5 * LEVEL_Q3) // at most in a silence: 13 s of skin creep at the limit of level
@@ -34,9 +34,9 @@ void bt_watch_pause(bt_watch *watch)
 {
     watch->wait_sweeps = WAIT_SWEEPS;
     watch->early = false;
-    watch->one_way = false;
+    watch->aligned = false;
     watch->follows = false;
-    watch->one_way_q2 = 0;
+    watch->side_avg_q2 = 0;
     watch->shared_q16 = 0;
 }
 
@@ -49,10 +49,10 @@ void bt_watch_begin(bt_watch *watch)
 
 int32_t bt_watch_drifts_q16(const bt_watch *watch)
 {
-    return watch->one_way ? bt_clamp(watch->shared_q16, -BT_SLEW_Q16, BT_SLEW_Q16) : 0;
+    return watch->aligned ? bt_clamp(watch->shared_q16, -BT_SLEW_Q16, BT_SLEW_Q16) : 0;
 }
 
-void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
+void bt_watch_store(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
 {
     watch->wait_sweeps = 0;
     watch->early = false;
@@ -70,7 +70,7 @@ void bt_watch_wait(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
 {
     uint8_t left = (uint8_t)(watch->wait_sweeps - (watch->wait_sweeps > 1));
     if (left == EARLY_SWEEPS && watch->base.electrode_q16[0] == BT_TARE_UNKNOWN) {
-        bt_watch_take(watch, sweep, unknown);
+        bt_watch_store(watch, sweep, unknown);
         watch->early = true;
     }
     watch->wait_sweeps = left;
@@ -91,7 +91,7 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
         return;
     }
     bool crept = farthest_q3 <= 2 * span_q3 && !watch->early;
-    bt_watch_take(watch, sweep, unknown);
+    bt_watch_store(watch, sweep, unknown);
     for (unsigned i = 0; i < BT_ELECTRODES && crept; i++) {
         watch->base.electrode_q16[i] = bt_baseline_moved(watch->base.electrode_q16[i], -sum_q3 * EACH_Q16);
     }
@@ -112,8 +112,8 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     } else if (watch->level_sweeps < UINT8_MAX) {
         watch->level_sweeps++;
     }
-    watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
-    watch->one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
+    watch->side_avg_q2 = (int16_t)(watch->side_avg_q2 + watch->side - bt_shift_down(watch->side_avg_q2, 2));
+    watch->aligned = watch->side_avg_q2 >= SIDE_MIN_Q2 || watch->side_avg_q2 <= -SIDE_MIN_Q2;
     watch->shared_q16 = watch->away_q3 * EACH_Q16;
     watch->alike = bt_abs32(watch->side) >= ALIKE_SIDE
                    && watch->farthest_q3 * BT_ELECTRODES <= ALIKE_TIMES * bt_abs32(watch->away_q3);
@@ -158,7 +158,7 @@ int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
         sum_q3 += away_q3[i];
         side += (away_q3[i] > 0) - (away_q3[i] < 0);
     }
-    bool even = 4 * side >= ONE_WAY_Q2 || 4 * side <= -ONE_WAY_Q2;
+    bool even = 4 * side >= SIDE_MIN_Q2 || 4 * side <= -SIDE_MIN_Q2;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         int32_t apart_q3 = away_q3[i] - sum_q3 / BT_ELECTRODES;
         bool known = watch->base.electrode_q16[i] != BT_TARE_UNKNOWN;

@@ -25,11 +25,11 @@ typedef struct {
     bool slow;            // it had stayed for long before it moved
     uint8_t creeps;       // sweeps since the load changed; saturates
     int8_t side;          // electrodes with a mean of this sweep above the watched baseline, less those below
-    int16_t one_way_q2;   // the same through a low-pass of four sweeps
+    int16_t side_avg_q2;  // the same through a low-pass of four sweeps
     int32_t away_q3;      // sum of the distances of this sweep's means from the watched baseline
     uint32_t farthest_q3; // the largest of these in a touch
     int32_t shared_q16;   // their mean in the last whole sweep
-    bool one_way;         // in the last whole sweep nearly all had moved one way
+    bool aligned;         // in the last whole sweep nearly all had moved one way
     bool alike;           // in the last whole sweep all but one had, and none by much more than the mean
     bool follows;         // each electrode follows drift at its own pace
 } bt_watch;
@@ -41,7 +41,7 @@ void bt_watch_begin(bt_watch *watch);
 void bt_watch_pause(bt_watch *watch);
 
 // The signals have come to rest: their means are the baseline. Lanes in `unknown` have none.
-void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
+void bt_watch_store(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
 
 // After a sweep in contact. Soon after pressure has moved, the means are an early baseline, whether they have
 // come to rest or not: what moves them all alike from there, while pressure stays, is drift.
