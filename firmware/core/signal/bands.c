@@ -21,8 +21,8 @@ static uint32_t smooth(uint16_t *line, unsigned apart, unsigned n, uint16_t *out
         const uint32_t middle = tap[2 * apart];
         const uint32_t sides = (uint32_t)tap[apart] + tap[3 * apart];
         const uint32_t left = (tap[0] + 4 * sides + 6 * middle + tap[4 * apart] + 8) >> 4;
-        const int32_t taken = (int32_t)(middle - left);
-        energy += (uint32_t)(taken * taken);
+        const int32_t removed = (int32_t)(middle - left);
+        energy += (uint32_t)(removed * removed);
         out[k] = (uint16_t)left;
     }
     for (unsigned k = 0; k < 4 * apart; k++) {
@@ -45,7 +45,7 @@ static void begin(bt_bands *bands, uint16_t sample)
     fill(bands->slow, sizeof bands->slow / sizeof *bands->slow, sample);
 }
 
-static uint8_t take(bt_bands *bands, const uint16_t pac[BT_PAC_PER_FRAME])
+static uint8_t load_samples(bt_bands *bands, const uint16_t pac[BT_PAC_PER_FRAME])
 {
     uint8_t good = 0;
     for (unsigned k = 0; k < BT_PAC_PER_FRAME; k++) {
@@ -65,7 +65,7 @@ static uint8_t take(bt_bands *bands, const uint16_t pac[BT_PAC_PER_FRAME])
 uint8_t bt_bands_round(bt_bands *bands, const uint16_t pac[BT_PAC_PER_FRAME], uint32_t energy_q4[BT_BANDS])
 {
     uint16_t left[BT_PAC_PER_FRAME];
-    const uint8_t good = take(bands, pac);
+    const uint8_t good = load_samples(bands, pac);
     energy_q4[BT_BANDS - 1] = smooth(bands->fast, 1, BT_PAC_PER_FRAME, left);
     uint16_t *line = bands->slow;
     for (unsigned k = 0; k < BT_BANDS_SLOW; k++) {

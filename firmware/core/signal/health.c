@@ -283,7 +283,7 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     case 3:
         bt_window_add(sum, smooth);
         leave_out(health, without);
-        health->moves = bt_moves_of(&health->mean, &health->anchor);
+        health->moves = bt_moves_between(&health->mean, &health->anchor);
         break;
     default:
         bt_window_add(sum, smooth);

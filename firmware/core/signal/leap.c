@@ -5,13 +5,13 @@
 
 #include <string.h>
 
-#define TDC_LEAP  64   // two degrees
-#define PDC_ALIKE 12   // another sensor's pressure is hundreds of counts away
-#define HEARD     48   // far above a quiet PAC's noise
-#define ALIKE     608  // in sum, 32 each
-#define FAR       1216 // in sum, with pressure's
-#define PRESSURE  4    // so often pressure counts
-#define SWINGS    16   // so many swings of PAC a blow's sum is less than
+#define TDC_LEAP   64   // two degrees
+#define PDC_ALIKE  12   // another sensor's pressure is hundreds of counts away
+#define PAC_ACTIVE 48   // far above a quiet PAC's noise
+#define ALIKE      608  // in sum, 32 each
+#define FAR        1216 // in sum, with pressure's
+#define PRESSURE   4    // so often pressure counts
+#define SWINGS     16   // so many swings of PAC a blow's sum is less than
 
 static bool pac_swings(const uint16_t *pac, uint32_t swing)
 {
@@ -26,9 +26,9 @@ static bool pac_swings(const uint16_t *pac, uint32_t swing)
     return most == least || (uint32_t)(most - least) >= swing; // constant: it has died, or is at its end
 }
 
-static bool swung(uint16_t one, uint16_t other)
+static bool swung(uint16_t first, uint16_t second)
 {
-    return bt_count_usable(one) && bt_count_usable(other) && bt_abs32(one - other) > HEARD;
+    return bt_count_usable(first) && bt_count_usable(second) && bt_abs32(first - second) > PAC_ACTIVE;
 }
 
 // Measure how far the words leapt that the filter holds back until the next round.
@@ -38,14 +38,14 @@ static void measure(bt_leap *leap, const bt_round *round, const bt_lanes *smooth
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         now.lane[i] = far >> i & 1 ? round->electrode[i] : now.lane[i];
     }
-    bt_moves moves = bt_moves_of(&now, smooth);
+    bt_moves moves = bt_moves_between(&now, smooth);
     uint32_t total = moves.total;
-    bool one_way = bt_abs32(moves.along) >= total - total / 8;
+    bool aligned = bt_abs32(moves.along) >= total - total / 8;
     bool pressed = far >> BT_LANE_PDC & 1;
-    leap->alike = total >= ALIKE && one_way && BT_ELECTRODES * moves.top < 2 * total && !pressed;
+    leap->alike = total >= ALIKE && aligned && BT_ELECTRODES * moves.top < 2 * total && !pressed;
     if (pressed) { // else skin that was stuck may have snapped back
         total += PRESSURE * bt_abs32(round->pdc - smooth->lane[BT_LANE_PDC]);
-        leap->swing = (uint16_t)(total >= FAR && leap->heard ? total / SWINGS : 0);
+        leap->swing = (uint16_t)(total >= FAR && leap->pac_active ? total / SWINGS : 0);
     }
 }
 
@@ -70,9 +70,9 @@ static bool tdc_leaps(bt_leap *leap, uint16_t tdc, uint16_t pdc)
 uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *trigger)
 {
     if (round->t_us - leap->t_us > BT_FRAME_MS * 1500u) {
-        bool heard = leap->heard;
+        bool pac_active = leap->pac_active;
         memset(leap, 0, sizeof *leap);
-        leap->heard = heard;
+        leap->pac_active = pac_active;
     }
     uint32_t stays = trigger->far & trigger->far_before;
     bool lasts = !bt_usable_without(stays & BT_ALL_ELECTRODES);
@@ -93,7 +93,7 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
     }
     memcpy(leap->pac, round->pac, sizeof leap->pac);
     leap->rounds = (uint8_t)(leap->rounds + (leap->rounds < BT_LEAP_ROUNDS));
-    leap->heard = leap->heard || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
+    leap->pac_active = leap->pac_active || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
     const uint16_t pdc = trigger->smooth.lane[BT_LANE_PDC];
     bool leaps = tdc_leaps(leap, round->tdc, pdc);
     leap->pending = leap->alike || leap->swing != 0 || (leap->off != 0 && (leapt || leap->pending));

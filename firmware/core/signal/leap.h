@@ -21,7 +21,7 @@ typedef struct {
     uint16_t pac[BT_PAC_PER_FRAME];
     uint16_t swing;  // below which PAC is too quiet for how far they leapt in it; 0: not too far
     bool alike;      // they leapt in it, all alike
-    bool heard;      // PAC has swung: it works
+    bool pac_active; // PAC has swung: it works
     uint16_t tdc;    // of the latest round in which it did not leap
     uint16_t pdc;    // static pressure with it
     uint8_t settled; // rounds in which it did not, less those without it; at most BT_LEAP_ROUNDS

@@ -32,7 +32,7 @@ void bt_mean_add(bt_lanes *mean_q4, const bt_lanes *sum_q2, unsigned first)
     }
 }
 
-bt_moves bt_moves_of(const bt_lanes *now, const bt_lanes *anchor)
+bt_moves bt_moves_between(const bt_lanes *now, const bt_lanes *anchor)
 {
     bt_moves sum = {0};
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {

@@ -24,6 +24,6 @@ typedef struct {
     uint32_t top;   // and the largest
 } bt_moves;
 
-bt_moves bt_moves_of(const bt_lanes *now, const bt_lanes *anchor);
+bt_moves bt_moves_between(const bt_lanes *now, const bt_lanes *anchor);
 
 #endif

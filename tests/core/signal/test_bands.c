@@ -54,8 +54,8 @@ static void smoothed(double *in, int n, int apart, int worth, double energy[ROUN
         for (int tap = 0; tap < 5; tap++) {
             out[k] += weight[tap] / 16 * before(in, k, tap * apart);
         }
-        double taken = before(in, k, 2 * apart) - out[k];
-        energy[k * worth / BT_PAC_PER_FRAME] += worth * taken * taken;
+        double removed = before(in, k, 2 * apart) - out[k];
+        energy[k * worth / BT_PAC_PER_FRAME] += worth * removed * removed;
     }
     memcpy(in, out, (size_t)n * sizeof *in);
 }

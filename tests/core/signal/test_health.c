@@ -36,7 +36,7 @@ static void end_round(void)
 
 // A round of a skin that is moved by `moved` counts in all, a third of it one electrode's, as pressure shows;
 // `wrong` is added to the words of `wrongs`.
-static void one_round(double moved, double wrong)
+static void run_round(double moved, double wrong)
 {
     bt_trigger_begin(&trigger, BT_TRIGGER_NEVER);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
@@ -53,7 +53,7 @@ static void one_round(double moved, double wrong)
 static void rounds(int n, double moved, double wrong)
 {
     for (int k = 0; k < n; k++) {
-        one_round(moved, wrong);
+        run_round(moved, wrong);
     }
 }
 
@@ -66,7 +66,7 @@ static void expect_out(uint32_t out, uint8_t fault)
 TEST(skin_that_is_pressed_is_never_condemned)
 {
     for (int k = 0; k < 20000; k++) {
-        one_round(k / 500 % 2 ? 400 : 400.0 * (k % 500) / 500, 0); // slowly on, and at once
+        run_round(k / 500 % 2 ? 400 : 400.0 * (k % 500) / 500, 0); // slowly on, and at once
         expect_out(0, BT_SENSOR_FAULT_NONE);
         assert_int_equal(health.sensor_fault, BT_SENSOR_FAULT_NONE);
     }
@@ -79,7 +79,7 @@ TEST(an_electrode_that_drifts_alone_is_condemned_unless_something_touches)
         rounds(200, 0, 0);
         touched = touches;
         for (int k = 0; k < 150; k++) {
-            one_round(0, -0.5 * k);
+            run_round(0, -0.5 * k);
         }
         assert_int_equal(health.alone, touches ? 1u << 4 : 0);
         expect_out(touches ? 0 : 1u << 4, touches ? BT_SENSOR_FAULT_NONE : BT_SENSOR_FAULT_ALONE);
@@ -113,13 +113,13 @@ TEST(what_jumps_to_and_fro_is_condemned_within_a_tenth_of_a_second)
     touched = true;
     rounds(200, 300, 0);
     for (int k = 0; k < 10; k++) {
-        one_round(300 + 20 * k, k % 2 ? 200 : -200); // in the middle of a squeeze
+        run_round(300 + 20 * k, k % 2 ? 200 : -200); // in the middle of a squeeze
     }
     expect_out(1u << 4, BT_SENSOR_FAULT_NOISY);
     rounds(40, 500, 0);
     wrongs = 1u << 7; // later another one, too
     for (int k = 0; k < 40; k++) {
-        one_round(500, k % 2 ? 200 : -200);
+        run_round(500, k % 2 ? 200 : -200);
     }
     expect_out(1u << 4 | 1u << 7, BT_SENSOR_FAULT_NOISY);
 }
@@ -128,7 +128,7 @@ TEST(skin_that_is_shaken_jumps_to_and_fro_as_pressure_does)
 {
     touched = true;
     for (int k = 0; k < 100; k++) {
-        one_round(k % 3 == 0 ? 300 : k % 3 == 1 ? 700 : -100, 0);
+        run_round(k % 3 == 0 ? 300 : k % 3 == 1 ? 700 : -100, 0);
         expect_out(0, BT_SENSOR_FAULT_NONE); // only suspected
     }
 }
@@ -202,7 +202,7 @@ TEST(a_condemned_electrode_comes_back_after_two_calm_seconds_where_it_rests)
     rounds(200, 0, 0);
     rounds(100, 0, -300);
     for (int k = 0; k < 400; k++) {
-        one_round(0, k % 50 < 25 ? 0 : -20); // not calm
+        run_round(0, k % 50 < 25 ? 0 : -20); // not calm
         bt_health_back(&health);
         expect_out(1u << 4, BT_SENSOR_FAULT_ALONE);
     }
@@ -212,7 +212,7 @@ TEST(a_condemned_electrode_comes_back_after_two_calm_seconds_where_it_rests)
     for (int k = 0; k < 260; k++) {
         bt_health_back(&health);
         assert_int_equal(health.out, k < 200 ? 1u << 4 : health.out);
-        one_round(0, 0);
+        run_round(0, 0);
     }
     expect_out(0, BT_SENSOR_FAULT_NONE);
 }

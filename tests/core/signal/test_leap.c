@@ -42,7 +42,7 @@ static void begin(int first_swing)
 
 // All electrodes move by `counts`, every `against`th to the other side, the last of them by `more`.
 typedef struct {
-    const char *what;
+    const char *name;
     int counts, more;
     unsigned against;
     int pdc, tdc;
@@ -61,13 +61,13 @@ static void move(const leap_case *by, int sign)
 }
 
 #define NEVER  99
-#define HEARD  75
+#define FAINT  75
 #define LOUD   76
 #define RAILED (BT_RAIL_COUNT - PAC_REST)
 #define UNREAD (BT_INVALID_COUNT - PAC_REST)
 
 static const leap_case cases[] = {
-    {"all leap while PAC is quiet", 54, 0, 2, -49, 0, {HEARD, HEARD, HEARD}, EXCHANGED},
+    {"all leap while PAC is quiet", 54, 0, 2, -49, 0, {FAINT, FAINT, FAINT}, EXCHANGED},
     {"all leap, PAC at rest", 54, 0, 2, -49, 0, {QUIET, QUIET, QUIET}, EXCHANGED},
     {"pressure leaps less", 59, 0, 2, -25, 0, {QUIET, QUIET, QUIET}, EXCHANGED},
     {"not far enough", 53, 0, 2, -49, 0, {QUIET, QUIET, QUIET}, NONE},
@@ -103,7 +103,7 @@ TEST(a_leap_is_told_once_when_later_rounds_confirm_it)
                 move(&snap, round == 6 && glitch ? 1 : 0);
                 uint8_t want = round == when && !glitch ? by->fault : NONE;
                 if (end_round(round < 3 ? by->pac[round] : QUIET) != want) {
-                    fail_msg("%s%s, round %d", by->what, glitch ? ", for one round" : "", round);
+                    fail_msg("%s%s, round %d", by->name, glitch ? ", for one round" : "", round);
                 }
                 move(by, round == 1 && glitch ? -1 : 0);
             }
@@ -113,9 +113,9 @@ TEST(a_leap_is_told_once_when_later_rounds_confirm_it)
 
 TEST(what_moved_while_nothing_was_read_or_heard_did_not_leap)
 {
-    enum { NO_ELECTRODES, NO_PRESSURE, NO_ROUND, NOT_HEARD, JUST_STARTED, REASONS };
+    enum { NO_ELECTRODES, NO_PRESSURE, NO_ROUND, PAC_INACTIVE, JUST_STARTED, REASONS };
     for (int why = 0; why < REASONS; why++) {
-        begin(why == NOT_HEARD ? 48 : 49);
+        begin(why == PAC_INACTIVE ? 48 : 49);
         bt_round before = now;
         if (why == NO_ELECTRODES) {
             memset(now.electrode, 0xFF, sizeof now.electrode);
@@ -123,7 +123,7 @@ TEST(what_moved_while_nothing_was_read_or_heard_did_not_leap)
         now.pdc = why == NO_PRESSURE ? BT_INVALID_COUNT : now.pdc;
         if (why == JUST_STARTED) {
             memset(&leap, 0, sizeof leap);
-            leap.heard = true;
+            leap.pac_active = true;
         }
         (void)end_round(QUIET);
         before.t_us = now.t_us + (why == NO_ROUND ? BT_FRAME_MS * 1000 : 0);
