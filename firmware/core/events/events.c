@@ -21,7 +21,7 @@
 #define UNIT_MAX_COUNT2       (1u << 22)
 #define NOISE_MAX_COUNT2      (1u << 20)
 // Times in samples, except NOISE_ROUNDS_LOG2
-#define ONE_VIBRATION_SAMPLES 18  // between rise and fall; 8 ms
+#define VIBRATION_MAX_SAMPLES 18  // between rise and fall; 8 ms
 #define LANDING_MIN_SAMPLES   220 // 0.1 s
 #define LANDING_MAX_SAMPLES   2200
 #define NOISE_ROUNDS_LOG2     6       // rounds that the noise is averaged over
@@ -69,7 +69,7 @@ void bt_events_reset(bt_events *events)
 
 // ---- touch and release
 
-static uint32_t square_of(const bt_tare *tare, unsigned electrode)
+static uint32_t electrode_energy(const bt_tare *tare, unsigned electrode)
 {
     int32_t e = tare->trigger.smooth.lane[electrode] - tare->trigger.rest.lane[electrode];
     return (uint32_t)(e * e);
@@ -83,7 +83,7 @@ static BT_NOINLINE void weigh(bt_events *events, const bt_tare *tare)
     for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
         unsigned electrode = (unsigned)bt_slot_channel[slot] - BT_CHANNEL_E1;
         if (electrode < BT_ELECTRODES) {
-            uint32_t square = square_of(tare, electrode);
+            uint32_t square = electrode_energy(tare, electrode);
             events->energy_count2 += square;
             if (square >= strongest) {
                 strongest = square;
@@ -119,7 +119,7 @@ static bool pressed(const bt_tare *tare)
 uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
 {
     const uint32_t half = tare->threshold_count2 / 2;
-    if (square_of(tare, (unsigned)bt_slot_channel[events->watched] - BT_CHANNEL_E1) > half) {
+    if (electrode_energy(tare, (unsigned)bt_slot_channel[events->watched] - BT_CHANNEL_E1) > half) {
         return 0;
     }
     weigh(events, tare);
@@ -145,13 +145,13 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 // ---- dynamic pressure
 
 // One copy for both callers: the code runs from RAM, which is short.
-static BT_NOINLINE uint32_t root_of(uint32_t square)
+static BT_NOINLINE uint32_t square_root(uint32_t square)
 {
     return bt_root_u32(square);
 }
 
 // L of SPEC.md. What one change must exceed to be evidence is some of this.
-static BT_NOINLINE uint32_t unit_of(const bt_events *events)
+static BT_NOINLINE uint32_t evidence_unit(const bt_events *events)
 {
     const uint32_t rattle = RATTLE_LEVELS * events->rattle_count2;
     const uint32_t unit = rattle > events->level_count2 ? rattle : events->level_count2;
@@ -160,11 +160,11 @@ static BT_NOINLINE uint32_t unit_of(const bt_events *events)
 
 static uint8_t slip_level(const bt_events *events)
 {
-    const uint32_t explained = BT_EVENTS_PAIRS * unit_of(events);
+    const uint32_t explained = BT_EVENTS_PAIRS * evidence_unit(events);
     if (!events->slipping || events->shaken_count2 <= explained) {
         return 0;
     }
-    const uint32_t counts = root_of(events->shaken_count2 - explained) * 5 >> 6;
+    const uint32_t counts = square_root(events->shaken_count2 - explained) * 5 >> 6;
     return counts < BT_SLIP_LEVEL_NONE ? (uint8_t)counts : BT_SLIP_LEVEL_NONE - 1;
 }
 
@@ -178,8 +178,8 @@ static void end_round(bt_events *events, const bt_tare *tare)
         const uint32_t level = events->noise_count2 * 1490 >> 13;
         events->level_count2 = level < LEVEL_MIN_COUNT2 ? LEVEL_MIN_COUNT2 : level;
     }
-    events->slip_level = events->heard ? slip_level(events) : BT_SLIP_LEVEL_NONE;
-    events->heard = false;
+    events->slip_level = events->pac_valid ? slip_level(events) : BT_SLIP_LEVEL_NONE;
+    events->pac_valid = false;
     events->round_count2 = events->shaken_count2 = 0;
     events->pairs_done = 0;
 }
@@ -190,11 +190,11 @@ static inline void follow(bt_events *events, const uint16_t *pac, unsigned pairs
     uint32_t differ_count2 = 0, missing = 0, before = events->pair;
     uint16_t *four = events->four + BT_EVENTS_APART;
     for (const uint16_t *end = pac + 2 * pairs; pac < end; pac += 2) {
-        const uint32_t one = pac[0], two = pac[1];
+        const uint32_t first = pac[0], second = pac[1];
         uint32_t pair = MISSING;
-        if ((one | two) <= BT_FULL_SCALE_COUNT) {
-            pair = one + two;
-            differ_count2 += (one - two) * (one - two);
+        if ((first | second) <= BT_FULL_SCALE_COUNT) {
+            pair = first + second;
+            differ_count2 += (first - second) * (first - second);
         } else {
             missing++;
         }
@@ -202,13 +202,13 @@ static inline void follow(bt_events *events, const uint16_t *pac, unsigned pairs
         before = pair;
     }
     events->pair = (uint16_t)before;
-    events->heard |= missing < pairs;
+    events->pac_valid |= missing < pairs;
     const int32_t more = (int32_t)(differ_count2 - (pairs - missing) * events->rattle_count2);
     events->rattle_count2 += (uint32_t)bt_shift_down(more, RATTLE_PAIRS_LOG2);
 }
 
 // The change up to a sum of four samples from the one eight samples before; 0 where any word is missing.
-static inline int32_t change_of(const uint16_t *then)
+static inline int32_t pac_change(const uint16_t *then)
 {
     const uint32_t now = then[BT_EVENTS_APART], before = then[0];
     return (now | before) >= MISSING ? 0 : (int32_t)(now - before);
@@ -218,7 +218,7 @@ static inline uint32_t squared(const bt_events *events, unsigned pairs)
 {
     uint32_t all = 0;
     for (const uint16_t *then = events->four, *end = then + pairs; then < end; then++) {
-        const int32_t change = change_of(then);
+        const int32_t change = pac_change(then);
         all += (uint32_t)(change * change);
     }
     return all;
@@ -232,7 +232,7 @@ static inline void add_up(const bt_events *events, unsigned pairs, uint32_t cap,
 {
     uint32_t full = 0, all = 0, rose = 0, peak = 0;
     for (const uint16_t *then = events->four, *end = then + pairs; then < end; then++) {
-        const int32_t change = change_of(then);
+        const int32_t change = pac_change(then);
         uint32_t square = (uint32_t)(change * change);
         full += square;
         peak = square > peak ? square : peak;
@@ -243,9 +243,9 @@ static inline void add_up(const bt_events *events, unsigned pairs, uint32_t cap,
     *sums = (changes){full, all, rose, peak};
 }
 
-static BT_NOINLINE uint32_t take_off(uint32_t evidence, uint32_t by, uint32_t most)
+static BT_NOINLINE uint32_t deduct(uint32_t evidence, uint32_t toll, uint32_t most)
 {
-    const uint32_t left = evidence > by ? evidence - by : 0;
+    const uint32_t left = evidence > toll ? evidence - toll : 0;
     return left > most ? most : left;
 }
 
@@ -254,7 +254,7 @@ static BT_NOINLINE uint32_t first_change(const bt_events *events, uint32_t toll,
 {
     unsigned k = 0;
     for (;; k++) {
-        const int32_t change = change_of(events->four + k);
+        const int32_t change = pac_change(events->four + k);
         if ((falls ? change < 0 : change > 0) && (uint32_t)(change * change) > toll) {
             return events->now + 2 * k;
         }
@@ -269,14 +269,14 @@ static inline bool shakes(const bt_events *events)
 // Add changes to the evidence, and subtract what they cost once for all of them.
 static void add_evidence(bt_events *events, unsigned pairs, uint32_t unit, uint32_t rose, uint32_t fell)
 {
-    const uint32_t one = unit * TOLL_LEVELS_Q4 >> 4, toll = one * pairs, most = SIDE_CAP_LEVELS * unit;
-    const uint32_t rises = take_off(events->risen_count2 + rose, toll, most);
-    const uint32_t falls = take_off(events->fallen_count2 + fell, toll, most);
+    const uint32_t cost = unit * TOLL_LEVELS_Q4 >> 4, toll = cost * pairs, most = SIDE_CAP_LEVELS * unit;
+    const uint32_t rises = deduct(events->risen_count2 + rose, toll, most);
+    const uint32_t falls = deduct(events->fallen_count2 + fell, toll, most);
     if (events->risen_count2 == 0 && rises != 0) {
-        events->rise_began = first_change(events, one, false);
+        events->rise_began = first_change(events, cost, false);
     }
     if (events->fallen_count2 == 0 && falls != 0) {
-        events->fall_began = first_change(events, one, true);
+        events->fall_began = first_change(events, cost, true);
     }
     if (!shakes(events)) {
         const bool falls_first = (int32_t)(events->fall_began - events->rise_began) < 0;
@@ -305,7 +305,7 @@ static BT_NOINLINE void shake(bt_events *events, unsigned pairs, uint32_t unit)
     }
     if (event_is_on(events)) { // all that matters now is how long it lasts, so both sides are summed as one
         const uint32_t sum = events->risen_count2 + events->fallen_count2 + sums.all;
-        events->risen_count2 = take_off(sum, pairs * unit, SLIP_CAP_LEVELS * unit);
+        events->risen_count2 = deduct(sum, pairs * unit, SLIP_CAP_LEVELS * unit);
         events->fallen_count2 = 0;
     } else {
         add_evidence(events, pairs, unit, sums.rose, sums.all - sums.rose);
@@ -344,8 +344,8 @@ static bool begins_to_slip(bt_events *events, uint32_t unit)
 {
     const uint32_t each = SLIP_LEVELS * unit;
     const int32_t apart = (int32_t)(events->fall_began - events->rise_began);
-    const bool one = apart <= ONE_VIBRATION_SAMPLES && apart >= -ONE_VIBRATION_SAMPLES;
-    events->slip_began = (apart > 0) == one ? events->rise_began : events->fall_began;
+    const bool joined = apart <= VIBRATION_MAX_SAMPLES && apart >= -VIBRATION_MAX_SAMPLES;
+    events->slip_began = (apart > 0) == joined ? events->rise_began : events->fall_began;
     return events->risen_count2 > each && events->fallen_count2 > each;
 }
 
@@ -381,7 +381,7 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     }
     const unsigned pairs = ended - events->pairs_done;
     follow(events, pac + 2 * events->pairs_done, pairs);
-    const uint32_t level = unit_of(events);
+    const uint32_t level = evidence_unit(events);
     const uint32_t unit = events->slipping || level > BEGIN_MIN_COUNT2 ? level : BEGIN_MIN_COUNT2;
     const bool shook = shakes(events);
     look(events, pairs, unit);
@@ -390,9 +390,9 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     }
     events->now += 2 * pairs;
     events->pairs_done = (uint8_t)(events->pairs_done + pairs);
-    const bool goes_on = events->slipping && events->touched && shakes(events);
+    const bool slip_continues = events->slipping && events->touched && shakes(events);
     uint32_t raised =
-        (shook || shakes(events) || events->landing) && !goes_on ? judge(events, level, unit) : 0;
+        (shook || shakes(events) || events->landing) && !slip_continues ? judge(events, level, unit) : 0;
     if (!events->touched && tare->state == BT_TARE_STATE_CONTACT) {
         raised |= touched_again(events, tare);
     }
@@ -428,6 +428,6 @@ void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, ui
     }
     msg->energy_count2 = shaken ? UINT32_MAX : events->energy_count2;
     msg->peak_count = event == BT_EVENT_KIND_JOLT || event == BT_EVENT_KIND_SLIP
-                          ? (uint16_t)(root_of(events->peak_count2) / 4)
+                          ? (uint16_t)(square_root(events->peak_count2) / 4)
                           : BT_INVALID_COUNT;
 }

@@ -36,7 +36,7 @@ typedef struct {
     bool landing;     // touched, and dynamic pressure has not been quiet since then
     bool jolt_raised; // a JOLT was reported for this vibration
     bool slipping;
-    bool heard;             // a good pair of samples came in this round
+    bool pac_valid;         // a good pair of samples came in this round
     uint8_t slip_level;     // of the latest round, as in FRAME
     uint8_t pairs_done;     // of this round's
     uint32_t now;           // number of the next sample

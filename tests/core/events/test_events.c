@@ -174,7 +174,7 @@ TEST(pressure_that_stays_is_no_lift)
 // A swing of 120 to 220 Hz: both ways of it take some milliseconds to be seen.
 TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
 {
-    int told_late = 0, onset_off = 0;
+    int reported_late = 0, onset_off = 0;
     for (int k = 0; k < 200; k++) {
         (void)new_course(NULL);
         run.seed = (uint64_t)(100 + k);
@@ -183,7 +183,7 @@ TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
         const uint32_t begins_us = run.t_us;
         shaken(30, 60, 120 + k / 2);
         const bt_msg_event *slip = first(BT_EVENT_KIND_SLIP);
-        told_late += slip->t_us - begins_us > 10000;
+        reported_late += slip->t_us - begins_us > 10000;
         onset_off += abs((int32_t)(slip->onset_us - begins_us)) > 5000;
         assert_in_range(slip->peak_count, 40, 160);
         assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
@@ -193,7 +193,7 @@ TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
         assert_int_equal(count_of(BT_EVENT_KIND_STUCK), 1);
         assert_int_equal(first(BT_EVENT_KIND_STUCK)->onset_us, slip->onset_us);
     }
-    assert_in_range(told_late, 0, 10);
+    assert_in_range(reported_late, 0, 10);
     assert_in_range(onset_off, 0, 10);
 }
 

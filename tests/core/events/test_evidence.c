@@ -3,10 +3,10 @@
 
 #include "events/events.h"
 
-#define LEVEL       800
-#define BEGIN       1200                    // the least level until a slip is on
-#define TOLL        (3 * (BEGIN * 11 / 16)) // that noise takes of each side in a stretch of three pairs
-#define TOLD(event) (1u << BT_EVENT_KIND_##event)
+#define LEVEL         800
+#define BEGIN         1200                    // the least level until a slip is on
+#define TOLL          (3 * (BEGIN * 11 / 16)) // that noise takes of each side in a stretch of three pairs
+#define RAISED(event) (1u << BT_EVENT_KIND_##event)
 
 static bt_tare tare;
 static uint16_t pac[BT_PAC_PER_FRAME];
@@ -54,7 +54,7 @@ TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
 {
     static const struct {
         uint32_t risen, fallen, flagged;
-    } cases[] = {{20400, 20401, 0}, {20401, 20400, 0}, {20401, 20401, TOLD(SLIP)}};
+    } cases[] = {{20400, 20401, 0}, {20401, 20400, 0}, {20401, 20401, RAISED(SLIP)}};
     for (int k = 0; k < 3; k++) {
         (void)held(NULL);
         events.jolt_raised = true;
@@ -63,7 +63,7 @@ TEST(a_slip_goes_both_ways_by_more_than_seventeen_levels)
         (void)held(NULL);
         events.touched = false;
         tare.state = BT_TARE_STATE_REST;
-        assert_int_equal(shaken(cases[k].risen, cases[k].fallen), TOLD(JOLT)); // nobody slips untouched
+        assert_int_equal(shaken(cases[k].risen, cases[k].fallen), RAISED(JOLT)); // nobody slips untouched
     }
 }
 
@@ -71,13 +71,13 @@ TEST(a_jolt_is_more_than_22_levels_and_told_once)
 {
     assert_int_equal(shaken(17600, 0), 0);
     assert_int_equal(shaken(8800, 8800), 0);
-    assert_int_equal(shaken(17601, 0), TOLD(JOLT));
+    assert_int_equal(shaken(17601, 0), RAISED(JOLT));
     assert_int_equal(shaken(20000, 0), 0);
     assert_int_equal(shaken(1, 0), 0);
     events.risen_count2 = TOLL;
     events.fallen_count2 = 0;
     assert_int_equal(stretch(), 0); // over: the next one is another
-    assert_int_equal(shaken(17601, 0), TOLD(JOLT));
+    assert_int_equal(shaken(17601, 0), RAISED(JOLT));
 }
 
 // Sums of two samples: 4000, 4200, 3600. The changes are 0, 200 and -200, of at most twelve levels each.
@@ -128,7 +128,7 @@ TEST(while_it_slips_both_sides_are_one)
     assert_int_equal(stretch(), 0);
     assert_true(events.slipping);
     events.risen_count2 = 3 * LEVEL;
-    assert_int_equal(stretch(), TOLD(STUCK));
+    assert_int_equal(stretch(), RAISED(STUCK));
     assert_false(events.slipping || events.jolt_raised);
     assert_int_equal(stretch(), 0);
 }
@@ -175,7 +175,7 @@ TEST(what_rattles_must_shake_more)
     for (uint32_t more = 0; more < 2; more++) {
         events.jolt_raised = true;
         events.risen_count2 = events.fallen_count2 = 17 * unit + toll + more;
-        assert_int_equal(stretch(), more ? TOLD(SLIP) : 0);
+        assert_int_equal(stretch(), more ? RAISED(SLIP) : 0);
     }
 }
 
@@ -193,7 +193,7 @@ TEST(what_has_just_been_touched_lands)
         (void)held(NULL);
         events.landing = true;
         events.touch_began = events.now + 6 - since;
-        assert_int_equal(shaken(20401, 20401), since < 2200 ? TOLD(JOLT) : TOLD(JOLT) | TOLD(SLIP));
+        assert_int_equal(shaken(20401, 20401), since < 2200 ? RAISED(JOLT) : RAISED(JOLT) | RAISED(SLIP));
         assert_int_equal(events.landing, since < 2200);
     }
 }
@@ -210,7 +210,7 @@ TEST(a_slip_began_with_its_vibration)
         events.jolt_raised = true;
         events.rise_began = 99000;
         events.fall_began = 99000 + (uint32_t)cases[k].fall_after_rise;
-        assert_int_equal(shaken(20401, 20401), TOLD(SLIP));
+        assert_int_equal(shaken(20401, 20401), RAISED(SLIP));
         assert_int_equal(events.slip_began, cases[k].with_rise ? events.rise_began : events.fall_began);
     }
 }
