@@ -53,7 +53,7 @@ static inline bool bt_is_plain(uint32_t count, uint32_t tare_q4)
 }
 
 // For any count and tare, limited to the range that maps were trained on; 0 where either is missing.
-static inline int32_t bt_conductance_of_any(int32_t count, int32_t tare_q4)
+static inline int32_t bt_conductance_limited(int32_t count, int32_t tare_q4)
 {
     int32_t now = bt_clamp(count, BT_MAP_COUNT_MIN, BT_MAP_COUNT_MAX);
     int32_t at_rest_q4 = bt_clamp(tare_q4, BT_CONDUCTANCE_MIN_Q4, BT_CONDUCTANCE_MAX_Q4);

@@ -21,12 +21,12 @@ typedef struct {
     int32_t compression[BT_MAP_LINE_COEFFICIENTS]; // the last one is 0
     int32_t bulge[BT_MAP_LINE_COEFFICIENTS];
     int32_t conductance[RING];
-    int32_t one, pressure;
+    int32_t unity, pressure;
     int32_t gate[BT_MAP_GATES];
 } features;
 
 static const uint16_t factors_at[BT_MAP_KINDS] = {
-    [BT_MAP_KIND_OFFSET] = offsetof(features, one),
+    [BT_MAP_KIND_OFFSET] = offsetof(features, unity),
     [BT_MAP_KIND_SIGNAL] = offsetof(features, signal),
     [BT_MAP_KIND_COMPRESSION] = offsetof(features, compression),
     [BT_MAP_KIND_BULGE] = offsetof(features, bulge),
@@ -85,7 +85,7 @@ static moments signals(const int32_t e_q4[BT_ELECTRODES], features *inputs)
 
 static BT_NOINLINE int32_t any_conductance(int32_t count, int32_t tare_q4)
 {
-    return bt_conductance_of_any(count, tare_q4);
+    return bt_conductance_limited(count, tare_q4);
 }
 
 static void conductances(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
@@ -120,7 +120,7 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                     int32_t pdc_above_rest_q4, features *inputs)
 {
-    moments of_compression = signals(e_q4, inputs);
+    moments compression = signals(e_q4, inputs);
     if (map->kinds & (1u << BT_MAP_KIND_SIGNAL | 1u << BT_MAP_KIND_SIGNAL_PAIRS)) {
         close_ring(inputs->signal);
     }
@@ -128,9 +128,9 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
         conductances(counts, tare_q4, inputs->conductance);
     }
     if (map->gates & ~(1u << BT_MAP_GATE_ONE)) {
-        gates(&of_compression, inputs->gate);
+        gates(&compression, inputs->gate);
     }
-    inputs->one = 1 << BT_MAP_ONE_Q;
+    inputs->unity = 1 << BT_MAP_ONE_Q;
     inputs->pressure =
         bt_shift_down(bt_clamp(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
 }

@@ -39,7 +39,7 @@ static uint32_t tenth(uint32_t strength_100un)
     return bt_scale(strength_100un, 0x3333, 0x3333, 1);
 }
 
-static int32_t mn_of(int32_t force_100un)
+static int32_t to_mn(int32_t force_100un)
 {
     uint32_t mn = tenth(bt_abs32(force_100un));
     return bt_with_sign(mn < BT_GRIP_MAX_MN ? mn : BT_GRIP_MAX_MN, force_100un);
@@ -50,7 +50,7 @@ static int32_t rounded(int32_t value, int bits)
     return bt_shift_down(value + (1 << (bits - 1)), bits);
 }
 
-static uint32_t root_of(uint32_t square)
+static uint32_t square_root(uint32_t square)
 {
     uint32_t root = bt_root_u32(square);
     return root + (square - root * root > root);
@@ -112,7 +112,7 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
     for (int d = 0; d < 3; d++) {
         bool counts = d > 0 || msg->poc_um[0] > 0;
         n[d] = counts ? rounded(msg->poc_um[d] * UNITS_PER_UM, PER_UM_BITS) : 0;
-        force_mn[d] = mn_of(msg->force_100un[d]);
+        force_mn[d] = to_mn(msg->force_100un[d]);
         against += force_mn[d] * n[d];
     }
     against = rounded(against, UNIT_BITS);
@@ -121,7 +121,7 @@ void bt_grip(const bt_uncertainty *uncertainty, bt_msg_frame *msg)
         square += (uint32_t)across * (uint32_t)across; // int32_t is too narrow for the square of 47 N
     }
     uint32_t normal = against < 0 ? (uint32_t)-against : 0;
-    uint32_t shear = root_of(square);
+    uint32_t shear = square_root(square);
     msg->normal_mn = (uint16_t)normal;
     msg->shear_mn = (uint16_t)shear;
     msg->normal_half_mn = half_mn(uncertainty, 0, normal + shear);

@@ -27,14 +27,14 @@ static void subscribe_as_at_first(bt_session *session)
 }
 
 // Nothing goes on of what the host at the other port wanted, except that what it holds is held.
-static void take_over(bt_session *session)
+static void change_owner(bt_session *session)
 {
     const uint8_t before = session->owner, after = session->link;
     const bool was_in_use = bt_session_is_kept(session) || session->streams != 0;
     bt_session_stop(session);
     subscribe_as_at_first(session);
     session->owner = after;
-    session->heard_us = session->command_us;
+    session->owner_rx_us = session->command_us;
     if (was_in_use) {
         session->faults |= BT_FAULT_FLAG_LINK_TAKEN;
         session->link = before;
@@ -52,7 +52,7 @@ static uint8_t take_link(bt_session *session, const uint8_t *payload)
         return BT_ERROR_OUT_OF_RANGE;
     }
     if (session->owner != session->link) {
-        take_over(session);
+        change_owner(session);
     }
     session->keepalive_ms = msg.keepalive_ms;
     return BT_ERROR_OK;
@@ -467,7 +467,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
     }
     session->command_us = now_us;
     if (session->owner == session->link || session->owner == BT_NO_LINK) {
-        session->heard_us = now_us;
+        session->owner_rx_us = now_us;
     }
     if (payload == NULL) { // of a payload of another length nothing can be trusted, not even where req_id is
         reply(session, 0, id, bt_wire_payload_bytes(id) < 0 ? BT_ERROR_UNKNOWN_COMMAND : BT_ERROR_BAD_LENGTH);
@@ -480,7 +480,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         }
         error = check(session, commands[k].checks, payload);
         if (error == BT_ERROR_OK && !(commands[k].checks & READS) && session->owner != session->link) {
-            take_over(session);
+            change_owner(session);
         }
         error = error == BT_ERROR_OK ? commands[k].run(session, payload) : error;
         if (error == BT_ERROR_OK && commands[k].checks & ANSWERS) {

@@ -40,7 +40,7 @@ static void lapse_holds(bt_session *session, uint32_t now_us)
     const uint32_t allowed_us = streams ? session->keepalive_ms * 1000u : 0;
     const uint32_t timeout_us = allowed_us > session->hold_timeout_us ? allowed_us : session->hold_timeout_us;
     if (session->hold_timeout_us == 0 || (streams && allowed_us == 0)
-        || now_us - session->heard_us <= timeout_us) {
+        || now_us - session->owner_rx_us <= timeout_us) {
         return;
     }
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -57,7 +57,7 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
         session->second_us += 1000000;
         session->uptime_s++;
     }
-    if (session->keepalive_ms != 0 && now_us - session->heard_us > session->keepalive_ms * 1000u) {
+    if (session->keepalive_ms != 0 && now_us - session->owner_rx_us > session->keepalive_ms * 1000u) {
         session->faults |= session->streams != 0 ? BT_FAULT_FLAG_HOST_SILENT : 0;
         bt_session_stop(session);
     }

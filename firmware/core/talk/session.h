@@ -99,8 +99,8 @@ typedef struct {
     uint8_t event_fingers;        // bit mask of the fingers that send EVENTs in this round
     uint8_t events_due[BT_SLOTS]; // and of those for which each slot may show one
     uint16_t keepalive_ms;
-    uint32_t heard_us;   // when the owner last said anything
-    uint32_t command_us; // when the latest command came, whoever sent it
+    uint32_t owner_rx_us; // when the owner last said anything
+    uint32_t command_us;  // when the latest command came, whoever sent it
     uint32_t status_us;
     uint32_t second_us; // uptime is counted in whole seconds from here
     uint32_t uptime_s;

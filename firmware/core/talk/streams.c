@@ -5,9 +5,9 @@
 
 #include <string.h>
 
-static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
+static bool streams(const bt_session *session, const bt_finger *finger, uint8_t stream)
 {
-    return (session->streams & what) && (session->fingers >> finger->index & 1);
+    return (session->streams & stream) && (session->fingers >> finger->index & 1);
 }
 
 // A finger that starts sending events starts without a history, and one that stops has no level.
