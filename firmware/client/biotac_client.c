@@ -9,15 +9,15 @@ typedef char a_frame_fits_one_cobs_block[BT_FRAME_MAX_BYTES <= 254 ? 1 : -1];
 // Half a byte at a time: 64 bytes of table in place of 1024.
 uint32_t bt_client_crc(const uint8_t *data, size_t bytes)
 {
-    static const uint32_t of_nibble[16] = {
+    static const uint32_t nibble_crc[16] = {
         0x00000000, 0x1DB71064, 0x3B6E20C8, 0x26D930AC, 0x76DC4190, 0x6B6B51F4, 0x4DB26158, 0x5005713C,
         0xEDB88320, 0xF00F9344, 0xD6D6A3E8, 0xCB61B38C, 0x9B64C2B0, 0x86D3D2D4, 0xA00AE278, 0xBDBDF21C,
     };
     uint32_t crc = 0xFFFFFFFF;
     for (size_t k = 0; k < bytes; k++) {
         crc ^= data[k];
-        crc = crc >> 4 ^ of_nibble[crc & 15];
-        crc = crc >> 4 ^ of_nibble[crc & 15];
+        crc = crc >> 4 ^ nibble_crc[crc & 15];
+        crc = crc >> 4 ^ nibble_crc[crc & 15];
     }
     return ~crc;
 }
@@ -45,7 +45,7 @@ int bt_client_uncobs(uint8_t *data, size_t bytes)
 }
 
 // Of a message that is known: its runs; NULL otherwise.
-static const uint8_t *layout_of(uint8_t id)
+static const uint8_t *find_layout(uint8_t id)
 {
     const uint8_t *at = bt_client_layout;
     while (at[0] != id || at[1] == 0) {
@@ -61,8 +61,8 @@ static const uint8_t *layout_of(uint8_t id)
 // be NULL: then only the payload's length is found, which is returned.
 static size_t copy(const uint8_t *layout, uint8_t *to, const uint8_t *from, int to_wire)
 {
-    const uint16_t one = 1;
-    const size_t big_endian = *(const uint8_t *)&one == 0;
+    const uint16_t probe = 1;
+    const size_t big_endian = *(const uint8_t *)&probe == 0;
     size_t in_struct = 0;
     size_t on_wire = 0;
     for (uint8_t runs = *layout++; runs > 0; runs--, layout++) {
@@ -122,7 +122,7 @@ int bt_client_push(bt_client *client, uint8_t byte)
             return refuse(client, BT_REFUSED_CRC);
         }
     }
-    const uint8_t *layout = layout_of(client->buffer[0]);
+    const uint8_t *layout = find_layout(client->buffer[0]);
     if (layout != NULL) {
         size_t known = copy(layout, NULL, NULL, 0);
         if (covered - 1 != known && !(covered - 1 > known && client->accept_longer)) {
@@ -136,7 +136,7 @@ int bt_client_push(bt_client *client, uint8_t byte)
 
 int bt_client_read(const bt_client *client, uint8_t id, void *msg)
 {
-    const uint8_t *layout = layout_of(id);
+    const uint8_t *layout = find_layout(id);
     if (layout == NULL || client->id != id) {
         return 0;
     }
@@ -166,6 +166,6 @@ size_t bt_client_seal(uint8_t id, size_t payload_bytes, uint8_t *out)
 
 size_t bt_client_write(uint8_t id, const void *msg, uint8_t out[BT_ENCODED_MAX_BYTES])
 {
-    const uint8_t *layout = layout_of(id);
+    const uint8_t *layout = find_layout(id);
     return layout == NULL ? 0 : bt_client_seal(id, copy(layout, out + 2, (const uint8_t *)msg, 1), out);
 }

@@ -89,12 +89,12 @@ typedef struct {
 
 // How many rounds the link has lost since the message before. seq and rounds: a FRAME's and 1, or an IDLE's
 // and its frames. Give it both, for together they leave nothing out.
-static inline uint16_t bt_client_lost(bt_client_rounds *rounds_of, uint16_t seq, uint16_t rounds)
+static inline uint16_t bt_client_lost(bt_client_rounds *sequence, uint16_t seq, uint16_t rounds)
 {
     const uint16_t first = (uint16_t)(seq - rounds + 1u);
-    const uint16_t lost = (uint16_t)(rounds_of->begun != 0 ? first - rounds_of->next : 0);
-    rounds_of->next = (uint16_t)(seq + 1u);
-    rounds_of->begun = 1;
+    const uint16_t lost = (uint16_t)(sequence->begun != 0 ? first - sequence->next : 0);
+    sequence->next = (uint16_t)(seq + 1u);
+    sequence->begun = 1;
     return lost;
 }
 

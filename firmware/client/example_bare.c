@@ -21,9 +21,9 @@ void act_on_event(const bt_msg_event *event);
 
 static bt_client board;
 static bt_client_rounds rounds[FINGERS];
-static uint32_t lost;     // rounds, on the link
-static uint32_t ping_ms;  // when the board last heard from here
-static uint32_t heard_ms; // and when it last told of a finger
+static uint32_t lost;    // rounds, on the link
+static uint32_t ping_ms; // when the board last heard from here
+static uint32_t rx_ms;   // and when it last told of a finger
 static uint8_t streaming;
 
 void hand_send(uint8_t id, const void *msg)
@@ -33,10 +33,10 @@ void hand_send(uint8_t id, const void *msg)
     ping_ms = now_ms();
 }
 
-static void take(int id)
+static void dispatch(int id)
 {
     if (id == BT_FRAME_ID || id == BT_IDLE_ID) {
-        heard_ms = now_ms();
+        rx_ms = now_ms();
     }
     bt_msg_hello hello;
     bt_msg_event event;
@@ -50,7 +50,7 @@ static void take(int id)
         board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
         hand_send(BT_SUBSCRIBE_ID, &all);
         hand_send(BT_START_ID, &start);
-        heard_ms = now_ms();
+        rx_ms = now_ms();
         streaming = 1;
     } else if (id == BT_IDLE_ID && bt_client_read(&board, BT_IDLE_ID, &idle) && idle.finger < FINGERS) {
         lost += bt_client_lost(&rounds[idle.finger], idle.seq, idle.frames);
@@ -67,9 +67,9 @@ void hand_poll(void)
 {
     int byte;
     while ((byte = uart_next()) >= 0) {
-        take(bt_client_push(&board, (uint8_t)byte));
+        dispatch(bt_client_push(&board, (uint8_t)byte));
     }
-    if (now_ms() - heard_ms > KEEPALIVE_MS) {
+    if (now_ms() - rx_ms > KEEPALIVE_MS) {
         streaming = 0;
     }
     if (now_ms() - ping_ms >= PING_MS) {
