@@ -11,18 +11,18 @@ static uint64_t slot_number(const bt_emu_stream *stream, uint64_t t_ns)
 
 bool bt_emu_stream_lacks(const bt_emu_stream *stream, uint64_t t_ns)
 {
-    return (stream->started ? slot_number(stream, t_ns) : stream->begins_at) >= stream->taken;
+    return (stream->started ? slot_number(stream, t_ns) : stream->begins_at) >= stream->written;
 }
 
 uint64_t bt_emu_stream_lacks_at_ns(const bt_emu_stream *stream)
 {
-    return stream->start_ns + stream->taken * 1000000000ull / BT_SLOT_HZ;
+    return stream->start_ns + stream->written * 1000000000ull / BT_SLOT_HZ;
 }
 
 uint32_t bt_emu_stream_round(const bt_emu_stream *stream, uint64_t t_ns)
 {
     const uint64_t number = stream->started ? slot_number(stream, t_ns) : stream->begins_at;
-    return (uint32_t)(number < stream->taken ? number : stream->taken - 1) / BT_SLOTS;
+    return (uint32_t)(number < stream->written ? number : stream->written - 1) / BT_SLOTS;
 }
 
 // In the default sequence the slot determines the channel. Another sequence gets its channel's next sample of
@@ -39,7 +39,7 @@ uint16_t bt_emu_stream_by_clock(void *context, uint8_t finger, uint8_t channel, 
     if (fault != BT_EMU_FAULT_NONE) {
         return fault;
     }
-    if (!stream->started || finger >= stream->fingers || stream->taken < BT_SLOTS) {
+    if (!stream->started || finger >= stream->fingers || stream->written < BT_SLOTS) {
         return line ? 0 : BT_EMU_FAULT_STUCK_LOW;
     }
     const uint64_t number = slot_number(stream, t_ns);

@@ -49,7 +49,7 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
 }
 
 // Unplugged and so without power: what was asked for is forgotten.
-static void lose_power(bt_emu_device *device, bool swapped)
+static void power_off(bt_emu_device *device, bool swapped)
 {
     device->pending = NOTHING;
     device->has_last = false;
@@ -65,7 +65,7 @@ static void lose_power(bt_emu_device *device, bool swapped)
 static uint16_t line_fault(bt_emu_device *device, uint16_t word)
 {
     if (word == BT_EMU_FAULT_SWAPPED || word == BT_EMU_FAULT_UNPLUGGED) {
-        lose_power(device, word == BT_EMU_FAULT_SWAPPED);
+        power_off(device, word == BT_EMU_FAULT_SWAPPED);
         return BT_EMU_FAULT_UNPLUGGED;
     }
     device->unplugged = false;
@@ -258,7 +258,7 @@ uint16_t bt_emu_word_ahead(const bt_emu_device *device, unsigned bytes, bool set
     return (uint16_t)(high << 8 | on_the_line(property_byte(device, at + 1), fault, true));
 }
 
-static void take_first_byte(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
+static void receive_first_byte(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
 {
     device->command = mosi;
     if (mosi == BT_LISTEN_WORD >> 8) {
@@ -307,7 +307,7 @@ uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
     // The first bit goes out before the master's first comes in.
     uint8_t miso = shift_out(device, t_ns);
     if (device->position % 2 == 0) {
-        take_first_byte(device, mosi, t_ns);
+        receive_first_byte(device, mosi, t_ns);
     } else if (device->command == BT_PROPERTY_READ_COMMAND) {
         look_up_property(device, mosi, t_ns);
     }

@@ -42,7 +42,7 @@ static void send_status(const bt_emu_feed *feed, uint8_t req_id)
     bt_msg_emu_status status = {
         .req_id = req_id,
         .fingers = (uint8_t)((1u << stream->fingers) - 1),
-        .slots_taken = stream->taken,
+        .slots_taken = stream->written,
         .room_slots = (uint16_t)(room < UINT16_MAX ? room : UINT16_MAX),
         .slots_served = stream->at + (stream->served != 0),
         .samples_starved = stream->starved,
@@ -65,7 +65,7 @@ static uint8_t put_tape(bt_emu_stream *stream)
         || 2 * tape->slots * tape->fingers > (int)sizeof tape->samples) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    if (tape->first_slot == stream->taken) {
+    if (tape->first_slot == stream->written) {
         (void)bt_emu_stream_put(stream, tape->fingers, tape->samples, tape->slots);
     }
     return BT_ERROR_OK;
@@ -143,8 +143,8 @@ void bt_emu_feed_receive(bt_emu_feed *feed, const uint8_t *bytes, size_t n)
 
 void bt_emu_feed_report(bt_emu_feed *feed)
 {
-    if (feed->reported != feed->stream->taken) {
-        feed->reported = feed->stream->taken;
+    if (feed->reported != feed->stream->written) {
+        feed->reported = feed->stream->written;
         send_status(feed, 0);
     }
 }

@@ -5,7 +5,7 @@
 // Slots left, from the one being served on.
 static uint32_t left(const bt_emu_stream *stream)
 {
-    return stream->repeats ? UINT32_MAX : stream->taken - stream->at;
+    return stream->repeats ? UINT32_MAX : stream->written - stream->at;
 }
 
 // How far ahead this channel's next slot is: 0 to BT_SLOTS, counting from the one being served, or from the
@@ -24,7 +24,7 @@ static int slots_ahead(const bt_emu_stream *stream, uint8_t finger, uint8_t chan
     return -1;
 }
 
-static void go_on(bt_emu_stream *stream, uint32_t slots)
+static void advance(bt_emu_stream *stream, uint32_t slots)
 {
     stream->at = stream->at + slots;
     stream->ring_at += slots;
@@ -36,7 +36,7 @@ static void go_on(bt_emu_stream *stream, uint32_t slots)
 
 // The round before the bus is still in the ring, as bt_emu_stream_room leaves it there. In the first round
 // the place wraps for the moment until the bus goes on.
-static void go_back(bt_emu_stream *stream)
+static void rewind_round(bt_emu_stream *stream)
 {
     stream->at = stream->at - BT_SLOTS;
     stream->ring_at =
@@ -68,12 +68,12 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
     stream->round_us = now_us;
     stream->behind_us = timed ? stream->behind_us + passed_us - ROUND_US : 0;
     while (stream->behind_us >= ROUND_US && left(stream) > BT_SLOTS + ahead) {
-        go_on(stream, BT_SLOTS);
+        advance(stream, BT_SLOTS);
         stream->behind_us -= ROUND_US;
         stream->moved++;
     }
     if (stream->behind_us <= -ROUND_US && stream->at >= BT_SLOTS) {
-        go_back(stream);
+        rewind_round(stream);
         stream->behind_us += ROUND_US;
         stream->moved--;
     }
@@ -84,7 +84,7 @@ static void repeat_if_late(bt_emu_stream *stream, uint32_t ahead)
 {
     bool begins = stream->slot + ahead >= BT_SLOTS;
     if (stream->live && begins && left(stream) < ahead + BT_SLOTS && stream->started) {
-        go_back(stream);
+        rewind_round(stream);
         stream->behind_us += ROUND_US;
         stream->late++;
     }
@@ -126,7 +126,7 @@ uint16_t bt_emu_stream_in_order(void *context, uint8_t finger, uint8_t channel, 
         keep_time(stream, (uint32_t)ahead, t_ns);
     }
     if (ahead > 0) {
-        go_on(stream, (uint32_t)ahead);
+        advance(stream, (uint32_t)ahead);
     }
     stream->started = true;
     stream->served = (uint8_t)(stream->served | 1u << finger);

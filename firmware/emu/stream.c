@@ -40,13 +40,13 @@ const char *bt_emu_stream_open(bt_emu_stream *stream, const uint8_t *bytes, size
     bt_emu_stream_init(stream, NULL, rounds * BT_SLOTS);
     stream->tape = (const uint16_t *)(const void *)(bytes + BT_EMU_TAPE_HEADER_BYTES);
     stream->fingers = (uint8_t)fingers;
-    stream->taken = stream->slots;
+    stream->written = stream->slots;
     return NULL;
 }
 
 const uint16_t *bt_emu_stream_whole(const bt_emu_stream *stream)
 {
-    bool whole = stream->tape == NULL && stream->taken <= stream->slots && stream->taken % BT_SLOTS == 0;
+    bool whole = stream->tape == NULL && stream->written <= stream->slots && stream->written % BT_SLOTS == 0;
     return whole ? stream->ring : NULL;
 }
 
@@ -59,7 +59,7 @@ uint16_t bt_emu_stream_sample(const bt_emu_stream *stream, uint32_t place, uint8
 // A round behind the bus stays where it may be repeated.
 uint32_t bt_emu_stream_room(const bt_emu_stream *stream)
 {
-    uint32_t used = stream->taken - stream->at + (stream->by_time || stream->live ? BT_SLOTS : 0);
+    uint32_t used = stream->written - stream->at + (stream->by_time || stream->live ? BT_SLOTS : 0);
     return stream->tape == NULL && used < stream->slots ? stream->slots - used : 0;
 }
 
@@ -76,11 +76,11 @@ bool bt_emu_stream_put(bt_emu_stream *stream, uint8_t fingers, const uint8_t *sa
     if (slots > bt_emu_stream_room(stream)) {
         return false;
     }
-    uint32_t at = stream->taken % stream->slots * fingers;
+    uint32_t at = stream->written % stream->slots * fingers;
     for (uint32_t k = 0; k < slots * fingers; k++) {
         stream->ring[at] = (uint16_t)(samples[2 * k] | samples[2 * k + 1] << 8);
         at = at + 1 == stream->slots * fingers ? 0 : at + 1;
     }
-    stream->taken = stream->taken + slots;
+    stream->written = stream->written + slots;
     return true;
 }

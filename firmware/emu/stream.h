@@ -21,8 +21,8 @@ typedef struct {
     bool repeats;         // that tape has no end
     uint32_t slots;       // in whole rounds: room in the ring, or length of the tape
     uint8_t fingers;
-    volatile uint32_t taken; // slots that came; written by the writer
-    volatile uint32_t at;    // the slot being served; written by the reader, as all below
+    volatile uint32_t written; // slots that came; set by the writer
+    volatile uint32_t at;      // the slot being served; written by the reader, as all below
     bool started;
 
     // of the reader by the clock

@@ -69,9 +69,9 @@ void loop_play(bt_emu_stream *stream)
 uint8_t loop_keep(const bt_emu_stream *stream, uint32_t slots, uint32_t crc32)
 {
     const uint8_t *samples = (const uint8_t *)bt_emu_stream_whole(stream);
-    uint32_t bytes = 2 * stream->taken * stream->fingers;
+    uint32_t bytes = 2 * stream->written * stream->fingers;
     if (slots != 0
-        && (samples == NULL || slots != stream->taken || bytes > MOST_BYTES
+        && (samples == NULL || slots != stream->written || bytes > MOST_BYTES
             || bt_crc32(samples, bytes) != crc32)) {
         return BT_ERROR_NOT_WHOLE;
     }

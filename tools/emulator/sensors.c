@@ -109,7 +109,7 @@ EXPORT("lacks_at") double lacks_at(void)
 
 EXPORT("rounds") uint32_t rounds(void)
 {
-    return stream.taken / BT_SLOTS;
+    return stream.written / BT_SLOTS;
 }
 
 // Power lost and back: the sensors forget what they were asked, the world they feel goes on.

@@ -94,20 +94,20 @@ bool door_admit(door *d)
             hang_up(&d->pending);
         }
         d->pending = incoming;
-        d->heard = d->wrong = 0;
+        d->token_bytes = d->wrong = 0;
         prepare(incoming);
         set_option(incoming, IPPROTO_TCP, TCP_NODELAY, 1);
     }
-    while (d->pending >= 0 && d->heard < expected) {
+    while (d->pending >= 0 && d->token_bytes < expected) {
         char byte;
         const long n = (long)read(d->pending, &byte, 1);
         if (n < 0 && IS_LATER) {
             return false;
         }
         // All of it is compared, whatever was wrong: the time says nothing about the token.
-        d->wrong |= (uint8_t)(n == 1 ? byte ^ token[d->heard] : 1);
-        d->heard++;
-        if (n != 1 || (d->heard == expected && d->wrong != 0)) {
+        d->wrong |= (uint8_t)(n == 1 ? byte ^ token[d->token_bytes] : 1);
+        d->token_bytes++;
+        if (n != 1 || (d->token_bytes == expected && d->wrong != 0)) {
             hang_up(&d->pending);
         }
     }

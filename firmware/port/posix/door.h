@@ -12,7 +12,7 @@ typedef struct {
     int program;   // who was let in; this and the next two are sockets, -1: none
     int listening; // where the next one comes
     int pending;   // who has not said the whole token yet; the next one to come takes its place
-    size_t heard;
+    size_t token_bytes;
     uint8_t wrong; // bits by which what was said differs
 } door;
 

@@ -22,7 +22,7 @@ int os_read_stdin(char *text, size_t bytes);
 // Wait until the host has what is waited for, the control socket can be read (-1: neither), or us have
 // passed; -1: as long as nothing comes on stdin.
 enum { OS_BYTES = 1, OS_ROOM = 2 };
-void os_wait(int host, int what, int control, int64_t us);
+void os_wait(int host, int wanted, int control, int64_t us);
 
 // The number of an open file that os_restart's process opens by os_inherited.
 int os_inherit(int file);

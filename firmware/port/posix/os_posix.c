@@ -28,10 +28,10 @@ int os_read_stdin(char *text, size_t bytes)
     return n == 0 ? -1 : n > 0 ? (int)n : 0;
 }
 
-void os_wait(int host, int what, int control, int64_t us)
+void os_wait(int host, int wanted, int control, int64_t us)
 {
     struct pollfd p[3] = {
-        {.fd = host, .events = (short)((what & OS_BYTES ? POLLIN : 0) | (what & OS_ROOM ? POLLOUT : 0))},
+        {.fd = host, .events = (short)((wanted & OS_BYTES ? POLLIN : 0) | (wanted & OS_ROOM ? POLLOUT : 0))},
         {.fd = control, .events = POLLIN},
         {.fd = us < 0 ? STDIN_FILENO : -1, .events = POLLIN},
     };

@@ -67,13 +67,13 @@ int os_read_stdin(char *text, size_t bytes)
     return (int)n;
 }
 
-void os_wait(int host, int what, int control, int64_t us)
+void os_wait(int host, int wanted, int control, int64_t us)
 {
     WSAPOLLFD p[2];
     ULONG count = 0;
     const int ms = us < 0 || us > LONGEST_MS * 1000 ? LONGEST_MS : (int)((us + 999) / 1000);
     if (host >= 0) {
-        const int events = (what & OS_BYTES ? POLLIN : 0) | (what & OS_ROOM ? POLLOUT : 0);
+        const int events = (wanted & OS_BYTES ? POLLIN : 0) | (wanted & OS_ROOM ? POLLOUT : 0);
         p[count++] = (WSAPOLLFD){.fd = (SOCKET)host, .events = (SHORT)events};
     }
     if (control >= 0) {

@@ -58,9 +58,9 @@ static uint32_t boot_id;
 static bool paced;
 static int tape = -1; // kept open for the board after a reset: its name may be gone by then
 
-static void die(const char *what, const char *why)
+static void die(const char *subject, const char *reason)
 {
-    fprintf(stderr, "biotac-sim: %s: %s\n", what, why);
+    fprintf(stderr, "biotac-sim: %s: %s\n", subject, reason);
     exit(2);
 }
 
@@ -109,7 +109,7 @@ static void feed_live(const char *fingers)
 static void resume(void)
 {
     if (live) { // a round that was not computed is the first that the board reads
-        stream.taken = stream.at = stream.begins_at = restarted()->taken;
+        stream.written = stream.at = stream.begins_at = restarted()->written;
     } else {
         stream.started = restarted()->started;
         stream.start_ns = restarted()->start_ns;
@@ -128,7 +128,7 @@ static void restart(void)
         .tape = tape >= 0 ? os_inherit(tape) : -1,
         .started = stream.started,
         .start_ns = stream.start_ns - clock_now_ns(), // a board's clock begins at 0
-        .taken = stream.taken,
+        .written = stream.written,
     };
     link_fds(state.link);
     control_fds(state.control);

@@ -10,7 +10,7 @@ typedef struct {
     unsigned times;                       // it has been reset
     bool started;
     uint64_t start_ns; // of the sensors' first slot, by the new board's clock
-    uint32_t taken;
+    uint32_t written;  // slots of the tape
 } restart_state;
 
 // Remember how the process was started, and what the one before has left.
