@@ -91,37 +91,37 @@ static void offer(uint8_t finger)
 
 // ---- what a sensor hears -------------------------------------------------------------------------------
 
-static void hear(uint8_t finger, const exchange *heard, bool alone)
+static void apply_exchange(uint8_t finger, const exchange *done, bool alone)
 {
     bt_emu_device *device = &sensor[finger];
-    uint64_t end_ns = heard->t_us * 1000ull;
-    bool settled = alone && heard->offer & OFFER_SETTLED;
+    uint64_t end_ns = done->t_us * 1000ull;
+    bool settled = alone && done->offer & OFFER_SETTLED;
     // What was offered tells on which side of the 50 us it was.
     bt_emu_select(device, true, settled ? device->released_ns + BT_SETTLE_US * 1000 : device->released_ns);
     uint16_t answer = 0;
-    for (int k = 0; k < heard->bytes; k++) {
-        uint8_t mosi = k == 0 ? (uint8_t)(heard->mosi >> 8) : k == 1 ? (uint8_t)heard->mosi : 0;
+    for (int k = 0; k < done->bytes; k++) {
+        uint8_t mosi = k == 0 ? (uint8_t)(done->mosi >> 8) : k == 1 ? (uint8_t)done->mosi : 0;
         uint8_t miso = bt_emu_transfer8(device, mosi, end_ns);
         answer = (uint16_t)(k > 1 ? answer : answer | miso << (k == 0 ? 8 : 0));
     }
     bt_emu_select(device, false, end_ns);
-    if (alone && heard->mosi <= BT_READ_MOSI_MAX) {
-        uint16_t mask = heard->bytes == 1 ? 0xFF00 : 0xFFFF;
-        uint16_t offered = heard->offer & OFFER_DRIVE ? WORD_OF(heard->offer) : 0;
+    if (alone && done->mosi <= BT_READ_MOSI_MAX) {
+        uint16_t mask = done->bytes == 1 ? 0xFF00 : 0xFFFF;
+        uint16_t offered = done->offer & OFFER_DRIVE ? OFFERED_WORD(done->offer) : 0;
         counts.words++;
-        counts.late += ((answer ^ offered) & mask) != 0 || heard->bytes > 2; // there are no more in an offer
+        counts.late += ((answer ^ offered) & mask) != 0 || done->bytes > 2; // there are no more in an offer
     }
 }
 
 static void exchanged(void)
 {
     exchange done;
-    while (shifter_take(&done)) {
+    while (shifter_read(&done)) {
         bool alone = (done.selected & (done.selected - 1)) == 0;
         bool started = source->started;
         for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
             if (done.selected >> f & 1) {
-                hear(f, &done, alone);
+                apply_exchange(f, &done, alone);
                 offer(f);
             }
         }
@@ -129,8 +129,8 @@ static void exchanged(void)
             counts.first_us = started ? counts.first_us : done.t_us;
             counts.latest_us = done.t_us;
         }
-        uint32_t took_us = port_now_us(ONLY_BOARD) - done.t_us;
-        counts.slowest_us = took_us > counts.slowest_us ? took_us : counts.slowest_us;
+        uint32_t elapsed_us = port_now_us(ONLY_BOARD) - done.t_us;
+        counts.slowest_us = elapsed_us > counts.slowest_us ? elapsed_us : counts.slowest_us;
     }
 }
 
@@ -142,7 +142,7 @@ void answers_renew(void)
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         offer(f);
     }
-    interrupt_let_go(PIO0_IRQ_1);
+    interrupt_enable(PIO0_IRQ_1);
 }
 
 void answers_plug(uint8_t finger, bool present, const char *serial)
@@ -150,7 +150,7 @@ void answers_plug(uint8_t finger, bool present, const char *serial)
     interrupt_hold_off(PIO0_IRQ_1);
     bt_emu_init(&sensor[finger], finger, present, serial, bt_emu_stream_in_order, source);
     offer(finger);
-    interrupt_let_go(PIO0_IRQ_1);
+    interrupt_enable(PIO0_IRQ_1);
 }
 
 void answers_forget(void)
@@ -158,7 +158,7 @@ void answers_forget(void)
     interrupt_hold_off(PIO0_IRQ_1);
     bt_emu_stream_init(source, samples, SAMPLE_RAM);
     memset(&counts, 0, sizeof counts);
-    interrupt_let_go(PIO0_IRQ_1);
+    interrupt_enable(PIO0_IRQ_1);
 }
 
 void answers_start(bt_emu_stream *stream)
@@ -177,7 +177,7 @@ bt_answer_counts answers_counts(void)
 {
     interrupt_hold_off(PIO0_IRQ_1);
     bt_answer_counts now = counts;
-    interrupt_let_go(PIO0_IRQ_1);
+    interrupt_enable(PIO0_IRQ_1);
     now.late += shifter_lost();
     return now;
 }

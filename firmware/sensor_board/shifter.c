@@ -72,10 +72,10 @@ _Static_assert(sizeof program / sizeof *program == WATCHER_END + 1 && WATCHER_EN
 
 // ---- offers ----------------------------------------------------------------------------------------------
 
-#define SELECTS    (1u << BT_MAX_FINGERS)
-#define NOBODY     (SELECTS - 1) // all selects are high
-#define OFFER_HEAR (1u << 30)
-#define OFFER_MARK (1u << 8) // tells an offer that comes back from a byte
+#define SELECTS        (1u << BT_MAX_FINGERS)
+#define NOBODY         (SELECTS - 1) // all selects are high
+#define OFFER_SELECTED (1u << 30)
+#define OFFER_MARK     (1u << 8) // tells an offer that comes back from a byte
 
 // By the five selects as they are, low for selected.
 static volatile uint32_t offers[SELECTS] __attribute__((aligned(SELECTS * 4)));
@@ -95,7 +95,7 @@ static struct {
 
 static uint32_t silence(uint32_t selects)
 {
-    return OFFER_MARK | selects | (selects != NOBODY ? OFFER_HEAR : 0);
+    return OFFER_MARK | selects | (selects != NOBODY ? OFFER_SELECTED : 0);
 }
 
 static uint32_t alone(uint8_t finger)
@@ -156,7 +156,7 @@ static void end_exchange(uint32_t offer)
     current.bytes = 0;
 }
 
-static void heard(void)
+static void rx_interrupt(void)
 {
     for (int k = 0; k < SPI_FIFO_WORDS && !(PIO0_FSTAT & PIO_RX_EMPTY(SHIFTER)); k++) {
         uint32_t word = PIO0_RXF(SHIFTER);
@@ -171,7 +171,7 @@ static void heard(void)
     }
 }
 
-bool shifter_take(exchange *out)
+bool shifter_read(exchange *out)
 {
     REG_CLR(PIO0_IRQ1_INTF) = PIO_INT_FLAG0; // one that ends now sets it again
     uint8_t tail = done_tail;
@@ -196,7 +196,7 @@ uint32_t shifter_lost(void)
 // ---- start -----------------------------------------------------------------------------------------------
 
 // The DMA's two who hand addresses on, one when the other has come to its end, and the one who fetches.
-enum { ASKER = DMA_DEALER, FETCHER = DMA_WORKER, ASKER_TOO = DMA_OF_UART + 1 };
+enum { ASKER = DMA_DEALER, FETCHER = DMA_WORKER, ASKER_TOO = DMA_UART_TX + 1 };
 
 static void start_asker(uint32_t channel, uint32_t next)
 {
@@ -229,7 +229,7 @@ static void start_machine(uint32_t sm, uint32_t from, uint32_t to, uint32_t in_b
 
 void shifter_start(void (*exchanged)(void))
 {
-    (void)take_out_of_reset(RESETS_PIO0);
+    (void)reset_blocks(RESETS_PIO0);
     for (uint32_t selects = 0; selects < SELECTS; selects++) {
         offers[selects] = silence(selects);
     }
@@ -251,7 +251,7 @@ void shifter_start(void (*exchanged)(void))
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_PIO0;
 
     PIO0_IRQ0_INTE = PIO_INT_RX(SHIFTER);
-    use_interrupt(PIO0_IRQ_0, 0, heard);
+    use_interrupt(PIO0_IRQ_0, 0, rx_interrupt);
     use_interrupt(PIO0_IRQ_1, 1, exchanged); // behind it and the timer's, before the USB's
     PIO0_CTRL = 1u << SHIFTER | 1u << WATCHER;
 }

@@ -6,10 +6,10 @@
 #include <stdint.h>
 
 // What a sensor will say when it is selected alone. Other bits are the shifter's own.
-#define OFFER_DRIVE    (1u << 31) // else MISO is let go, and the word is 0
-#define OFFER_WORD(w)  ((uint32_t)(w) << 14)
-#define OFFER_SETTLED  (1u << 5) // after its 50 us, not before
-#define WORD_OF(offer) ((uint16_t)((offer) >> 14))
+#define OFFER_DRIVE         (1u << 31) // else MISO is let go, and the word is 0
+#define OFFER_WORD(w)       ((uint32_t)(w) << 14)
+#define OFFER_SETTLED       (1u << 5) // after its 50 us, not before
+#define OFFERED_WORD(offer) ((uint16_t)((offer) >> 14))
 
 // A first byte up to this one reads: 0x00, and 0x01 of a public driver. Others are commands.
 #define BT_READ_MOSI_MAX 0x01FFu
@@ -34,7 +34,7 @@ bool shifter_offer(uint8_t finger, uint32_t offer, uint32_t after_byte);
 uint32_t shifter_released_us(uint8_t finger);
 
 // The next exchange, or false. Once it is over its sensor lets MISO go, until it has another offer.
-bool shifter_take(exchange *done);
+bool shifter_read(exchange *done);
 
 // Exchanges that nobody took in time.
 uint32_t shifter_lost(void);

@@ -28,7 +28,7 @@ FIGURES = [
     ("firmware/boards/f405/README.md", r"after (\w+) seconds", "firmware/port/stm32f405/clocks.c", r"RLR = (\d+)", 500),
     ("firmware/port/README.md", r"a halt of (\w+) seconds", SYSTEM, r"WATCHDOG_US (\d+)u", 1e6),
     (SAFETY, r"no start of frame for (\d+) ms", CONTROLLER, r"SUSPENDED_US +(\d+)u", 1e3),
-    (PICO, r"hears no frame for (\d+) ms", CONTROLLER, r"HEARS_NOTHING_US (\d+)u", 1e3),
+    (PICO, r"hears no frame for (\d+) ms", CONTROLLER, r"SOF_TIMEOUT_US (\d+)u", 1e3),
     (SAFETY, r"hold_timeout_ms` \| 1 s; (\d+) s", LINK, r"hold_timeout_ms\](?s:.*?)default = ([\d_]+)", 1e3),
     (MODEL, r"gap of (\d) mm", PHYSICS, r"GAP_MM = ([\d.]+)", 1),
     (MODEL, r"at (4\.5) N", PHYSICS, r"PLATE_N, FAINT_N = ([\d.]+)", 1),

@@ -33,7 +33,7 @@ static inline void interrupt_hold_off(uint32_t number)
     __asm volatile("dsb\n isb" ::: "memory");
 }
 
-static inline void interrupt_let_go(uint32_t number)
+static inline void interrupt_enable(uint32_t number)
 {
     __asm volatile("" ::: "memory");
     NVIC_ISER(number) = 1u << number % 32;
@@ -43,7 +43,7 @@ static inline void interrupt_let_go(uint32_t number)
 #define SYSTICK (-1) // as an interrupt's number
 
 // Who takes an interrupt; one that nobody takes resets the board. priority: 0 goes first, 3 last; an
-// interrupt interrupts those of a larger number. It is let go at once.
+// interrupt interrupts those of a larger number. It is enabled at once.
 void use_interrupt(int number, uint32_t priority, void (*handler)(void));
 
 // ---- image_note.c

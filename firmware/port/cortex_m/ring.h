@@ -77,19 +77,19 @@ static inline bool ring_put(ring *r, const uint8_t *data, size_t bytes)
 }
 
 // The reader's. Returns how many there were.
-static inline size_t ring_take(ring *r, uint8_t *data, size_t bytes)
+static inline size_t ring_pop(ring *r, uint8_t *data, size_t bytes)
 {
     uint32_t tail = ring_get(&r->tail);
     const uint32_t filled = ring_get(&r->head) - tail;
     if (filled == 0) {
         return 0;
     }
-    const size_t taken = filled < bytes ? filled : bytes;
-    for (size_t k = 0; k < taken; k++) {
+    const size_t count = filled < bytes ? filled : bytes;
+    for (size_t k = 0; k < count; k++) {
         data[k] = *ring_at(r, tail++);
     }
     ring_set(&r->tail, tail);
-    return taken;
+    return count;
 }
 
 // The reader's: as if all were taken.

@@ -56,7 +56,7 @@ void use_interrupt(int number, uint32_t priority, void (*handler)(void))
     }
     const uint32_t n = (uint32_t)number;
     NVIC_IPR(n) = with_priority(NVIC_IPR(n), n % 4, priority);
-    interrupt_let_go(n);
+    interrupt_enable(n);
 }
 
 // With what it calls it may run from flash and copy all other code. At the full clock, because on a slow one

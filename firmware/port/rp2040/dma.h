@@ -7,7 +7,7 @@
 enum dma_channel {
     DMA_DEALER, // slot.c
     DMA_WORKER,
-    DMA_OF_UART,
+    DMA_UART_TX,
 };
 
 // An address as the DMA's registers take it.

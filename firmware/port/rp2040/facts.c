@@ -9,7 +9,7 @@
 
 #define READS 16 // averaged; their sum is 16 bits of 3.3 V
 
-static uint32_t sum_of(uint32_t input)
+static uint32_t adc_sum(uint32_t input)
 {
     uint32_t sum = 0;
     for (int k = 0; k < READS; k++) {
@@ -24,14 +24,14 @@ port_facts port_measure(bt_port *port)
 {
     port_facts facts = PORT_NO_FACTS;
     CLK_ADC_CTRL = CLK_ENABLE; // from PLL_USB
-    if (take_out_of_reset(RESETS_ADC)) {
+    if (reset_blocks(RESETS_ADC)) {
         // 27 degrees at 706 mV, -1.721 mV a degree (4.9.5); in 0.1 mV.
-        (void)sum_of(ADC_INPUT_DIE); // while the sensor comes up
-        int32_t above = (int32_t)(sum_of(ADC_INPUT_DIE) * 33000u >> 16) - 7060;
+        (void)adc_sum(ADC_INPUT_DIE); // while the sensor comes up
+        int32_t above = (int32_t)(adc_sum(ADC_INPUT_DIE) * 33000u >> 16) - 7060;
         facts.die_centi_c = (int16_t)(2700 - above * 581 / 100);
 #ifdef PIN_SUPPLY
         PADS_BANK0_GPIO(PIN_SUPPLY) = PADS_OD; // and no pull, which would load the divider
-        facts.supply_mv = (uint16_t)(sum_of(ADC_INPUT_OF(PIN_SUPPLY)) * 9900u >> 16);
+        facts.supply_mv = (uint16_t)(adc_sum(ADC_INPUT_OF(PIN_SUPPLY)) * 9900u >> 16);
 #endif
     }
     facts.chip_id = SYSINFO_CHIP_ID;

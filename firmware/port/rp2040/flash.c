@@ -91,8 +91,8 @@ bool port_flash_erase(bt_port *port, uint32_t sector_offset)
     uint32_t primask = leave_xip();
     rom.erase(on_chip(sector_offset), BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
     back_to_xip(primask);
-    uint32_t took_us = port_now_us(port) - since_us;
-    flash_erase_us = took_us > flash_erase_us ? took_us : flash_erase_us;
+    uint32_t elapsed_us = port_now_us(port) - since_us;
+    flash_erase_us = elapsed_us > flash_erase_us ? elapsed_us : flash_erase_us;
     return true;
 }
 

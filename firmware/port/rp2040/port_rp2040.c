@@ -107,7 +107,7 @@ void port_idle(bt_port *port)
     uart_watch();
 #ifdef PIN_LED
     const uint32_t lit =
-        port_now_us(port) >> (usb_hears_frames ? 19 : 17) & 1; // s/2 or s/8: a host's frames, none
+        port_now_us(port) >> (usb_receives_sof ? 19 : 17) & 1; // s/2 or s/8: a host's frames, none
     SIO_GPIO_OUT_SET = lit << PIN_LED;
     SIO_GPIO_OUT_CLR = (lit ^ 1) << PIN_LED;
 #endif

@@ -64,7 +64,7 @@ void spi_configure(uint32_t control)
 
 void spi_reset(void)
 {
-    (void)take_out_of_reset(RESETS_SPI0);
+    (void)reset_blocks(RESETS_SPI0);
     spi_configure(spi_control);
 }
 

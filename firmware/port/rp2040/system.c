@@ -53,7 +53,7 @@ AT_BOOT bool clocks_start(void)
     }
     CLK_REF_CTRL = CLK_REF_SRC_XOSC;
     if (!wait_for(&CLK_REF_SELECTED, 1u << CLK_REF_SRC_XOSC, 1u << CLK_REF_SRC_XOSC, WAIT_CLOCKS_TURNS)
-        || !take_out_of_reset(RESETS_PLL_SYS | RESETS_PLL_USB)
+        || !reset_blocks(RESETS_PLL_SYS | RESETS_PLL_USB)
         || !start_pll(PLL_SYS_BASE, 125, 6, 2)    // 1500 / 12 = 125 MHz
         || !start_pll(PLL_USB_BASE, 100, 5, 5)) { // 1200 / 25 = 48 MHz
         return false;
@@ -65,8 +65,8 @@ AT_BOOT bool clocks_start(void)
     }
     CLK_PERI_CTRL = CLK_ENABLE; // from clk_sys
     CLK_USB_CTRL = CLK_ENABLE;  // from PLL_USB
-    if (!take_out_of_reset(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_SYSINFO
-                           | RESETS_TIMER | RESETS_USBCTRL)) {
+    if (!reset_blocks(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_SYSINFO
+                      | RESETS_TIMER | RESETS_USBCTRL)) {
         return false;
     }
 #ifdef PIN_LED

@@ -50,7 +50,7 @@ void usb_start(const char *serial);
 
 // In the main loop, often: start over a controller that hears nothing any more.
 void usb_watch(void);
-extern bool usb_hears_frames; // of a host
+extern bool usb_receives_sof; // of a host
 bool usb_all_sent(void);
 extern volatile uint32_t usb_starts; // of frame
 

@@ -31,7 +31,7 @@ static void uart_interrupt(void)
 
 void uart_start(uint32_t bits_per_s)
 {
-    if (!take_out_of_reset(RESETS_UART0)) {
+    if (!reset_blocks(RESETS_UART0)) {
         return;
     }
     const uint32_t divisor_q6 = (CLK_SYS_HZ / 16 * 64 + bits_per_s / 2) / bits_per_s;
@@ -56,19 +56,19 @@ bool uart_started(void)
 
 void uart_watch(void)
 {
-    if (DMA_CTRL_TRIG(DMA_OF_UART) & DMA_BUSY) {
+    if (DMA_CTRL_TRIG(DMA_UART_TX) & DMA_BUSY) {
         return;
     }
     const uint32_t tail = ring_get(&tx.tail) + given;
     ring_set(&tx.tail, tail);
     given = ring_run(&tx, tail, ring_filled(&tx));
     if (given > 0) {
-        DMA_READ_ADDR(DMA_OF_UART) = dma_address(ring_at(&tx, tail));
-        DMA_WRITE_ADDR(DMA_OF_UART) = dma_address(&UART_DR);
-        DMA_TRANS_COUNT(DMA_OF_UART) = given;
+        DMA_READ_ADDR(DMA_UART_TX) = dma_address(ring_at(&tx, tail));
+        DMA_WRITE_ADDR(DMA_UART_TX) = dma_address(&UART_DR);
+        DMA_TRANS_COUNT(DMA_UART_TX) = given;
         __asm volatile("" ::: "memory"); // what the DMA reads is written
-        DMA_CTRL_TRIG(DMA_OF_UART) =
-            DMA_QUIET | DMA_BY_UART0_TX | DMA_CHAIN_TO_ITSELF(DMA_OF_UART) | DMA_INCR_READ | DMA_CHANNEL_EN;
+        DMA_CTRL_TRIG(DMA_UART_TX) =
+            DMA_QUIET | DMA_BY_UART0_TX | DMA_CHAIN_TO_ITSELF(DMA_UART_TX) | DMA_INCR_READ | DMA_CHANNEL_EN;
     }
 }
 
@@ -87,5 +87,5 @@ bool uart_all_sent(void)
 
 size_t uart_read(uint8_t *data, size_t bytes)
 {
-    return !started ? 0 : ring_take(&rx, data, bytes);
+    return !started ? 0 : ring_pop(&rx, data, bytes);
 }

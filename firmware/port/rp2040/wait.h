@@ -14,7 +14,7 @@
 
 // Into reset and out again: every register of these blocks is as after power-on. False when they do not come
 // back. Inline, because boot calls it before there is code in SRAM, and the USB's guard after.
-static inline bool take_out_of_reset(uint32_t blocks)
+static inline bool reset_blocks(uint32_t blocks)
 {
     REG_SET(RESETS_RESET) = blocks;
     REG_CLR(RESETS_RESET) = blocks;

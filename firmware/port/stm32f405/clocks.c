@@ -31,7 +31,7 @@ AT_BOOT bool clocks_start(void)
     }
     // The ROM's loader leaves the PLL on at Go, where PLLCFGR cannot be written, and interrupts let go that
     // nobody here takes (AN2606; stm32duino #1653).
-    for (uint32_t number = 0; number < INTERRUPTS_OF_CHIP; number += 32) {
+    for (uint32_t number = 0; number < CHIP_INTERRUPTS; number += 32) {
         NVIC_ICER(number) = UINT32_MAX;
     }
     RCC_CR |= RCC_CR_HSION;

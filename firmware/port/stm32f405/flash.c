@@ -51,8 +51,8 @@ bool port_flash_erase(bt_port *port, uint32_t sector_offset)
         erased = done();
     }
     end();
-    const uint32_t took_us = clock_us() - start_us;
-    flash_erase_us = took_us > flash_erase_us ? took_us : flash_erase_us;
+    const uint32_t elapsed_us = clock_us() - start_us;
+    flash_erase_us = elapsed_us > flash_erase_us ? elapsed_us : flash_erase_us;
     return erased;
 }
 

@@ -46,7 +46,7 @@ void port_idle(bt_port *port)
     }
     uart_watch();
     // Slow once a host was heard, fast before; dark without clocks, steady where this loop is not reached.
-    const uint32_t lit = clock_us() >> (uart_heard ? 19 : 17) & 1;
+    const uint32_t lit = clock_us() >> (uart_received ? 19 : 17) & 1;
     GPIO_BSRR(PORT_LED) = 1u << (PIN_LED + (lit ? 0 : 16));
     watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
     sleep_until_woken();

@@ -51,7 +51,7 @@ void spi_start(void);
 uint32_t spi_khz(void);
 
 // ---- uart.c
-extern volatile bool uart_heard; // a byte, so far
+extern volatile bool uart_received; // a byte, so far
 void uart_watch(void);
 bool uart_all_sent(void);
 

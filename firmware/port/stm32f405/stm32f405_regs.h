@@ -16,7 +16,7 @@
 #define TIM2_HZ (HCLK_HZ / 2)
 #endif
 
-#define INTERRUPTS_OF_CHIP 82 // 12.2
+#define CHIP_INTERRUPTS 82 // 12.2
 
 #define SCB_AIRCR       REG32(0xE000ED0Cu)
 #define SCB_AIRCR_RESET (0x05FA0000u | 1u << 2)

@@ -12,7 +12,7 @@
 RING(tx, 4096); // 40 ms of five fingers' frames
 RING(rx, 512);  // some commands
 static bool started;
-volatile bool uart_heard;
+volatile bool uart_received;
 
 // In the interrupt, or with it held off. On silicon a byte at a time; QEMU's UART is always ready, but never
 // interrupts for it.
@@ -23,7 +23,7 @@ static void send(void)
         if (!(USART3_SR & USART_SR_TXE)) {
             break;
         }
-        (void)ring_take(&tx, &byte, 1);
+        (void)ring_pop(&tx, &byte, 1);
         USART3_DR = byte;
     }
     if (ring_filled(&tx) != 0) {
@@ -38,7 +38,7 @@ static void uart_interrupt(void)
     if (USART3_SR & (USART_SR_RXNE | USART_SR_ORE)) {
         uint8_t byte = (uint8_t)USART3_DR; // a damaged one, too: the CRC judges
         (void)ring_put(&rx, &byte, 1);
-        uart_heard = true;
+        uart_received = true;
         wake();
     }
     send();
@@ -49,7 +49,7 @@ void uart_watch(void)
     if (started && ring_filled(&tx) != 0) {
         interrupt_hold_off(USART3_IRQ);
         send();
-        interrupt_let_go(USART3_IRQ);
+        interrupt_enable(USART3_IRQ);
     }
 }
 
@@ -84,7 +84,7 @@ bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t b
 
 size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)
 {
-    return link == 0 ? ring_take(&rx, data, bytes) : 0;
+    return link == 0 ? ring_pop(&rx, data, bytes) : 0;
 }
 
 bool uart_all_sent(void)

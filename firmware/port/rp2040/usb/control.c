@@ -167,7 +167,7 @@ static void set_configuration(uint32_t value)
     accept();
 }
 
-static void take_setup(uint8_t setup[8])
+static void read_setup(uint8_t setup[8])
 {
     // A host may begin another request at any time (USB 2.0, 8.4.6.4). What is armed for the one before goes
     // first, while SETUP_REC still holds the host off; and a packet that comes while it is read is read anew.
@@ -188,7 +188,7 @@ void usb_control_setup(void)
 {
     static const uint8_t zeros[2];
     uint8_t setup[8] = {0};
-    take_setup(setup);
+    read_setup(setup);
     uint32_t value = setup[2] | (uint32_t)setup[3] << 8;
     uint32_t index = setup[4] | (uint32_t)setup[5] << 8;
     uint32_t asked = setup[6] | (uint32_t)setup[7] << 8;

@@ -19,14 +19,14 @@
 // controller for good: it hears neither tokens nor bus resets, and so no start of frame, which a host sends
 // every millisecond even while nobody reads. Only a reset of the block helps. data.c avoids what is known to
 // cause it; this is for what is left.
-#define HEARS_NOTHING_US 100000u
-#define SUSPENDED_US     3000u  // without a start of frame, USB 2.0, 7.1.7.6
-#define OFF_THE_BUS_US   20000u // so that a hub sees it leave
-#define BOUNCES_US       10000u // of a plug, or of a button that another board has on the sense pin
+#define SOF_TIMEOUT_US 100000u
+#define SUSPENDED_US   3000u  // without a start of frame, USB 2.0, 7.1.7.6
+#define OFF_THE_BUS_US 20000u // so that a hub sees it leave
+#define BOUNCES_US     10000u // of a plug, or of a button that another board has on the sense pin
 
 // The controller says that the bus is suspended. By itself this means little: it is told once when that
 // changes, maybe long after it has changed back. So it counts while no frame has begun since.
-static volatile bool suspend_told;
+static volatile bool suspend_reported;
 volatile uint32_t usb_starts;
 
 static void buffers_done(void)
@@ -49,7 +49,7 @@ static void buffers_done(void)
 
 static void not_suspended(void)
 {
-    suspend_told = false;
+    suspend_reported = false;
     usb_data_suspend(false);
 }
 
@@ -61,7 +61,7 @@ static void usb_interrupt(void)
         buffers_done();
     }
     if (status & USB_INT_SUSPEND) {
-        suspend_told = USB_SIE_STATUS & USB_SIE_SUSPENDED;
+        suspend_reported = USB_SIE_STATUS & USB_SIE_SUSPENDED;
         USB_SIE_STATUS = USB_SIE_SUSPENDED; // writing 1 clears, here and below
     }
     if (status & USB_INT_RESUME) {
@@ -124,7 +124,7 @@ static bool has_host(uint32_t now_us)
 #endif
 }
 
-bool usb_hears_frames;
+bool usb_receives_sof;
 static bool off = true;
 static uint32_t since_us = 0u - OFF_THE_BUS_US; // of the latest frame, or since it is off
 
@@ -132,9 +132,9 @@ static void detach(uint32_t now_us)
 {
     interrupt_hold_off(USBCTRL_IRQ);
     usb_control_bus_reset();
-    (void)take_out_of_reset(RESETS_USBCTRL);
+    (void)reset_blocks(RESETS_USBCTRL);
     off = true;
-    usb_hears_frames = false;
+    usb_receives_sof = false;
     since_us = now_us;
 }
 
@@ -168,7 +168,7 @@ void usb_watch(void)
     }
     if (frame != usb_starts) {
         frame = usb_starts;
-        usb_hears_frames = true;
+        usb_receives_sof = true;
         since_us = now_us;
         line_moves = false;
         return;
@@ -176,16 +176,16 @@ void usb_watch(void)
     if (silent_us < SUSPENDED_US) {
         return;
     }
-    usb_hears_frames = false;
+    usb_receives_sof = false;
     // On a bus that sleeps the lines do not change; on one whose host still talks, a hung controller believes
     // it asleep.
     line_moves = line_moves || (USB_SIE_STATUS & USB_SIE_LINE_STATE) != USB_SIE_LINE_J;
     const bool expects = usb_data_configured() || USB_BUFFER_IN(0) & USB_BUFFER_AVAILABLE;
-    if (suspend_told && !line_moves) {
+    if (suspend_reported && !line_moves) {
         interrupt_hold_off(USBCTRL_IRQ);
-        usb_data_suspend(suspend_told);
-        interrupt_let_go(USBCTRL_IRQ);
-    } else if (expects && silent_us >= HEARS_NOTHING_US) {
+        usb_data_suspend(suspend_reported);
+        interrupt_enable(USBCTRL_IRQ);
+    } else if (expects && silent_us >= SOF_TIMEOUT_US) {
         detach(now_us);
     }
 }

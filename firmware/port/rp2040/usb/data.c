@@ -73,12 +73,12 @@ static void send_next(void)
         out[bytes++] = 0;
         delimiter_due = false;
     }
-    const uint32_t taken = min(ring_filled(&tx), USB_PACKET_BYTES - bytes);
-    const uint32_t first = ring_run(&tx, tail, taken);
+    const uint32_t count = min(ring_filled(&tx), USB_PACKET_BYTES - bytes);
+    const uint32_t first = ring_run(&tx, tail, count);
     copy_bytes(out + bytes, ring_at(&tx, tail), first);
-    copy_bytes(out + bytes + first, tx.bytes, taken - first);
-    bytes += taken;
-    tail += taken;
+    copy_bytes(out + bytes + first, tx.bytes, count - first);
+    bytes += count;
+    tail += count;
     // A host waits for more after a full packet; when there is none, an empty one tells it so.
     if (bytes == 0 && !last_was_full) {
         return;
@@ -211,7 +211,7 @@ bool usb_link_write(const uint8_t *data, size_t bytes)
     if (!in_busy) {
         interrupt_hold_off(USBCTRL_IRQ); // and no other: sampling goes on
         send_next();
-        interrupt_let_go(USBCTRL_IRQ);
+        interrupt_enable(USBCTRL_IRQ);
     }
     return true;
 }
@@ -221,18 +221,18 @@ bool usb_link_write(const uint8_t *data, size_t bytes)
 size_t usb_link_read(uint8_t *data, size_t bytes)
 {
     const bool turned = turns != read_turns;
-    size_t taken = 0;
+    size_t count = 0;
     if (turned) {
         read_turns = turns;
         ring_set(&rx.tail, turned_at);
     } else {
-        taken = ring_take(&rx, data, bytes);
+        count = ring_pop(&rx, data, bytes);
     }
     atomic_signal_fence(memory_order_seq_cst);
-    if ((turned || taken > 0) && !out_armed) {
+    if ((turned || count > 0) && !out_armed) {
         interrupt_hold_off(USBCTRL_IRQ);
         receive_next();
-        interrupt_let_go(USBCTRL_IRQ);
+        interrupt_enable(USBCTRL_IRQ);
     }
-    return taken;
+    return count;
 }
