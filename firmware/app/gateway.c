@@ -327,7 +327,7 @@ static void close_round(bt_gateway *gateway)
     atomic_store_explicit(&gateway->in_use, is_in_use(session), memory_order_relaxed);
 }
 
-static void take_slot(bt_gateway *gateway, const bt_slot *slot)
+static void process_slot(bt_gateway *gateway, const bt_slot *slot)
 {
     bt_session *session = &gateway->session;
     // A new round number closes the one before, even when its last slots were lost.
@@ -395,7 +395,7 @@ void bt_gateway_poll(bt_gateway *gateway)
     // At most a round's worth: a main loop that is behind must still hear the host and feed the watchdog.
     bt_slot slot;
     for (int k = 0; k < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); k++) {
-        take_slot(gateway, &slot);
+        process_slot(gateway, &slot);
     }
     if (session->slots_late != gateway->sampler.late) {
         session->slots_late = gateway->sampler.late;

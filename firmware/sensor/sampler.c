@@ -115,7 +115,7 @@ static uint32_t command(bt_sampler *sampler)
     return port_now_us(sampler->port) + SETTLE_TICKS_US;
 }
 
-static uint16_t read_one(const bt_sampler *sampler, uint8_t f)
+static uint16_t read_word(const bt_sampler *sampler, uint8_t f)
 {
     port_spi_select(sampler->port, (uint8_t)(1u << f));
     uint16_t word = port_spi_transfer16(sampler->port, BT_LISTEN_WORD);
@@ -145,7 +145,7 @@ static bool read_sensors(bt_sampler *sampler)
         if (queried) {
             bt_serial_query_step(&sampler->query[f], sampler->port, f); // waits for its byte, but only rarely
         } else {
-            sampler->current.word[f] = read_one(sampler, f);
+            sampler->current.word[f] = read_word(sampler, f);
         }
         if (sampler->fingers >> f != 1) { // not the last of them
             port_delay_us(sampler->port, BT_GAP_US);
