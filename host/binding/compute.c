@@ -43,7 +43,7 @@ static bool read_signals(const uint8_t *row, const int32_t tare_q4[BT_ELECTRODES
 
 // The compression's centroid over its reaches, along the finger and across. The sums are whole, so that the
 // sign of noise makes no branch, which would take longer than all of them.
-static void gates_of(const int32_t e_q4[BT_ELECTRODES], double *x, double *y)
+static void compute_gates(const int32_t e_q4[BT_ELECTRODES], double *x, double *y)
 {
     int64_t weight = 0, along = 0, across = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -68,7 +68,7 @@ static void replace_force(const bt_population_column *columns, const int32_t e_q
     double part = part_q8 / (double)BT_POPULATION_ALL,
            rest = (likeness.gain - part_q8) / (double)BT_POPULATION_ALL;
     double *force = result->force_n;
-    gates_of(e_q4, &gate_x, &gate_y);
+    compute_gates(e_q4, &gate_x, &gate_y);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         const double *column = columns[i + (BT_ELECTRODES & -(e_q4[i] > 0))];
         for (int k = 0; k < 9; k++) {
@@ -140,7 +140,7 @@ int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, i
     return -1;
 }
 
-int bt_compute_one(const bt_formulas *formulas, const void *counts, const void *tare, void *results)
+int bt_compute_frame(const bt_formulas *formulas, const void *counts, const void *tare, void *results)
 {
     return bt_compute(formulas, 1, counts, 0, tare, 0, results) < 0;
 }

@@ -32,6 +32,6 @@ int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, i
                    const void *tare, int64_t tare_stride, void *results);
 
 // The same for one frame; true if it is in range. Fewer arguments: converting them counts here.
-int bt_compute_one(const bt_formulas *formulas, const void *counts, const void *tare, void *results);
+int bt_compute_frame(const bt_formulas *formulas, const void *counts, const void *tare, void *results);
 
 #endif

@@ -14,7 +14,7 @@ void bt_crc_fast_set_up(bt_crc_fast *fast)
     }
 }
 
-uint32_t bt_crc_fast_of(const bt_crc_fast *fast, const uint8_t *data, size_t bytes)
+uint32_t bt_crc_fast_compute(const bt_crc_fast *fast, const uint8_t *data, size_t bytes)
 {
     const uint32_t (*slices)[256] = (const uint32_t (*)[256])fast->slices;
     uint32_t crc = BT_CRC32_START;

@@ -14,6 +14,6 @@ typedef struct {
 
 void bt_crc_fast_set_up(bt_crc_fast *crc);
 
-uint32_t bt_crc_fast_of(const bt_crc_fast *crc, const uint8_t *data, size_t bytes);
+uint32_t bt_crc_fast_compute(const bt_crc_fast *crc, const uint8_t *data, size_t bytes);
 
 #endif

@@ -74,7 +74,7 @@ static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t by
         return BT_DEFRAMED_BAD_CRC;
     }
     size_t covered = bytes - 1 - BT_CRC_BYTES;
-    if (bt_crc_fast_of(&decoder->crc, plain, covered) != bt_get_u32(plain + covered)) {
+    if (bt_crc_fast_compute(&decoder->crc, plain, covered) != bt_get_u32(plain + covered)) {
         return BT_DEFRAMED_BAD_CRC;
     }
     int payload_bytes = (int)covered - 1;
@@ -112,9 +112,9 @@ static enum bt_deframed finish_rest(bt_decoder *decoder, const uint8_t *data, si
 
 size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes)
 {
-    size_t taken = bytes < BT_DECODE_BYTES ? bytes : BT_DECODE_BYTES;
+    size_t consumed = bytes < BT_DECODE_BYTES ? bytes : BT_DECODE_BYTES;
     memset(decoder->filled, 0, sizeof decoder->filled);
-    const uint8_t *end = data + taken;
+    const uint8_t *end = data + consumed;
     while (data < end) {
         const uint8_t *zero = memchr(data, 0, (size_t)(end - data));
         if (zero == NULL) {
@@ -127,5 +127,5 @@ size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes)
         decoder->outcomes[outcome]++;
         data = zero + 1;
     }
-    return taken;
+    return consumed;
 }

@@ -70,7 +70,7 @@ static int is_start(const uint8_t *other)
 }
 
 // Device time goes on, and says how long nothing was heard when that is long.
-static int64_t hear(bt_intake *intake, uint32_t t_us)
+static int64_t advance_clock(bt_intake *intake, uint32_t t_us)
 {
     int64_t before_us = intake->t_us.seen ? intake->t_us.last : t_us;
     int64_t now_us = bt_unwrap(&intake->t_us, t_us);
@@ -81,7 +81,7 @@ static int64_t hear(bt_intake *intake, uint32_t t_us)
 }
 
 // Who has not listened for longer than device time takes to wrap finds the wraps in the board's uptime.
-static void hear_status(bt_intake *intake, const bt_msg_status *status)
+static void apply_status(bt_intake *intake, const bt_msg_status *status)
 {
     if (status->uptime_s >= intake->uptime_s) { // else this is the first, or the board has restarted
         int64_t due_us = intake->status_us + INT64_C(1000000) * (status->uptime_s - intake->uptime_s);
@@ -92,7 +92,7 @@ static void hear_status(bt_intake *intake, const bt_msg_status *status)
             intake->unheard += skip_us / ROUND_US;
         }
     }
-    intake->status_us = hear(intake, status->t_us);
+    intake->status_us = advance_clock(intake, status->t_us);
     intake->uptime_s = status->uptime_s;
 }
 
@@ -119,14 +119,14 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
             if (other[0] == BT_STATUS_ID) {
                 bt_msg_status status;
                 bt_msg_status_unpack(&status, other + 2);
-                hear_status(intake, &status);
+                apply_status(intake, &status);
             }
             other += 2 + other[1];
             continue;
         }
         const uint8_t *row = rows[kind];
         rows[kind] += row_bytes[kind];
-        int64_t now_us = hear(intake, t_us_of(row));
+        int64_t now_us = advance_clock(intake, t_us_of(row));
         *t_us[kind]++ = now_us;
         if (kind == BT_DECODED_PAC) {
             *seq[kind]++ = bt_number(&intake->pacs, finger_of(row), seq_of(row), 1, intake->unheard, NULL);
@@ -148,7 +148,7 @@ size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
 {
     bt_decoder *decoder = &intake->decoder;
     bt_intake_facts *facts = &intake->facts;
-    facts->taken = (int64_t)bt_decode(decoder, data, bytes);
+    facts->consumed = (int64_t)bt_decode(decoder, data, bytes);
 
     int64_t *seq[BT_INTAKE_ROW_KINDS];
     int64_t *t_us[BT_INTAKE_ROW_KINDS];
@@ -168,7 +168,7 @@ size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
     number(intake, seq, t_us);
     facts->other_bytes = decoder->filled[BT_DECODED_OTHER];
     facts->out_bytes = at - (uint8_t *)intake->out;
-    return (size_t)facts->taken;
+    return (size_t)facts->consumed;
 }
 
 int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)

@@ -12,7 +12,7 @@
 
 // What a call completed.
 typedef struct {
-    int64_t taken;      // bytes of input
+    int64_t consumed;   // bytes of input
     int64_t arrived_ns; // when they were read, by the clock of time.monotonic(); bt_intake_read() only
     int64_t out_bytes;
     int64_t rows[BT_INTAKE_ROW_KINDS]; // FRAMEs, PACs, IDLEs

@@ -26,7 +26,7 @@ void bt_numbering_rejoin(bt_numbering *numbering)
 }
 
 // One that is not after the last: late, so it was counted as lost, or here twice.
-static void take_late(bt_numbering *numbering, uint8_t finger, int64_t behind, uint16_t rounds)
+static void count_late(bt_numbering *numbering, uint8_t finger, int64_t behind, uint16_t rounds)
 {
     uint64_t covered = behind < RECENT ? newest(rounds) << behind : 0;
     numbering->disordered++;
@@ -48,7 +48,7 @@ int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_
     }
     numbering->unheard[finger] = unheard;
     if (numbering->joined[finger] && number <= before && before - number < RECENT) {
-        take_late(numbering, finger, before - number, rounds);
+        count_late(numbering, finger, before - number, rounds);
         return number;
     }
     if (!numbering->joined[finger] || number <= before) {

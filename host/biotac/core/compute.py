@@ -41,7 +41,7 @@ _QUANTITY |= dict.fromkeys(_NUMBERS, _Q.POC | _Q.FORCE)
 # Looked up once: a call with one frame takes less time than a few of these would.
 _buffer = ffi.from_buffer
 _compute = lib.bt_compute
-_compute_one = lib.bt_compute_one
+_compute_one = lib.bt_compute_frame
 
 
 def compute(

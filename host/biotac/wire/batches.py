@@ -231,7 +231,7 @@ class StreamDecoder:
         # Copy everything out of the state: the next call overwrites it. The order is that of bt_intake.out: numbers of
         # FRAMEs, PACs and IDLEs, then the rows, then the others.
         facts = self._facts
-        self.taken, others = facts.taken, facts.other_bytes
+        self.taken, others = facts.consumed, facts.other_bytes
         n, pacs, idles = facts.rows
         self.last_t_us = facts.last_t_us if n or idles else None
         raw = self._out[: facts.out_bytes]
