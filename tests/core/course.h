@@ -48,8 +48,8 @@ static inline bt_round course_frame(emulated_finger *finger, int k)
         frame.electrode[i] = to_count(frame.electrode[i] + 120 * sin(1.1 * i) * sin(0.1 * (k - 500)));
     }
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        bool gone = random_unit(&finger->seed) < 0.002 || (between(k, 1180, 1200) && i % 5 == 2);
-        frame.electrode[i] = gone ? BT_INVALID_COUNT : frame.electrode[i];
+        bool missing = random_unit(&finger->seed) < 0.002 || (between(k, 1180, 1200) && i % 5 == 2);
+        frame.electrode[i] = missing ? BT_INVALID_COUNT : frame.electrode[i];
     }
     frame.pdc = random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : frame.pdc;
     frame.tdc = (uint16_t)(random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : 1000 + k / 20);
@@ -133,8 +133,8 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             uint16_t count[BT_MAX_FINGERS];
             for (int f = 0; f < BT_MAX_FINGERS; f++) {
-                bool there = (BOTH_FINGERS >> f & 1) && !course_away(f, k);
-                count[f] = there ? course_word(&frame[f], slot) : BT_INVALID_COUNT;
+                bool present = (BOTH_FINGERS >> f & 1) && !course_away(f, k);
+                count[f] = present ? course_word(&frame[f], slot) : BT_INVALID_COUNT;
             }
             bt_session_slot(&session, slot, count, slot_t_us(k, slot));
         }
@@ -148,7 +148,7 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
 }
 
 // Of FRAME, IDLE, TARE and TOUCH: all begin with seq, t_us and finger.
-static inline bool of_finger(const received_message *message, int finger)
+static inline bool is_from_finger(const received_message *message, int finger)
 {
     return (message->id == BT_FRAME_ID || message->id == BT_IDLE_ID || message->id == BT_TARE_ID
             || message->id == BT_TOUCH_ID)
@@ -166,7 +166,7 @@ static inline const received_message *find_message(const course_log *log, uint8_
 {
     for (int k = 0; k < log->count; k++) {
         const received_message *message = &log->message[k];
-        if (message->id == id && of_finger(message, finger) && seq_at(message) == seq) {
+        if (message->id == id && is_from_finger(message, finger) && seq_at(message) == seq) {
             return message;
         }
     }

@@ -36,7 +36,7 @@ static inline void host_reset(void)
     host.room = SIZE_MAX;
 }
 
-static inline void host_take_bytes(const uint8_t *data, size_t bytes)
+static inline void host_receive_bytes(const uint8_t *data, size_t bytes)
 {
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(&host.deframer, data[k]);
@@ -65,7 +65,7 @@ static inline bool host_write(void *context, unsigned link, const uint8_t *data,
     }
     host.room -= host.room == SIZE_MAX ? 0 : bytes;
     host.broken = host.broken || bytes == 0 || data[bytes - 1] != 0;
-    host_take_bytes(data, bytes);
+    host_receive_bytes(data, bytes);
     return true;
 }
 

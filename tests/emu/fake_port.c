@@ -12,7 +12,7 @@ fake_port fake;
 uint16_t fake_started_by = BT_FAULT_FLAG_STARTED;
 uint32_t fake_kept[PORT_KEPT_BYTES / 4];
 uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
+bool (*fake_host_accepts)(const uint8_t *data, size_t bytes);
 
 static uint64_t released_ns;
 static bool released;
@@ -126,7 +126,7 @@ uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 
 bool port_link_write(bt_port *port, unsigned link, const uint8_t *data, size_t bytes)
 {
-    return fake_host_takes(data, bytes);
+    return fake_host_accepts(data, bytes);
 }
 
 size_t port_link_read(bt_port *port, unsigned link, uint8_t *data, size_t bytes)

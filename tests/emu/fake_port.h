@@ -63,6 +63,6 @@ bool fake_next_interrupt(void);
 void fake_host_sends(const uint8_t *data, size_t bytes);
 
 // Where port_link_write goes. Set before the firmware runs.
-extern bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
+extern bool (*fake_host_accepts)(const uint8_t *data, size_t bytes);
 
 #endif

@@ -27,7 +27,7 @@ static struct {
     uint8_t finger;
     uint16_t fault; // what the finger's samples are
     bool absent;
-    uint32_t one_in; // of so many samples; 0: none
+    uint32_t period; // in samples; 0: never
 } trouble;
 
 static uint64_t first_command_ns;
@@ -36,7 +36,7 @@ static inline uint16_t source(void *context, uint8_t finger, uint8_t channel, ui
 {
     (void)context;
     if (channel == BT_EMU_LINE) {
-        return finger == trouble.finger && trouble.one_in == 1 ? trouble.fault : 0;
+        return finger == trouble.finger && trouble.period == 1 ? trouble.fault : 0;
     }
     if (first_command_ns == 0) {
         first_command_ns = t_ns;
@@ -45,7 +45,7 @@ static inline uint16_t source(void *context, uint8_t finger, uint8_t channel, ui
     uint64_t slot = ((t_ns - first_command_ns) * BT_SLOT_HZ + 500000000ull) / 1000000000ull;
     uint64_t mixed = (slot / BT_SLOTS * 64 + channel + 1u) * 0x9E3779B97F4A7C15ull;
     mixed += (uint64_t)finger * 0xC2B2AE3D27D4EB4Full;
-    if (finger == trouble.finger && trouble.one_in != 0 && (mixed >> 20) % trouble.one_in == 0) {
+    if (finger == trouble.finger && trouble.period != 0 && (mixed >> 20) % trouble.period == 0) {
         return trouble.fault;
     }
     return (uint16_t)(1500u + 300u * finger + 10u * channel + (mixed >> 40) % 8);
@@ -60,7 +60,7 @@ static struct {
     bt_deframer deframer;
 } host;
 
-static inline bool take(const uint8_t *data, size_t bytes)
+static inline bool host_accept(const uint8_t *data, size_t bytes)
 {
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(&host.deframer, data[k]);
@@ -91,7 +91,7 @@ static inline void boot(uint64_t start_ns)
     memset(&gateway, 0, sizeof gateway);
     first_command_ns = 0;
     fake_reset(source, start_ns);
-    fake_host_takes = take;
+    fake_host_accepts = host_accept;
     fake.bus.sensor[trouble.finger].present = !trouble.absent;
     bt_gateway_init(&gateway, ONLY_BOARD);
     t0_ns = (uint64_t)gateway.sampler.slot_start_us * 1000;

@@ -213,7 +213,7 @@ TEST(nothing_can_be_written)
     assert_int_equal(transfer(BT_LISTEN_WORD, 50000), 0xA552);
 }
 
-static uint8_t one_byte(uint64_t t_ns)
+static uint8_t read_byte(uint64_t t_ns)
 {
     bt_emu_select(&device, true, t_ns);
     uint8_t miso = bt_emu_transfer8(&device, 0, t_ns);
@@ -225,13 +225,13 @@ TEST(the_list_of_channels_is_pairs_and_an_end)
 {
     (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x73, 0);
     for (unsigned slot = 0; slot < 44; slot++) {
-        assert_int_equal(one_byte(50000 + 30000 * slot), bt_channel_command[bt_slot_channel[slot]]);
-        assert_int_equal(one_byte(60000 + 30000 * slot), slot < 43 ? 0x01 : 0xFE);
+        assert_int_equal(read_byte(50000 + 30000 * slot), bt_channel_command[bt_slot_channel[slot]]);
+        assert_int_equal(read_byte(60000 + 30000 * slot), slot < 43 ? 0x01 : 0xFE);
     }
-    assert_int_equal(one_byte(9000000), 0);
+    assert_int_equal(read_byte(9000000), 0);
 }
 
-static void assert_said_ahead(uint64_t t_ns, bool settled)
+static void assert_predicted(uint64_t t_ns, bool settled)
 {
     uint16_t ahead = bt_emu_word_ahead(&device, 0, settled, t_ns);
     bt_emu_device copy = device;
@@ -254,8 +254,8 @@ TEST(what_it_will_say_is_told_ahead)
         next_count = counts[c];
         for (size_t w = 0; w < sizeof words / sizeof *words; w++) {
             (void)transfer(words[w], t_ns);
-            assert_said_ahead(t_ns + 49999, device.settled);
-            assert_said_ahead(t_ns + 50000, true);
+            assert_predicted(t_ns + 49999, device.settled);
+            assert_predicted(t_ns + 50000, true);
             t_ns += 60000;
         }
     }

@@ -120,7 +120,7 @@ static void count_time_from_the_start(void)
     }
 }
 
-static void fingers_other_than_the_faulty_one_are_untouched(const char *what)
+static void fingers_other_than_the_faulty_one_are_untouched(const char *fault_name)
 {
     boot(START_NS);
     run_rounds(150);
@@ -133,7 +133,7 @@ static void fingers_other_than_the_faulty_one_are_untouched(const char *what)
         for (int k = 0; k < host.frames[f]; k++) {
             if (memcmp(&host.frame[f][k], &clean_frame[f][k], sizeof(bt_msg_frame)) != 0
                 || memcmp(&host.pac[f][k], &clean_pac[f][k], sizeof(bt_msg_pac)) != 0) {
-                fail_msg("%s on finger %d changed frame %d of finger %d", what, trouble.finger, k, f);
+                fail_msg("%s on finger %d changed frame %d of finger %d", fault_name, trouble.finger, k, f);
             }
         }
     }
@@ -144,7 +144,7 @@ TEST(one_finger_in_trouble_never_changes_another)
     static const struct {
         const char *name;
         uint16_t fault;
-        uint32_t one_in;
+        uint32_t period;
     } faults[] = {
         {"bad parity at times", BT_EMU_FAULT_BAD_PARITY, 5},
         {"bad parity", BT_EMU_FAULT_BAD_PARITY, 1},
@@ -166,10 +166,10 @@ TEST(one_finger_in_trouble_never_changes_another)
         trouble.finger = finger;
         for (size_t k = 0; k < sizeof faults / sizeof *faults; k++) {
             trouble.fault = faults[k].fault;
-            trouble.one_in = faults[k].one_in;
+            trouble.period = faults[k].period;
             fingers_other_than_the_faulty_one_are_untouched(faults[k].name);
         }
-        trouble.one_in = 0;
+        trouble.period = 0;
         trouble.absent = true;
         fingers_other_than_the_faulty_one_are_untouched("absence");
         assert_int_equal(host.frames[finger], 0);
@@ -199,7 +199,7 @@ TEST(every_count_arrives_at_its_finger_and_channel)
 TEST(bad_words_are_counted_by_kind_for_their_finger)
 {
     trouble.finger = 3;
-    trouble.one_in = 1;
+    trouble.period = 1;
     trouble.fault = BT_EMU_FAULT_NO_CHANNEL;
     boot(START_NS);
     run_rounds(20);

@@ -49,7 +49,7 @@ static void pass(uint64_t ns)
     atomic_store_explicit(&now_ns, now() + ns, memory_order_relaxed);
 }
 
-static uint32_t value_of(_Atomic uint32_t *count)
+static uint32_t load_relaxed(_Atomic uint32_t *count)
 {
     return atomic_load_explicit(count, memory_order_relaxed);
 }
@@ -72,12 +72,12 @@ bool bt_port_alarm(void)
 static void *interrupts(void *nothing)
 {
     while (now() < ROUNDS * ROUND_NS) {
-        while (value_of(&alarms) - value_of(&seen_alarms) > AHEAD_ALARMS) {
+        while (load_relaxed(&alarms) - load_relaxed(&seen_alarms) > AHEAD_ALARMS) {
         }
         uint64_t at_ns = (uint64_t)alarm_us * 1000;
         pass(at_ns > now() ? at_ns - now() : 0);
         (void)bt_port_alarm();
-        atomic_store_explicit(&alarms, value_of(&alarms) + 1, memory_order_relaxed);
+        atomic_store_explicit(&alarms, load_relaxed(&alarms) + 1, memory_order_relaxed);
     }
     return nothing;
 }
@@ -104,7 +104,7 @@ int main(int argc, char **argv)
         return 2;
     }
     while (now() < ROUNDS * ROUND_NS) {
-        uint32_t before = value_of(&alarms);
+        uint32_t before = load_relaxed(&alarms);
         bt_gateway_poll(&gateway);
         looked += defect ? gateway.sampler.fraction : 0;
         atomic_store_explicit(&seen_alarms, before, memory_order_relaxed);

@@ -9,7 +9,7 @@
 static uint8_t answer_id;
 static uint8_t answer[BT_FRAME_MAX_BYTES];
 
-static bool take_answer(const uint8_t *data, size_t bytes)
+static bool accept_answer(const uint8_t *data, size_t bytes)
 {
     for (size_t k = 0; k < bytes; k++) {
         if (bt_deframer_push(&host.deframer, data[k]) == BT_DEFRAMED_GOOD) {
@@ -26,7 +26,7 @@ static void ask(uint8_t id, const void *payload)
     size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
     answer_id = 0;
     fake_host_sends(encoded, bytes);
-    for (size_t taken = 0; taken < bytes; taken += 64) { // of which the gateway takes so many in a turn
+    for (size_t polled = 0; polled < bytes; polled += 64) { // of which the gateway takes so many in a turn
         bt_gateway_poll(&gateway);
     }
 }
@@ -132,7 +132,7 @@ static int powered(void **state)
 {
     (void)no_trouble(state);
     boot(START_NS);
-    fake_host_takes = take_answer;
+    fake_host_accepts = accept_answer;
     power_on();
     upload_and_save(1, 77, 3);
     return 0;

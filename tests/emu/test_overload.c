@@ -29,7 +29,7 @@ void __wrap_bt_map_wrench(const bt_map *map, const uint16_t *counts, const uint1
 static uint8_t answer_id;
 static bt_deframer answers;
 
-static bool take_all(const uint8_t *data, size_t bytes)
+static bool accept_all(const uint8_t *data, size_t bytes)
 {
     uint8_t id = 0;
     for (size_t k = 0; k < bytes; k++) {
@@ -41,7 +41,7 @@ static bool take_all(const uint8_t *data, size_t bytes)
     if (id == BT_FRAME_ID) {
         spend(frame_ns);
     }
-    return take(data, bytes);
+    return host_accept(data, bytes);
 }
 
 static void send(uint8_t id, const void *payload)
@@ -55,7 +55,7 @@ static void start(void)
 {
     map_ns = frame_ns = 0;
     boot(START_NS);
-    fake_host_takes = take_all;
+    fake_host_accepts = accept_all;
     run_rounds(60);
     for (uint8_t f = 0; f < FINGERS; f++) {
         bt_session *session = &gateway.session;

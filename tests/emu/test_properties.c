@@ -59,7 +59,7 @@ TEST(all_are_read_with_gaps_between_the_bytes)
 
 static uint64_t flipped;
 
-static uint16_t one_bit(uint64_t n)
+static uint16_t flip_bit(uint64_t n)
 {
     return n == flipped ? BT_EMU_FAULT_BAD_PARITY : 0;
 }
@@ -69,7 +69,7 @@ TEST(one_flipped_bit_anywhere_changes_nothing)
     for (flipped = 0; flipped < 80; flipped++) {
         bt_msg_sensor_info info;
         (void)new_bus(NULL);
-        line = one_bit;
+        line = flip_bit;
         read_all(0, &info);
         assert_all_are_known(&info);
     }
@@ -114,11 +114,11 @@ TEST(a_sensor_of_another_type_is_named_and_never_sure)
         assert_memory_equal(info.serial, serial[k], 16);
     }
     trouble.finger = 2;
-    trouble.one_in = 1;
+    trouble.period = 1;
     trouble.fault = BT_EMU_FAULT_BAD_PARITY;
     boot(START_NS);
     memcpy(fake.bus.sensor[2].serial, serial[0], 16); // plugged in while sampling goes on
-    trouble.one_in = 0;
+    trouble.period = 0;
     run_rounds(300);
     assert_int_equal(gateway.session.info[2].present, 0);
     assert_true(host.frames[2] > 200);
@@ -141,11 +141,11 @@ TEST(a_mute_sensor_finds_its_voice)
 TEST(a_serial_number_that_could_not_be_read_is_read_later)
 {
     trouble.finger = 2;
-    trouble.one_in = 1;
+    trouble.period = 1;
     trouble.fault = BT_EMU_FAULT_BAD_PARITY;
     boot(START_NS);
     assert_int_equal(gateway.session.info[2].present, 0);
-    trouble.one_in = 0;
+    trouble.period = 0;
     run_rounds(30);
     assert_int_equal(gateway.session.info[2].present, 1);
     assert_memory_equal(gateway.session.info[2].serial, "BTEMU00000000003", 16);

@@ -3,7 +3,7 @@
 
 static uint8_t error;
 
-static bool take_reply(const uint8_t *data, size_t bytes)
+static bool accept_reply(const uint8_t *data, size_t bytes)
 {
     for (size_t k = 0; k < bytes; k++) {
         if (bt_deframer_push(&host.deframer, data[k]) == BT_DEFRAMED_GOOD
@@ -17,7 +17,7 @@ static bool take_reply(const uint8_t *data, size_t bytes)
 static uint8_t ask(uint8_t id, const void *payload, size_t bytes)
 {
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    fake_host_takes = take_reply;
+    fake_host_accepts = accept_reply;
     error = 0xFF;
     fake_host_sends(encoded, bt_frame_encode(id, payload, bytes, encoded));
     bt_gateway_poll(&gateway);

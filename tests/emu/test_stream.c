@@ -105,7 +105,7 @@ TEST(test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape)
     assert_int_equal(ask(FINGERS, 0), BT_EMU_FAULT_STUCK_LOW);
 }
 
-static void ask_who(uint8_t finger)
+static void query_serial(uint8_t finger)
 {
     (void)bt_emu_stream_in_order(&stream, finger, BT_EMU_LINE, 0);
 }
@@ -123,12 +123,12 @@ TEST(test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_
     for (uint8_t f = 0; f < FINGERS; f++) {
         assert_int_equal(ask(f, 1), BT_EMU_FAULT_STUCK_LOW); // in the middle of a round
     }
-    ask_who(0);
-    ask_who(1);
+    query_serial(0);
+    query_serial(1);
     assert_int_equal(ask(2, 0), BT_EMU_FAULT_STUCK_LOW); // one of them is sampled meanwhile
     assert_int_equal(ask(0, 0), BT_EMU_FAULT_STUCK_LOW);
     for (uint8_t f = 0; f < FINGERS; f++) {
-        ask_who(f);
+        query_serial(f);
     }
     for (uint32_t slot = BT_SLOTS; slot < 2 * BT_SLOTS; slot++) {
         for (uint8_t f = 0; f < FINGERS; f++) {

@@ -38,24 +38,24 @@ static void add(const uint8_t *bytes, size_t count)
 static void read_steps(fuzz_input *in)
 {
     while (in->left > 0) {
-        uint8_t what = take_u8(in) % STEPS;
-        if (what == RAW) {
-            size_t bytes = take_u8(in);
+        uint8_t step = next_u8(in) % STEPS;
+        if (step == RAW) {
+            size_t bytes = next_u8(in);
             bytes = bytes < in->left ? bytes : in->left;
             add(in->data, bytes);
             in->data += bytes;
             in->left -= bytes;
-        } else if (what == END_CHUNK) {
+        } else if (step == END_CHUNK) {
             if (cut_count < MAX_CUTS) {
                 cuts[cut_count++] = filled;
             }
-        } else if (what == REPEAT) { // so that little input passes BT_DECODE_BYTES
-            size_t bytes = 16u * take_u8(in);
+        } else if (step == REPEAT) { // so that little input passes BT_DECODE_BYTES
+            size_t bytes = 16u * next_u8(in);
             bytes = bytes < filled ? bytes : filled;
             add(stream + filled - bytes, bytes);
         } else {
             uint8_t encoded[BT_ENCODED_MAX_BYTES];
-            fuzz_message message = take_message(in, what == DAMAGED, encoded);
+            fuzz_message message = next_message(in, step == DAMAGED, encoded);
             add(encoded, message.wire_bytes);
         }
     }
@@ -118,16 +118,16 @@ static void check_chunk(const uint8_t *bytes, size_t count)
     uint8_t *chunk = malloc(count + !count); // exactly as long, so that the sanitizer sees what reads past it
     memcpy(chunk, bytes, count);
     for (size_t at = 0; at < count;) {
-        size_t taken = bt_decode(&decoder, chunk + at, count - at);
-        if (taken == 0 || taken > count - at) {
-            FAIL("of %zu bytes, %zu were taken", count - at, taken);
+        size_t consumed = bt_decode(&decoder, chunk + at, count - at);
+        if (consumed == 0 || consumed > count - at) {
+            FAIL("of %zu bytes, %zu were taken", count - at, consumed);
         }
-        expect(chunk + at, taken);
-        if (bt_intake_feed(&intake, chunk + at, taken) != taken) {
-            FAIL("not all of %zu bytes were numbered", taken);
+        expect(chunk + at, consumed);
+        if (bt_intake_feed(&intake, chunk + at, consumed) != consumed) {
+            FAIL("not all of %zu bytes were numbered", consumed);
         }
         check_rows();
-        at += taken;
+        at += consumed;
         for (int kind = 0; kind < BT_DECODED_KINDS; kind++) {
             if (decoder.filled[kind] != want.filled[kind]
                 || memcmp(decoder.data[kind], want.data[kind], want.filled[kind]) != 0) {
@@ -154,7 +154,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     memset(&want, 0, sizeof want);
     bt_decoder_reset(&decoder);
     bt_intake_reset(&intake);
-    decoder.allow_longer = intake.decoder.allow_longer = take_u8(&in) & 1;
+    decoder.allow_longer = intake.decoder.allow_longer = next_u8(&in) & 1;
     read_steps(&in);
     size_t begin = 0;
     for (size_t k = 0; k < cut_count; k++) {

@@ -44,7 +44,7 @@ typedef struct {
 typedef struct {
     const char *name;
     void (*run)(const frame_input *in, answer *out);
-    void (*bound)(const load *of, bounds *out);
+    void (*bound)(const load *given, bounds *out);
 } variant;
 
 // ---- the kernel that ships -------------------------------------------------------------------------
@@ -95,13 +95,13 @@ static void shipped(const frame_input *in, answer *out)
     check_wanted(in, poc_um, force_100un, torque_mnmm);
 }
 
-static void shipped_bounds(const load *of, bounds *out)
+static void shipped_bounds(const load *given, bounds *out)
 {
     out->poc_um = POC_BOUND_UM;
     out->force_mn = FORCE_BOUND_MN;
-    out->torque_mnmm[0] = torque_x_bound_mnmm(of->force_n);
+    out->torque_mnmm[0] = torque_x_bound_mnmm(given->force_n);
     for (int d = 0; d < 2; d++) {
-        out->torque_mnmm[d + 1] = torque_yz_bound_mnmm(of->size, of->gain_n[d], of->sum[d]);
+        out->torque_mnmm[d + 1] = torque_yz_bound_mnmm(given->size, given->gain_n[d], given->sum[d]);
     }
 }
 
@@ -125,13 +125,13 @@ static void exact(const frame_input *in, answer *out)
 
 // Half of the last digit of each, as exact.h states them; the lever's two inputs are off by as much. The
 // terms of 1e-6 are what the double itself may be off.
-static void exact_bounds(const load *of, bounds *out)
+static void exact_bounds(const load *given, bounds *out)
 {
     out->poc_um = 1e-3;
     out->force_mn = 0.5e-3 + 1e-6;
-    out->torque_mnmm[0] = 0.5 + 2 * 5.08 * 0.5e-3 + 1e-3 * of->force_n + 1e-6;
+    out->torque_mnmm[0] = 0.5 + 2 * 5.08 * 0.5e-3 + 1e-3 * given->force_n + 1e-6;
     for (int d = 0; d < 2; d++) {
-        out->torque_mnmm[d + 1] = 0.5 + 0.5 / 16 * of->gain_n[d] + 1e-6;
+        out->torque_mnmm[d + 1] = 0.5 + 0.5 / 16 * given->gain_n[d] + 1e-6;
     }
 }
 
@@ -168,14 +168,14 @@ static void check(const variant *v, const answer *got, const lin2013_result *wan
     }
 }
 
-static void oracle(const frame_input *in, lin2013_result *want, load *of)
+static void oracle(const frame_input *in, lin2013_result *want, load *given)
 {
     lin2013_settings settings = {.poc_weights = in->weights};
     double e[BT_ELECTRODES];
-    *of = (load){0};
+    *given = (load){0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
         e[i] = in->e_q4[i] / 16.0;
-        of->size += fabs(e[i]);
+        given->size += fabs(e[i]);
     }
     for (int d = 0; d < 3; d++) {
         settings.force_gain[d] = in->force_nn[d] * 1e-9;
@@ -185,10 +185,10 @@ static void oracle(const frame_input *in, lin2013_result *want, load *of)
     }
     lin2013(e, &settings, want);
     for (int d = 0; d < 2; d++) {
-        of->gain_n[d] = fabs(settings.torque_gain[d]);
-        of->sum[d] = of->gain_n[d] > 0 ? fabs(want->torque_nmm[d + 1]) / of->gain_n[d] * 1000 : 0;
+        given->gain_n[d] = fabs(settings.torque_gain[d]);
+        given->sum[d] = given->gain_n[d] > 0 ? fabs(want->torque_nmm[d + 1]) / given->gain_n[d] * 1000 : 0;
     }
-    of->force_n = fabs(want->force_n[1]) + fabs(want->force_n[2]);
+    given->force_n = fabs(want->force_n[1]) + fabs(want->force_n[2]);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
@@ -197,25 +197,25 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
 {
     fuzz_input input = {data, bytes};
     frame_input in;
-    in.weights = take_u8(&input) % (BT_SETTING_POC_WEIGHTS_MAX + 1);
+    in.weights = next_u8(&input) % (BT_SETTING_POC_WEIGHTS_MAX + 1);
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        in.e_q4[i] = take_within(&input, BT_E_MAX_Q4);
+        in.e_q4[i] = next_within(&input, BT_E_MAX_Q4);
     }
     for (int d = 0; d < 3; d++) {
-        in.force_nn[d] = take_within(&input, BT_GAIN_MAX_NN);
+        in.force_nn[d] = next_within(&input, BT_GAIN_MAX_NN);
     }
     for (int d = 0; d < 2; d++) {
-        in.torque_nn[d] = take_within(&input, BT_GAIN_MAX_NN);
+        in.torque_nn[d] = next_within(&input, BT_GAIN_MAX_NN);
     }
     lin2013_result want;
-    load of;
-    oracle(&in, &want, &of);
+    load given;
+    oracle(&in, &want, &given);
     for (size_t k = 0; k < sizeof variants / sizeof variants[0]; k++) {
         answer got;
         bounds allowed;
         memset(&got, 0, sizeof got);
         variants[k].run(&in, &got);
-        variants[k].bound(&of, &allowed);
+        variants[k].bound(&given, &allowed);
         check(&variants[k], &got, &want, &allowed);
     }
     return 0;

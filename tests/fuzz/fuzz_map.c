@@ -43,16 +43,16 @@ static int64_t block_of(int kind, const int64_t e[BT_ELECTRODES], int64_t pressu
         return sum;
     default:
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            bool taken = kind == BT_MAP_KIND_SIGNAL || (kind == BT_MAP_KIND_BULGE) == (e[i] > 0);
-            sum += taken ? e[i] * c[i * width] : 0;
+            bool counted = kind == BT_MAP_KIND_SIGNAL || (kind == BT_MAP_KIND_BULGE) == (e[i] > 0);
+            sum += counted ? e[i] * c[i * width] : 0;
         }
         return sum;
     }
 }
 
-static void fail(const char *what)
+static void fail(const char *failure)
 {
-    (void)fprintf(stderr, "%s\n", what);
+    (void)fprintf(stderr, "%s\n", failure);
     abort();
 }
 
@@ -61,22 +61,22 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fuzz_input in = {data, size};
     uint8_t *bytes = (uint8_t *)blob;
     static const int some[] = {BT_MAP_AXES_FORCE, BT_MAP_AXES_TORQUE, BT_MAP_AXES_TORSION};
-    int axes = some[take_u8(&in) % 3];
-    int count = 1 + take_u8(&in) % BLOCKS_MAX;
+    int axes = some[next_u8(&in) % 3];
+    int count = 1 + next_u8(&in) % BLOCKS_MAX;
     bool plain = true; // only what is summed once more below
     uint32_t words = (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (uint32_t)count) / 4;
     memset(blob, 0, 4 * words);
     blob[0] = BT_MAP_VERSION | (uint32_t)axes << 8 | (uint32_t)count << 16;
     for (int b = 0; b < count; b++) {
         uint8_t *head = bytes + BT_MAP_HEADER_BYTES + b * BT_MAP_BLOCK_BYTES;
-        head[0] = take_u8(&in) % BT_MAP_KINDS;
-        head[1] = take_u8(&in) % BT_MAP_GATES;
+        head[0] = next_u8(&in) % BT_MAP_KINDS;
+        head[1] = next_u8(&in) % BT_MAP_GATES;
         for (int a = 0; a < axes; a++) {
-            head[2 + a] = 1 + take_u8(&in) % BT_MAP_EXPONENT_MAX;
+            head[2 + a] = 1 + next_u8(&in) % BT_MAP_EXPONENT_MAX;
         }
         plain = plain && head[1] == BT_MAP_GATE_ONE && head[0] != BT_MAP_KIND_CONDUCTANCE
                 && head[0] != BT_MAP_KIND_CONDUCTANCE_PAIRS;
-        uint32_t coefficient = take_u32(&in), step = take_u32(&in);
+        uint32_t coefficient = next_u32(&in), step = next_u32(&in);
         for (int group = 0; group < axes; group += group == 0 ? 3 : 4) {
             uint32_t width = group == 0 ? 3 : (uint32_t)axes - 3;
             for (uint32_t k = 0; k < coefficients_of[head[0]] * width; k += 2) {
@@ -93,10 +93,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         }
     }
     size_t length = 4 * words;
-    uint8_t spoil = take_u8(&in);
+    uint8_t spoil = next_u8(&in);
     if (spoil & 1) {
-        bytes[take_u8(&in) % (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * BLOCKS_MAX)] = take_u8(&in);
-        length -= take_u8(&in) % 8;
+        bytes[next_u8(&in) % (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * BLOCKS_MAX)] = next_u8(&in);
+        length -= next_u8(&in) % 8;
         plain = false;
     }
     bt_map map;
@@ -105,9 +105,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
     int64_t e[BT_ELECTRODES];
-    int32_t pdc_q4 = take_within(&in, BT_E_MAX_Q4);
+    int32_t pdc_q4 = next_within(&in, BT_E_MAX_Q4);
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint32_t both = take_u32(&in);
+        uint32_t both = next_u32(&in);
         counts[i] = both & 0xF000 ? (uint16_t)(both & BT_FULL_SCALE_COUNT) : BT_INVALID_COUNT;
         tare_q4[i] = (uint16_t)(both >> 16) > 65520 ? BT_INVALID_COUNT : (uint16_t)(both >> 16);
         bool missing = counts[i] == BT_INVALID_COUNT || tare_q4[i] == BT_INVALID_COUNT;

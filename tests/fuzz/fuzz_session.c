@@ -98,7 +98,7 @@ static bool host_write(void *context, unsigned link, const uint8_t *data, size_t
 static void give_frame(bt_session *session, fuzz_input *in, bool damage, uint32_t now_us)
 {
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    fuzz_message message = take_message(in, damage, encoded);
+    fuzz_message message = next_message(in, damage, encoded);
     uint8_t nothing = 0;
     bt_session_receive(session, 0, &nothing, 1, now_us); // whatever came before ends here
     int before = host.messages, erases_before = erases;
@@ -127,32 +127,32 @@ static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
     static const uint8_t coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
     static uint8_t blob[BT_MAP_MAX_BYTES];
     uint8_t payload[BT_FRAME_MAX_BYTES];
-    uint8_t finger = (uint8_t)(take_u8(in) % (BT_MAX_FINGERS + 1));
-    size_t blocks = 1 + take_u8(in) % 3, at = BT_MAP_HEADER_BYTES, count = 0;
+    uint8_t finger = (uint8_t)(next_u8(in) % (BT_MAX_FINGERS + 1));
+    size_t blocks = 1 + next_u8(in) % 3, at = BT_MAP_HEADER_BYTES, count = 0;
     memset(blob, 0, sizeof blob);
     blob[0] = BT_MAP_VERSION;
-    blob[1] = take_u8(in) & 1 ? 3 : 6;
+    blob[1] = next_u8(in) & 1 ? 3 : 6;
     blob[2] = (uint8_t)blocks;
-    blob[4] = take_u8(in) & 1; // a serial number that no sensor has, or none
+    blob[4] = next_u8(in) & 1; // a serial number that no sensor has, or none
     for (size_t k = 0; k < blocks; k++, at += BT_MAP_BLOCK_BYTES) {
-        blob[at] = (uint8_t)(take_u8(in) % BT_MAP_KINDS);
+        blob[at] = (uint8_t)(next_u8(in) % BT_MAP_KINDS);
         blob[at + 1] = (uint8_t)k;
         for (size_t a = 0; a < blob[1]; a++) {
-            blob[at + 2 + a] = (uint8_t)(1 + take_u8(in) % BT_MAP_EXPONENT_MAX);
+            blob[at + 2 + a] = (uint8_t)(1 + next_u8(in) % BT_MAP_EXPONENT_MAX);
         }
         count += (size_t)coefficients[blob[at]] * blob[1];
     }
     for (size_t k = 0; k < count && at + 2 <= sizeof blob; k++, at += 2) {
-        blob[at] = take_u8(in);
+        blob[at] = next_u8(in);
     }
-    if (take_u8(in) & 1) {
-        blob[take_u32(in) % at] ^= take_u8(in);
+    if (next_u8(in) & 1) {
+        blob[next_u32(in) % at] ^= next_u8(in);
     }
     bt_msg_begin_map begin = {1, finger, (uint16_t)at, bt_crc32(blob, at)};
     bt_msg_begin_map_pack(&begin, payload);
     give(session, BT_BEGIN_MAP_ID, payload, now_us);
     size_t parts = (at + BT_MAP_PART_BYTES - 1) / BT_MAP_PART_BYTES;
-    size_t step = 1 + take_u8(in) % 7, written = parts + take_u8(in) % 4;
+    size_t step = 1 + next_u8(in) % 7, written = parts + next_u8(in) % 4;
     for (size_t k = 0; k + 1 < written; k++) {
         size_t offset = k * step % parts * BT_MAP_PART_BYTES;
         bt_msg_write_map write = {.req_id = 2, .finger = finger, .offset = (uint16_t)offset};
@@ -168,7 +168,7 @@ static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
 
 static void give_raw(bt_session *session, fuzz_input *in, uint32_t now_us)
 {
-    size_t bytes = take_u8(in);
+    size_t bytes = next_u8(in);
     bytes = bytes < in->left ? bytes : in->left;
     bt_session_receive(session, 0, in->data, bytes, now_us);
     in->data += bytes;
@@ -177,10 +177,10 @@ static void give_raw(bt_session *session, fuzz_input *in, uint32_t now_us)
 
 static void give_round(bt_session *session, fuzz_input *in, uint32_t now_us)
 {
-    uint8_t mask = take_u8(in);
-    uint16_t base = (uint16_t)(take_u32(in) & 0xFFFF);
-    uint8_t spread = take_u8(in);
-    uint8_t missed = take_u8(in); // every so many slots never come; 0: all come
+    uint8_t mask = next_u8(in);
+    uint16_t base = (uint16_t)(next_u32(in) & 0xFFFF);
+    uint8_t spread = next_u8(in);
+    uint8_t missed = next_u8(in); // every so many slots never come; 0: all come
     bt_session_begin(session, now_us);
     for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
         uint16_t counts[BT_MAX_FINGERS];
@@ -249,25 +249,25 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     static const bt_identity identity = {
         .board = BT_BOARD_PICO, .fingers = BT_MAX_FINGERS, .firmware_version = {1, 2, 3}};
     fuzz_input in = {data, bytes};
-    uint32_t now_us = take_u32(&in);
+    uint32_t now_us = next_u32(&in);
     memset(&host, 0, sizeof host);
     bt_session_init(&session, &identity, host_write, NULL, now_us);
     bt_session_use_board(&session, &actions);
     while (in.left > 0) {
-        uint8_t what = take_u8(&in);
-        switch (what % STEPS) {
+        uint8_t step = next_u8(&in);
+        switch (step % STEPS) {
         case RAW:
             give_raw(&session, &in, now_us);
             break;
         case COMMAND:
         case DAMAGED:
-            give_frame(&session, &in, what % STEPS == DAMAGED, now_us);
+            give_frame(&session, &in, step % STEPS == DAMAGED, now_us);
             break;
         case ROUND:
             give_round(&session, &in, now_us);
             break;
         case TICK:
-            now_us += take_u32(&in);
+            now_us += next_u32(&in);
             bt_session_tick(&session, now_us);
             break;
         case UNPLUG:
@@ -277,7 +277,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
             give_upload(&session, &in, now_us);
             break;
         default:
-            host.full = take_u8(&in) & 1;
+            host.full = next_u8(&in) & 1;
             break;
         }
         check_settings(&session);

@@ -60,7 +60,7 @@ typedef struct {
     uint8_t data[BT_STORAGE_MAX_BYTES];
 } record;
 
-static record read_one(uint16_t id)
+static record read_record(uint16_t id)
 {
     record found = {.bytes = -1};
     found.bytes = bt_storage_read(&flash, id, &found.version, found.data, sizeof found.data);
@@ -105,23 +105,23 @@ static void settings_are_in_range(uint16_t version, const uint8_t *data, size_t 
     }
 }
 
-static void write_one(fuzz_input *in)
+static void write_record(fuzz_input *in)
 {
-    record old[BT_STORAGE_IDS + 1], fresh = {.bytes = take_u8(in) % (BT_STORAGE_MAX_BYTES + 1)};
+    record old[BT_STORAGE_IDS + 1], fresh = {.bytes = next_u8(in) % (BT_STORAGE_MAX_BYTES + 1)};
     for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
-        old[other] = read_one(other);
+        old[other] = read_record(other);
     }
-    uint16_t id = (uint16_t)(1 + take_u8(in) % BT_STORAGE_IDS);
-    fresh.version = take_u8(in);
+    uint16_t id = (uint16_t)(1 + next_u8(in) % BT_STORAGE_IDS);
+    fresh.version = next_u8(in);
     for (int k = 0; k < fresh.bytes; k++) {
         fresh.data[k] = (uint8_t)(k + fresh.version);
     }
-    uint8_t cut = take_u8(in);
+    uint8_t cut = next_u8(in);
     bytes_left = cut == 0 ? UINT32_MAX : cut * 67u;
     bool kept = bt_storage_write(&flash, id, fresh.version, fresh.data, (size_t)fresh.bytes);
     bytes_left = UINT32_MAX;
     for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
-        record now = read_one(other);
+        record now = read_record(other);
         bool is_new = other == id && same(&now, &fresh);
         if (!is_new && ((other == id && kept) || !same(&now, &old[other]))) {
             FAIL("record %u is wrong after a write of %u that %s", (unsigned)other, (unsigned)id,
@@ -136,15 +136,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     memset(flash_bytes, 0xFF, sizeof flash_bytes);
     bytes_left = UINT32_MAX;
     while (in.left > 0) {
-        uint8_t what = take_u8(&in);
-        uint8_t *page = flash_bytes + take_u8(&in) % PAGES * BT_FLASH_PAGE_BYTES;
-        uint8_t size = take_u8(&in);
+        uint8_t step = next_u8(&in);
+        uint8_t *page = flash_bytes + next_u8(&in) % PAGES * BT_FLASH_PAGE_BYTES;
+        uint8_t size = next_u8(&in);
         uint8_t content[BT_FLASH_PAGE_BYTES];
         memset(content, size, sizeof content);
         for (int k = 0; k < 8; k++) {
-            content[k] = take_u8(&in);
+            content[k] = next_u8(&in);
         }
-        switch (what % 5) {
+        switch (step % 5) {
         case 0:
             memcpy(page, content, sizeof content);
             break;
@@ -159,12 +159,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
             page[size] ^= content[0];
             break;
         default:
-            write_one(&in);
+            write_record(&in);
             break;
         }
     }
     for (uint16_t id = 1; id <= BT_STORAGE_IDS; id++) {
-        record found = read_one(id);
+        record found = read_record(id);
         if (found.bytes >= 0) {
             uint8_t *exact = malloc((size_t)found.bytes + 1); // so that a byte too many is noticed
             memcpy(exact, found.data, (size_t)found.bytes);

@@ -15,7 +15,7 @@ typedef struct {
     size_t left;
 } fuzz_input;
 
-static inline uint8_t take_u8(fuzz_input *in)
+static inline uint8_t next_u8(fuzz_input *in)
 {
     if (in->left == 0) {
         return 0;
@@ -24,19 +24,19 @@ static inline uint8_t take_u8(fuzz_input *in)
     return *in->data++;
 }
 
-static inline uint32_t take_u32(fuzz_input *in)
+static inline uint32_t next_u32(fuzz_input *in)
 {
     uint32_t value = 0;
     for (int k = 0; k < 4; k++) {
-        value |= (uint32_t)take_u8(in) << (8 * k);
+        value |= (uint32_t)next_u8(in) << (8 * k);
     }
     return value;
 }
 
 // -limit..limit; a number within it is taken as it is, so that a dictionary's values arrive.
-static inline int32_t take_within(fuzz_input *in, int32_t limit)
+static inline int32_t next_within(fuzz_input *in, int32_t limit)
 {
-    uint32_t value = take_u32(in);
+    uint32_t value = next_u32(in);
     uint32_t sign = value >> 31;
     uint32_t magnitude = (sign ? 0 - value : value) % ((uint32_t)limit + 1);
     return sign ? -(int32_t)magnitude : (int32_t)magnitude;
@@ -49,19 +49,19 @@ typedef struct {
     size_t wire_bytes;
 } fuzz_message;
 
-static inline fuzz_message take_message(fuzz_input *in, bool damage, uint8_t *out)
+static inline fuzz_message next_message(fuzz_input *in, bool damage, uint8_t *out)
 {
     uint8_t payload[BT_FRAME_MAX_BYTES] = {0};
-    uint8_t id = take_u8(in);
-    uint8_t odd = take_u8(in); // 0: the length that belongs to the id
+    uint8_t id = next_u8(in);
+    uint8_t odd = next_u8(in); // 0: the length that belongs to the id
     int known = bt_wire_payload_bytes(id);
     size_t bytes = odd == 0 && known >= 0 ? (size_t)known : odd % (BT_FRAME_MAX_BYTES - BT_CRC_BYTES);
     for (size_t k = 0; k < bytes; k++) {
-        payload[k] = take_u8(in);
+        payload[k] = next_u8(in);
     }
     size_t wire_bytes = bt_frame_encode(id, payload, bytes, out);
     if (damage) {
-        out[take_u8(in) % wire_bytes] ^= take_u8(in);
+        out[next_u8(in) % wire_bytes] ^= next_u8(in);
     }
     return (fuzz_message){id, bytes, wire_bytes};
 }

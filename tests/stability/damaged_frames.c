@@ -111,10 +111,10 @@ static void make(sent *message)
     message->bytes = bt_frame_encode(message->id, message->payload, message->payload_bytes, message->wire);
 }
 
-static void insert(uint8_t *unit, size_t *bytes, size_t at, const uint8_t *what, size_t count)
+static void insert(uint8_t *unit, size_t *bytes, size_t at, const uint8_t *data, size_t count)
 {
     memmove(unit + at + count, unit + at, *bytes - at);
-    memcpy(unit + at, what, count);
+    memcpy(unit + at, data, count);
     *bytes += count;
 }
 
@@ -209,7 +209,7 @@ static void accuse(const char *deframer, enum damage kind, const uint8_t *unit, 
 }
 
 // What the host's decoder made of it, message by message.
-static bool host_is_right(const sent *one, const sent *other)
+static bool host_is_right(const sent *frame, const sent *other)
 {
     const uint8_t *at[] = {decoder.data[BT_DECODED_FRAME], decoder.data[BT_DECODED_PAC],
                            decoder.data[BT_DECODED_IDLE], decoder.data[BT_DECODED_OTHER]};
@@ -221,7 +221,7 @@ static bool host_is_right(const sent *one, const sent *other)
             bytes = at[kind][1];
             at[kind] += 2;
         }
-        if (!is(one, id, at[kind], bytes) && !is(other, id, at[kind], bytes)) {
+        if (!is(frame, id, at[kind], bytes) && !is(other, id, at[kind], bytes)) {
             return false;
         }
         at[kind] += bytes;
@@ -229,13 +229,13 @@ static bool host_is_right(const sent *one, const sent *other)
     return true;
 }
 
-static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sent *one, const sent *other)
+static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sent *frame, const sent *other)
 {
     tally *entry = &tallies[kind];
     uint64_t before[BT_DECODE_OUTCOMES];
     memcpy(before, decoder.outcomes, sizeof before);
     (void)bt_decode(&decoder, unit, bytes);
-    if (!host_is_right(one, other)) {
+    if (!host_is_right(frame, other)) {
         accuse("host", kind, unit, bytes);
     }
     for (int k = BT_DEFRAMED_GOOD; k < BT_DECODE_OUTCOMES; k++) {
@@ -248,7 +248,7 @@ static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sen
     for (size_t k = 0; k < bytes; k++) {
         if (bt_deframer_push(&deframer, unit[k]) == BT_DEFRAMED_GOOD) {
             const uint8_t *payload = deframer.buffer + 1;
-            if (!is(one, deframer.id, payload, deframer.payload_bytes)
+            if (!is(frame, deframer.id, payload, deframer.payload_bytes)
                 && !is(other, deframer.id, payload, deframer.payload_bytes)) {
                 accuse("board", kind, unit, bytes);
             }
@@ -257,20 +257,20 @@ static void judge(enum damage kind, const uint8_t *unit, size_t bytes, const sen
     entry->frames++;
 }
 
-static void try_one(uint64_t number, int only)
+static void try_damage(uint64_t number, int only)
 {
     enum damage kind = only < 0 ? (enum damage)(number % DAMAGES) : (enum damage)only;
     if (number % 8 == 0) {
         make(&pool[below(POOL)]);
     }
-    const sent *one = &pool[below(POOL)], *other = &pool[below(POOL)];
+    const sent *frame = &pool[below(POOL)], *other = &pool[below(POOL)];
     uint8_t unit[UNIT_BYTES];
-    memcpy(unit, one->wire, one->bytes);
-    size_t bytes = harm(kind, unit, one->bytes, other);
+    memcpy(unit, frame->wire, frame->bytes);
+    size_t bytes = harm(kind, unit, frame->bytes, other);
     if (unit[bytes - 1] != 0) { // the next one begins afresh
         unit[bytes++] = 0;
     }
-    judge(kind, unit, bytes, one, other);
+    judge(kind, unit, bytes, frame, other);
 }
 
 static int report(void)
@@ -319,13 +319,13 @@ static void make_numbered(sent *message, uint32_t number)
 
 static int stream(uint64_t frames)
 {
-    static sent one, other;
+    static sent frame, other;
     for (uint32_t number = 0; number < frames + frames / 9; number++) {
         uint8_t unit[UNIT_BYTES];
-        other = one;
-        make_numbered(&one, number);
-        memcpy(unit, one.wire, one.bytes);
-        size_t bytes = one.bytes;
+        other = frame;
+        make_numbered(&frame, number);
+        memcpy(unit, frame.wire, frame.bytes);
+        size_t bytes = frame.bytes;
         if (number % 10 != 0) {
             bytes = harm((enum damage)below(DAMAGES), unit, bytes, &other);
         }
@@ -370,7 +370,7 @@ int main(int argc, char **argv)
         make(&pool[k]);
     }
     for (uint64_t number = 0; number < frames; number++) {
-        try_one(number, only);
+        try_damage(number, only);
     }
     return report();
 }

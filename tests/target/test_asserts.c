@@ -11,21 +11,21 @@ static int reached; // statements that only a passing assertion lets run
         reached++;                                                                                           \
     }
 
-static const uint8_t one[3] = {1, 2, 3}, other[3] = {1, 2, 4};
+static const uint8_t first[3] = {1, 2, 3}, second[3] = {1, 2, 4};
 static const uint8_t *const nothing = NULL;
 
 FAILS(not_true, assert_true(reached < 0))
 FAILS(not_false, assert_false(reached >= 0))
 FAILS(null, assert_non_null(nothing))
-FAILS(pointers_differ, assert_ptr_equal(one, other))
+FAILS(pointers_differ, assert_ptr_equal(first, second))
 FAILS(integers_differ, assert_int_equal(reached, -1))
 FAILS(differ_above_32_bits, assert_int_equal(1ull << 32, 0))
 FAILS(equal_after_all, assert_int_not_equal(reached, reached))
 FAILS(below_the_range, assert_in_range(4, 5, 6))
 FAILS(above_the_range, assert_in_range(7, 5, 6))
 FAILS(negative_is_large, assert_in_range(-1, 0, 10))
-FAILS(a_byte_differs, assert_memory_equal(one, other, 3))
-FAILS(told_to, fail_msg("told to, %d", 1))
+FAILS(a_byte_differs, assert_memory_equal(first, second, 3))
+FAILS(on_demand, fail_msg("told to, %d", 1))
 
 static int no_setup(void **state)
 {
@@ -44,13 +44,13 @@ static void what_holds_passes(void **state)
     (void)state;
     assert_true(reached == 0);
     assert_false(reached != 0);
-    assert_non_null(one);
-    assert_ptr_equal(one, &one[0]);
+    assert_non_null(first);
+    assert_ptr_equal(first, &first[0]);
     assert_int_equal(-1, (int64_t)-1);
     assert_int_not_equal(1, 2);
     assert_in_range(5, 5, 6);
     assert_in_range(6, 5, 6);
-    assert_memory_equal(one, other, 2);
+    assert_memory_equal(first, second, 2);
 }
 
 int main(void)

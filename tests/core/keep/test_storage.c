@@ -61,7 +61,7 @@ static size_t make(uint8_t *data, uint16_t id, int number)
     return bytes;
 }
 
-static bool write_one(uint16_t id, int number)
+static bool write_record(uint16_t id, int number)
 {
     uint8_t data[BT_STORAGE_MAX_BYTES];
     size_t bytes = make(data, id, number);
@@ -88,7 +88,7 @@ TEST(a_new_flash_holds_nothing)
     assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
     memset(bytes_of_flash, 0, sizeof bytes_of_flash); // nor does one that is full of something else
     assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
-    assert_true(write_one(BT_RECORD_SETTINGS, 1));
+    assert_true(write_record(BT_RECORD_SETTINGS, 1));
     assert_int_equal(stored(BT_RECORD_SETTINGS), 1);
 }
 
@@ -97,7 +97,7 @@ TEST(the_latest_record_of_each_id_is_found_over_many_writes)
     int last[BT_STORAGE_IDS + 1] = {0};
     for (int number = 1; number < 1000; number++) {
         uint16_t id = (uint16_t)random_range(&nor.seed, 1, BT_STORAGE_IDS);
-        assert_true(write_one(id, number));
+        assert_true(write_record(id, number));
         last[id] = number;
         for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
             assert_int_equal(stored(other), last[other] == 0 ? -1 : last[other]);
@@ -111,7 +111,7 @@ TEST(a_damaged_page_is_told)
 {
     assert_false(bt_storage_damaged(&flash)); // nothing was ever saved
     for (int number = 1; number <= SAVES; number++) {
-        assert_true(write_one(1, number));
+        assert_true(write_record(1, number));
         assert_false(bt_storage_damaged(&flash));
     }
     size_t last = 0;
@@ -133,9 +133,9 @@ TEST(a_damaged_page_is_told)
 
 TEST(the_same_again_wears_nothing)
 {
-    assert_true(write_one(1, 5));
+    assert_true(write_record(1, 5));
     nor.bytes_left = 1000;
-    assert_true(write_one(1, 5));
+    assert_true(write_record(1, 5));
     assert_int_equal(nor.bytes_left, 1000);
 }
 
@@ -146,8 +146,8 @@ TEST(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record)
         (void)new_flash(NULL);
         nor.dud = dud;
         for (int number = 1; number <= SAVES; number++) {
-            int *of = &last[number % 2];
-            *of = write_one((uint16_t)(1 + number % 2), number) ? number : *of;
+            int *kept = &last[number % 2];
+            *kept = write_record((uint16_t)(1 + number % 2), number) ? number : *kept;
             assert_true(stored(1) == last[0] && stored(2) == last[1]);
         }
     }
@@ -164,12 +164,12 @@ TEST(what_does_not_fit_is_refused)
 
 TEST(generations_may_wrap)
 {
-    assert_true(write_one(1, 0));
+    assert_true(write_record(1, 0));
     const uint8_t last[4] = {0xFF, 0xFF, 0xFF, 0xFF}; // generation, which the sector in use claims
     bt_storage_make_page(bytes_of_flash, bt_get_u16(bytes_of_flash + 4), 0, last, sizeof last);
     assert_int_equal(stored(1), 0);
     for (int number = 1; number < SAVES; number++) {
-        assert_true(write_one(1, number));
+        assert_true(write_record(1, number));
         assert_int_equal(stored(1), number);
     }
 }
@@ -184,7 +184,7 @@ static bool save_with_cut(int number, long *left, long cut)
         *left = -1;
         return false;
     }
-    assert_true(write_one(BT_RECORD_SETTINGS, number));
+    assert_true(write_record(BT_RECORD_SETTINGS, number));
     *left = -1;
     return true;
 }
@@ -202,9 +202,9 @@ static int cut_everywhere(long *left, long stride)
     static uint8_t before[2 * SECTOR];
     int cuts = 0;
     for (uint16_t id = BT_RECORD_CALIBRATION; id < BT_RECORD_CALIBRATION + NEIGHBOURS; id++) {
-        assert_true(write_one(id, 77 + id));
+        assert_true(write_record(id, 77 + id));
     }
-    assert_true(write_one(BT_RECORD_SETTINGS, 0));
+    assert_true(write_record(BT_RECORD_SETTINGS, 0));
     for (int number = 1; number < SAVES; number++) {
         memcpy(before, bytes_of_flash, sizeof before);
         for (long cut = 0; !save_with_cut(number, left, cut); cut += stride) {
@@ -219,7 +219,7 @@ static int cut_everywhere(long *left, long stride)
             int again = stored(BT_RECORD_SETTINGS);
             assert_true(again == found || again == 500);
             memcpy(bytes_of_flash, after_cut, sizeof after_cut);
-            assert_true(write_one(BT_RECORD_SETTINGS, 999));
+            assert_true(write_record(BT_RECORD_SETTINGS, 999));
             assert_int_equal(stored(BT_RECORD_SETTINGS), 999);
             assert_neighbours_are_whole();
             memcpy(bytes_of_flash, before, sizeof before);

@@ -102,12 +102,12 @@ static void check_split_by(const int32_t v[BT_ELECTRODES], int up, int down)
     }
     bt_split_sums sums;
     bt_sums_split(given, up, down, &sums);
-    const int64_t one = 1 << BT_SUMS_SPLIT_BITS;
+    const int64_t scale = 1 << BT_SUMS_SPLIT_BITS;
     const int64_t behind = (int64_t)sums.behind[0] + sums.behind[1];
-    assert_int_equal(sums.ahead_hi * one + sums.ahead_lo - BT_SUMS_X_UNIT_UM * behind,
+    assert_int_equal(sums.ahead_hi * scale + sums.ahead_lo - BT_SUMS_X_UNIT_UM * behind,
                      plain(weight, bt_electrode_um, 0));
-    assert_int_equal(sums.y_hi * one + sums.y_lo, plain(weight, bt_electrode_um, 1));
-    assert_int_equal(-(sums.z_hi * one + sums.z_lo), plain(weight, bt_electrode_um, 2));
+    assert_int_equal(sums.y_hi * scale + sums.y_lo, plain(weight, bt_electrode_um, 1));
+    assert_int_equal(-(sums.z_hi * scale + sums.z_lo), plain(weight, bt_electrode_um, 2));
     assert_int_equal(sums.total, total);
     assert_true(sums.ahead_hi <= (int64_t)WEIGHT_MAX * (BT_SUMS_AHEAD_UM >> BT_SUMS_SPLIT_BITS));
     assert_true(llabs(sums.y_hi) <= (int64_t)WEIGHT_MAX * (BT_SUMS_Y_UM >> BT_SUMS_SPLIT_BITS));

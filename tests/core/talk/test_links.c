@@ -29,7 +29,7 @@ static uint8_t stream_at(unsigned link, uint16_t keepalive_ms)
     return ask(link, BT_START_ID, payload, sizeof payload);
 }
 
-static uint8_t take_at(unsigned link, uint16_t keepalive_ms)
+static uint8_t take_link_at(unsigned link, uint16_t keepalive_ms)
 {
     const uint8_t payload[BT_TAKE_LINK_BYTES] = {7, (uint8_t)keepalive_ms, (uint8_t)(keepalive_ms >> 8)};
     return ask(link, BT_TAKE_LINK_ID, payload, sizeof payload);
@@ -124,8 +124,8 @@ TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
 {
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
     assert_int_equal(ask(UART, BT_HOLD_ID, "\3\1", 2), BT_ERROR_OK);
-    assert_int_equal(take_at(USB, 0), BT_ERROR_OUT_OF_RANGE);
-    assert_int_equal(take_at(USB, 1000), BT_ERROR_OK);
+    assert_int_equal(take_link_at(USB, 0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(take_link_at(USB, 1000), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(session.streams, 0);
     assert_true(session.finger[0].tare.held); // what it holds it still holds
@@ -134,7 +134,7 @@ TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
     bt_session_tick(&session, now_us += 1000001);
     assert_int_equal(session.faults & BT_FAULT_FLAG_HOST_SILENT, 0); // no stream ended
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
-    assert_int_equal(take_at(USB, 1000), BT_ERROR_OK);
+    assert_int_equal(take_link_at(USB, 1000), BT_ERROR_OK);
     assert_int_equal(ask(USB, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // gives it back
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
 }

@@ -63,7 +63,7 @@ static int messages_of(const course_log *log, uint8_t id, int finger)
 {
     int n = 0;
     for (int k = 0; k < log->count; k++) {
-        n += log->message[k].id == id && of_finger(&log->message[k], finger);
+        n += log->message[k].id == id && is_from_finger(&log->message[k], finger);
     }
     return n;
 }
@@ -133,7 +133,7 @@ static int tile(const course_log *log, int finger, int idle_rounds)
     int next = 0; // the round that the next message has to begin with
     for (int k = 0; k < log->count; k++) {
         const received_message *message = &log->message[k];
-        if (!of_finger(message, finger) || (message->id != BT_FRAME_ID && message->id != BT_IDLE_ID)) {
+        if (!is_from_finger(message, finger) || (message->id != BT_FRAME_ID && message->id != BT_IDLE_ID)) {
             continue;
         }
         assert_true(next > 0 || message->id == BT_FRAME_ID); // the first is a FRAME
@@ -156,7 +156,7 @@ static int tile(const course_log *log, int finger, int idle_rounds)
             bt_msg_frame_unpack(&frame, find_message(&full, BT_FRAME_ID, finger, (uint16_t)next)->payload);
             const received_message *after = message + 1;
             after += after->id == BT_TARE_ID;
-            assert_true(after->id == BT_FRAME_ID && of_finger(after, finger) && seq_at(after) == next);
+            assert_true(after->id == BT_FRAME_ID && is_from_finger(after, finger) && seq_at(after) == next);
         }
         uint32_t computed = BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX | BT_FRAME_FLAG_TORSION_OK
                             | BT_FRAME_FLAG_TARE_CHANGED | BY_POPULATION;
@@ -175,15 +175,15 @@ static void assert_rounds_are_tiled(uint8_t quantities)
     int marked = 0, frames = 0, rounds = 0;
     for (int f = FIRST_FINGER; f <= SECOND_FINGER; f += SECOND_FINGER - FIRST_FINGER) {
         int all = messages_of(&full, BT_FRAME_ID, f);
-        int of_this = tile(&lean, f, 10);
+        int tiled = tile(&lean, f, 10);
         int sent = messages_of(&lean, BT_FRAME_ID, f);
-        assert_in_range(all - of_this, 0, 9); // less than a heartbeat is untold
+        assert_in_range(all - tiled, 0, 9); // less than a heartbeat is untold
         if (quantities & BT_QUANTITY_FLAG_REST_FRAMES) {
             assert_int_equal(sent, all);
         } else {
             assert_true(sent < all * 3 / 4);
         }
-        marked += of_this;
+        marked += tiled;
         frames += sent;
         rounds += all;
     }
@@ -212,7 +212,7 @@ static void assert_tares_come_with_their_frame(void)
         const received_message *same = find_message(&full, BT_TARE_ID, message->payload[6], seq_at(message));
         assert_memory_equal(message->payload, same->payload, BT_TARE_BYTES);
         assert_true(k + 1 < lean.count && next->id == BT_FRAME_ID);
-        assert_true(of_finger(next, message->payload[6]) && seq_at(next) == seq_at(message));
+        assert_true(is_from_finger(next, message->payload[6]) && seq_at(next) == seq_at(message));
         bt_msg_frame frame;
         bt_msg_frame_unpack(&frame, next->payload);
         assert_true(frame.flags & BT_FRAME_FLAG_TARE_CHANGED);
@@ -238,7 +238,7 @@ static void assert_touches_come_in_their_slot(uint8_t quantities)
         assert_memory_equal(lean.message[k].payload, same->payload, BT_TOUCH_BYTES);
         // Its FRAME is the finger's next that is not an IDLE or TARE of the same round.
         int at = k + 1;
-        while (!of_finger(&lean.message[at], touch.finger) || lean.message[at].id != BT_FRAME_ID) {
+        while (!is_from_finger(&lean.message[at], touch.finger) || lean.message[at].id != BT_FRAME_ID) {
             at++;
             assert_true(at < lean.count);
         }

@@ -53,12 +53,12 @@ TEST(less_pressure_than_at_rest_is_no_touch)
 
 TEST(electrodes_without_a_tare_or_a_word_say_nothing)
 {
-    finger one = reading(1, 60, 30);
-    assert_true(inverted(one));
-    finger silent = one;
+    finger pressed = reading(1, 60, 30);
+    assert_true(inverted(pressed));
+    finger silent = pressed;
     silent.smooth.lane[0] = BT_FULL_SCALE_COUNT + 1;
     assert_false(inverted(silent));
-    silent = one;
+    silent = pressed;
     silent.base.electrode_q16[0] = BT_TARE_UNKNOWN;
     assert_false(inverted(silent));
 }

@@ -59,7 +59,7 @@ static emulated_finger held_finger(int gain_milli)
     return finger;
 }
 
-static void let_go(emulated_finger *finger)
+static void release(emulated_finger *finger)
 {
     finger->load = 0;
     finger->pdc_load = 0;
@@ -177,7 +177,7 @@ TEST(a_degree_is_flagged_in_contact_alone)
                 assert_false(flag);
             }
         }
-        let_go(&finger);
+        release(&finger);
         warm_rounds(&finger, 100);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
         tdc_now = T0;

@@ -17,13 +17,13 @@ typedef struct {
 // Every electrode read 3000 counts after the silence, away_q3 more than where it was watched.
 static hold after(const int16_t away_q3[BT_ELECTRODES], int pressure_q3)
 {
-    hold one = {.watch = {.level_q3 = REST_Q3, .level_sweeps = LEVEL_SINCE}, .silence = {.sweeps = SWEEPS}};
+    hold held = {.watch = {.level_q3 = REST_Q3, .level_sweeps = LEVEL_SINCE}, .silence = {.sweeps = SWEEPS}};
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        one.watch.base.electrode_q16[i] = (uint32_t)(8 * 3000 - away_q3[i]) << 13;
-        one.silence.sum.lane[i] = 3000 * BT_SILENCE_ROUNDS;
+        held.watch.base.electrode_q16[i] = (uint32_t)(8 * 3000 - away_q3[i]) << 13;
+        held.silence.sum.lane[i] = 3000 * BT_SILENCE_ROUNDS;
     }
-    one.silence.sum.lane[BT_LANE_PDC] = (uint16_t)((REST_Q3 + pressure_q3) / 8 * BT_SILENCE_ROUNDS);
-    return one;
+    held.silence.sum.lane[BT_LANE_PDC] = (uint16_t)((REST_Q3 + pressure_q3) / 8 * BT_SILENCE_ROUNDS);
+    return held;
 }
 
 static hold after_even(int16_t each_q3, int pressure_q3)
@@ -35,9 +35,9 @@ static hold after_even(int16_t each_q3, int pressure_q3)
     return after(away_q3, pressure_q3);
 }
 
-static int32_t resumed(hold one)
+static int32_t resumed(hold held)
 {
-    return bt_watch_resume(&one.watch, &one.silence, SPAN_Q3);
+    return bt_watch_resume(&held.watch, &held.silence, SPAN_Q3);
 }
 
 TEST(what_is_no_drift_is_not_followed)
@@ -56,10 +56,10 @@ TEST(what_is_no_drift_is_not_followed)
         away_q3[i] = 16;
     }
     away_q3[7] = 300;
-    hold one_apart = after(away_q3, 0);
-    assert_int_equal(resumed(one_apart), 0);
-    one_apart.watch.base.electrode_q16[7] = BT_TARE_UNKNOWN; // says nothing
-    assert_true(resumed(one_apart) != 0);
+    hold outlier = after(away_q3, 0);
+    assert_int_equal(resumed(outlier), 0);
+    outlier.watch.base.electrode_q16[7] = BT_TARE_UNKNOWN; // says nothing
+    assert_true(resumed(outlier) != 0);
     hold waits = after_even(8, 0);
     waits.watch.wait_sweeps = 1; // what was watched is not where it came to rest
     assert_int_equal(resumed(waits), 0);

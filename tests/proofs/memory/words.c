@@ -5,7 +5,7 @@
 
 #include <__fc_builtin.h>
 
-static void one(size_t bytes)
+static void check_length(size_t bytes)
 {
     uint8_t *at = (uint8_t *)END - bytes;
     Frama_C_make_unknown((char *)at, bytes);
@@ -13,7 +13,7 @@ static void one(size_t bytes)
     bt_cobs_in_place(at, bytes);
 }
 
-#define FOUR(n)    one(n), one(n + 1), one(n + 2), one(n + 3)
+#define FOUR(n)    check_length(n), check_length(n + 1), check_length(n + 2), check_length(n + 3)
 #define SIXTEEN(n) FOUR(n), FOUR(n + 4), FOUR(n + 8), FOUR(n + 12)
 
 void main(void)
