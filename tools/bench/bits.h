@@ -92,9 +92,9 @@ static inline uint32_t bits_finger_hash(void)
         bt_finger_begin(&finger, t_us, &tare);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             bool touched = bt_finger_put(&finger, slot, bits_word(&seed, round, slot));
-            uint32_t told = bt_finger_events(&finger, slot, touched);
-            for (uint8_t event = 0; told != 0; event++, told >>= 1) {
-                if (told & 1) {
+            uint32_t raised = bt_finger_events(&finger, slot, touched);
+            for (uint8_t event = 0; raised != 0; event++, raised >>= 1) {
+                if (raised & 1) {
                     bt_msg_event msg;
                     bt_finger_event(&finger, event, slot, t_us, &msg);
                     bt_msg_event_pack(&msg, payload);

@@ -103,14 +103,14 @@ static void swing(bt_finger *finger, int counts)
 static void events(bt_finger *finger)
 {
     static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
-    uint32_t told = 0;
+    uint32_t raised = 0;
     for (size_t k = 0; k < sizeof pac_slot; k++) {
-        told |= bt_finger_events(finger, pac_slot[k], false);
+        raised |= bt_finger_events(finger, pac_slot[k], false);
     }
     if (finger->events.watched != BT_EVENTS_NO_SLOT) {
-        told |= bt_finger_events(finger, finger->events.watched, false);
+        raised |= bt_finger_events(finger, finger->events.watched, false);
     }
-    sink = told;
+    sink = raised;
 }
 
 SCENE(events_at_rest)

@@ -81,12 +81,12 @@ void asm_seen(const char *text)
 bool broke(const char *words)
 {
     registers_settle();
-    const bool as_said = strstr(broken, words) != NULL && (words[0] != '\0' || broken[0] == '\0');
-    if (!as_said) {
+    const bool as_expected = strstr(broken, words) != NULL && (words[0] != '\0' || broken[0] == '\0');
+    if (!as_expected) {
         (void)fprintf(stderr, "expected \"%s\" to be broken, seen \"%s\"\n", words, broken);
     }
     broken[0] = '\0';
-    return as_said;
+    return as_expected;
 }
 
 // ---- what the instrumented code calls before each access ------------------------------------------------
