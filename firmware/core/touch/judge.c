@@ -1,7 +1,6 @@
 #include "touch/judge.h"
 
 #include "touch/adopt.h"
-#include "touch/inverted.h"
 
 #include "fixed_point.h"
 
@@ -17,6 +16,31 @@
 
 _Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
 _Static_assert(BT_ELECTRODES == 19, "220753 / 2^22 is 1/19");
+_Static_assert(BT_ELECTRODES *(int64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT <= INT32_MAX,
+               "squares of counts over all electrodes must fit 32 bits");
+
+// The squared distances of counts from a tare over all electrodes that have both, and the sum of these.
+static uint32_t distance_count2(const bt_lanes *counts, unsigned shift, const bt_baseline *base, int32_t *sum)
+{
+    uint32_t distance_count2 = 0;
+    *sum = 0;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        int32_t count = counts->lane[i] >> shift;
+        if (base->electrode_q16[i] != BT_TARE_UNKNOWN && count <= BT_FULL_SCALE_COUNT) {
+            int32_t e = count - bt_baseline_count(base->electrode_q16[i]);
+            distance_count2 += (uint32_t)(e * e);
+            *sum += e;
+        }
+    }
+    return distance_count2;
+}
+
+bool bt_inverted(const bt_lanes *smooth, const bt_baseline *base, int32_t pdc_missing)
+{
+    int32_t below = (int32_t)(base->pdc_q16 >> 16) - smooth->lane[BT_LANE_PDC], sum;
+    return base->pdc_q16 != BT_TARE_UNKNOWN && below > pdc_missing
+           && distance_count2(smooth, 0, base, &sum) > BT_INVERTED_COUNT2;
+}
 
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
@@ -95,15 +119,8 @@ static void judge_release(bt_tare *tare)
 // pattern of the electrodes agree, or neither.
 static bool fits(const bt_tare *tare)
 {
-    uint32_t energy = 0;
-    int32_t sum = 0;
-    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        if (tare->base.electrode_q16[i] != BT_TARE_UNKNOWN && !(tare->trigger.unknown >> i & 1)) {
-            int32_t e = (tare->sweep.mean_q3.lane[i] >> 3) - bt_baseline_count(tare->base.electrode_q16[i]);
-            energy += (uint32_t)(e * e);
-            sum += e;
-        }
-    }
+    int32_t sum;
+    uint32_t energy = distance_count2(&tare->sweep.mean_q3, 3, &tare->base, &sum);
     uint32_t uneven = energy - (uint32_t)((int64_t)sum * sum / BT_ELECTRODES);
     if (!tare->pressure_seen || tare->base.pdc_q16 == BT_TARE_UNKNOWN) {
         return energy < BT_CALM_COUNT2;

@@ -1,5 +1,5 @@
 // The verdicts after a sweep, or after a round that speaks against the tare: has a contact ended, is the tare
-// wrong, what was drift? The rules are in release.h, inverted.h and drift.h; here they are applied.
+// wrong, what was drift? The rules are in release.h and drift.h; here they are applied.
 #ifndef BIOTAC_JUDGE_H
 #define BIOTAC_JUDGE_H
 
@@ -7,7 +7,11 @@
 
 #define BT_TARE_STILL_SWEEPS 2 // needed for a tare; the first may hold what came before it
 
-// A round with pressure below the tare: a tare taken of a hold shows when the hold ends.
+// Do filtered counts speak against the tare? Skin is pressed, never pulled: pressure well below rest shows a
+// tare that was taken of a hold. pdc_missing: what else may have taken pressure.
+bool bt_inverted(const bt_lanes *smooth, const bt_baseline *base, int32_t pdc_missing);
+
+// A round with pressure below the tare.
 void bt_judge_inverted(bt_tare *tare);
 
 // The sweep is over, all of its lanes were served.

@@ -1,8 +1,7 @@
 // When pressure shows that a tare was taken of a hold (SPEC.md, Tare), well inside of each condition.
 #include "support.h"
 
-#include "touch/inverted.h"
-#include "touch/release.h"
+#include "touch/judge.h"
 
 #define REST 3000
 #define PDC  1000
