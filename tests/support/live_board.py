@@ -69,7 +69,7 @@ class Firmware:
         self.after: dict[type, bytes] = {}  # and with it
         self.settings: dict[int, int] = {}
         self.commands: list[Any] = []
-        self.heard = threading.Condition()
+        self.news = threading.Condition()
 
     def now_us(self) -> int:
         """Its time."""
@@ -82,9 +82,9 @@ class Firmware:
             self.streams = message.streams
         elif kind is wire.Stop:
             self.streams = 0
-        with self.heard:
+        with self.news:
             self.commands.append(message)
-            self.heard.notify_all()
+            self.news.notify_all()
         answer = b"" if kind in self.mute else self._answer(message, payload)
         return self.before.pop(kind, b"") + answer + self.after.pop(kind, b"")
 
@@ -110,18 +110,18 @@ class Firmware:
         facts |= {"fingers_present": self.facts["fingers_present"]}
         return wire.Status(**facts | {"streams": self.streams, "faults": self.faults, "frames_idle": self.frames_idle})
 
-    def of(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:
-        """What it was told of a kind."""
+    def received(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:
+        """The commands of a kind that it received."""
         return [m for m in self.commands if isinstance(m, kind)]
 
     def wait_for(self, kind: type[Any] | tuple[type[Any], ...], count: int = 1) -> None:
-        """Until it was told so many of a kind."""
-        with self.heard:
-            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, WAIT_S), f"no {kind}: {self.commands}"
+        """Until it received so many of a kind."""
+        with self.news:
+            assert self.news.wait_for(lambda: len(self.received(kind)) >= count, WAIT_S), f"no {kind}: {self.commands}"
 
     def wait_for_looks(self, count: int = 2) -> None:
         """Until the host has looked so often, from now on; the first may have been under way."""
-        self.wait_for(wire.GetStatus, len(self.of(wire.GetStatus)) + count)
+        self.wait_for(wire.GetStatus, len(self.received(wire.GetStatus)) + count)
 
 
 class Live:

@@ -15,7 +15,7 @@ BITS_PER_BYTE = 10  # with start and stop bit
 
 def bits_per_s(streams: int, fingers: int) -> int:
     """The bit rate of ``streams`` for so many fingers, all touched; without messages that come only now and then."""
-    a_round = sum(map(_bytes, _of_a_round(streams)))
+    a_round = sum(map(_bytes, _round_messages(streams)))
     a_second = _bytes(wire.Status) + fingers * _bytes(wire.SensorStatus) if streams & wire.StreamFlags.STATUS else 0
     return BITS_PER_BYTE * (round(FRAME_HZ * fingers * a_round) + a_second)
 
@@ -31,14 +31,14 @@ def check(port: str, line_bits_per_s: int, streams: int, fingers: int) -> None:
     if needed <= line_bits_per_s:
         return
     lean = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
-    asked = " and ".join(message.__name__.upper() for message in _of_a_round(streams))
+    asked = " and ".join(message.__name__.upper() for message in _round_messages(streams))
     raise InputError(
         f"{port} carries {line_bits_per_s} bit/s, but {asked} of {fingers} fingers take {needed}; stream at most "
         f"{most_fingers(streams, line_bits_per_s)} finger(s), or {most_fingers(lean, line_bits_per_s)} with FRAME alone"
     )
 
 
-def _of_a_round(streams: int) -> list[Any]:
+def _round_messages(streams: int) -> list[Any]:
     return [message for message in wire.EVERY_ROUND if streams & wire.STREAMS_OF[message]]
 
 

@@ -185,11 +185,11 @@ class Board:
         if lasting is not None:
             self.remember(lasting, lambda: self.ask(request, answers))
 
-    def remember(self, what: tuple[str, int], again: Callable[[], object]) -> None:
-        """Remember to tell a board that restarted ``what`` (kind, number) again, by ``again``; the latest goes last."""
+    def remember(self, subject: tuple[str, int], again: Callable[[], object]) -> None:
+        """Remember to send a restarted board ``subject`` (kind, number) anew, by ``again``; the latest goes last."""
         with self._asking:
-            self._lasting.pop(what, None)
-            self._lasting[what] = again
+            self._lasting.pop(subject, None)
+            self._lasting[subject] = again
 
     def restore(self) -> None:
         """Repeat everything that lasts until the board restarts: settings, calibrations and maps.
@@ -197,12 +197,12 @@ class Board:
         Not tares, which watch.py gives back with their age. Raises
         CommandRefusedError if the board refuses something: without it, its forces would not be what was asked for.
         """
-        for (what, number), again in list(self._lasting.items()):
+        for (kind, number), again in list(self._lasting.items()):
             try:
                 again()
             except CommandRefusedError as error:
                 text = (
-                    f"{self.link.port} came back, but not with its {what} {number}: {error}; open it and set it again"
+                    f"{self.link.port} came back, but not with its {kind} {number}: {error}; open it and set it again"
                 )
                 raise CommandRefusedError(text, error.error) from error
 

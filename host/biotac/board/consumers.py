@@ -33,15 +33,15 @@ class Queue(Consumer):
     ``on_news`` is called on the reading thread, to tell the consumer to look.
     """
 
-    def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None, *, is_taken: bool = True) -> None:
-        self.is_taken = is_taken
+    def __init__(self, reader: Reader, on_news: Callable[[], None] | None = None, *, is_read: bool = True) -> None:
+        self.is_read = is_read
         self._reader = reader
         self._on_news = on_news
         # Thousands of times a second: this wakes its consumer at a fifth of the cost of a Condition. None only wakes.
         self._waiting: SimpleQueue[Batch | None] = SimpleQueue()
         self._back: list[Batch] = []  # the consumer did not use it
         # Rows put and dropped here, and taken: each counted by one thread. A batch of messages alone counts as one.
-        self._put_rows = self._taken_rows = 0
+        self._put_rows = self._read_rows = 0
         self._has_rows = False  # messages alone make no board wait
         self._before: Batch | None = None  # the latest with frames that was taken
         self._slow: Gap | None = None
@@ -52,7 +52,7 @@ class Queue(Consumer):
         self._put_rows += weight(batch)
         self._has_rows |= bool(len(batch.wire) or len(batch.pac) or len(batch.idle))
         # The newest batch stays, however large it is.
-        while self._put_rows - self._taken_rows > LIMIT_ROWS and self._waiting.qsize() > 1:
+        while self._put_rows - self._read_rows > LIMIT_ROWS and self._waiting.qsize() > 1:
             self._skip()
         if self._on_news is not None:
             self._on_news()
@@ -63,9 +63,9 @@ class Queue(Consumer):
             self._on_news()
 
     def is_full(self) -> bool:
-        return self._has_rows and self._put_rows > self._taken_rows
+        return self._has_rows and self._put_rows > self._read_rows
 
-    def take(self, *, wait: bool = False, timeout_s: float | None = None) -> Batch | None:
+    def get(self, *, wait: bool = False, timeout_s: float | None = None) -> Batch | None:
         """Take the oldest batch. None when there is none; with ``wait``, when there is none but a wake, or in time."""
         if self._back:
             return self._back.pop()
@@ -77,8 +77,8 @@ class Queue(Consumer):
                 return None
             if batch is None and wait and self._waiting.empty():
                 return None
-        self._taken_rows += weight(batch)
-        self._has_rows &= self._put_rows > self._taken_rows
+        self._read_rows += weight(batch)
+        self._has_rows &= self._put_rows > self._read_rows
         self._reader.notify_space()
         if self._slow is not None or self._kept:
             batch = self._with_gaps(batch)
@@ -92,7 +92,7 @@ class Queue(Consumer):
 
     def clear(self) -> None:
         """Discard what waits without counting it: the consumer does not want it."""
-        while self.take() is not None:
+        while self.get() is not None:
             pass
 
     def leave(self) -> None:
@@ -109,7 +109,7 @@ class Queue(Consumer):
                 return
             self._put_rows -= weight(batch)
             self._kept += [m for m in batch.messages if isinstance(m, Gap)]
-            if not self.is_taken:
+            if not self.is_read:
                 return
             self._reader.batches_skipped += 1
             self._reader.frames_skipped += len(batch.wire)
@@ -186,7 +186,7 @@ class Callbacks:
 
         def unsubscribe() -> None:
             with self._lock:
-                self._wanted = tuple(one for one in self._wanted if one is not entry)
+                self._wanted = tuple(other for other in self._wanted if other is not entry)
 
         with self._lock:
             self._wanted = (*self._wanted, entry)
@@ -208,7 +208,7 @@ class Callbacks:
         try:
             while True:
                 closing = self._give_up_s < math.inf
-                batch = self._queue.take(wait=not closing)
+                batch = self._queue.get(wait=not closing)
                 if batch is not None and time.monotonic() < self._give_up_s:
                     self._call(batch)
                 elif batch is not None:
@@ -221,11 +221,11 @@ class Callbacks:
 
     def _call(self, batch: Batch) -> None:
         wanted = self._wanted
-        for one in (batch, *batch.messages):
+        for item in (batch, *batch.messages):
             for kind, fn in wanted:
-                if type(one) is kind:
+                if type(item) is kind:
                     try:
-                        fn(one)
+                        fn(item)
                     except BaseException as error:  # SystemExit too: a thread that ended would look like silence
                         self._failed(fn, error)
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from ..errors import DeviceLostError
 from ..link import Link
-from ..link.serial_port import went_away
+from ..link.serial_port import disconnected
 from ..wire import messages_gen as wire
 from ..wire.batches import ROUND_US, Batch, LinkStats, StreamDecoder
 from .gap import Gaps, Reason
@@ -120,12 +120,12 @@ class Reader:
     def remove(self, consumer: Consumer) -> None:
         """Pass nothing more to ``consumer``."""
         with self.changed:
-            self._set(tuple(one for one in self.consumers if one is not consumer))
+            self._set(tuple(other for other in self.consumers if other is not consumer))
             self.changed.notify_all()
 
     def _set(self, consumers: tuple[Consumer, ...]) -> None:
         self.consumers = consumers
-        self._taps = tuple(one for one in consumers if isinstance(one, Tap))
+        self._taps = tuple(tap for tap in consumers if isinstance(tap, Tap))
 
     # ---- what has become of it -----------------------------------------------------------------
 
@@ -245,7 +245,7 @@ class Reader:
             self.disconnect(error, "unplugged")
             return
         except OSError as error:
-            self.disconnect(went_away(self.link.port, error), "unplugged")
+            self.disconnect(disconnected(self.link.port, error), "unplugged")
             return
         self.silent_s = 0.0 if batch is not None else self.silent_s + POLL_S
         if batch is not None:

@@ -93,12 +93,12 @@ class Stream:
 
     def start(self, names: tuple[str, ...], *, fingers: int, rest: bool, rate_hz: float | None) -> None:
         """See Hand.stream."""
-        self._tell(Wants.named(names, fingers=fingers, rest=rest, rate_hz=rate_hz, has_room=self._has_room))
+        self._send(Wants.named(names, fingers=fingers, rest=rest, rate_hz=rate_hz, has_room=self._has_room))
 
-    def go(self) -> None:
+    def ensure_started(self) -> None:
         """Start the stream with what was chosen last, unless it runs or the source has ended."""
         if not (self.on or self.ended):
-            self._tell(self._wants)
+            self._send(self._wants)
 
     def imply(self, kind: type) -> None:
         """Add what carries messages of this kind, which a callback waits for."""
@@ -106,9 +106,9 @@ class Stream:
         if name is not None and name not in self._implied:
             self._implied[name] = None
             if self.on:
-                self._tell(self._wants)
+                self._send(self._wants)
 
-    def _tell(self, wants: Wants) -> None:
+    def _send(self, wants: Wants) -> None:
         board, link = self._board, self._board.link
         asked = wants
         for name in self._implied:

@@ -40,7 +40,7 @@ class StreamWatch:
         self._stream = stream
         self._reader.reconnects = reconnect
         self._started: wire.Start | None = None  # the stream that was looked at last
-        self._heard_us: int | None = None  # the board's time at the last look; None before the first after a START
+        self._answered_us: int | None = None  # the board's time at the last look; None before the first after a START
         # At the last look; looks without rows since, and how often the stream was started again for that.
         self._rows = self._idle = self._faults = self._looks = self._restarts = 0
         self._thread = self._reader.thread(self._run, "stream watch")
@@ -98,13 +98,13 @@ class StreamWatch:
             except CommandRefusedError:
                 return  # a recording that has no STATUS yet
             if is_new:
-                self._looks, self._restarts, self._heard_us = 0, 0, None
+                self._looks, self._restarts, self._answered_us = 0, 0, None
                 if self._has_restarted():  # while nothing streamed, so that nobody looked
                     return
             if board.link.owns_stream or board.link.keeps_time:  # a recording has pauses of its own
                 self._judge(started, status)
             self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
-            self._heard_us = status.t_us
+            self._answered_us = status.t_us
 
     def _judge(self, started: wire.Start, status: wire.Status) -> None:
         if self._stream.started is not started:
@@ -140,9 +140,9 @@ class StreamWatch:
         By its own clock: this computer's stands still in its sleep, and a simulated board's goes in jumps. An answer
         is a little younger than the hearing of its question, hence a tenth.
         """
-        if self._heard_us is None:
+        if self._answered_us is None:
             return True
-        return (status.t_us - self._heard_us) % 2**32 >= 900 * started.keepalive_ms
+        return (status.t_us - self._answered_us) % 2**32 >= 900 * started.keepalive_ms
 
     def _has_restarted(self) -> bool:
         hello = self._board.ask(wire.HelloRequest(0, secrets.randbits(32)), wire.Hello, quiet=True)
@@ -183,7 +183,7 @@ class StreamWatch:
                 with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
                     board.command(tare)
             self._stream.resume()
-            self._heard_us = None
+            self._answered_us = None
 
     def _found(self, before: wire.Hello) -> bool:
         board = self._board

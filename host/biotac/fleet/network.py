@@ -35,9 +35,9 @@ GRANTED = b"\0"  # begins the answer to a claim, before the secret; no name does
 NUMBER = struct.Struct("<Q")
 
 
-def key(name: str, what: str) -> str:
+def key(name: str, kind: str) -> str:
     """Key of a board's ``wire/EPOCH``, ``command``, ``claim`` or ``info``, or token ``live/EPOCH``, ``writer/ID``."""
-    return f"{ROOT}/{name}/{what}"
+    return f"{ROOT}/{name}/{kind}"
 
 
 def checked_name(name: str) -> str:
@@ -76,9 +76,9 @@ def open_session(
             facts.insert_json5("transport/link/rx/max_message_size", str(MESSAGE_BYTES))
             facts.insert_json5("scouting/multicast/interface", json.dumps(LOOPBACK))
             facts.insert_json5("listen/endpoints", json.dumps([f"tcp/{LOOPBACK}:0"]))
-        for what, endpoint in (("connect", connect), ("listen", listen)):
+        for option, endpoint in (("connect", connect), ("listen", listen)):
             if endpoint is not None:
-                facts.insert_json5(f"{what}/endpoints", json.dumps([endpoint]))
+                facts.insert_json5(f"{option}/endpoints", json.dumps([endpoint]))
         if connect is not None or listen is not None:
             facts.insert_json5("scouting/multicast/enabled", "false")
         if connect is not None and listen is None:

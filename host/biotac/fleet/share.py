@@ -44,12 +44,12 @@ class Share:
         self._paused: threading.Timer | None = None
         self._pauses = 0
         self._tail = b""
-        self._of_epoch: list[Any] = []
+        self._epoch_entities: list[Any] = []
         if network.shared(session, name):
             raise PortError(f"a board is already shared as {name}; choose another name, or stop that one")
         self._declared = [
-            session.declare_queryable(network.key(name, what), answer)
-            for what, answer in (("info", self._tell), ("claim", self._claim), ("command", self._command))
+            session.declare_queryable(network.key(name, kind), answer)
+            for kind, answer in (("info", self._answer_info), ("claim", self._claim), ("command", self._command))
         ]
         self._declared.append(
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
@@ -67,13 +67,13 @@ class Share:
         self.epoch = secrets.token_hex(8)
         self._wire = self._session.declare_publisher(network.key(self.name, f"wire/{self.epoch}"))
         token = self._session.liveliness().declare_token(network.key(self.name, f"live/{self.epoch}"))
-        self._of_epoch = [self._wire, token]
+        self._epoch_entities = [self._wire, token]
 
     def _end_epoch(self) -> None:
         """Tell readers that the board is gone: what comes later is of another epoch."""
-        before, self._of_epoch = self._of_epoch, []
-        for declared in before:
-            declared.undeclare()
+        before, self._epoch_entities = self._epoch_entities, []
+        for entity in before:
+            entity.undeclare()
 
     # ---- what it sends, as a reader.Consumer and tap -------------------------------------------
 
@@ -101,13 +101,13 @@ class Share:
             part for part in data.split(b"\0") if len(part) > 1 and not (part[1] in rights.ANSWERS and _asked(part))
         ]
         with self._publishing:
-            if kept and self._of_epoch:
+            if kept and self._epoch_entities:
                 self._wire.put(network.NUMBER.pack(self.batches) + b"\0".join(kept) + b"\0")
                 self.batches += 1
 
     # ---- what it is asked ----------------------------------------------------------------------
 
-    def _tell(self, query: Any) -> None:
+    def _answer_info(self, query: Any) -> None:
         hello = self._hand.info
         facts = {
             "name": self.name,
@@ -135,9 +135,9 @@ class Share:
         query.reply(network.key(self.name, "claim"), answer)
 
     def _writer_changed(self, sample: Any) -> None:
-        gone = str(sample.key_expr).rpartition("/")[2]
+        token = str(sample.key_expr).rpartition("/")[2]
         with self._deciding:
-            if "DELETE" in str(sample.kind) and gone == self.writer:
+            if "DELETE" in str(sample.kind) and token == self.writer:
                 self.writer, self._secret = None, b""
 
     def _command(self, query: Any) -> None:
@@ -207,17 +207,17 @@ class Share:
             return self._board.ask(request, answers)
         finally:
             self._pauses += 1
-            self._paused = threading.Timer(PAUSE_S, self._go_on, [self._pauses])
+            self._paused = threading.Timer(PAUSE_S, self._resume, [self._pauses])
             self._paused.daemon = True
             self._paused.start()
 
-    def _go_on(self, pause: int) -> None:
+    def _resume(self, pause: int) -> None:
         with self._commanding:
             if pause != self._pauses:
                 return  # another command came in between
             self._paused = None
             with suppress(BiotacError):  # a board that is away is started when it is back
-                self._hand._go()
+                self._hand._start()
 
     def close(self) -> None:
         """Take the board off the network. The hand goes on streaming. Safe to call twice."""
@@ -226,8 +226,8 @@ class Share:
             self._paused.cancel()
         with self._publishing:
             declared, self._declared = self._declared, []
-            for one in declared:
-                one.undeclare()
+            for entity in declared:
+                entity.undeclare()
             self._end_epoch()
 
 

@@ -24,7 +24,7 @@ FORM = "zenoh:NAME?connect=tcp/HOST:7447&write=yes&config=FILE"
 REPLAYED, FOREIGN = 1 << 12, 1 << 32  # batches back, or ahead, of the one that is due
 ANSWER_S = 1.0
 # After a cut connection, or a stop shorter than Zenoh's lease, a reader finds the same board again by itself.
-GONE_S = 0.5
+ABSENT_S = 0.5
 
 
 class ZenohLink(Link):
@@ -53,7 +53,7 @@ class ZenohLink(Link):
         self._waiting = 0  # bytes
         self._next: int | None = None
         self._started = False
-        self._gone_s = math.inf  # since when, by time.monotonic
+        self._absent_since_s = math.inf  # since when, by time.monotonic
         self._declared: list[Any] = []
         self.reopen(port)
 
@@ -84,19 +84,19 @@ class ZenohLink(Link):
     def _listen(self, session: Any, epoch: str) -> None:
         with self._came:
             self._batches.clear()
-            self._waiting, self._next, self._started, self._gone_s = 0, None, False, math.inf
+            self._waiting, self._next, self._started, self._absent_since_s = 0, None, False, math.inf
 
-        def came_or_went(sample: Any) -> None:
+        def liveliness_changed(sample: Any) -> None:
             if str(sample.key_expr).endswith(f"/{epoch}"):
                 with self._came:
-                    self._gone_s = time.monotonic() if "DELETE" in str(sample.kind) else math.inf
+                    self._absent_since_s = time.monotonic() if "DELETE" in str(sample.kind) else math.inf
                     self._came.notify_all()
 
         tokens = session.liveliness()
         # Zenoh undeclares objects that nothing refers to.
         self._declared = [
-            session.declare_subscriber(network.key(self._name, f"wire/{epoch}"), self._take),
-            tokens.declare_subscriber(network.key(self._name, "live/*"), came_or_went, history=True),
+            session.declare_subscriber(network.key(self._name, f"wire/{epoch}"), self._receive),
+            tokens.declare_subscriber(network.key(self._name, "live/*"), liveliness_changed, history=True),
         ]
 
     def _claim(self, session: Any) -> None:
@@ -113,7 +113,7 @@ class ZenohLink(Link):
             )
         self._secret, self._count = answer.removeprefix(network.GRANTED), 0
 
-    def _take(self, sample: Any) -> None:
+    def _receive(self, sample: Any) -> None:
         data = sample.payload.to_bytes()
         if len(data) <= network.NUMBER.size:
             return
@@ -145,7 +145,7 @@ class ZenohLink(Link):
             data = b"".join(self._batches)
             self._batches.clear()
             self._waiting = 0
-            if not data and time.monotonic() - self._gone_s >= GONE_S:
+            if not data and time.monotonic() - self._absent_since_s >= ABSENT_S:
                 raise DeviceLostError(f"{self.port} is no longer shared; check `biotac share` there and open it again")
             return data
 
@@ -184,7 +184,7 @@ class ZenohLink(Link):
         session, self._session = self._session, None
         declared, self._declared = self._declared, []
         if session is not None:
-            for one in declared:
+            for entity in declared:
                 with suppress(Exception):  # the network may be gone already
-                    one.undeclare()
+                    entity.undeclare()
             session.close()

@@ -95,11 +95,11 @@ class AsyncHand:
 
         queue = hand._reading.add_queue(wake)
         try:
-            await asyncio.to_thread(hand._go)
+            await asyncio.to_thread(hand._start)
             while True:
                 news.clear()
                 over = not hand.streaming  # before the queue is emptied, so that nothing is left in it
-                while (batch := queue.take()) is not None:
+                while (batch := queue.get()) is not None:
                     yield batch
                 hand.check()
                 if over:

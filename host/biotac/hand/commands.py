@@ -19,7 +19,7 @@ from .views import Latest, finger_index
 Finger: TypeAlias = str | SupportsIndex
 Answer = TypeVar("Answer")
 #: How long a board keeps the link for a host that took it, and says nothing.
-TAKEN_S = 10.0
+TAKE_LINK_S = 10.0
 
 
 class Requests:
@@ -73,9 +73,9 @@ class Commands:
     def take_link(self) -> None:
         """Take the board over from the host at its other port, whose stream ends; what it holds stays held.
 
-        Both are told, and the other is refused (LINK_BUSY) until this hand stops, or has said nothing for TAKEN_S.
+        Both are told, and the other is refused (LINK_BUSY) until this hand stops, or has said nothing for TAKE_LINK_S.
         """
-        self._requests.command(wire.TakeLink(0, round(1000 * TAKEN_S)))
+        self._requests.command(wire.TakeLink(0, round(1000 * TAKE_LINK_S)))
 
     def sensor_status(self, finger: Finger) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""

@@ -135,7 +135,7 @@ class Hand(Commands, Subscriptions):
         """
         number = self._latest.present(finger)
         self._reading.stop_buffering()
-        return FingerView(self._latest.name(number), number, self._latest, self._go)
+        return FingerView(self._latest.name(number), number, self._latest, self._start)
 
     def __iter__(self) -> Iterator[str]:
         """Names of the fingers whose sensor answered; a chip select without a name is given as text."""
@@ -161,7 +161,7 @@ class Hand(Commands, Subscriptions):
         return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._board.closed else ''}>"
 
     def _repr_html_(self) -> str:
-        views = [FingerView(self._latest.name(finger), finger, self._latest, self._go) for finger in self.fingers]
+        views = [FingerView(self._latest.name(finger), finger, self._latest, self._start) for finger in self.fingers]
         return html_table(repr(self), [[view.name, *view._now()] for view in views])
 
     # ---- life ----------------------------------------------------------------------------------
@@ -247,8 +247,8 @@ class Hand(Commands, Subscriptions):
             for row in batch.frames:
                 yield Frame.from_row(row)
 
-    def _go(self) -> None:
-        self._reading.go()
+    def _start(self) -> None:
+        self._reading.start()
 
     def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
         """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
@@ -281,7 +281,7 @@ class Hand(Commands, Subscriptions):
         if self._rounds is None:
             self._stream.imply(wire.Event)
             self._rounds = Rounds(self._reader, self._latest)
-        self._go()
+        self._start()
         return self._rounds.wait(after, timeout_s)
 
     # ---- recording -----------------------------------------------------------------------------

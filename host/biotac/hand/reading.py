@@ -24,14 +24,14 @@ class Reading:
         self._reader = board.reader
         self._stream = stream
         self._latest = latest
-        self._queue = Queue(self._reader, is_taken=False)
+        self._queue = Queue(self._reader, is_read=False)
         self._thread: threading.Thread | None = None  # that takes
         self._turn = threading.Lock()
         self._reader.add(self._queue)
 
     def stop_buffering(self) -> None:
         """What arrives is looked at in another way: it need not be kept until somebody reads."""
-        if not self._queue.is_taken:
+        if not self._queue.is_read:
             self._reader.remove(self._queue)
 
     def add_queue(self, on_news: Callable[[], None]) -> Queue:
@@ -42,21 +42,21 @@ class Reading:
         self._reader.add(queue)
         return queue
 
-    def go(self) -> None:
+    def start(self) -> None:
         """Start the stream, with what was chosen last, unless it runs."""
         self._latest.report()
-        self._stream.go()
+        self._stream.ensure_started()
 
     def batches(self) -> Iterator[Batch]:
         """See Hand.batches, which keeps the hand open meanwhile."""
         stream, closing = self._stream, self._reader.closing
         with self._by_one_thread():
             self._begin()
-            self.go()
+            self.start()
             while True:
                 self._latest.report()
                 over = not stream.on  # before the queue is emptied, so that nothing is left in it
-                batch = self._queue.take(wait=not (over or closing.is_set()))
+                batch = self._queue.get(wait=not (over or closing.is_set()))
                 if batch is not None:
                     yield batch
                 elif closing.is_set():
@@ -68,7 +68,7 @@ class Reading:
         if self._queue not in self._reader.consumers:
             self._queue = Queue(self._reader)
             self._reader.add(self._queue)
-        self._queue.is_taken = True
+        self._queue.is_read = True
 
     @contextmanager
     def _by_one_thread(self) -> Iterator[None]:
@@ -93,21 +93,21 @@ class Reading:
         if fresh and self._stream.on:
             self._board.command(wire.Ping(0))  # a barrier: its reply comes after everything made before
             self._queue.clear()
-        taken: list[Batch] = []
+        found: list[Batch] = []
         end_us: int | None = None
         first_status_us: int | None = None
         for batch in self.batches():
             for status in (m for m in batch.messages if isinstance(m, wire.Status)):
                 first_status_us = status.t_us if first_status_us is None else first_status_us
                 if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
-                    return join(taken)  # the board is there, its sensors are not
+                    return join(found)  # the board is there, its sensors are not
             first_us, last_us = batch.first_t_us(), batch.last_t_us()
             if end_us is None and first_us is not None:
                 end_us = first_us + round(seconds * 1e6)
             if end_us is None or last_us is None or last_us < end_us:
-                taken.append(batch)
+                found.append(batch)
                 continue
             now, later = split(batch, end_us)
             self._queue.put_back(later)
-            return join([*taken, now])
-        return join(taken)
+            return join([*found, now])
+        return join(found)

@@ -62,7 +62,7 @@ class Recorder(Tap):
         self._writer = Writer(path, self._known, board.link.port, **options)
         self._boot_id = board.info.boot_id
         self._waiting: deque[tuple[int, bytes | Gap | Label]] = deque()
-        self._put_bytes = self._taken_bytes = 0  # each counted by one thread
+        self._put_bytes = self._written_bytes = 0  # each counted by one thread
         self._chunk = b""  # the latest: a Gap that ends with it is written first
         self._dropped: Gap | None = None
         self._over = False
@@ -117,7 +117,7 @@ class Recorder(Tap):
     # ---- on the reading thread -----------------------------------------------------------------
 
     def put_raw(self, chunk: bytes) -> None:
-        if self._put_bytes - self._taken_bytes > LIMIT_BYTES:
+        if self._put_bytes - self._written_bytes > LIMIT_BYTES:
             reader = self._board.reader
             self._dropped = self._dropped or Gap("slow", reader.last_t_us, None, time.time_ns(), 0, self._boot_id)
             return
@@ -134,15 +134,15 @@ class Recorder(Tap):
         self._append(self._chunk)
         self._chunk = b""
 
-    def _append(self, what: bytes | Gap | Label) -> None:
-        self._waiting.append((self._board.info.boot_id, what))
-        if isinstance(what, bytes):
-            self._put_bytes += len(what)
+    def _append(self, item: bytes | Gap | Label) -> None:
+        self._waiting.append((self._board.info.boot_id, item))
+        if isinstance(item, bytes):
+            self._put_bytes += len(item)
             if self.is_full():
                 self._due.set()
 
     def is_full(self) -> bool:
-        return self._put_bytes - self._taken_bytes > WRITE_BYTES
+        return self._put_bytes - self._written_bytes > WRITE_BYTES
 
     # ---- on its own thread ---------------------------------------------------------------------
 
@@ -161,19 +161,19 @@ class Recorder(Tap):
 
     def _write(self) -> None:
         while self._waiting:
-            boot_id, what = self._waiting.popleft()
+            boot_id, item = self._waiting.popleft()
             if boot_id != self._boot_id:
                 self._boot_id = boot_id
                 with suppress(DeviceLostError):  # it is gone again, or closed: what was known before has to do
                     self._known = self._facts()
-                self._writer.go_on(replace(self._known, info=self._board.info))
-            if isinstance(what, Gap):
-                self._writer.write_gap(what)
-            elif not isinstance(what, bytes):
-                self._writer.write_label(what)
+                self._writer.next_file(replace(self._known, info=self._board.info))
+            if isinstance(item, Gap):
+                self._writer.write_gap(item)
+            elif not isinstance(item, bytes):
+                self._writer.write_label(item)
             else:
-                self._writer.write(what)
-                self._taken_bytes += len(what)
+                self._writer.write(item)
+                self._written_bytes += len(item)
         self._writer.write(b"")  # so that a block is closed in time
         self._board.reader.notify_space()
 

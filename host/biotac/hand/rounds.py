@@ -85,9 +85,9 @@ class Rounds(Consumer):
         """The newest complete round after ``after``, or after this call. Raises TimeoutError when none comes."""
         reader = self._reader
 
-        def is_there() -> bool:
-            gone = reader.failure is not None or reader.closing.is_set()
-            return gone or self._complete_us() > self._after_us
+        def is_complete() -> bool:
+            ended = reader.failure is not None or reader.closing.is_set()
+            return ended or self._complete_us() > self._after_us
 
         with self._news:
             # All that the first call finds has come since it was made. What was given before the board restarted is
@@ -95,13 +95,13 @@ class Rounds(Consumer):
             before_us = -1 if self._is_new else max(self._rows, default=-1)
             self._after_us = before_us if after is None else min(after.t_us, self._given_us)
             self._is_new = False
-            came = self._news.wait_for(is_there, timeout_s)
+            came = self._news.wait_for(is_complete, timeout_s)
         if reader.closing.is_set():
             reader.raise_closed()
         self._latest.report()
         if not came:
             raise TimeoutError(f"no new round in {timeout_s:g} s: is a finger there, and streamed with rest=True?")
-        return self.take(self._complete_us())
+        return self.pop(self._complete_us())
 
     def _complete_us(self) -> int:
         times = sorted(self._rows)
@@ -109,25 +109,25 @@ class Rounds(Consumer):
             return times[-1]
         return times[-2] if len(times) > 1 else -1
 
-    def take(self, t_us: int | None = None) -> Round:
+    def pop(self, t_us: int | None = None) -> Round:
         """The round at ``t_us``, by default the newest that has come, and the events up to its end."""
         with self._news:
             newest = max(self._rows, default=None) if t_us is None else t_us
             rows = {} if newest is None or newest <= self._given_us else self._rows[newest]
             end_us = None if t_us is None else t_us + ROUND_US
-            taken = [event for at_us, event in self._events if end_us is None or at_us < end_us]
-            self._events = self._events[len(taken) :]
+            due = [event for at_us, event in self._events if end_us is None or at_us < end_us]
+            self._events = self._events[len(due) :]
             if rows:
                 self._expected = set(rows)
                 self._rows = {at: row for at, row in self._rows.items() if newest is not None and at > newest}
         frames = {finger: Frame.from_row(batch.frames[row]) for finger, (batch, row) in rows.items()}
         fingers = {}
-        for finger in sorted({*frames, *(event.finger for event in taken), *FINGERS_IN[self._reader.present]}):
-            own = tuple(event for event in taken if event.finger == finger)
+        for finger in sorted({*frames, *(event.finger for event in due), *FINGERS_IN[self._reader.present]}):
+            own = tuple(event for event in due if event.finger == finger)
             fingers[self._latest.name(finger)] = FingerRound(frames.get(finger), own)
         seq = next((frame.seq for frame in frames.values()), -1)
         if not frames or newest is None:
-            return Round(-1, -1, 0, fingers, tuple(taken))
+            return Round(-1, -1, 0, fingers, tuple(due))
         missed = round((newest - self._given_us) / ROUND_US) - 1 if self._given_us >= 0 else 0
         self._given_us = newest
-        return Round(seq, newest, missed, fingers, tuple(taken))
+        return Round(seq, newest, missed, fingers, tuple(due))

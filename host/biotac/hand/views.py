@@ -156,7 +156,7 @@ class Latest(Consumer):
         """Wait for a row that comes after this call and is not stale. Raises TimeoutError."""
         before, reader, why = self._batches.get(finger), self._reader, ""
 
-        def is_there() -> bool:
+        def has_come() -> bool:
             nonlocal why
             if reader.failure is not None or reader.closing.is_set():
                 return True
@@ -166,7 +166,7 @@ class Latest(Consumer):
         with self._news:
             self._waiters += 1
             try:
-                came = self._news.wait_for(is_there, timeout_s)
+                came = self._news.wait_for(has_come, timeout_s)
             finally:
                 self._waiters -= 1
         if reader.closing.is_set():
@@ -224,11 +224,11 @@ class FingerView:
     CallbackError or OSError when a callback or a recording has failed since the last call.
     """
 
-    def __init__(self, name: str, finger: int, latest: Latest, go: Callable[[], None]) -> None:
+    def __init__(self, name: str, finger: int, latest: Latest, start: Callable[[], None]) -> None:
         self.name = name
         self.finger = finger
         self._latest = latest
-        self._go = go  # starts the stream; holds the hand, which would be closed with its last reference
+        self._start = start  # starts the stream; holds the hand, which would be closed with its last reference
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
@@ -250,7 +250,7 @@ class FingerView:
 
         Raises TimeoutError when none comes in time, DeviceLostError when the board is lost.
         """
-        self._go()
+        self._start()
         self._latest.wait(self.finger, timeout_s)
         return self.frame
 

@@ -36,9 +36,9 @@ class InProcessLink(Link):
         if board == ffi.NULL:
             raise MemoryError("no memory for a board")
         self._board = ffi.gc(board, lib.bt_sbc_free)
-        self._go()
+        self._start()
 
-    def _go(self) -> None:
+    def _start(self) -> None:
         self._thread = threading.Thread(target=self._run, name=self.port, daemon=True)
         self._thread.start()
 
@@ -103,37 +103,37 @@ class InProcessLink(Link):
         return data
 
 
-def _of(handle: Any) -> Any:
+def _link(handle: Any) -> Any:
     return ffi.from_handle(handle)
 
 
 def _failed(kind: Any, error: Any, trace: Any) -> None:
     """Keep what a callback below raised from being lost in C: it ends the board, and the host gets the error."""
-    _of(trace.tb_frame.f_locals["handle"])._fail(error)
+    _link(trace.tb_frame.f_locals["handle"])._fail(error)
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_now_us(handle: Any) -> int:
-    return int(_of(handle)._us() % 2**32)
+    return int(_link(handle)._us() % 2**32)
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_delay_us(handle: Any, us: int) -> None:
-    _of(handle)._delay(us)
+    _link(handle)._delay(us)
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_exchange(handle: Any, finger: int, data: Any, n: int) -> None:
-    _of(handle)._exchange(finger, ffi.buffer(data, n))
+    _link(handle)._exchange(finger, ffi.buffer(data, n))
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_link_write(handle: Any, data: Any, n: int) -> bool:
-    return bool(_of(handle)._send(bytes(ffi.buffer(data, n))))
+    return bool(_link(handle)._send(bytes(ffi.buffer(data, n))))
 
 
 @ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
 def bt_sbc_link_read(handle: Any, data: Any, most: int) -> int:
-    received = _of(handle)._receive(most)
+    received = _link(handle)._receive(most)
     ffi.buffer(data, most)[: len(received)] = received
     return len(received)

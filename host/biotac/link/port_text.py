@@ -12,12 +12,12 @@ from ..errors import PortError
 
 def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
     """WHAT, and the options by key. Raises PortError, with the expected ``form``, for an option not in ``known``."""
-    what, query = file_and_query(port.partition(":")[2])
+    target, query = file_and_query(port.partition(":")[2])
     options = dict(parse_qsl(query))
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise PortError(f"{port}: unknown option {unknown[0]!r}; expected {form}")
-    return what, options
+    return target, options
 
 
 def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
@@ -35,8 +35,8 @@ def file_and_query(text: str) -> tuple[str, str]:
         return text, ""
     if os.path.exists(longest):
         return longest, rest
-    what, _, query = text.partition("?")
-    return what, query
+    head, _, query = text.partition("?")
+    return head, query
 
 
 def parse_pace(text: str) -> float:

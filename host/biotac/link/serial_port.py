@@ -20,7 +20,7 @@ READ_BYTES = 65536
 USB_BITS_PER_S = 115200  # any value will do
 TTY_BYTES = 4000  # nearly the most that one tty read gives
 UART_FORM = "uart:DEVICE?baud=N"
-ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times a second
+READ_STEP_BYTES = 8192  # more would be allocated for nothing, thousands of times a second
 
 
 class SerialLink(Link):
@@ -58,7 +58,7 @@ class SerialLink(Link):
             raise open_error(port, error) from error
         if os.name == "posix":
             self.fd = self._serial.fileno()
-            _one_byte_at_least(self.fd)
+            _wait_for_a_byte(self.fd)
             self._poll = select.poll()  # serves all waits; select() would build and take apart three lists for each
             self._poll.register(self.fd, select.POLLIN)
 
@@ -68,7 +68,7 @@ class SerialLink(Link):
                 return self._read_blocking(timeout_s)
             return self._drain() if self.wait(timeout_s) else b""
         except (serial.SerialException, OSError) as error:
-            raise went_away(self.port, error) from error
+            raise disconnected(self.port, error) from error
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until something can be read; false when nothing can within timeout_s. Not on Windows."""
@@ -80,7 +80,7 @@ class SerialLink(Link):
         fd, pieces = self._serial.fileno(), list[bytes]()
         with suppress(BlockingIOError):  # that was all, or another program took it
             while not pieces or (len(pieces[-1]) >= TTY_BYTES and len(pieces) < READ_BYTES // TTY_BYTES):
-                pieces.append(os.read(fd, ONE_READ_BYTES))
+                pieces.append(os.read(fd, READ_STEP_BYTES))
         if pieces[:1] == [b""]:
             raise OSError("it hung up")
         return b"".join(pieces)
@@ -96,14 +96,14 @@ class SerialLink(Link):
         try:
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
-            raise went_away(self.port, error) from error
+            raise disconnected(self.port, error) from error
 
     def close(self) -> None:
         if self._serial is not None:
             self._serial.close()
 
 
-def _one_byte_at_least(fd: int) -> None:
+def _wait_for_a_byte(fd: int) -> None:
     """Let a read without data wait, as cfmakeraw does: pyserial's setting, no wait, would stay for the next program."""
     import termios
 
@@ -132,7 +132,7 @@ def open_uart(port: str) -> SerialLink:
     return SerialLink(path, int(baud))
 
 
-def went_away(port: str, error: Exception) -> DeviceLostError:
+def disconnected(port: str, error: Exception) -> DeviceLostError:
     """The DeviceLostError to raise when reading an open port failed with ``error``."""
     return DeviceLostError(f"{port} went away while it was open ({error}); plug the board in and open it again")
 

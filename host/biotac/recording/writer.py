@@ -67,7 +67,7 @@ class Writer:
         self._frames_before = self._lost_before = 0  # in earlier files
         self._file = self._begin(path, facts.metadata(port))
 
-    def go_on(self, facts: Facts) -> None:
+    def next_file(self, facts: Facts) -> None:
         """Close this file and go on in a new one after a restart of the board.
 
         ``press.mcap`` is followed by ``press.2.mcap``, ``press.3.mcap`` and so on. Raises InputError when the new file

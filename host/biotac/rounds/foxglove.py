@@ -34,7 +34,7 @@ class Foxglove:
         self._channel: int | None = None
         self._subscriptions = 0
         self._decode: Decode | None = None
-        self._heard_s = 0.0
+        self._received_s = 0.0
 
     def __iter__(self) -> Iterator[Message | RefusedError | None]:
         try:
@@ -48,16 +48,16 @@ class Foxglove:
                 try:
                     kind, data = bridge.recv_data()
                 except websocket.WebSocketTimeoutException:
-                    if self._decode is not None and time.monotonic() - self._heard_s > AGAIN_S:
+                    if self._decode is not None and time.monotonic() - self._received_s > AGAIN_S:
                         self._ask(bridge)
                     yield None
                     continue
                 if kind == websocket.ABNF.OPCODE_TEXT:
-                    yield self._hear(bridge, data)
+                    yield self._receive(bridge, data)
                 elif kind == websocket.ABNF.OPCODE_BINARY and len(data) >= _DATA.size and data[0] == 1:
                     _, subscription, logged_ns = _DATA.unpack_from(data)
                     if self._decode is not None and subscription == self._subscriptions:
-                        self._heard_s = time.monotonic()
+                        self._received_s = time.monotonic()
                         _acknowledge(bridge)
                         try:
                             yield self._decode(data[_DATA.size :], logged_ns)
@@ -67,11 +67,11 @@ class Foxglove:
             self._channel = self._decode = None
             bridge.close()
 
-    def _hear(self, bridge: Any, data: bytes) -> RefusedError | None:
+    def _receive(self, bridge: Any, data: bytes) -> RefusedError | None:
         """Subscribe to the topic whenever it is advertised, as after a change of its definition."""
         try:
-            said = json.loads(data)
-            channels = said["channels"] if said.get("op") == "advertise" else []
+            advert = json.loads(data)
+            channels = advert["channels"] if advert.get("op") == "advertise" else []
             for own in channels:
                 topic, kind = own["topic"], own["schemaName"]
                 if is_known(kind) and self._topic in ("", topic):
@@ -98,7 +98,7 @@ class Foxglove:
     def _ask(self, bridge: Any) -> None:
         """Again after a silence: a bridge that has just started may not know yet the channel that it advertised."""
         bridge.send(json.dumps({"op": "unsubscribe", "subscriptionIds": [self._subscriptions]}))
-        self._subscriptions, self._heard_s = self._subscriptions + 1, time.monotonic()
+        self._subscriptions, self._received_s = self._subscriptions + 1, time.monotonic()
         subscription = {"id": self._subscriptions, "channelId": self._channel}
         bridge.send(json.dumps({"op": "subscribe", "subscriptions": [subscription]}))
 

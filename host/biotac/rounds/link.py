@@ -58,7 +58,7 @@ class MessagesLink(InProcessLink):
         self._zero_ns = self._begin_ns = first[0].stamp_ns
         self._now_us, self._last_us, self._last_s = 0, -ROUND_US, time.monotonic()
         self._wrong = 0  # stamps in a row
-        self._said: dict[int, tuple[bytes, bool]] = {}  # to the board, of each finger's sensor
+        self._announced: dict[int, tuple[bytes, bool]] = {}  # to the board, of each finger's sensor
         self.begin(lib.bt_sbc_new(self._handle, 0, self._rounds.timed, secrets.randbits(32)))
 
     @property
@@ -103,9 +103,9 @@ class MessagesLink(InProcessLink):
     def reopen(self, port: str) -> None:
         self._thread.join()
         self._messages = iter(self._source)
-        self._take(next(self._messages))  # raises when it is not there
+        self._add(next(self._messages))  # raises when it is not there
         self._failure = None
-        self._go()
+        self._start()
 
     # ---- the board's thread ----------------------------------------------------------------------
 
@@ -114,9 +114,9 @@ class MessagesLink(InProcessLink):
 
     def _run(self) -> None:
         try:
-            if not self._said:
+            if not self._announced:
                 lib.bt_sbc_start(self._board)
-                self._say_sensors()
+                self._announce_sensors()
             while not self._closing and self._failure is None:
                 lib.bt_sbc_poll(self._board)
                 if self._source.live:
@@ -127,7 +127,7 @@ class MessagesLink(InProcessLink):
                 else:
                     message = next(self._messages, None)
                     self.ended = message is None
-                    self._take(message)
+                    self._add(message)
         except Exception as error:  # as of a network, or unforeseen: the host gets it
             self._fail(error)
 
@@ -139,11 +139,11 @@ class MessagesLink(InProcessLink):
         self._polled_s = time.monotonic()
         since_us = int((time.monotonic() - self._last_s) * 1e6)
         self._now_us = max(self._now_us, self._last_us + since_us)
-        self._take(message)
+        self._add(message)
         if message is None and since_us > LIVE_SILENCE_US:
             self._fall_silent()
 
-    def _take(self, message: Message | RefusedError | None) -> None:
+    def _add(self, message: Message | RefusedError | None) -> None:
         if not isinstance(message, Message):
             if message is not None:
                 self._rounds.note(f"a message was refused: {message}")
@@ -158,13 +158,13 @@ class MessagesLink(InProcessLink):
             t_us = self._last_us + ROUND_US
             self._zero_ns = message.stamp_ns - t_us * 1000
         self._wrong = 0
-        round_ = self._rounds.of(message)
+        round_ = self._rounds.add(message)
         if round_ is None:
             return
         if self._last_us >= 0 and t_us - self._last_us > SILENCE_US:
             self._gaps.append((t_us - self._last_us, self._last_us))
             self._fall_silent()
-        self._say_sensors()
+        self._announce_sensors()
         self._put(t_us, round_)
         self._silent = False
         self._last_us, self._last_s = t_us, time.monotonic()
@@ -184,9 +184,9 @@ class MessagesLink(InProcessLink):
         slots_at = ffi.from_buffer("uint32_t[]", slot_us)
         lib.bt_sbc_round(self._board, t_us % 2**32, slots_at, words_at, round_.sp_fingers, sp_at)
 
-    def _say_sensors(self) -> None:
+    def _announce_sensors(self) -> None:
         for f, judge in self._rounds.judges.items():
             now = self._rounds.serials[f], bool(judge.foreign)
-            if self._said.get(f) != now:
-                self._said[f] = now
+            if self._announced.get(f) != now:
+                self._announced[f] = now
                 lib.bt_sbc_sensor(self._board, f, now[0].ljust(SENSOR_SERIAL_BYTES, b"\0"), now[1])

@@ -57,8 +57,8 @@ def counts_of(
         raise RefusedError(f"finger {finger} has {len(values)} electrodes, expected 19, or a BioTac SP's 24")
     if len(samples) > MAX_PAC:
         raise RefusedError(f"finger {finger} has {len(samples)} samples of PAC, expected at most {MAX_PAC}")
-    said = [word if word is not None and 0 <= word <= sensor.FULL_SCALE_COUNT else None for word in slow]
-    return Counts(values, said[0], said[1], said[2], samples, serial)
+    valid = [word if word is not None and 0 <= word <= sensor.FULL_SCALE_COUNT else None for word in slow]
+    return Counts(values, valid[0], valid[1], valid[2], samples, serial)
 
 
 def _integers(name: str, values: Any) -> NDArray[np.int64]:

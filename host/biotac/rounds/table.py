@@ -58,7 +58,7 @@ class Table:
         every_s = np.arange(len(self._rows)) / (rate_hz or 1.0)
         self._times_s = every_s if time is None else self._rows[:, self._column[self._place(time)]]
         for f, places in enumerate(self._fingers):
-            if not _rests(self._of(places["electrodes"])):
+            if not _rests(self._values(places["electrodes"])):
                 raise InputError(
                     f"{self._where}: finger {f} has no row at rest: of {len(self._rows)}, no {REST_ROWS} one after the "
                     "other are still, and without them there is no tare; expected a recording, with all its rows"
@@ -74,7 +74,7 @@ class Table:
         if name is None:
             return []
         names = [str(name).replace("{}", str(k)) for k in range(1, 100)]
-        found = [self._head.index(one) for one in dict.fromkeys(names) if one in self._head]
+        found = [self._head.index(column) for column in dict.fromkeys(names) if column in self._head]
         return found or [self._place(names[0])]
 
     def _used(self, time: Any) -> list[int]:
@@ -83,7 +83,7 @@ class Table:
         self._column = {place: k for k, place in enumerate(every)}
         return every
 
-    def _of(self, places: list[int], rows: Any = slice(None)) -> Floats:
+    def _values(self, places: list[int], rows: Any = slice(None)) -> Floats:
         columns: Floats = self._rows[rows, [self._column[place] for place in places]]
         return columns
 
@@ -94,7 +94,7 @@ class Table:
                     raise RefusedError(f"row {k + 1}: its time is {time_s} s")
                 found: list[Any] = [None] * MAX_SENSORS
                 for f, places in enumerate(self._fingers):
-                    electrodes, *slow, pac = (self._of(places[name], k) for name in CHANNELS)
+                    electrodes, *slow, pac = (self._values(places[name], k) for name in CHANNELS)
                     pdc, tac, tdc = (word[0] if len(word) else None for word in slow)
                     found[f] = counts_of(f, electrodes, pdc, tac, tdc, pac, self._serials[f])
                 yield Message(round(time_s * 1e9), tuple(found))

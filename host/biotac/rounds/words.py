@@ -52,7 +52,7 @@ class Rounds:
         self.notes: list[str] = []
         self.serials: dict[int, bytes] = {}
         self.judges: dict[int, Judge] = {}
-        self._said: dict[int, set[str]] = {}  # channels, by finger
+        self._channels: dict[int, set[str]] = {}  # in use, by finger
         self._kept_ns: int | None = None
         self._skipped: list[Message] = []
         steps_us = np.diff([message.stamp_ns for message in first]) / 1e3
@@ -96,16 +96,16 @@ class Rounds:
         self.serials[f] = counts[-1].serial
         if judge.foreign:
             self.note(f"finger {f}: {judge.foreign}")
-        # What is zero throughout was never said.
-        said = {name for name in SLOW if any(getattr(own, name) for own in counts)}
-        self._said[f] = said | ({"pac"} if any(own.pac.any() for own in counts) else set())
-        samples = sum(len(own.pac) for own in counts) / len(counts) * self._each if "pac" in self._said[f] else 0.0
+        # What is zero throughout was never sent.
+        slow = {name for name in SLOW if any(getattr(own, name) for own in counts)}
+        self._channels[f] = slow | ({"pac"} if any(own.pac.any() for own in counts) else set())
+        samples = sum(len(own.pac) for own in counts) / len(counts) * self._each if "pac" in self._channels[f] else 0.0
         if samples < 0.5 * self._pac_slots:
             seen = f"{samples:.0f} of {self._pac_slots} samples of PAC a round"
             self.note(f"finger {f}: {seen}: no vibration, no JOLT and no SLIP")
         elif round(samples) != self._pac_slots:
             self.note(f"finger {f}: PAC at {samples / self.period_us * 1e6:.0f} Hz is resampled to {PAC_HZ:.0f} Hz")
-        if "pdc" not in said:
+        if "pdc" not in slow:
             self.note(f"finger {f}: no static pressure")
 
     def look_at(self, messages: Iterable[Any]) -> None:
@@ -120,7 +120,7 @@ class Rounds:
             self._begin(f, [message])
         return self.judges[f]
 
-    def of(self, message: Message) -> Round | None:
+    def add(self, message: Message) -> Round | None:
         """The round that this message completes, if it does."""
         due_us = self.period_us - self._step_us / 2
         if self._kept_ns is not None and self._each > 1 and (message.stamp_ns - self._kept_ns) / 1e3 < due_us:
@@ -135,9 +135,9 @@ class Rounds:
             judge = self._judge(f, message)
             words[slots.ELECTRODE_SLOT, f] = judge.words(own)
             for name, slot in SLOW.items():
-                word = getattr(own, name) if name in self._said[f] else None
+                word = getattr(own, name) if name in self._channels[f] else None
                 words[slot, f] = wire.INVALID_COUNT if word is None else word
-            if "pac" in self._said[f]:
+            if "pac" in self._channels[f]:
                 parts = [skipped.fingers[f] for skipped in self._skipped]
                 pac = np.concatenate([*(part.pac for part in parts if part is not None), own.pac])
                 words[slots.PAC_SLOT, f] = resampled(pac, self._pac_slots)

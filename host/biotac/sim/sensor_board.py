@@ -86,9 +86,9 @@ class SensorBoard:
         CommandRefusedError when the board has lost some of it.
         """
         slots, fingers = self._samples.shape
-        taken = self.feed(until_full=True).slots_taken
-        if taken < slots:
-            tape_s, room_s = slots / sensor.SLOT_HZ, taken / sensor.SLOT_HZ
+        received = self.feed(until_full=True).slots_taken
+        if received < slots:
+            tape_s, room_s = slots / sensor.SLOT_HZ, received / sensor.SLOT_HZ
             raise InputError(
                 f"{tape_s:g} s of {fingers} fingers do not fit the board: expected up to {room_s:g} s; shorten it"
             )
@@ -144,17 +144,17 @@ class SensorBoard:
 
         Raises DeviceLostError when it is too long ago, as after a restart of the board.
         """
-        taken = self.status().slots_taken
-        if taken < self._before:
+        received = self.status().slots_taken
+        if received < self._before:
             raise DeviceLostError(
-                f"{self._board.link.port} has {taken} slots of its tape, expected {self._before}: it restarted, "
+                f"{self._board.link.port} has {received} slots of its tape, expected {self._before}: it restarted, "
                 "or its link lost too much; start another world"
             )
-        self._send_from(taken)
+        self._send_from(received)
 
-    def _send_from(self, taken: int) -> None:
+    def _send_from(self, received: int) -> None:
         slots, size = self._before + len(self._samples), SAMPLES_A_MESSAGE // self._samples.shape[1]
-        for first in range(taken, slots, size):
+        for first in range(received, slots, size):
             self._board.send(self._part(first, min(size, slots - first)))
 
     def listen(self) -> None:
@@ -168,7 +168,7 @@ class SensorBoard:
         """
         until_s, sent = time.monotonic() + STILL_S, self._before + len(self._samples)
         while time.monotonic() < until_s:
-            batch = self._reports.take(wait=True, timeout_s=until_s - time.monotonic())
+            batch = self._reports.get(wait=True, timeout_s=until_s - time.monotonic())
             self._board.reader.check()
             for message in batch.messages if batch else ():
                 if isinstance(message, wire.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:

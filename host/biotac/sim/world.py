@@ -132,8 +132,8 @@ class LockStep(World):
     def run(self, seconds: float, **loads: Load) -> Round:
         left, events = _rounds_of(seconds), tuple[Any, ...]()
         while left:
-            link, goes_wrong = self._link, self._dead or self._away or self._stalled
-            count = 1 if goes_wrong or (link is not None and link.reopened) else min(left, AT_ONCE_ROUNDS)
+            link, is_disturbed = self._link, self._dead or self._away or self._stalled
+            count = 1 if is_disturbed or (link is not None and link.reopened) else min(left, AT_ONCE_ROUNDS)
             now, left = self._step(count, loads), left - count
             events += now.events
         return replace(now, missed=max(0, now.missed - count + 1), events=events)
@@ -156,7 +156,7 @@ class LockStep(World):
         self._stalled = max(0, self._stalled - 1)
         if self._stalled or self._rounds is None or link is None or link.away:
             return Round(-1, -1, 0, {name: FingerRound(None, ()) for name in self._fingers.names}, ())
-        return self._rounds.take()
+        return self._rounds.pop()
 
     # ---- what goes wrong -----------------------------------------------------------------------
 

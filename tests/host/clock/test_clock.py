@@ -327,10 +327,10 @@ class Heard:
     """In place of a DeviceClock: what it was told."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[int, float]] = []
+        self.received: list[tuple[int, float]] = []
 
     def arrived(self, t_us: int, host_s: float) -> None:
-        self.heard.append((t_us, host_s))
+        self.received.append((t_us, host_s))
 
 
 def test_of_a_fast_link_the_clock_is_told_the_quickest_of_every_20_ms() -> None:
@@ -340,8 +340,8 @@ def test_of_a_fast_link_the_clock_is_told_the_quickest_of_every_20_ms() -> None:
     for k in range(400):  # a message each 5 ms
         delay_us = delays_us[k % 8]
         arrivals.note(5_000 * k, 5.0 + (5_000 * k + delay_us) / 1e6)
-    assert clock.heard[0] == (0, pytest.approx(5.0009))
-    lags_us = [round((host_s - 5.0) * 1e6) - t_us for t_us, host_s in clock.heard[1:]]
+    assert clock.received[0] == (0, pytest.approx(5.0009))
+    lags_us = [round((host_s - 5.0) * 1e6) - t_us for t_us, host_s in clock.received[1:]]
     assert set(lags_us) <= {100, 200, 300} and len(lags_us) >= 79
 
 
@@ -352,7 +352,7 @@ def test_what_came_before_a_restart_is_not_told_after_it() -> None:
     arrivals.note(10**9 + 5_000, 50.005)
     arrivals.forget()
     arrivals.note(1_000, 50.03)
-    assert clock.heard == [(10**9, 50.0), (1_000, 50.03)]
+    assert clock.received == [(10**9, 50.0), (1_000, 50.03)]
 
 
 def test_a_simulated_board_in_real_time_is_a_clock() -> None:

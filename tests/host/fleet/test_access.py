@@ -21,9 +21,9 @@ pytest.importorskip("zenoh")
 def test_nothing_leaves_this_computer_without_a_configuration(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.delenv("ZENOH_CONFIG", raising=False)
     for endpoint in ("tcp/0.0.0.0:7447", "tcp/192.0.2.1:7447", "tls/[::]:7447", "udp/example.org:7447", "nonsense"):
-        for what in ("connect", "listen"):
+        for kind in ("connect", "listen"):
             with pytest.raises(InputError, match="leaves this computer"):
-                network.open_session("left", **{what: endpoint})
+                network.open_session("left", **{kind: endpoint})
     with closing(network.open_session("left")) as session:
         assert session.zid()
         assert {address for address in listening_at() if address != LOOPBACK_HEX} == set()

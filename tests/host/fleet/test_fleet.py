@@ -171,21 +171,21 @@ def test_the_sharing_side_enforces_it(shared) -> None:
 
 def test_a_stranger_gets_no_secret_and_blocks_nobody(shared) -> None:
     """Queryables at the writer's keys hear its claim and its commands; what they hear cannot be used again."""
-    heard: list[tuple[bytes, bytes]] = []
+    received: list[tuple[bytes, bytes]] = []
 
-    def hear(query: Any) -> None:
-        heard.append((query.payload.to_bytes(), query.attachment.to_bytes() if query.attachment else b""))
+    def receive(query: Any) -> None:
+        received.append((query.payload.to_bytes(), query.attachment.to_bytes() if query.attachment else b""))
 
     before = shared.hand.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2)
     with shared.client() as session:
-        kept = [session.declare_queryable(network.key("left", what), hear) for what in ("claim", "command")]
+        kept = [session.declare_queryable(network.key("left", kind), receive) for kind in ("claim", "command")]
         kept.append(session.liveliness().declare_token(network.key("left", "live/feed")))  # of no board
         with biotac.open(shared.port("&write=yes")) as writer:
             writer.board.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, before + 7)
-            assert shared.share._secret and not any(shared.share._secret in data + sent for data, sent in heard)
+            assert shared.share._secret and not any(shared.share._secret in data + sent for data, sent in received)
             writer.board.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, before)
-            assert len(heard) > 2
-            for payload, attachment in list(heard):
+            assert len(received) > 2
+            for payload, attachment in list(received):
                 list(session.get(network.key("left", "command"), payload=payload, attachment=attachment, timeout=1.0))
             assert shared.hand.board.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
             until(writer, 20)
@@ -231,11 +231,11 @@ def test_what_means_nothing_is_left_alone(shared, capfd) -> None:
     before, draw = shared.hand.board.settings(), random.Random(1)
     with shared.client() as session:
         for _ in range(150):
-            what = draw.choice(["command", "command", "claim", "info"])
+            kind = draw.choice(["command", "command", "claim", "info"])
             secret = draw.choice([None, b"", draw.randbytes(32)])
-            list(session.get(network.key("left", what), payload=garbage(draw), attachment=secret, timeout=5.0))
-        for who in (b"", b"nobody", b"x" * 70_000, b"\xff", b"*", b"a/b"):
-            list(session.get(network.key("left", "claim"), payload=who, timeout=5.0))
+            list(session.get(network.key("left", kind), payload=garbage(draw), attachment=secret, timeout=5.0))
+        for claim in (b"", b"nobody", b"x" * 70_000, b"\xff", b"*", b"a/b"):
+            list(session.get(network.key("left", "claim"), payload=claim, timeout=5.0))
         assert [facts["name"] for facts in network.shared(session)] == ["left"]
     assert shared.share.writer is None and shared.hand.board.settings() == before
     with biotac.open(shared.port("&write=yes")) as writer:

@@ -105,9 +105,9 @@ def test_every_example_is_run_somewhere() -> None:
     assert names == {"grip.py", "grip_in_c.py", "textures.py", "tip_and_sides.py"}
 
 
-@pytest.mark.parametrize(("program", "says"), list(zip(PROGRAMS, SAY, strict=True)), ids=SAY)
-def test_an_example_runs_and_says_what_it_should(program: str, says: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("program", "output"), list(zip(PROGRAMS, SAY, strict=True)), ids=SAY)
+def test_an_example_runs_and_says_what_it_should(program: str, output: str, tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(program, encoding="utf-8")
     done = subprocess.run([sys.executable, "program.py"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert says in done.stdout
+    assert output in done.stdout

@@ -22,7 +22,7 @@ def test_callbacks_get_everything_in_order_until_they_unsubscribe(live: Live) ->
     live.hand.on_touch(lambda touch: seen.append(f"touch {touch.finger}"))
     live.hand.on_status(lambda status: seen.append(f"status {status.req_id}"))
     live.hand.stream()
-    assert [s.quantities & wire.QuantityFlags.TOUCH for s in live.firmware.of(wire.Subscribe)] == [32]
+    assert [s.quantities & wire.QuantityFlags.TOUCH for s in live.firmware.received(wire.Subscribe)] == [32]
     touch = wire.Touch(3, live.firmware.now_us(), 2, 1, 500)
     live.send(frame(0), frame(1), packed(touch), frame(2), packed(live.firmware.status()))
     until(lambda: len(seen) == 5)
@@ -40,8 +40,8 @@ def test_events_come_with_slips_apart_and_old_ones_do_not(live: Live) -> None:
     live.hand.on_event(lambda event: seen.append(biotac.EventKind(event.kind).name))
     stop = live.hand.on_slip(lambda event: seen.append(f"slip of {event.finger}, {event.peak_count}"))
     live.hand.stream()
-    assert live.firmware.of(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
-    assert len(live.firmware.of(wire.Subscribe)) == 1
+    assert live.firmware.received(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
+    assert len(live.firmware.received(wire.Subscribe)) == 1
     now_us = live.firmware.now_us()
     touch = wire.Event(3, now_us, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT, 255)
     slip = wire.Event(5, now_us, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120, 255)
@@ -56,14 +56,14 @@ def test_what_callbacks_wait_for_is_added_to_what_was_chosen(live: Live) -> None
     touch, force, firmware = wire.QuantityFlags.TOUCH, wire.QuantityFlags.FORCE, live.firmware
     live.hand.on_touch(print)
     live.hand.stream("force", rest=False)
-    assert firmware.of(wire.Subscribe)[-1].quantities == force | touch
+    assert firmware.received(wire.Subscribe)[-1].quantities == force | touch
     live.hand.stream("pac")  # TOUCH comes with frames only
-    assert firmware.of(wire.Start)[-1].streams & wire.StreamFlags.FRAMES
+    assert firmware.received(wire.Start)[-1].streams & wire.StreamFlags.FRAMES
     live.hand.stream("force", rest=False)
     seen: list[wire.Bands] = []
     live.hand.on_bands(seen.append)  # a running stream is changed at once
-    assert firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
-    assert firmware.of(wire.Subscribe)[-1].quantities == force | touch
+    assert firmware.received(wire.Start)[-1].streams & wire.StreamFlags.BANDS
+    assert firmware.received(wire.Subscribe)[-1].quantities == force | touch
     bands = wire.Bands(3, 30_227, 2, 22, (1, 2, 3, 4, 5, 2**32 - 2))
     live.send(packed(bands), frame(0))
     until(lambda: seen)
@@ -72,20 +72,20 @@ def test_what_callbacks_wait_for_is_added_to_what_was_chosen(live: Live) -> None
 
 def streaming_to_a_slow_callback(live: Live) -> tuple[threading.Event, list[Batch]]:
     """An event that the callback waits for, and the batches it was called with."""
-    go_on, calls = threading.Event(), []
+    resume, calls = threading.Event(), []
 
     def slow(batch: Batch) -> None:
         calls.append(batch)
-        assert go_on.wait(WAIT_S)
+        assert resume.wait(WAIT_S)
 
     live.hand.on_batch(slow)
     live.hand.stream()
-    return go_on, calls
+    return resume, calls
 
 
 def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Live, monkeypatch) -> None:
     monkeypatch.setattr(consumers, "LIMIT_ROWS", 100)
-    go_on, calls = streaming_to_a_slow_callback(live)
+    resume, calls = streaming_to_a_slow_callback(live)
     live.send(frame(0))
     until(lambda: calls)
     for first in range(1, 2001, 20):  # 400 kB, much more than a pty holds
@@ -93,7 +93,7 @@ def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Liv
     until(lambda: live.hand.stats.frames == 2001)
     assert live.hand[0].t_us == 20_000_000
     live.hand.ping()
-    go_on.set()
+    resume.set()
     live.send(frame(2001))  # alone it fits, however large the batches before were
     until(lambda: any(2001 in batch.seq for batch in calls))
     frames = sum(len(b.wire) for b in calls)
@@ -103,14 +103,14 @@ def test_a_callback_that_hangs_keeps_neither_link_nor_commands_waiting(live: Liv
 
 def test_close_leaves_the_backlog_of_a_slow_callback(live: Live, monkeypatch) -> None:
     monkeypatch.setattr(consumers, "BACKLOG_S", 0.0)
-    go_on, calls = streaming_to_a_slow_callback(live)
+    resume, calls = streaming_to_a_slow_callback(live)
     for seq in range(100):
         live.send(frame(seq))
         until(lambda seq=seq: live.hand.stats.frames > seq)
     closing = threading.Thread(target=live.hand.close)
     closing.start()
     until(lambda: live.hand._callbacks._give_up_s < math.inf)
-    go_on.set()
+    resume.set()
     closing.join()
     stats = live.hand.stats
     assert len(calls) == 1 and stats.frames == 100

@@ -53,7 +53,7 @@ def test_a_finger_and_an_iteration_keep_their_hand() -> None:
     finger, alive = hand["index"], weakref.ref(hand)
     del hand
     gc.collect()
-    batches = finger._go.__self__.batches()
+    batches = finger._start.__self__.batches()
     next(batches)
     del finger
     gc.collect()
@@ -67,8 +67,8 @@ def test_two_threads_that_close_a_hand_close_it_once(scripted_board, hello) -> N
     firmware = Firmware(hello)
     live = Live(scripted_board(firmware), firmware)
     hand, closed = live.hand, []
-    running, go_on = threading.Event(), threading.Event()
-    hand.on_batch(lambda batch: (running.set(), go_on.wait(WAIT_S)))
+    running, resume = threading.Event(), threading.Event()
+    hand.on_batch(lambda batch: (running.set(), resume.wait(WAIT_S)))
     hand.stream()
     live.send(frame(1))
     assert running.wait(WAIT_S)
@@ -79,7 +79,7 @@ def test_two_threads_that_close_a_hand_close_it_once(scripted_board, hello) -> N
         assert hand._reader.closing.wait(WAIT_S)
         while not both[1].running():
             pass
-        go_on.set()
+        resume.set()
         for one in both:
             one.result(WAIT_S)
     assert len(closed) == 1
@@ -89,18 +89,18 @@ def test_a_hand_collected_on_its_own_thread_ends_too(scripted_board, hello) -> N
     firmware = Firmware(hello)
     board = scripted_board(firmware)
     hands = [Hand(SerialLink(board.path))]
-    inner, gone = hands[0]._board, threading.Event()
+    inner, ended = hands[0]._board, threading.Event()
 
     def forgets(batch: biotac.Batch) -> None:
         if hands and len(batch.wire):
             hands.clear()
             gc.collect()
-            gone.set()
+            ended.set()
 
     hands[0].on_batch(forgets)
     hands[0].stream()
     os.write(board._master, frame(1))
-    assert gone.wait(WAIT_S)
+    assert ended.wait(WAIT_S)
     firmware.wait_for(wire.Stop, 2)
     for thread in threading.enumerate():
         if thread.name == "biotac end":
@@ -233,12 +233,12 @@ def test_a_spawned_process_has_hands_of_its_own_and_gets_none(tmp_path: Path) ->
 
 
 def test_a_time_out_around_open_leaves_nothing_open() -> None:
-    opening, go_on = threading.Event(), threading.Event()
+    opening, resume = threading.Event(), threading.Event()
     opened: list[biotac.Hand] = []
 
     def slowly() -> biotac.Hand:
         opening.set()
-        assert go_on.wait(WAIT_S)
+        assert resume.wait(WAIT_S)
         opened.append(biotac.open("sim:press.toml?seconds=1000"))
         return opened[0]
 
@@ -252,7 +252,7 @@ def test_a_time_out_around_open_leaves_nothing_open() -> None:
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
-        go_on.set()
+        resume.set()
 
     with ThreadPoolExecutor(1) as pool:
         pool.submit(asyncio.run, main()).result()

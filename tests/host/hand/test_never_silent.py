@@ -74,15 +74,14 @@ def test_names_of_fingers_work_in_every_command(live: Live) -> None:
     hand.board.clear_map("thumb")
     hand.tare(np.uint8(3))
     hand.hold("index", np.uint8(2))
-    assert [m.finger for m in firmware.of((wire.TareNow, wire.TareSet, wire.ClearCalibration, wire.ClearMap))] == [
-        *(1, 2, 3, 4, 3)
-    ]
+    kinds = wire.TareNow, wire.TareSet, wire.ClearCalibration, wire.ClearMap
+    assert [m.finger for m in firmware.received(kinds)] == [1, 2, 3, 4, 3]
     hand._reader.present = 0b1
     for refused in (hand.tare, hand.hold, hand.release, lambda name: hand.grasp("index", name).__enter__()):
         for name in ("pinky", "thumb"):
             with pytest.raises(KeyError, match=name):
                 refused(name)
-    assert len(firmware.of(wire.Hold)) == 1
+    assert len(firmware.received(wire.Hold)) == 1
 
 
 def test_a_port_is_not_closed_in_the_middle_of_a_command(live: Live, monkeypatch) -> None:
@@ -112,8 +111,8 @@ def test_a_silent_reply_is_asked_for_again_and_then_an_error(live: Live, monkeyp
     monkeypatch.setattr(board_module, "REPLY_TIMEOUT_S", 0.001)
     with pytest.raises(biotac.DeviceLostError, match="did not answer Ping"):
         live.hand.ping()
-    assert len({m.req_id for m in live.firmware.of(wire.Ping)}) == 1
-    assert len(live.firmware.of(wire.Ping)) == board_module.REPLY_TRIES
+    assert len({m.req_id for m in live.firmware.received(wire.Ping)}) == 1
+    assert len(live.firmware.received(wire.Ping)) == board_module.REPLY_TRIES
 
 
 @pytest.mark.parametrize("pace", [0, 1])
@@ -133,14 +132,14 @@ def test_a_full_disk_is_told_and_neither_reading_nor_the_board_wait_for_it(tmp_p
 
 
 def test_a_recording_is_whole_while_callbacks_hang(live: Live, tmp_path) -> None:
-    go_on = threading.Event()
+    resume = threading.Event()
     live.firmware.facts["fingers_present"] = live.hand._reader.hello.fingers_present
     with biotac.open("sim:press.toml?fingers=2&seconds=3", pace=1) as hand:
         hand.record(tmp_path / "a.mcap")
-        hand.on_batch(lambda batch: go_on.wait(WAIT_S))
+        hand.on_batch(lambda batch: resume.wait(WAIT_S))
         hand.stream()
         until(lambda: hand.ended)
-        go_on.set()
+        resume.set()
     recording = biotac.Recording(tmp_path / "a.mcap")
     assert (recording.problems, len(recording.frames)) == ([], 600)
 

@@ -17,7 +17,7 @@ from biotac.wire.batches import Batch
 
 
 def drained(queue: Queue) -> list[Batch]:
-    return list(iter(queue.take, None))
+    return list(iter(queue.get, None))
 
 
 # ---- one queue -----------------------------------------------------------------------------------
@@ -60,8 +60,8 @@ def test_gaps_of_dropped_batches_are_kept_and_come_in_their_order(queue: Queue) 
 
 def test_a_batch_larger_than_the_limit_stays_while_it_is_the_newest(queue: Queue) -> None:
     queue.put(batch_of(*(frame(n) for n in range(12))))
-    whole = queue.take()
-    assert (len(whole.wire), queue.take(), queue._reader.batches_skipped) == (12, None, 0)
+    whole = queue.get()
+    assert (len(whole.wire), queue.get(), queue._reader.batches_skipped) == (12, None, 0)
     queue.put_back(whole)
     queue.leave()
     assert (queue._reader.batches_skipped, queue._reader.frames_skipped) == (1, 12)
@@ -141,7 +141,7 @@ def test_a_reply_comes_after_all_that_was_sent_before_it(live: Live) -> None:
         assert live.hand[0].frame.seq == 10 * round_
         live.firmware.before[wire.Stop] = frame(10 * round_ + 1)
         live.hand.stop()
-        assert queue.take() is not None
+        assert queue.get() is not None
         assert [b.seq[-1] for b in drained(queue) if len(b.wire)][-1:] == [10 * round_ + 1]
 
 
@@ -197,10 +197,10 @@ def test_readers_may_take_turns(live: Live) -> None:
 )
 def test_names_reach_the_board_as_subscribe_and_start(live: Live, names, rest, quantities, streams) -> None:
     live.hand.stream(*names, rest=rest)
-    assert live.firmware.of(wire.Subscribe)[-1].quantities == quantities
-    assert live.firmware.of(wire.Start)[-1].streams == streams
+    assert live.firmware.received(wire.Subscribe)[-1].quantities == quantities
+    assert live.firmware.received(wire.Start)[-1].streams == streams
     live.hand.stream("force", "pac", fingers=["index", 4])  # a running stream is changed at once
-    (start,) = live.firmware.of(wire.Start)[-1:]
+    (start,) = live.firmware.received(wire.Start)[-1:]
     assert (start.streams, start.fingers) == (0b111, 0b10001)
 
 
@@ -209,8 +209,8 @@ def test_reading_starts_what_was_chosen_last(live: Live) -> None:
     live.hand.stop()
     live.firmware.after[wire.Start] = frame(1) + frame(2)
     live.hand.read(0.01)
-    assert len(live.firmware.of(wire.Start)) == 2
-    assert live.firmware.of(wire.Start)[0].streams == live.firmware.of(wire.Start)[1].streams
+    assert len(live.firmware.received(wire.Start)) == 2
+    assert live.firmware.received(wire.Start)[0].streams == live.firmware.received(wire.Start)[1].streams
 
 
 def test_a_rate_takes_every_nth_frame_here_and_leaves_the_recording_whole(tmp_path) -> None:
@@ -230,14 +230,14 @@ def test_unknown_wants_are_refused_and_change_nothing(live: Live) -> None:
             live.hand.stream("force", rate_hz=rate_hz)
     with pytest.raises(KeyError, match="no finger 'pinky'"):
         live.hand.stream(fingers=["pinky"])
-    assert live.firmware.of((wire.Subscribe, wire.Start)) == [] and not live.hand.streaming
+    assert live.firmware.received((wire.Subscribe, wire.Start)) == [] and not live.hand.streaming
 
 
 @pytest.mark.parametrize(("pace", "keepalive_ms"), [(0, 0), (0.5, 1000), (1, 1000), (4, 4000), (1000, 0xFFFF)])
 def test_the_keep_alive_is_a_second_of_this_computers(live: Live, pace, keepalive_ms) -> None:
     live.hand.link.pace = pace
     live.hand.stream()
-    assert live.firmware.of(wire.Start)[-1].keepalive_ms == keepalive_ms
+    assert live.firmware.received(wire.Start)[-1].keepalive_ms == keepalive_ms
 
 
 # ---- the latest of each finger -------------------------------------------------------------------

@@ -59,11 +59,11 @@ def test_looks_keep_a_stream_alive_and_are_nobody_elses(live: Live, quick) -> No
     assert live.hand.status().req_id > 0  # asked for by the program, it is the program's
     until(lambda: len(seen) == 1)
     live.hand.stop()
-    looks = len(live.firmware.of(wire.GetStatus))
+    looks = len(live.firmware.received(wire.GetStatus))
     live.hand.ping()
     live.hand.ping()
-    assert len(live.firmware.of(wire.GetStatus)) == looks
-    assert len(live.firmware.of(wire.Start)) == 1
+    assert len(live.firmware.received(wire.GetStatus)) == looks
+    assert len(live.firmware.received(wire.Start)) == 1
 
 
 def test_a_stream_that_another_host_took_is_a_lost_board(live: Live, quick) -> None:
@@ -72,7 +72,7 @@ def test_a_stream_that_another_host_took_is_a_lost_board(live: Live, quick) -> N
     live.firmware.streams = 0b100
     with pytest.raises(biotac.DeviceLostError, match=r"another program, or the board's other port, took the stream"):
         live.hand.read(1.0)
-    assert len(live.firmware.of(wire.Start)) == 1 and not live.hand.connected
+    assert len(live.firmware.received(wire.Start)) == 1 and not live.hand.connected
 
 
 @pytest.mark.parametrize("pause_s", [0.09, 600.0, 4500.0])
@@ -90,12 +90,12 @@ def test_a_board_that_heard_nothing_for_too_long_is_started_again(live: Live, qu
     (gap,) = gaps()
     assert (gap.reason, gap.last_t_us, gap.next_t_us) == ("paused", 10_000, 10_000 * (2 + missed))
     assert (gap.fingers, gap.frames_missed, gap.holds_lapsed, gap.boot_id) == (0b101, 2 * missed, 0, 1)
-    first, again = live.firmware.of(wire.Start)
+    first, again = live.firmware.received(wire.Start)
     assert (first.streams, first.fingers, first.keepalive_ms) == (again.streams, again.fingers, again.keepalive_ms)
-    subscribed, renewed = live.firmware.of(wire.Subscribe)  # the HELLO of the look made the board forget it
+    subscribed, renewed = live.firmware.received(wire.Subscribe)  # the HELLO of the look made the board forget it
     assert subscribed.quantities == renewed.quantities
     live.firmware.wait_for_looks()  # the fault is latched, and not new any more
-    assert live.hand.connected and len(live.firmware.of(wire.Start)) == 2
+    assert live.hand.connected and len(live.firmware.received(wire.Start)) == 2
 
 
 def test_a_board_that_may_have_heard_nothing_by_its_own_clock_was_not_taken(live: Live, quick) -> None:
@@ -121,7 +121,7 @@ def test_a_stream_without_rows_is_started_again_once_and_then_lost(live: Live, q
     assert gaps()[0].reason == "silence"
     with pytest.raises(biotac.DeviceLostError, match="answers, but its stream stays silent; look for the cause"):
         live.hand.read(100.0)
-    assert len(live.firmware.of(wire.Start)) == 2  # by the program, and once more
+    assert len(live.firmware.received(wire.Start)) == 2  # by the program, and once more
 
 
 @pytest.mark.parametrize("how", [{"fingers_present": 0}, {}])
@@ -133,7 +133,7 @@ def test_where_no_rows_are_due_none_are_missed(scripted_board, hello, quick, how
     firmware.wait_for_looks(20)
     live.hand.check()
     live.hand.close()
-    assert len(firmware.of(wire.Start)) == 1
+    assert len(firmware.received(wire.Start)) == 1
 
 
 def test_a_board_that_does_not_answer_is_lost(live: Live, quick) -> None:
@@ -268,12 +268,12 @@ def test_a_board_that_comes_back_is_told_all_again_and_the_gap_is_marked(world, 
     until(gaps)
     (gap,), firmware = gaps(), back[0].firmware
     assert (gap.reason, gap.last_t_us, gap.next_t_us, gap.boot_id) == (reason, 110_000, 500_000, boot_id)
-    assert (gap.holds_lapsed, firmware.of(wire.Hold)) == (1, [])  # nothing renews a hold
+    assert (gap.holds_lapsed, firmware.received(wire.Hold)) == (1, [])  # nothing renews a hold
     assert gap.frames_missed == (None if boot_id == 2 else 38)
     assert world.clock.pauses == 3 and gap.back_at_ns >= gap.lost_at_ns
-    assert [(m.setting, m.value) for m in firmware.of(wire.SetSetting)] == [(2, 50), (1, 0)]
-    assert [m.quantities for m in firmware.of(wire.Subscribe)] == [wire.QuantityFlags.FORCE]
-    assert [(m.streams, m.keepalive_ms) for m in firmware.of(wire.Start)] == [(0b111, 1000)]
+    assert [(m.setting, m.value) for m in firmware.received(wire.SetSetting)] == [(2, 50), (1, 0)]
+    assert [m.quantities for m in firmware.received(wire.Subscribe)] == [wire.QuantityFlags.FORCE]
+    assert [(m.streams, m.keepalive_ms) for m in firmware.received(wire.Start)] == [(0b111, 1000)]
     assert hand.stats.gaps == 1 and hand.connected and hand[0].t_us == 500_000
 
 
@@ -293,7 +293,7 @@ def test_a_board_that_came_back_and_stopped_at_once_was_not_taken(world, quick) 
 
     world.clock.while_away = come_back
     world.unplug(plugged)
-    until(lambda: live.hand.check() or (back and len(back[0].of(wire.Start)) == 2))
+    until(lambda: live.hand.check() or (back and len(back[0].received(wire.Start)) == 2))
     back[0].wait_for_looks()
     assert live.hand.connected
 
@@ -333,7 +333,7 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
                 live.hand.close()
     until(gaps)
     assert (gaps()[0].reason, gaps()[0].next_t_us, live.hand.info.boot_id) == ("rebooted", 10_000, 2)
-    assert [m.value for m in plugged.firmware.of(wire.SetSetting)] == [2, 2]
+    assert [m.value for m in plugged.firmware.received(wire.SetSetting)] == [2, 2]
     assert live.hand.stats.disordered == 0  # numbers that begin anew are no step back
 
 
@@ -358,7 +358,7 @@ def test_rounds_have_events_without_being_asked_for_them(world) -> None:
     live = world.opened(plugged := world.plug(boot_id=1))
     plugged.firmware.after[wire.Start] = frame(1) + frame(2)
     live.hand.next_round(timeout_s=20)
-    assert plugged.firmware.of(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
+    assert plugged.firmware.received(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
 
 
 def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
@@ -410,7 +410,7 @@ def test_a_board_that_is_lost_while_it_is_restored_is_restored_again(world) -> N
     world.unplug(plugged)
     until(gaps)
     assert [gap.reason for gap in gaps()] == ["rebooted"]
-    assert [m.value for m in back[-1].firmware.of(wire.SetSetting)] == [2]
+    assert [m.value for m in back[-1].firmware.received(wire.SetSetting)] == [2]
 
 
 def test_a_stream_that_is_stopped_while_the_board_is_away_stays_stopped(world) -> None:
@@ -433,7 +433,7 @@ def test_a_stream_that_is_stopped_while_the_board_is_away_stays_stopped(world) -
     world.unplug(plugged)
     until(lambda: live.hand.connected and back)
     live.hand.ping()
-    assert back[0].firmware.of(wire.Start) == [] and not live.hand.streaming
+    assert back[0].firmware.received(wire.Start) == [] and not live.hand.streaming
 
 
 def test_close_ends_the_search(world) -> None:
@@ -462,7 +462,7 @@ def test_a_hold_that_lapsed_is_in_the_gap_and_is_not_renewed(live: Live, quick) 
     lapse(live, frame(10, finger=1, flags=HELD), frame(11, finger=1, flags=HELD), frame(11))
     until(gaps)
     assert gaps()[0].holds_lapsed == 0b1
-    assert len(live.firmware.of(wire.Hold)) == 1
+    assert len(live.firmware.received(wire.Hold)) == 1
 
 
 def test_rows_wait_for_what_held_fingers_say_but_not_for_ever_and_come_once(live: Live, quick) -> None:

@@ -90,11 +90,11 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
     asked = {"board": 0, "other": 0}
 
     def answer(name: str):
-        def say(message_id: int, payload: bytes) -> bytes:
+        def reply(message_id: int, payload: bytes) -> bytes:
             asked[name] += 1
             return hello(payload, fingers_present=0b101) if message_id == wire.HelloRequest.ID else b""
 
-        return say
+        return reply
 
     board, other = scripted_board(answer("board")), scripted_board(answer("other"))
     plugged([usb_port(board.path, "0102"), usb_port(other.path, "A5", ours=False)])

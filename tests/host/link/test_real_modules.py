@@ -67,8 +67,8 @@ def test_the_fake_smbus2_has_the_real_ones_names_and_takes_what_it_takes() -> No
         names = [n for n, _ in inspect.getmembers(fake, callable) if not n.startswith("_")]
         assert names
         for name in names:
-            ours, theirs = (inspect.signature(getattr(of, name)) for of in (fake, real))
-            kinds = [[p.kind for p in of.parameters.values()] for of in (ours, theirs)]
+            ours, theirs = (inspect.signature(getattr(owner, name)) for owner in (fake, real))
+            kinds = [[p.kind for p in signature.parameters.values()] for signature in (ours, theirs)]
             assert kinds[0] == kinds[1], name
 
 

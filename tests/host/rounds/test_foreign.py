@@ -28,12 +28,12 @@ def played(port: str) -> tuple[Batch, list[str]]:
         return hand.read_batch(1000.0), list(hand.link.notes)
 
 
-def of(tmp_path: Path, rows: np.ndarray, robot: Robot | None = None) -> tuple[Batch, list[str]]:
+def replayed(tmp_path: Path, rows: np.ndarray, robot: Robot | None = None) -> tuple[Batch, list[str]]:
     return played((robot or Robot(pac=True)).write(tmp_path / "a.bag", rows))
 
 
 def test_the_press_itself_has_force(tmp_path: Path) -> None:
-    batch, notes = of(tmp_path, PRESSED)
+    batch, notes = replayed(tmp_path, PRESSED)
     touched = (batch.frames["flags"] & CONTACT) != 0
     assert notes == [] and touched.sum() > 200 and np.isfinite(batch.frames["force_n"][touched]).all()
     assert not (batch.frames["flags"] & FAULT).any()
@@ -50,7 +50,7 @@ def test_the_press_itself_has_force(tmp_path: Path) -> None:
 def test_other_skins_are_no_biotac(tmp_path: Path, change: Callable[[np.ndarray], np.ndarray], words: str) -> None:
     rows = PRESSED.copy()
     rows[..., E] = change(rows)
-    batch, notes = of(tmp_path, rows)
+    batch, notes = replayed(tmp_path, rows)
     assert any("these are not a BioTac's counts" in text and words in text for text in notes), notes
     frames = batch.frames
     assert np.isnan(frames["force_n"]).all() and np.isnan(frames["poc_mm"]).all() and (frames["flags"] & FAULT).all()
@@ -62,7 +62,7 @@ def test_other_skins_are_no_biotac(tmp_path: Path, change: Callable[[np.ndarray]
 def test_every_second_electrode_frozen_is_missing(tmp_path: Path, first: int) -> None:
     rows = PRESSED.copy()
     rows[..., E[first::2]] = rows[0, 0, E[first::2]]
-    batch, notes = of(tmp_path, rows)
+    batch, notes = replayed(tmp_path, rows)
     assert (batch.frames["counts"][:, first::2] == wire.INVALID_COUNT).all()
     assert np.isnan(batch.frames["force_n"]).all()
     assert f"finger 0: {', '.join(f'E{k}' for k in range(first + 1, 20, 2))} repeat" in notes[-1]
@@ -71,7 +71,7 @@ def test_every_second_electrode_frozen_is_missing(tmp_path: Path, first: int) ->
 def test_a_word_that_is_repeated_while_others_move_is_missing(tmp_path: Path) -> None:
     rows = PRESSED.copy()
     rows[300:600, 0, E[4]] = rows[300, 0, E[4]]
-    batch, _ = of(tmp_path, rows)
+    batch, _ = replayed(tmp_path, rows)
     missing = np.flatnonzero(batch.frames["counts"][:, 4] == wire.INVALID_COUNT)
     assert 300 < missing[0] <= 401 and missing[-1] == 599 and len(missing) == 600 - missing[0]
     assert (batch.frames["counts"][:, :4] != wire.INVALID_COUNT).all()
@@ -79,7 +79,7 @@ def test_a_word_that_is_repeated_while_others_move_is_missing(tmp_path: Path) ->
 
 def test_24_electrodes_are_a_contact_finger(tmp_path: Path) -> None:
     rows = np.concatenate([PRESSED, PRESSED[..., E[:5]]], axis=2)
-    batch, notes = of(tmp_path, rows)
+    batch, notes = replayed(tmp_path, rows)
     frames = batch.frames
     assert notes == ["finger 0: 24 electrodes are a BioTac SP's: it has contact, but no force"]
     assert ((frames["flags"] & CONTACT) != 0).sum() > 200 and (frames["flags"] & FAULT).all()

@@ -38,7 +38,7 @@ def test_damaged_bytes_are_messages_or_refused(kind: str, ros1: bool) -> None:
         if draw.random() < 0.3:
             raw = raw[: draw.randrange(len(raw))] + bytes(draw.randrange(64))
         try:
-            made = rounds.of(decode(bytes(raw), 1))
+            made = rounds.add(decode(bytes(raw), 1))
             outcomes[0] += 1
             assert made is None or ((made.words <= 4095) | (made.words == wire.INVALID_COUNT)).all()
         except RefusedError as error:

@@ -30,9 +30,9 @@ class Bridge:
         self.port = f"foxglove://127.0.0.1:{port}/rh/tactile"
         assert self.process.stdout is not None and self.process.stdout.readline() == "ready\n"
 
-    def say(self, what: str) -> None:
+    def send(self, command: str) -> None:
         assert self.process.stdin is not None
-        self.process.stdin.write(f"{what}\n")
+        self.process.stdin.write(f"{command}\n")
         self.process.stdin.flush()
 
     def end(self) -> None:
@@ -119,14 +119,14 @@ def test_a_topic_that_stops_changes_and_comes_back(bridge) -> None:
     with biotac.open(robot.port) as hand:
         hand.stream("results")
         until(hand, lambda b: len(b.frames) > 0)
-        robot.say("stop")
+        robot.send("stop")
         end_s = time.monotonic() + 30.0
         while hand.status().fingers_present and time.monotonic() < end_s:
             time.sleep(0.1)
-        robot.say("go")
+        robot.send("go")
         until(hand, lambda b: len(b.frames) > 0 and hand.status().fingers_present == 1)
         assert time.monotonic() < end_s and hand.stats.frames_lost == 0
-        robot.say("change")  # to the message without pac[]
+        robot.send("change")  # to the message without pac[]
         batch = until(hand, lambda b: len(b.pac) > 0 and (b.pac["pac"] == wire.INVALID_COUNT).all())
         assert (batch.frames["counts"] != wire.INVALID_COUNT).all()
 
