@@ -15,14 +15,14 @@ ROS2_METADATA = "metadata.yaml"
 
 
 @contextlib.contextmanager
-def whole(path: Path, *, overwrite: bool, made_of: Iterable[Path] = ()) -> Iterator[Path]:
+def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Iterator[Path]:
     """Give a place beside ``path`` to write to, file or folder; it becomes ``path`` when all went well.
 
     Otherwise it is removed, and what was at ``path`` before is untouched. A KeyboardInterrupt goes on with
     words that say so. Raises InputError when ``path`` exists and may not be overwritten, is neither file nor folder, or
-    is one of the files that it is ``made_of``.
+    is one of ``sources``, which it is made of.
     """
-    refuse_source(path, made_of)
+    refuse_source(path, sources)
     if path.exists() and not path.is_file() and not path.is_dir():
         raise InputError(f"{path} is a pipe or a device, which a file would replace; choose another name")
     if path.exists() and not overwrite:
@@ -44,9 +44,9 @@ def whole(path: Path, *, overwrite: bool, made_of: Iterable[Path] = ()) -> Itera
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
 
 
-def refuse_source(out: Path, made_of: Iterable[Path]) -> None:
+def refuse_source(out: Path, sources: Iterable[Path]) -> None:
     """Raises InputError if ``out`` is one of those files, by whatever name: what was measured cannot be made again."""
-    for path in made_of:
+    for path in sources:
         with contextlib.suppress(OSError, ValueError):  # one that is not there
             if os.path.samefile(out, path):
                 raise InputError(f"{out} is {path} itself, which would be lost; choose another name")

@@ -21,7 +21,7 @@ def biotac_world() -> Iterator[Any]:
     with ExitStack() as worlds:
 
         def start(options: Mapping[str, Any] | None = None, **fingers: Any) -> World:
-            drawn = {name: SimFinger(one) if isinstance(one, int) else one for name, one in fingers.items()}
+            drawn = {name: SimFinger(value) if isinstance(value, int) else value for name, value in fingers.items()}
             return worlds.enter_context(world(drawn or {"index": SimFinger(1)}, **(options or {})))
 
         yield start

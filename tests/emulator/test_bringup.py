@@ -68,7 +68,7 @@ def test_a_board_without_a_defect_has_a_report_without_findings(tmp_path: Path) 
 
 @pytest.mark.usefixtures("few")
 def test_defects_at_once_are_each_named_with_a_cure(tmp_path: Path) -> None:
-    together = [verbs for verbs in DEFECTS if not any(one in verbs for one in ("feels 0 of", "nothing"))]
+    together = [verbs for verbs in DEFECTS if not any(word in verbs for word in ("feels 0 of", "nothing"))]
     found, page = report(";".join(together), tmp_path)
     for verbs in together:
         code, words = DEFECTS[verbs]

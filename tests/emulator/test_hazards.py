@@ -81,7 +81,7 @@ def comes_back(hand: biotac.Hand, board: Any, verb: str, within_s: float = 0.3) 
     before = board.counters()["usb"]
     board.do(verb)
     if "control" in verb:
-        board.say("open and close 1 times")
+        board.send_line("open and close 1 times")
     else:
         hand._board.send(wire.Ping(req_id=1))
     wanted = {"hangs": before["hangs"] + 1, "resets": before["resets"] + 1, "state": "configured"}
@@ -116,7 +116,7 @@ def test_a_corrupt_handshake_hangs_the_controller(board: Board, verb: str) -> No
 def test_what_follows_a_release_meets_a_board_whose_time_runs(board: Board) -> None:
     """Otherwise the host's time-out goes by while the watchdog's clock stands still, and the board never comes back."""
     _, emulated = board.open()
-    emulated.say("run\ncorrupt a control handshake\nopen and close 1 times")  # in one piece, as under load
+    emulated.send_line("run\ncorrupt a control handshake\nopen and close 1 times")  # in one piece, as under load
     emulated.until(0.3, usb={"hangs": 1, "resets": 2, "state": "configured"})
 
 
@@ -149,7 +149,7 @@ def test_a_request_comes_before_the_one_before_is_answered(board: Board, verbs: 
     _, emulated = board.open(*verbs)
     gaps_ns = [*range(100, 12_000, 100), *range(12_000, 60_000, 1000)]
     for gap_ns in gaps_ns:
-        emulated.say(f"two setups {gap_ns}")
+        emulated.send_line(f"two setups {gap_ns}")
     usb = emulated.until(2, usb={"hurried": {"asked": len(gaps_ns)}})["usb"]
     assert usb["hurried"] == {"asked": len(gaps_ns), "wrong": 0}
     assert usb["failed"] == [] and usb["toggle_errors"] == usb["available_not_last"] == 0
@@ -201,7 +201,7 @@ def test_the_dma_is_late_with_a_word_of_every_slot(board: Board) -> None:
     assert faults.board == FaultFlags.STARTED | FaultFlags.SLOT_DMA_LATE
     facts = hand.board.measure()
     assert facts.slots_dma_late == 44
-    assert [one.code for one in bringup.of_board(bringup.Bringup(chip=[facts])) if one.code] == ["dma_late"]
+    assert [m.code for m in bringup.measures(bringup.Bringup(chip=[facts])) if m.code] == ["dma_late"]
     assert hand.status().fingers_present == 0b11111
     assert not any(hand.sensor_status(finger).words_stuck for finger in hand.fingers)
 
@@ -251,8 +251,8 @@ def rows() -> str:
     """A row for each test of this file that plays a hazard."""
     lines = ["| What may happen | Known from | What the image does |", "|---|---|---|"]
     for name, source in SOURCES.items():
-        what, does = name.removeprefix("test_").replace("_", " "), inspect.getdoc(globals()[name])
-        lines.append(f"| {what.replace('crc', 'CRC').replace('sram', 'SRAM')} | {source} | {does} |")
+        hazard, does = name.removeprefix("test_").replace("_", " "), inspect.getdoc(globals()[name])
+        lines.append(f"| {hazard.replace('crc', 'CRC').replace('sram', 'SRAM')} | {source} | {does} |")
     return "\n".join(lines) + "\n"
 
 

@@ -67,9 +67,9 @@ def test_it_computes_what_the_simulated_board_computes(
     assert main(["check", str(recording)]) == 0
     monkeypatch.delenv("BIOTAC_SIM")
     with biotac.open(source) as hand:
-        there = hand.read_batch(1000).wire
-    here["t_us"] -= here["t_us"][0] - there["t_us"][0]  # they do not start at the same microsecond
-    assert here.tobytes() == there.tobytes()
+        in_qemu = hand.read_batch(1000).wire
+    here["t_us"] -= here["t_us"][0] - in_qemu["t_us"][0]  # they do not start at the same microsecond
+    assert here.tobytes() == in_qemu.tobytes()
 
 
 def test_what_it_saved_is_there_after_a_restart(board: dict[str, Any], tmp_path: Path) -> None:

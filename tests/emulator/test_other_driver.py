@@ -39,9 +39,9 @@ def run(
     image: Path, folder: Path, samples: list[int], course: list[dict[str, Any]], *, then: bytes = b""
 ) -> dict[str, Any]:
     """``then``: what the host says behind the tape."""
-    heard = encode(wire.EmuPlug.ID, wire.EmuPlug(1, 0, 1, (0,) * 16).pack())
-    heard += encode(wire.EmuTape.ID, wire.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
-    (folder / "said").write_bytes(heard + then)
+    sent = encode(wire.EmuPlug.ID, wire.EmuPlug(1, 0, 1, (0,) * 16).pack())
+    sent += encode(wire.EmuTape.ID, wire.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
+    (folder / "said").write_bytes(sent + then)
     (folder / "course").write_text(json.dumps(course))
     words = ["node", Path(__file__).with_name("other_driver.mjs"), image, folder / "said", folder / "course"]
     answer: dict[str, Any] = json.loads(subprocess.run(words, check=True, capture_output=True).stdout)
@@ -111,7 +111,7 @@ def test_what_is_not_whole_is_not_kept_and_what_was_is_forgotten_when_told_so(im
     answer = run(image, tmp_path, KEPT, [{"power": True}, *reading(0)], then=then)
     refused = wire.Reply(3, wire.EmuKeep.ID, wire.Error.NOT_WHOLE)
     assert answers(answer)[-6:-2] == [refused] * 4
-    assert all(isinstance(one, wire.EmuStatus) for one in answers(answer)[-2:])
+    assert all(isinstance(status, wire.EmuStatus) for status in answers(answer)[-2:])
     assert answer["words"][1] == 0x0000  # nothing is played
 
 

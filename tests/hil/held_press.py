@@ -22,6 +22,6 @@ def fault(kind: str, at_s: float, seconds: float, finger: int = 1, channel: str 
     return f'[[fault]]\nat_s = {at_s}\nseconds = {seconds}\nfinger = {finger}\nkind = "{kind}"\n{where}'
 
 
-def of(frames: np.ndarray, finger: int) -> np.ndarray:
+def of_finger(frames: np.ndarray, finger: int) -> np.ndarray:
     """That finger's."""
     return frames[frames["finger"] == finger]

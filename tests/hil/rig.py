@@ -92,8 +92,8 @@ class Rig:
         return board
 
     def close(self) -> None:
-        for one in reversed(self.opened):
-            one.close()
+        for board in reversed(self.opened):
+            board.close()
         self.opened.clear()
 
 

@@ -48,9 +48,9 @@ def boards() -> Iterator[Callable[..., Ports]]:
         return port, sensor_port
 
     yield start
-    for one in running:
-        one.terminate()
-        one.communicate()
+    for process in running:
+        process.terminate()
+        process.communicate()
 
 
 @pytest.mark.nightly
@@ -70,7 +70,7 @@ def test_the_doctor_names_the_lead(boards: Callable[..., Ports], capsys, leads: 
     # In this process, whose patience is that of all tests: emulated boards are slow.
     code = main(["doctor", port, "--sensor-port", sensor_port, "--seconds", "0.5", "--json"])
     found = json.loads(capsys.readouterr().out)["findings"]
-    assert tuple(one["code"] for one in found if one["code"].startswith("lead_")) == LEADS[leads], found
+    assert tuple(finding["code"] for finding in found if finding["code"].startswith("lead_")) == LEADS[leads], found
     assert bool(found) == bool(code) == bool(leads), found
 
 

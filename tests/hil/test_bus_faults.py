@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from held_press import fault, held_press, of
+from held_press import fault, held_press, of_finger
 from rig import Rig
 
 import biotac
@@ -58,7 +58,7 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, 
     healthy, before = play(HEALTHY)
     faulty, after = play(hurt_by(kind))
     for finger in (0, 2):
-        alike = of(faulty, finger), of(healthy, finger)
+        alike = of_finger(faulty, finger), of_finger(healthy, finger)
         if rig.facts.get("jitter"):
             alike[0]["t_us"] = alike[1]["t_us"]
         assert alike[0].tobytes() == alike[1].tobytes()
@@ -66,9 +66,9 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, 
     # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all, nor one in which the sensor is
     # asked who it is: three of those 30, and one when it is back.
     assert getattr(after[1], counter) == (30 - ASKED) * 44
-    assert len(of(healthy, 1)) - len(of(faulty, 1)) == 31
-    assert np.count_nonzero(np.diff(of(faulty, 1)["t_us"]) == 31 * 10_000) == 1
-    assert np.count_nonzero(np.diff(of(faulty, 1)["t_us"]) == 2 * 10_000) == 1
+    assert len(of_finger(healthy, 1)) - len(of_finger(faulty, 1)) == 31
+    assert np.count_nonzero(np.diff(of_finger(faulty, 1)["t_us"]) == 31 * 10_000) == 1
+    assert np.count_nonzero(np.diff(of_finger(faulty, 1)["t_us"]) == 2 * 10_000) == 1
 
 
 @pytest.mark.long
@@ -80,7 +80,7 @@ def test_an_error_word_is_kept_for_the_user(play) -> None:
 @pytest.mark.long
 def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     frames, _ = play(hurt_by("bad_parity", "E5"))
-    faulty = of(frames, 1)
+    faulty = of_finger(frames, 1)
     hurt = np.flatnonzero(faulty["counts"][:, 4] == INVALID)
     assert hurt.tolist() == list(range(180, 210))
     missing = (faulty["flags"] & FrameFlags.ELECTRODE_MISSING) != 0
@@ -94,7 +94,7 @@ def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
 def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
     healthy, _ = play(HEALTHY)
     frames, _ = play(hurt_by("no_channel", "TDC"))
-    faulty, whole = of(frames, 1), of(healthy, 1)
+    faulty, whole = of_finger(frames, 1), of_finger(healthy, 1)
     hurt = slice(180, 210)
     assert (faulty["tdc"][hurt] == INVALID).all()
     assert ((faulty["flags"][hurt] & FrameFlags.TDC_MISSING) != 0).all()
@@ -124,8 +124,8 @@ def test_every_slot_of_every_finger_was_read(rig, play) -> None:
 def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
     hand = board("faults.toml")
     frames = hand.read_batch(100).frames
-    assert len(of(frames, 0)) == len(of(frames, 2)) == 1200
-    assert len(of(frames, 1)) < 1200
+    assert len(of_finger(frames, 0)) == len(of_finger(frames, 2)) == 1200
+    assert len(of_finger(frames, 1)) < 1200
     assert hand.stats.frames_lost == 0
 
 
@@ -147,7 +147,7 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
     # 44 slots at 4400 Hz are 10 ms; the fraction of a us per slot must not add up.
     for finger in range(5):
         assert hand.sensor_status(finger).words_good == 60 * 4400
-        t_us = of(frames, finger)["t_us"]
+        t_us = of_finger(frames, finger)["t_us"]
         assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
 
 

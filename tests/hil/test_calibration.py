@@ -110,7 +110,7 @@ def test_a_saved_calibration_holds_after_power_was_off(rig: Rig) -> None:
 
 def reboot(hand: biotac.Hand, boots: int) -> None:
     board = hand.link.board  # type: ignore[attr-defined]
-    board.say("cut power")
+    board.send_line("cut power")
     board.until(BOOT_S, boots=boots, usb={"state": "configured"})
     # What is kept for a sensor is in force once the sensor, which had no power either, has said which one it is.
     asked = 0

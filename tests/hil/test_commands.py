@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from overheard import Overheard
+from capture import Capture
 
 import biotac
 from biotac import FaultFlags, FrameFlags, Setting, TareReason, TareState
@@ -79,12 +79,12 @@ REQ_ID = 249  # the hand numbers its own commands from 1, and does not come so f
 
 def replies_to(hand: biotac.Hand, message_id: int, payload: bytes, *, times: int = 1) -> list[Any]:
     """All that comes back for a message, sent so many times, and the PING behind it, but not the PING's reply."""
-    overheard = Overheard()
-    hand._reader.add(overheard)
+    capture = Capture()
+    hand._reader.add(capture)
     hand.link.write(times * encode(message_id, payload))
     hand.ping()
-    hand._reader.remove(overheard)
-    seen = [m for m in overheard.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == REQ_ID]
+    hand._reader.remove(capture)
+    seen = [m for m in capture.messages if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == REQ_ID]
     assert seen.pop().command == wire.Ping.ID
     return seen
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from held_press import fault, held_press, of
+from held_press import fault, held_press, of_finger
 from rig import Rig
 
 import biotac
@@ -76,12 +76,12 @@ def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
 ) -> None:
     whole = undisturbed(rig, tmp_path, seconds)
     frames, hand = play(rig, tmp_path, seconds, kind, calibrated=True)
-    assert of(frames, 0).tobytes() == of(whole, 0).tobytes()
-    _, after = split(of(frames, 1))
+    assert of_finger(frames, 0).tobytes() == of_finger(whole, 0).tobytes()
+    _, after = split(of_finger(frames, 1))
     back = after[np.argmax(np.all(after["counts"] != wire.INVALID_COUNT, axis=1)) :]  # from the first good round
     sure = back["t_us"] >= back["t_us"][0] + BACK_ROUNDS * 10_000
     assert np.all(back["flags"][sure] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER) == 0)
-    held = of(whole, 1)["force_n"][np.isin(of(whole, 1)["t_us"], back["t_us"][sure])]
+    held = of_finger(whole, 1)["force_n"][np.isin(of_finger(whole, 1)["t_us"], back["t_us"][sure])]
     assert len(held) == sure.sum() > 100
     assert np.linalg.norm(held, axis=1).min() > 0.5  # it does hold something
     assert np.all(np.linalg.norm(back["force_n"][sure] - held, axis=1) <= 0.05 * np.linalg.norm(held, axis=1))
@@ -93,8 +93,8 @@ def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
 def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, seconds: float) -> None:
     whole = undisturbed(rig, tmp_path, seconds)
     frames, hand = play(rig, tmp_path, seconds, "swapped", calibrated=True)
-    assert of(frames, 0).tobytes() == of(whole, 0).tobytes()
-    before, after = split(of(frames, 1))
+    assert of_finger(frames, 0).tobytes() == of_finger(whole, 0).tobytes()
+    before, after = split(of_finger(frames, 1))
     assert np.all(before["flags"] & FrameFlags.SENSOR_OTHER == 0)
     sure = after["t_us"] >= after["t_us"][0] + BACK_ROUNDS * 10_000
     flags = after["flags"]
@@ -117,7 +117,7 @@ def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tm
     assert hand.fingers == [0]
     sensor = hand.sensor_info(1)
     assert (sensor.present, bytes(sensor.serial)) == (0, b"BTSP050400018017")
-    foreign, other = of(frames, 1), of(frames, 0)
+    foreign, other = of_finger(frames, 1), of_finger(frames, 0)
     assert len(foreign) > 200 and np.all(foreign["flags"] & FrameFlags.SENSOR_UNSURE)
     assert np.all(foreign["flags"] & FrameFlags.SENSOR_FAULT) and np.isnan(foreign["force_n"]).all()
     assert not np.any(other["flags"] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER))
@@ -134,7 +134,7 @@ def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
         hand.board.set_calibration(finger, for_finger(hand, finger))
     frames = hand.read_batch(100).frames
     for finger in (0, 1):
-        _, after = split(of(frames, finger))
+        _, after = split(of_finger(frames, finger))
         assert np.all(after["flags"] & (FrameFlags.SENSOR_OTHER | FrameFlags.SENSOR_UNSURE))
         assert np.all(np.isnan(after["force_n"][BACK_ROUNDS:]))
         assert hand.board.faults().by_index[finger] & FrameFlags.SENSOR_OTHER

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from held_press import fault, held_press, of
+from held_press import fault, held_press, of_finger
 from rig import ROOT, Rig
 
 import biotac
@@ -102,7 +102,7 @@ def healthy(rig: Rig, tmp_path: Path, recorded: bool) -> biotac.Batch:
 
 def counts_file(path: Path, frames: np.ndarray, play: dict[str, Any] | None = None) -> Path:
     """The hurt finger's counts, with words that have good parity and are wrong."""
-    faulty = of(frames, HURT)
+    faulty = of_finger(frames, HURT)
     counts = faulty["counts"].copy()
     if play is not None:
         counts[round(play["at_s"] * 100), : play["electrodes"]] = play["count"]
@@ -130,8 +130,8 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
         source.write_text(scenario(play))
     batch, status, latched = run(rig, source)
     frames = batch.frames
-    assert of(frames, WITNESS).tobytes() == of(good, WITNESS).tobytes()
-    good, faulty = of(good, HURT), of(frames, HURT)
+    assert of_finger(frames, WITNESS).tobytes() == of_finger(good, WITNESS).tobytes()
+    good, faulty = of_finger(good, HURT), of_finger(frames, HURT)
     begin_us = good["t_us"][0]
     missing_s = (np.setdiff1d(good["t_us"], faulty["t_us"]) - begin_us) / 1e6
     windows = [(at_s - 0.01, at_s + seconds + BACK_S) for at_s, seconds in faults_of(play)]
@@ -145,7 +145,7 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     for name in row.get("flags", []):
         assert (faulty["flags"] & FrameFlags[name]).any(), name
     for finger in (HURT, WITNESS):  # what a FRAME said once, the board still knows
-        sent = int(np.bitwise_or.reduce(of(frames, finger)["flags"])) & LATCHED
+        sent = int(np.bitwise_or.reduce(of_finger(frames, finger)["flags"])) & LATCHED
         assert latched.by_index[finger] & sent == sent
     if "counter" in row:
         assert getattr(status, row["counter"]) > 0

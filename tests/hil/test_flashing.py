@@ -60,7 +60,7 @@ class Bench:
 
     def setting_after_a_power_cut(self, setting: Setting) -> int:
         boots = self.counters()["boots"]
-        self.target.board.say("cut power")
+        self.target.board.send_line("cut power")
         self.target.board.until(5, boots=boots + 1, usb={"state": "configured"})
         with self.target.open() as hand:
             return hand.board.setting(setting)

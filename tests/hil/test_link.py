@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from overheard import Overheard
+from capture import Capture
 from rig import Rig
 
 import biotac
@@ -114,12 +114,12 @@ def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
     source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
     hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
     hand._board.command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
-    standstill = Overheard(still=True)
+    standstill = Capture(still=True)
     hand._reader.add(standstill)
     hand.link.release()
     while not hand.link.board.over:
-        hand.link.board.hear(None)
-    standstill.go_on.set()
+        hand.link.board.receive(None)
+    standstill.resume.set()
     while hand._board.reader.silent_s < 0.5:  # there is no room for an answer before
         time.sleep(0.05)
     status = hand.status()
@@ -180,10 +180,10 @@ def hurt(sent: bytes, draw: random.Random) -> bytes:
 @pytest.mark.long
 def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board) -> None:
     hand = board("press.toml?fingers=5&seconds=1")
-    overheard = Overheard()
-    hand._reader.add(overheard)
+    capture = Capture()
+    hand._reader.add(capture)
     hand.read(10)
-    sent = overheard.sent
+    sent = capture.sent
     truth = StreamDecoder().feed(sent)
     assert len(truth.wire) == 500
     for seed in range(20):
@@ -206,7 +206,7 @@ def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:
     board = rig.on_a_pty("press.toml", pace=0)
     with biotac.open(board.path) as hand:
         first = hand.info
-    board.say("cut power")
+    board.send_line("cut power")
     with biotac.open(board.path) as hand:
         assert hand.info.boot_id != first.boot_id
         assert hand.info.board_serial == first.board_serial

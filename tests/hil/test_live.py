@@ -25,7 +25,7 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
         for batch in hand.batches():
             if not acted and len(batch.wire):
                 for verb in verbs:
-                    hand.link.board.say(verb)
+                    hand.link.board.send_line(verb)
                 # From now on silence is what is looked for: until here a busy computer made none.
                 hand.link.patience = 1.0
                 acted = True

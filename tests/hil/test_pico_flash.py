@@ -74,7 +74,7 @@ def test_saved_settings_are_in_force_after_power_was_off(pico: Pico) -> None:
     pico.hand.board.save_settings()
     pico.hand.board.set_setting(Setting.IDLE_PERIOD_MS, 260)  # not saved
     first = pico.boot_id()
-    pico.board.say("cut power")
+    pico.board.send_line("cut power")
     pico.up(2)
     assert pico.hand.board.setting(Setting.IDLE_PERIOD_MS) == 250
     assert pico.hand.board.setting(Setting.FORCE_GAIN_X_NN) == -7
@@ -117,20 +117,20 @@ def test_the_loader_is_entered_by_command_once_the_reply_is_out(pico: Pico) -> N
 
 
 def test_the_loader_is_entered_by_a_touch_at_1200_baud(pico: Pico) -> None:
-    pico.board.say("touch at 1200 baud")
+    pico.board.send_line("touch at 1200 baud")
     pico.until(loaders=1)
 
 
 def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
     first = pico.boot_id()
     assert pico.hand.board.clear_faults().board == FaultFlags.STARTED
-    pico.board.say("lose interrupts")
+    pico.board.send_line("lose interrupts")
     facts = pico.until(watchdog_resets=1)
     assert facts["boots"] == 2
     pico.up(2)
     assert pico.boot_id() != first
     assert pico.hand.board.clear_faults().board == FaultFlags.HUNG
-    pico.board.say("cut power")
+    pico.board.send_line("cut power")
     pico.up(3)
     assert pico.hand.board.faults().board == FaultFlags.STARTED
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from held_press import held_press, of
+from held_press import held_press, of_finger
 from maps import BIG, make_map
 from rig import Rig
 
@@ -79,7 +79,7 @@ def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: R
     with biotac.open(f"sim:{source}") as other:
         whole = other.read(100)
     for finger in range(2):
-        seen, played = of(frames, finger), of(whole, finger)
+        seen, played = of_finger(frames, finger), of_finger(whole, finger)
         after_us = (seen["t_us"] - seen["t_us"][0]).astype(np.int64)
         rounds, late_us = np.divmod(after_us + 1, 10_000)  # without slot 0 its time is worked out, to whole us
         assert (late_us <= 1_000_000 // SLOT_HZ + 1).all() and (late_us[-50:] == 1).all()

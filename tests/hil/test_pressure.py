@@ -108,11 +108,11 @@ def test_fingers_are_calibrated_and_verified_on_board(rig: Rig, seed: int, profi
     if slow and profile == "worn":
         pytest.skip(f"{rig.name}: a worn finger's pressure is a new one's, and emulated time is slow")
     hands = navarro.calibrate(seed, profile, board=board, fingers=fingers)
-    verified = [one.verified for one in hands.fingers]
-    assert [one.fit.finger for one in hands.fingers] == list(fingers)
-    for one in verified:
-        assert one.force_n == pytest.approx(4.0)
-        assert one.board_error <= 0.059 and one.float_error <= 0.059
-        assert one.apart_n <= 0.5e-4 + 1e-9  # half of what the board counts in
+    verified = [finger.verified for finger in hands.fingers]
+    assert [finger.fit.finger for finger in hands.fingers] == list(fingers)
+    for check in verified:
+        assert check.force_n == pytest.approx(4.0)
+        assert check.board_error <= 0.059 and check.float_error <= 0.059
+        assert check.apart_n <= 0.5e-4 + 1e-9  # half of what the board counts in
     assert hands.violations == 0
     assert hands.frames_checked > 1500 * len(fingers)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from held_press import of
+from held_press import of_finger
 from maps import make_map
 from restarts import Restarts
 from rig import NO_MAPS, Rig
@@ -63,14 +63,14 @@ def with_a_keep_alive(run: Restarts) -> None:
 
 
 def touched(run: Restarts) -> None:
-    frames = of(run.hand.read(2.0), PRESSED)
+    frames = of_finger(run.hand.read(2.0), PRESSED)
     assert frames["flags"][-1] & FrameFlags.CONTACT and frames["force_n"][-1].max() > 0.3
 
 
 def held(run: Restarts) -> None:
     touched(run)
     run.hand.hold(PRESSED)
-    assert of(run.hand.read(0.1, fresh=True), PRESSED)["flags"][-1] & FrameFlags.HELD
+    assert of_finger(run.hand.read(0.1, fresh=True), PRESSED)["flags"][-1] & FrameFlags.HELD
 
 
 def uploading_a_map(run: Restarts) -> None:
@@ -101,7 +101,7 @@ def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: st
     run.hand.board.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
     before = run.hand.info
     state(run)
-    pressed_n = of(run.hand.read(0.1), PRESSED)["force_n"][-1] if state in (touched, held) else None
+    pressed_n = of_finger(run.hand.read(0.1), PRESSED)["force_n"][-1] if state in (touched, held) else None
     getattr(run, how)()
     hand, after = run.hand, run.hand.info
     assert after.boot_id != before.boot_id
@@ -124,7 +124,7 @@ def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: st
     goes_on = kept and state in (touched, held)
     assert (flags[frames["finger"] == PRESSED] & FrameFlags.HELD != 0).all() == (goes_on and state is held)
     if goes_on:
-        again = of(frames, PRESSED)[10:]
+        again = of_finger(frames, PRESSED)[10:]
         assert (again["flags"] & FrameFlags.CONTACT).all()
         assert np.abs(again["force_n"] - pressed_n).max() < 0.01 * np.abs(pressed_n).max() + 0.05
     for finger in set(range(FINGERS)) - {PRESSED}:  # which has no tare while the force grows

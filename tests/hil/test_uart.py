@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from held_press import of
+from held_press import of_finger
 from rig import Rig
 
 import biotac
@@ -73,7 +73,7 @@ def test_the_same_wire_whatever_is_done_at_usb(rig: Rig, tmp_path: Path) -> None
                 other.read(0.1)
             hand.hold(0)
             board.do("open and close 1000 times")
-            held = of(hand.read(1.0), 0)
+            held = of_finger(hand.read(1.0), 0)
             assert (held["flags"][-FRAMES:] & FrameFlags.HELD).all() and hand.stats.frames_lost == 0
         found = judge(examine(board.path, seconds=0.5))
         assert [finding.code for finding in found] == ["refused"]
@@ -112,7 +112,7 @@ def test_the_first_frame_comes_within_150_ms_of_a_reset(rig: Rig, how: str) -> N
             os.set_blocking(port.fileno(), False)
             port.read()
             now = before = board.counters()
-            board.say(how)
+            board.send_line(how)
             while now["boots"] == before["boots"] or (configured and now["usb"]["state"] != configured):
                 before, now = (now if now["boots"] == before["boots"] else before), board.counters()
             begun_s, came = (now if configured else before)["emulated_s"], b""

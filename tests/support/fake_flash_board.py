@@ -71,7 +71,7 @@ class FakeBoard:
         self.in_loader = False
         self.answers = True
         self.silence: Callable[[], bytes] = bytes  # in place of answers
-        self.takes = True
+        self.accepts = True
         self.comes_back = True
         self.refuses_loader = 0  # or the error it answers
         self.refuses: set[int] = set()  # settings it refuses to change
@@ -120,7 +120,7 @@ class FakeBoard:
         return encode(wire.SettingValue.ID, wire.SettingValue(req_id, key, self.settings[key]).pack())
 
     # Target
-    def there(self) -> bool:
+    def port_exists(self) -> bool:
         return not self.in_loader
 
     def open(self) -> Hand:
@@ -153,7 +153,7 @@ class FakeBoard:
         self.answers = True
         self.boot_id += 1
         self.settings = dict(self.stored)
-        if self.takes:
+        if self.accepts:
             self.version = image.note.firmware
             self.image_crc32 = image.note.crc32
 

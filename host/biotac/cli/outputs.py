@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import InputError, exists_error
 
 
-def say(args: argparse.Namespace, facts: Any, text: str) -> None:
+def report(args: argparse.Namespace, facts: Any, text: str) -> None:
     """Print a result: its facts for --json, else its text."""
     print(json.dumps(facts) if args.json else text, flush=True)
 

@@ -88,10 +88,10 @@ def fingers(text: str) -> tuple[int, ...]:
 
 
 def add_subverb(
-    what: Any, name: str, run: Callable[[argparse.Namespace], int], text: str, example: str = ""
+    verbs: Any, name: str, run: Callable[[argparse.Namespace], int], text: str, example: str = ""
 ) -> argparse.ArgumentParser:
-    """Add ``name`` to ``what``, the subparsers of a verb."""
-    parser: argparse.ArgumentParser = what.add_parser(
+    """Add ``name`` to ``verbs``, the subparsers of a verb."""
+    parser: argparse.ArgumentParser = verbs.add_parser(
         name,
         help=text,
         description=text,

@@ -100,8 +100,8 @@ def run_demo(
     frames, sent = joined.frames[at_0], joined.wire[at_0]
     answers, applied_n = answers_to(sent, settings, own), hand.applied_n(frames["finger"], frames["t_us"])
     felt = {name: Felt() for name in answers if applied_n is not None}
-    for name, one in felt.items():
-        one.add(applied_n, answers[name])  # type: ignore[arg-type]
+    for name, force in felt.items():
+        force.add(applied_n, answers[name])  # type: ignore[arg-type]
     rows, played_fingers = source.samples.shape[:2]
     device_s = rows / FRAME_HZ
     recorded = Recording(recording_path)
@@ -128,7 +128,7 @@ def run_demo(
         "recording_matches": bool(same),
         "tare_changes": tare_changes(joined.messages),
         "calibration_rmse_n": held_out_n,
-        "felt": {name: one.bands for name, one in felt.items()},
+        "felt": {name: force.bands for name, force in felt.items()},
         "crosscheck": outcome.as_dict(),
         "recording": str(recording_path),
         "report": str(folder / "report.json"),

@@ -76,7 +76,7 @@ class Bringup:
         """Of all rates, the usual one first."""
         return self.rates | self.slow
 
-    def of(self, finger: int) -> StructArray:
+    def rows_of(self, finger: int) -> StructArray:
         rows: StructArray = self.frames[self.frames["finger"] == finger]
         return rows
 
@@ -258,13 +258,13 @@ def clean_khz(seen: Bringup, finger: int) -> tuple[int, int] | None:
 class Measure:
     """A value of the board's own, as text, and what is expected; ``code`` is the finding where it is not that."""
 
-    what: str
+    name: str
     seen: str
     expected: str
     code: str = ""
 
 
-def of_board(seen: Bringup) -> list[Measure]:
+def measures(seen: Bringup) -> list[Measure]:
     """What the board measured of itself, empty where it cannot."""
     if not seen.chip:
         return []
@@ -288,21 +288,21 @@ def of_board(seen: Bringup) -> list[Measure]:
          "usb_frames", lost is not None and lost[0] > LOST_STARTS),
     ]  # fmt: skip
     if len(seen.frames):
-        late_us = np.ptp(jitter_us(seen.of(seen.frames["finger"][0])))
+        late_us = np.ptp(jitter_us(seen.rows_of(seen.frames["finger"][0])))
         expected = f"at most {JITTER_US:g} us"
         found.append(("jitter of rounds", f"{late_us:.0f} us", expected, "slots_jitter", bool(late_us > JITTER_US)))
-    return [Measure(what, text, expected, code if is_bad else "") for what, text, expected, code, is_bad in found]
+    return [Measure(name, text, expected, code if is_bad else "") for name, text, expected, code, is_bad in found]
 
 
 def check(seen: Bringup, facts: Facts) -> Iterator[Finding]:
     """What is outside its range, the board first; beside what ``judge`` finds."""
-    for one in of_board(seen):
-        if one.code:
-            yield Finding(one.code, f"{one.what}: {one.seen}; expected {one.expected}")
+    for measured in measures(seen):
+        if measured.code:
+            yield Finding(measured.code, f"{measured.name}: {measured.seen}; expected {measured.expected}")
     for k, restart in enumerate(seen.restarts, 1):
         if restart.present != seen.restarts[0].present or restart.faults != wire.FaultFlags.STARTED:
-            what = f"sensors {restart.present:#07b}, faults {wire.FaultFlags(restart.faults)!r}"
-            yield Finding("restart", f"after restart {k}: {what}; after the first {seen.restarts[0].present:#07b}")
+            state = f"sensors {restart.present:#07b}, faults {wire.FaultFlags(restart.faults)!r}"
+            yield Finding("restart", f"after restart {k}: {state}; after the first {seen.restarts[0].present:#07b}")
     if facts.board is not None:
         yield from crossed(facts.board, seen.serials)
         for finger in range(sensor.MAX_SENSORS):
@@ -317,13 +317,13 @@ def check(seen: Bringup, facts: Facts) -> Iterator[Finding]:
 
 
 def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:
-    gain, most_n = pdc_per_n(seen.of(finger))
+    gain, most_n = pdc_per_n(seen.rows_of(finger))
     if np.isnan(gain):
         yield Finding("not_pressed", f"finger {finger} was not pressed with {TOUCHED_N:g} N")
     elif gain < PDC_PER_N:
         yield Finding(
             "pressure_flat", f"finger {finger}: {gain:.1f} counts/N, up to {most_n:.1f} N; fingers have 62 to 111"
         )
-    drift = pdc_per_c(seen.of(finger))
+    drift = pdc_per_c(seen.rows_of(finger))
     if abs(drift) > PDC_PER_C:
         yield Finding("pdc_warm", f"finger {finger}: {drift:+.0f} counts a degree; expected up to {PDC_PER_C:.0f}")

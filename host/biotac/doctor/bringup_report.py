@@ -64,7 +64,7 @@ def _findings(findings: Sequence[Finding]) -> list[str]:
 def _board(seen: Bringup) -> list[str]:
     if not seen.chip:
         return ["The board measures nothing of itself: its firmware or its kind does not.", ""]
-    rows = [[one.what, one.seen, one.expected] for one in bringup.of_board(seen)]
+    rows = [[measured.name, measured.seen, measured.expected] for measured in bringup.measures(seen)]
     if seen.restarts:
         took_s = [restart.seconds for restart in seen.restarts]
         rows.append(
@@ -79,9 +79,9 @@ def _fingers(seen: Bringup, facts: Facts) -> list[str]:
     rows = []
     for finger in facts.board.present:
         serial = next(ascii_text(info.serial) for info in facts.board.sensors if info.finger == finger)
-        noise = bringup.noise_counts(seen.of(finger))
-        gain, most_n = bringup.pdc_per_n(seen.of(finger))
-        warm = bringup.pdc_per_c(seen.of(finger))
+        noise = bringup.noise_counts(seen.rows_of(finger))
+        gain, most_n = bringup.pdc_per_n(seen.rows_of(finger))
+        warm = bringup.pdc_per_c(seen.rows_of(finger))
         parity = facts.board.more(finger, "words_parity")
         cells = [f"{noise.min():.2f} to {noise.max():.2f}", f"{gain:.0f} ({most_n:.1f} N)", f"{warm:+.0f}"]
         rows.append([str(finger), serial, str(parity), *("-" if "nan" in cell else cell for cell in cells)])
@@ -127,7 +127,7 @@ def _draw(path: Path, seen: Bringup, facts: Facts, findings: Sequence[Finding]) 
         page.suptitle(f"Outside its range: {found}" if found else "Everything measured is within its range")
         (noise, bus), (press, ping) = page.subplots(2, 2)
         for finger in present:
-            rows = seen.of(finger)
+            rows = seen.rows_of(finger)
             noise.plot(range(1, 20), bringup.noise_counts(rows), "o-", label=f"finger {finger}")
             rise, force_n = rows["pdc"] - rows["pdc_tare"], np.linalg.norm(rows["force_n"], axis=1)
             press.plot(force_n, rise, ".", markersize=2, label=f"finger {finger}")

@@ -143,22 +143,22 @@ def _judge(channels: dict[str, NDArray[np.integer]]) -> dict[str, list[str]]:
             found["channel_stuck"].append(name)
         elif name.startswith("E") and STUCK_ROUNDS <= len(good) == len(counts) and np.ptp(good) >= SAME_MOVED_COUNTS:
             moved[name] = good[:, 0]
-    for one, two in combinations(moved, 2):
-        apart = moved[one] - moved[two]
-        if np.abs(apart).max() * SAME_SHARE <= np.ptp(moved[one]) and _one_voltage(moved[one], moved[two]):
-            found["electrodes_shorted"].append(f"{one} and {two}")
+    for first, second in combinations(moved, 2):
+        apart = moved[first] - moved[second]
+        if np.abs(apart).max() * SAME_SHARE <= np.ptp(moved[first]) and _same_voltage(moved[first], moved[second]):
+            found["electrodes_shorted"].append(f"{first} and {second}")
         elif np.ptp(apart) <= COPIED_COUNTS:
-            found["channel_copied"].append(f"{one} and {two}")
+            found["channel_copied"].append(f"{first} and {second}")
     return found
 
 
-def _one_voltage(one: NDArray[np.floating], two: NDArray[np.floating]) -> bool:
+def _same_voltage(first: NDArray[np.floating], second: NDArray[np.floating]) -> bool:
     """Whether counts (rounds,) of two electrodes differ by no more than readings of the same voltage may."""
-    sigma = 1.05 * float(np.median(np.abs(np.diff(one - two)))) if len(one) > 1 else 0.0
-    for begin in range(0, len(one) - SAME_ROUNDS + 1, SAME_ROUNDS):
+    sigma = 1.05 * float(np.median(np.abs(np.diff(first - second)))) if len(first) > 1 else 0.0
+    for begin in range(0, len(first) - SAME_ROUNDS + 1, SAME_ROUNDS):
         block = slice(begin, begin + SAME_ROUNDS)
-        per_round = np.ptp(one[block]) / (SAME_ROUNDS - 1)
+        per_round = np.ptp(first[block]) / (SAME_ROUNDS - 1)
         limit = 5.0 * sigma / np.sqrt(SAME_ROUNDS) + SAME_SETTLING_COUNTS + per_round
-        if abs((one[block] - two[block]).mean()) > limit:
+        if abs((first[block] - second[block]).mean()) > limit:
             return False
     return True

@@ -19,8 +19,8 @@ def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
     """Wrong type, none, fewer than ``expected``, lost or changed while listening, equal serials, damaged words."""
     for sensor in board.sensors:
         if not sensor.present and (serial := ascii_text(sensor.serial)):
-            what = "which is not a BioTac with 19 electrodes"
-            yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, {what}")
+            reason = "which is not a BioTac with 19 electrodes"
+            yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, {reason}")
     if not board.present:
         yield Finding("no_sensor", f"no sensor answers on any of {board.hello.fingers} chip selects")
         return
@@ -74,9 +74,9 @@ def _words(board: BoardFacts) -> Iterator[Finding]:
     """Stuck words, parity errors and error words, of sensors that are present: an open chip select reads as stuck."""
     for finger in board.present:
         words = {kind: board.more(finger, kind) for kind in ("words_good", *WORDS)}
-        for kind, what in WORDS.items():
+        for kind, text in WORDS.items():
             if words[kind]:
-                seen = f"finger {finger}: {words[kind]} of {sum(words.values())} words {what}"
+                seen = f"finger {finger}: {words[kind]} of {sum(words.values())} words {text}"
                 last = board.sensors_after[finger].last_error_word
                 if kind == "words_error" and last:
                     seen += f", the last 0x{last:04X} ({sensor_gen.ERROR_WORD.get(last, 'not in the manual')})"

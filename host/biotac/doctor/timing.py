@@ -34,9 +34,9 @@ def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
         earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)
     if faults := faults_of(earlier, DEFAULT_NAMES):
         yield Finding("faults_latched", str(faults).replace("\n", "; "))
-    for counter, what in (("slots_late", "slots were too late"), ("messages_dropped", "messages did not fit the link")):
+    for counter, text in (("slots_late", "slots were too late"), ("messages_dropped", "messages did not fit the link")):
         if more := grown(board.before, board.after, counter):
-            yield Finding(counter, f"{more} {what}")
+            yield Finding(counter, f"{more} {text}")
     if board.stats.frames_lost or board.stats.pac_lost:
         seen = f"{board.stats.frames_lost} frames and {board.stats.pac_lost} PAC blocks are missing"
         yield Finding("frames_lost", seen)

@@ -20,7 +20,7 @@ class Format:
     """An export format. ``module`` is imported when needed; it may need the ``extra``."""
 
     module: str
-    what: str
+    meaning: str
     extra: str = "export"
 
 
@@ -69,7 +69,7 @@ def export(
     with ExitStack() as together:  # no file is put in place before all are complete
         for path, part in parts(out, made, apart=module.KINDS_APART):
             more = {} if beside is None else {"beside": beside}
-            target = together.enter_context(whole(path, overwrite=overwrite, made_of=sources))
+            target = together.enter_context(whole(path, overwrite=overwrite, sources=sources))
             module.write(target, part, recording, show, **more)
             written.append(path)
     return written

@@ -91,7 +91,7 @@ def read_backup(path: Path) -> Backup:
     """Read a file that save() wrote. Raises InputError when it cannot be read or is not such a file."""
 
     def parse(content: dict[str, Any]) -> Backup:
-        values = {int(one["id"]): int(one["value"]) for one in content["settings"]}
+        values = {int(entry["id"]): int(entry["value"]) for entry in content["settings"]}
         calibrations = {int(finger): from_dict(tree) for finger, tree in content.get("calibrations", {}).items()}
         maps = {int(finger): map_file.from_dict(tree) for finger, tree in content.get("maps", {}).items()}
         return Backup(path.resolve(), values, calibrations, maps)

@@ -34,14 +34,14 @@ class EmulatedTarget(Target):
         self.board = EmulatedBoard(sim.board, source, pace=sim.pace, hold=True, image=sim.image)
         self.board.release()
 
-    def there(self) -> bool:
+    def port_exists(self) -> bool:
         return bool(self.board.counters()["usb"]["state"] == "configured")
 
     def open(self) -> Hand:
         return Hand(SerialLink(self.board.path))
 
     def touch(self) -> None:
-        self.board.say("touch at 1200 baud")
+        self.board.send_line("touch at 1200 baud")
 
     def reopen(self) -> Hand:
         self.board.until(BACK_S, loader=None, usb={"state": "configured"})
@@ -71,6 +71,6 @@ class EmulatedLoader(Loader):
         with tempfile.TemporaryDirectory(prefix="biotac-flash-") as folder:
             path = Path(folder) / "image.uf2"
             path.write_bytes(b"".join(image.boot_last()))
-            self._board.say(f"write uf2 {path}")
+            self._board.send_line(f"write uf2 {path}")
             self._board.until(WRITE_S, images=before + 1)
         show(len(image.blocks), len(image.blocks))

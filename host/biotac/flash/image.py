@@ -105,9 +105,9 @@ def read_bin(path: Path, data: bytes) -> Image:
     """What an STM32's loader writes. Raises ValueError for another board's."""
     note, beside = find(data), path.with_suffix(".flash.json")
     try:
-        said = read_json(beside)
-        sectors = tuple(accumulate((1024 * int(kib) for kib in said["sectors_kib"]), initial=0))
-        chip = Chip(int(said["chip"], 16), str(said["family"]), int(said["flash"], 16), int(said["image"], 16), sectors)
+        info = read_json(beside)
+        sectors = tuple(accumulate((1024 * int(kib) for kib in info["sectors_kib"]), initial=0))
+        chip = Chip(int(info["chip"], 16), str(info["family"]), int(info["flash"], 16), int(info["image"], 16), sectors)
     except (OSError, KeyError, TypeError, ValueError) as error:
         how = f"use the build's .uf2 or, for an STM32, its .bin with {beside.name} beside it ({error!r})"
         raise ValueError(f"it is for a {board_text(note.board)}, and nothing says where it goes: {how}") from error

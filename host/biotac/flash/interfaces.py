@@ -34,7 +34,7 @@ class Target(Protocol):
     #: For messages.
     port: str
 
-    def there(self) -> bool:
+    def port_exists(self) -> bool:
         """True if its port exists, whatever is connected to it."""
 
     def open(self) -> Hand:

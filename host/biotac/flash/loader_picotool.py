@@ -20,7 +20,7 @@ class PicotoolLoader(Loader):
     name = TOOL
 
     def __init__(self) -> None:
-        self._heard = ""
+        self._output = ""
 
     def ready(self) -> bool:
         return shutil.which(TOOL) is not None and self._run("info", seconds=ASK_S)
@@ -28,13 +28,13 @@ class PicotoolLoader(Loader):
     def cure(self) -> str:
         if shutil.which(TOOL) is None:
             return "or install picotool, which needs no mounted drive"
-        return f"picotool says: {self._heard}"
+        return f"picotool says: {self._output}"
 
     def write(self, image: Image, show: Show) -> None:
         """Write the image with picotool, which verifies it and starts the board."""
         show(0, len(image.blocks))
         if not self._run("load", "-v", "-x", str(image.path), seconds=LOAD_S):
-            raise FlashError(f"picotool did not load {image.path}: {self._heard}; plug the board in with BOOTSEL held")
+            raise FlashError(f"picotool did not load {image.path}: {self._output}; plug the board in with BOOTSEL held")
         show(len(image.blocks), len(image.blocks))
 
     def _run(self, *arguments: str, seconds: float) -> bool:
@@ -43,7 +43,7 @@ class PicotoolLoader(Loader):
                 [TOOL, *arguments], capture_output=True, text=True, errors="replace", timeout=seconds, check=False
             )
         except (OSError, subprocess.TimeoutExpired) as error:
-            self._heard = str(error)
+            self._output = str(error)
             return False
-        self._heard = " ".join((done.stderr or done.stdout).split()) or f"no output, exit code {done.returncode}"
+        self._output = " ".join((done.stderr or done.stdout).split()) or f"no output, exit code {done.returncode}"
         return done.returncode == 0

@@ -30,7 +30,7 @@ class UartTarget(Target):
     def __init__(self, port: str) -> None:
         self.port = port
 
-    def there(self) -> bool:
+    def port_exists(self) -> bool:
         """False: whether it runs or is in its loader, the port is there."""
         return False
 

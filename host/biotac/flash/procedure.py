@@ -18,7 +18,7 @@ from .interfaces import Show as ShowBlocks
 from .waiting import wait_for
 
 LOADER_S = 20.0  # from the command to a mounted drive; desktops take some seconds
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ def flash(
     restore_from: Backup | None = None,
     downgrade: bool = False,
     take_link: bool = False,
-    say: Say = lambda text: None,
-    show: ShowBlocks = lambda done, of: None,
+    log: Log = lambda text: None,
+    show: ShowBlocks = lambda done, total: None,
 ) -> Outcome:
     """Write ``image`` to the board and restore its settings.
 
@@ -72,9 +72,9 @@ def flash(
     written: Backup | None = None
     if loader is None:
         before, written = leave(
-            image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, take_link=take_link, say=say
+            image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, take_link=take_link, log=log
         )
-    elif target.there():
+    elif target.port_exists():
         raise InputError(
             f"{target.port} is plugged in, and another board is in its loader ({loader.name}); unplug one of them"
         )
@@ -83,11 +83,11 @@ def flash(
         if loader is None:
             loader = wait_for(lambda: first_ready(loaders), LOADER_S)
             if loader is None:
-                cures = "; ".join(one.cure() for one in loaders)
+                cures = "; ".join(own.cure() for own in loaders)
                 raise FlashError(f"no board in its loader was found within {LOADER_S:.0f} s: {cures}; then flash again")
-        say(f"writing {len(image.blocks)} blocks to the {loader.name}")
+        log(f"writing {len(image.blocks)} blocks to the {loader.name}")
         loader.write(image, show)
-        say("waiting for the board to come back")
+        log("waiting for the board to come back")
         with target.reopen() as hand:
             if take_link:  # the other host may have begun again
                 hand.take_link()
@@ -101,7 +101,7 @@ def first_ready(loaders: Sequence[Loader]) -> Loader | None:
 
 
 def leave(
-    image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, take_link: bool, say: Say
+    image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, take_link: bool, log: Log
 ) -> tuple[wire.Hello | None, Backup | None]:
     """Identify the board, save its settings, and send it to its loader; return its HELLO and the backup."""
     try:
@@ -109,7 +109,7 @@ def leave(
     except (NotAGatewayError, WireVersionError) as error:
         if keep:
             raise type(error)(f"{error}, or flash it without a backup of its settings: --no-backup") from error
-        say(f"{error}; trying the 1200 baud touch")
+        log(f"{error}; trying the 1200 baud touch")
         target.touch()
         return None, None
     with hand:
@@ -123,13 +123,13 @@ def leave(
                 f"{image.path} has firmware {image.note.version}, {target.port} runs {version_text(hand.info)}: older "
                 "firmware may not understand newer settings; use --downgrade if you mean it"
             )
-        say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
+        log(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
         if take_link:
             hand.take_link()
         # A sensor board has no settings to save.
         backup = save(hand, backup_path) if keep and hand.info.board != wire.Board.PICO_SENSOR else None
         if backup is not None:
-            say(f"saved {len(backup.values)} settings to {backup.path}")
+            log(f"saved {len(backup.values)} settings to {backup.path}")
         with step(backup):
             hand.board.reboot_bootloader()
         return hand.info, backup

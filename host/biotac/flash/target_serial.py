@@ -26,7 +26,7 @@ class SerialTarget(Target):
         self._serial_number = self._before.get(port or "")
         self.port = port or "the board in its loader"
 
-    def there(self) -> bool:
+    def port_exists(self) -> bool:
         return self._device is not None and (self._device in gateway_ports() or Path(self._device).exists())
 
     def open(self) -> Hand:

@@ -78,14 +78,14 @@ class EmulatedBoard(SimBoard):
 
     def plan(self, seconds: float, verb: str) -> None:
         """Make something happen to the board when its sensors' time reaches ``seconds``; see rig.mjs for verbs."""
-        self.say(f"@{seconds:.9f} {verb}")
+        self.send_line(f"@{seconds:.9f} {verb}")
 
     def do(self, verb: str) -> None:
         """Make something happen to the board before it gets anything written to its link from now on; see rig.mjs.
 
         Verbs and the link are separate pipes: without waiting for an answer, the link could overtake the verb.
         """
-        self.say(verb)
+        self.send_line(verb)
         self.counters()
 
     def counters(self) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class EmulatedBoard(SimBoard):
 
     def arrivals(self) -> list[tuple[int, int, float]]:
         """For each FRAME: its t_us, its finger, and the board's time in us when its last byte reached the host."""
-        return [tuple(one) for one in self._asked("arrivals")[1]]
+        return [tuple(arrival) for arrival in self._asked("arrivals")[1]]
 
     def until(self, seconds: float, **counters: Any) -> dict[str, Any]:
         """Wait until these counters have these values; return all counters.
@@ -111,9 +111,9 @@ class EmulatedBoard(SimBoard):
         return dict(facts)
 
     def _asked(self, line: str) -> tuple[str, Any]:
-        self.say(line)
+        self.send_line(line)
         while not self._answers:
-            self.hear(LISTEN_S)
+            self.receive(LISTEN_S)
         word, _, text = self._answers.pop(0).partition(" ")
         return word, json.loads(text)
 

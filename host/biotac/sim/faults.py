@@ -72,7 +72,7 @@ def electrode_fault(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault
     return _slot_fault(ELECTRODE_SLOT, lambda on, counts, _: change(on, counts, on.time_s(len(counts))))
 
 
-def _one(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
+def _of_electrode(change: Callable[[Faulty, Floats, Floats], Floats]) -> Fault:
     """The same of the electrode that breaks: its counts (n,)."""
 
     def electrodes(on: Faulty, counts: Floats, t_s: Floats) -> Floats:
@@ -133,16 +133,16 @@ def noisy_line(a_bit: float) -> Fault:
 
 
 FAULTS: dict[str, Fault] = {
-    "electrode open": _one(lambda on, x, t: np.full_like(x, 4095)),
-    "electrode shorted": _one(lambda on, x, t: np.zeros_like(x)),
-    "electrode floating: walks 20 counts a round": _one(_walks),
-    "electrode floating: uniform noise": _one(lambda on, x, t: on.rng.uniform(1, 4089, len(x))),
-    "electrode with noise of 200 counts": _one(lambda on, x, t: x + on.rng.normal(0, 200, len(x))),
-    "electrode stuck": _one(lambda on, x, t: np.full_like(x, on.first(x[0]))),
-    "electrode at half gain": _one(lambda on, x, t: on.rest[on.electrode] + (x - on.rest[on.electrode]) / 2),
-    "electrode drifts 10 counts/s": _one(lambda on, x, t: x - 10 * t),
-    "electrode drifts 50 counts/s": _one(lambda on, x, t: x - 50 * t),
-    "electrode drifts 200 counts/s": _one(lambda on, x, t: x - 200 * t),
+    "electrode open": _of_electrode(lambda on, x, t: np.full_like(x, 4095)),
+    "electrode shorted": _of_electrode(lambda on, x, t: np.zeros_like(x)),
+    "electrode floating: walks 20 counts a round": _of_electrode(_walks),
+    "electrode floating: uniform noise": _of_electrode(lambda on, x, t: on.rng.uniform(1, 4089, len(x))),
+    "electrode with noise of 200 counts": _of_electrode(lambda on, x, t: x + on.rng.normal(0, 200, len(x))),
+    "electrode stuck": _of_electrode(lambda on, x, t: np.full_like(x, on.first(x[0]))),
+    "electrode at half gain": _of_electrode(lambda on, x, t: on.rest[on.electrode] + (x - on.rest[on.electrode]) / 2),
+    "electrode drifts 10 counts/s": _of_electrode(lambda on, x, t: x - 10 * t),
+    "electrode drifts 50 counts/s": _of_electrode(lambda on, x, t: x - 50 * t),
+    "electrode drifts 200 counts/s": _of_electrode(lambda on, x, t: x - 200 * t),
     "all electrodes drift 1 count/s": electrode_fault(lambda on, x, t: x - 1 * t[:, None]),
     "all electrodes drift 5 counts/s": electrode_fault(lambda on, x, t: x - 5 * t[:, None]),
     "all electrodes drift 20 counts/s": electrode_fault(lambda on, x, t: x - 20 * t[:, None]),

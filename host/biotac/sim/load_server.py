@@ -74,7 +74,7 @@ def _load(value: Any) -> Load:
     if value is None:
         return None
     if isinstance(value, list):
-        return [_touch(one) for one in value]
+        return [_touch(touch) for touch in value]
     if isinstance(value, dict) and "course" in value:
         return Course(_load(part) or () for part in value["course"])  # type: ignore[misc]
     return _touch(value)
@@ -83,5 +83,5 @@ def _load(value: Any) -> Load:
 def _touch(value: Any) -> Touch:
     if not isinstance(value, dict) or not value.keys() <= set(_KEYS):
         raise InputError(f"a touch is {json.dumps(value)}, expected an object with some of: {', '.join(_KEYS)}")
-    given: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in value.items()}
+    given: dict[str, Any] = {name: tuple(item) if isinstance(item, list) else item for name, item in value.items()}
     return Touch(**given)

@@ -27,7 +27,7 @@ from .sensor_board import SensorBoard
 from .source import Source
 from .tape import write_tape
 
-HEAR_S = 0.005  # another thread may hear it first
+RECEIVE_S = 0.005  # another thread may read it first
 
 
 class SimBoard:
@@ -44,9 +44,9 @@ class SimBoard:
         self.pace = pace
         self.sensors: SensorBoard | None = None
         self.over = False  # the tape has been played, and everything handed over
-        self._heard = b""
+        self._received = b""
         self._answers: list[str] = []
-        self._hearing = threading.Lock()
+        self._receiving = threading.Lock()
         self._token = ""  # of the sockets of its process
         self._stdout_socket: socket.socket | None = None
         # Windows removes no file that is open; the second time the board is gone.
@@ -81,10 +81,10 @@ class SimBoard:
         # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()
 
-    def _announced(self, *what: str) -> str:
-        """The port in the next line of its stdout, which says where one of ``what`` is."""
+    def _announced(self, *kinds: str) -> str:
+        """The port in the next line of its stdout, which says where one of ``kinds`` is."""
         words = self._process.stdout.readline().decode().split()
-        if len(words) != 2 or words[0] not in what:
+        if len(words) != 2 or words[0] not in kinds:
             raise PortError(f"the simulator did not start: {self._last_lines() or 'no message'}")
         query = f"?token={self._token}" if self._token else ""
         return str(words[1]) if words[0] == "pty" else f"socket://127.0.0.1:{words[1]}{query}"
@@ -126,10 +126,10 @@ class SimBoard:
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
 
-    def hear(self, timeout_s: float | None) -> None:
+    def receive(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
         select.select([self.stdout_fd], [], [], timeout_s)
-        with self._hearing:  # another thread may have read it meanwhile
+        with self._receiving:  # another thread may have read it meanwhile
             if not select.select([self.stdout_fd], [], [], 0)[0]:
                 return
             text = (
@@ -137,29 +137,29 @@ class SimBoard:
             )
             if not text:
                 raise DeviceLostError(f"the simulated board died: {self._last_lines() or 'no message'}")
-            *lines, self._heard = (self._heard + text).split(b"\n")
+            *lines, self._received = (self._received + text).split(b"\n")
             for line in lines:
                 if line == b"end":
                     self.over = True
                 else:
                     self._answers.append(line.decode())
 
-    def say(self, line: str) -> None:
+    def send_line(self, line: str) -> None:
         """Send a line to the board's process, separately from the link."""
         self._process.stdin.write(f"{line}\n".encode())
         self._process.stdin.flush()
 
     def release(self) -> None:
         """Let a held board's time run."""
-        self.say("run")
+        self.send_line("run")
 
     def restart(self) -> None:
         """Reset the board, and wait until it runs again. What is sent to its sensors before may be lost."""
-        self.hear(0)
+        self.receive(0)
         self._answers.clear()
-        self.say("restart")
+        self.send_line("restart")
         while "restarted" not in self._answers:
-            self.hear(HEAR_S)
+            self.receive(RECEIVE_S)
 
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
@@ -223,7 +223,7 @@ class SimLink(UrlLink):
         watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd])
         ready, _, _ = select.select(watched, [], [], timeout_s)
         if len(watched) > 1 and watched[1] in ready:
-            self.board.hear(0)
+            self.board.receive(0)
         self.ended = self.board.over
         return self._serial.fileno() in ready
 

@@ -70,17 +70,17 @@ def effects_of(finger: Finger, states: States, *more: States) -> npt.NDArray[np.
     """EFFECTS_DTYPE (n,) of one contact, or of several at once, whose temperature is the first one's."""
     contacts = (states, *more)
     if more:
-        compression, bulge = (sum(part) for part in zip(*(one.deformation for one in contacts), strict=True))
+        compression, bulge = (sum(part) for part in zip(*(contact.deformation for contact in contacts), strict=True))
         exact = finger.counts_of(compression, bulge, states.warm_c)
     else:
         exact = finger.counts(states)  # which another model may override
     effects = np.empty(len(states), EFFECTS_DTYPE)
     effects["exact"] = exact
     effects["pressed"] = exact - finger.rest_counts(states.warm_c)
-    effects["force_n"] = np.sum([one.force_n for one in contacts], axis=0)
-    effects["load"] = np.sum([spring_load(one) for one in contacts], axis=0)
+    effects["force_n"] = np.sum([contact.force_n for contact in contacts], axis=0)
+    effects["load"] = np.sum([spring_load(contact) for contact in contacts], axis=0)
     effects["tdc"] = tdc_counts(REST_CELSIUS + states.warm_c)
-    speeds = [one.slip_mm_s for one in contacts if one.slip_mm_s is not None]
+    speeds = [contact.slip_mm_s for contact in contacts if contact.slip_mm_s is not None]
     effects["slip_mm_s"] = np.max(speeds, axis=0) if speeds else 0.0
     return effects
 

@@ -162,9 +162,9 @@ def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
         if index not in acting or do == "hold":
             track.ramp(seconds, track.pose)
         elif do == "rest":
-            letting_go = min(RELEASE_S, seconds / 2)
-            track.ramp(letting_go, track.pose.released())
-            track.ramp(seconds - letting_go, track.pose)
+            release_s = min(RELEASE_S, seconds / 2)
+            track.ramp(release_s, track.pose.released())
+            track.ramp(seconds - release_s, track.pose)
         elif do == "temperature":
             celsius = step.number("celsius", 5.0, 60.0, "C")
             track.ramp(seconds, replace(track.pose, celsius=celsius))

@@ -41,10 +41,10 @@ class Ringing:
 
     def __call__(self, speed_mm_s: Floats) -> Floats:
         draw = self._rng.random((len(speed_mm_s), _PAC, 2))
-        lets_go = draw[:, :, 0] < (speed_mm_s / DRAWN_MM / PAC_HZ)[:, None]
+        slips = draw[:, :, 0] < (speed_mm_s / DRAWN_MM / PAC_HZ)[:, None]
         sway = 2.0 * draw[:, :, 1] - 1.0
         blow = np.zeros(sway.shape)
-        blow[lets_go] = AMPLITUDE_COUNTS * np.sign(sway[lets_go]) * np.sqrt(np.abs(sway[lets_go]))
+        blow[slips] = AMPLITUDE_COUNTS * np.sign(sway[slips]) * np.sqrt(np.abs(sway[slips]))
         slides = speed_mm_s > 0.0
         begins = slides & ~np.concatenate([[self._slid], slides[:-1]])
         self._slid = bool(slides[-1])

@@ -94,13 +94,13 @@ class Table:
         label = f"{self._label}: " if self._label else ""
         return ScenarioError(f"{self._file}:{line}: {label}key '{key}' {seen}: expected {expected}; {cure}")
 
-    def only(self, allowed: Sequence[str], what: str = "") -> None:
-        """Refuse keys other than ``allowed``; ``what`` says whose keys they are."""
+    def only(self, allowed: Sequence[str], context: str = "") -> None:
+        """Refuse keys other than ``allowed``; ``context`` says whose keys they are."""
         for key in self.values:
             if key not in allowed:
                 near = difflib.get_close_matches(key, allowed, 1)
                 cure = f"did you mean '{near[0]}'?" if near else "remove it"
-                raise self.error(key, "is unknown" + what, "one of " + ", ".join(allowed), cure)
+                raise self.error(key, "is unknown" + context, "one of " + ", ".join(allowed), cure)
 
     def _checked(self, key: str, is_good: Callable[[Any], object], expected: str, default: Any = None) -> Any:
         if key in self.values and is_good(self.values[key]):

@@ -81,7 +81,7 @@ class Player:
         if command == "mark":
             return self._mark(str(value or "mark"), finger)
         if self._replay is not None:
-            return self._of_recording(self._replay, command, value)
+            return self._command_replay(self._replay, command, value)
         if command == "tare":
             return self._tare(self._hand.fingers if finger is None else [finger])
         if command == "record":
@@ -100,7 +100,7 @@ class Player:
             self._hand.mark(text, finger)
         return f"marked {text!r}" + (f" at {at_s:.2f} s" if at_s is not None else "")
 
-    def _of_recording(self, replay: ReplayLink, command: str, value: float | str | None) -> str:
+    def _command_replay(self, replay: ReplayLink, command: str, value: float | str | None) -> str:
         if command == "pace" and isinstance(value, float) and 0.01 <= value <= 100:
             replay.pacer.pace = value
             return f"playing at {value:g} times its pace"
@@ -110,8 +110,8 @@ class Player:
             begin_s, end_s = cut(replay.recording, path, max(0.0, stop_s - value), stop_s + 0.01)
             return f"{begin_s:.1f} to {end_s:.1f} s saved to {path}"
         if command not in ("pause", "resume"):
-            what = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
-            raise InputError(f"a recording cannot be {what}; open a board for that")
+            done = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
+            raise InputError(f"a recording cannot be {done}; open a board for that")
         replay.pacer.paused = command == "pause"
         return "paused" if replay.pacer.paused else "playing"
 

@@ -24,7 +24,7 @@ class Reader:
         self._resting = "it is being opened; try again"  # why there is none
         self._turn = threading.Lock()  # of commands, and of the player's coming and going
         self._tried = threading.Event()  # to open it
-        self._go_on = threading.Event()  # ends a rest
+        self._wakeup = threading.Event()  # ends a rest
         self._stopping = self._seeking = False
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
         self.start = self._thread.start
@@ -35,7 +35,7 @@ class Reader:
     def stop(self) -> None:
         """Close what is open, and wait for the thread to end."""
         self._stopping = True
-        self._go_on.set()
+        self._wakeup.set()
         if self._player is not None:
             self._close(self._player)
         self._thread.join()
@@ -54,12 +54,12 @@ class Reader:
             if name == "again":
                 if self._player is not None:
                     raise InputError("it is already playing")
-                self._go_on.set()
+                self._wakeup.set()
                 return "trying again"
             if self._player is None:
                 raise InputError(self._resting)
             words = self._player.do(name, finger, value)
-            self._say_playing(self._player)
+            self._report_playing(self._player)
             return words
 
     def _seek(self, at_s: float | str | None) -> str:
@@ -68,7 +68,7 @@ class Reader:
             raise InputError("a board plays as time passes; open a recording to go to a time in it")
         opener.from_s = min(max(at_s, 0.0), (opener.recording.end_us - opener.recording.begin_us) / 1e6)
         self._seeking = True
-        self._go_on.set()
+        self._wakeup.set()
         if self._player is not None:
             self._player.close()
         return f"playing from {opener.from_s:.2f} s"
@@ -93,16 +93,16 @@ class Reader:
         except BiotacError as error:
             self._rest("lost", f"{self._loss}No board: {error}. Retrying every second.", RETRY_S)
             return
-        self._loss, was_taken = "", False
+        self._loss, is_taken_over = "", False
         self._state.begin(player)
         with self._turn:
             self._player = player
-            self._say_playing(player)
+            self._report_playing(player)
         self._tried.set()
         try:
             # Without a batch nothing is noticed: ``stop`` sets its flag, then closes the player, which ends them.
             for batch in player.batches() if not self._stopping else ():
-                self._state.take(batch, player)
+                self._state.add(batch, player)
                 if self._stopping or self._seeking:
                     break
         except (BiotacError, OSError) as error:
@@ -111,38 +111,38 @@ class Reader:
             self._loss = f"Connection lost: {error}. "
             if kept:
                 self._loss += f"The recording {kept['path']} is kept up to that point. "
-            was_taken = isinstance(error, StreamTakenError)
+            is_taken_over = isinstance(error, StreamTakenError)
         self._close(player)
         if self._seeking:  # the player was closed for that
             self._seeking, self._loss = False, ""
-        elif was_taken:  # to open the board again would take it back
+        elif is_taken_over:  # to open the board again would take it back
             self._rest("taken", self._loss, None)
         elif self._loss:
             self._rest("lost", f"{self._loss}Retrying every second.", RETRY_S)
         elif not self._again:
             self._rest("over", "Playback finished.", None)
 
-    def _say_playing(self, player: Player) -> None:
+    def _report_playing(self, player: Player) -> None:
         if player.live:
-            self._state.say("live", "Connected.")
+            self._state.report("live", "Connected.")
         elif player.paused:
-            self._state.say("paused", "Paused.")
+            self._state.report("paused", "Paused.")
         else:
-            self._state.say("playing", "Playing a recording.")
+            self._state.report("playing", "Playing a recording.")
 
     def _rest(self, link: str, words: str, seconds: float | None) -> None:
         """Wait, while every command but ``again`` is refused."""
         with self._turn:
             self._player, self._resting = None, words
             if not self._seeking:
-                self._go_on.clear()
+                self._wakeup.clear()
         self._tried.set()
         if not self._stopping:
-            self._state.say(link, words)
-            self._go_on.wait(seconds)
+            self._state.report(link, words)
+            self._wakeup.wait(seconds)
 
     def _close(self, player: Player) -> None:
         try:
             player.close()
         except OSError as error:
-            self._state.say("lost", f"{error}")
+            self._state.report("lost", f"{error}")

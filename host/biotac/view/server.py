@@ -61,7 +61,7 @@ class ViewServer(ThreadingHTTPServer):
         self.reader = reader
         self.token = secrets.token_urlsafe(24)
         folder = resources.files("biotac.view").joinpath("static")
-        self.files = {one.name: one.read_bytes() for one in folder.iterdir() if one.name.endswith(tuple(TYPES))}
+        self.files = {file.name: file.read_bytes() for file in folder.iterdir() if file.name.endswith(tuple(TYPES))}
         self._counting = threading.Lock()
         self._asking: dict[Any, None] = {}  # connections that do not get events, oldest first
         self._pages: set[Any] = set()  # connections that get events

@@ -102,7 +102,7 @@ class State:
 
     # ---- the reader's side ---------------------------------------------------------------------
 
-    def say(self, link: str, words: str) -> None:
+    def report(self, link: str, words: str) -> None:
         """Change the link's state and publish it at once."""
         with self._news:
             self._health.link, self._health.words = link, words
@@ -121,7 +121,7 @@ class State:
             self._pac.clear()
             self._arrived.clear()
 
-    def take(self, batch: Batch, player: Player) -> None:
+    def add(self, batch: Batch, player: Player) -> None:
         frames, pac = frame_rows(batch, player.applied_n(batch.wire["finger"], batch.t_us)), pac_rows(batch)
         now_s = time.monotonic()
         with self._news:
@@ -129,7 +129,7 @@ class State:
             self._pac.extend(pac)
             self._arrived.append((now_s, len(batch.frames)))
             for message in batch.messages:
-                self._take_message(message, batch.last_t_us() or 0)
+                self._add_message(message, batch.last_t_us() or 0)
             for finger, t_us in zip(batch.frames["finger"].tolist(), batch.frames["t_us"].tolist(), strict=True):
                 self._finger(finger)["t_us"] = t_us
             if now_s >= self._health_due_s:
@@ -143,7 +143,7 @@ class State:
     def _finger(self, finger: int) -> dict[str, Any]:
         return self._health.fingers.setdefault(finger, {"present": 1})
 
-    def _take_message(self, message: Any, now_us: int) -> None:
+    def _add_message(self, message: Any, now_us: int) -> None:
         if isinstance(message, wire.Status):
             self._health.status = asdict(message)
         elif isinstance(message, wire.SensorStatus):

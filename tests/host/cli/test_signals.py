@@ -83,15 +83,15 @@ def ended(process: subprocess.Popen[str], number: int, to_all: bool) -> tuple[in
     if process.poll() is None:
         (os.killpg if to_all else os.kill)(process.pid, number)
     sent_s = time.monotonic()
-    _, said = process.communicate(timeout=60)
-    return process.returncode, said, time.monotonic() - sent_s
+    _, output = process.communicate(timeout=60)
+    return process.returncode, output, time.monotonic() - sent_s
 
 
-def judge(folder: Path, code: int, said: str) -> str:
+def judge(folder: Path, code: int, output: str) -> str:
     """What is wrong with how it ended; empty if nothing."""
     if code not in CODES:
         return f"code {code}"
-    if "Traceback" in said or "died" in said or "Exception" in said or "went away" in said:
+    if "Traceback" in output or "died" in output or "Exception" in output or "went away" in output:
         return "words"
     for path in (folder / "FITTED").glob("*.mcap"):
         if path.stat().st_size and biotac.Recording(path).damage:
@@ -119,11 +119,11 @@ def table(folder: Path, verbs: dict[str, list[str]], moments: int) -> list[str]:
                 process = begun(words, folder)
                 moment_s = rng.uniform(FIRST_LINE_S, FLASHING_S if words[0] == "flash" else LONGEST_S)
                 time.sleep(moment_s)
-                code, said, took_s = ended(process, number, to_all)
-                what = judge(folder, code, said) or ("" if took_s < LATE_S else f"{took_s:.1f} s")
-                slow_s, bad = max(slow_s, took_s), bad + bool(what)
-                if what:
-                    wrong.append(f"{verb}, {how} after {moment_s:.2f} s: {what}; {said[-600:]}")
+                code, output, took_s = ended(process, number, to_all)
+                problem = judge(folder, code, output) or ("" if took_s < LATE_S else f"{took_s:.1f} s")
+                slow_s, bad = max(slow_s, took_s), bad + bool(problem)
+                if problem:
+                    wrong.append(f"{verb}, {how} after {moment_s:.2f} s: {problem}; {output[-600:]}")
             cells.append(f"{moments - bad}/{moments}, {slow_s:.1f} s")
         print(f"| {verb} | {' | '.join(cells)} |", flush=True)
     return wrong
@@ -158,16 +158,16 @@ def test_an_ignored_signal_stays_ignored(folder: Path) -> None:
     os.killpg(process.pid, signal.SIGHUP)
     time.sleep(1.0)
     assert process.poll() is None
-    code, said, _ = ended(process, signal.SIGTERM, False)
-    assert (code, judge(folder, code, said)) == (0, "")
+    code, output, _ = ended(process, signal.SIGTERM, False)
+    assert (code, judge(folder, code, output)) == (0, "")
 
 
 def test_two_signals_are_one(folder: Path) -> None:
     process = recording(folder)
     os.killpg(process.pid, signal.SIGHUP)
     time.sleep(0.1)
-    code, said, _ = ended(process, signal.SIGINT, True)
-    assert judge(folder, code, said) == ""
+    code, output, _ = ended(process, signal.SIGINT, True)
+    assert judge(folder, code, output) == ""
 
 
 def test_a_signal_that_an_import_would_swallow_is_put_off(tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ def pair(words: int, *, error: int = 0, good: tuple[int, ...] = (), serials: tup
     rows = rounds(good) if good else rounds()[:0]
     changed = {"sensors_after": after, "frames": rows, "hello": hello(*RELEASE, fingers_present=0)}
     status = [message(wire.EmuStatus, words=count) for count in (2**32 - 1, words - 1)]
-    who = [info(finger, f"BTEMU{k}") for k, finger in enumerate(good)]
-    return dataclasses.replace(board(sensors=who, **changed), pair=PairFacts(*status, serials))
+    sensors = [info(finger, f"BTEMU{k}") for k, finger in enumerate(good)]
+    return dataclasses.replace(board(sensors=sensors, **changed), pair=PairFacts(*status, serials))
 
 
 ALL = tuple(range(5))
@@ -151,7 +151,7 @@ def test_a_scenario_that_ends_ends_the_evening(tmp_path: Path, monkeypatch, caps
     monkeypatch.setattr("biotac.cli.boards.doctor.PLAYED_PRESS_S", 1.0)
     words = ["doctor", "sim:press.toml?seconds=3", "--bringup", "--seconds", "1", "--report", str(tmp_path / "b.md")]
     assert main(words) in (0, 1)
-    said = capsys.readouterr().err
-    assert "restart 1" not in said and "bus_margin" not in said
-    steps = [said.index(text) for text in ("words at 1 MHz", "finger 0: ", "serial numbers", "faster rates")]
+    output = capsys.readouterr().err
+    assert "restart 1" not in output and "bus_margin" not in output
+    steps = [output.index(text) for text in ("words at 1 MHz", "finger 0: ", "serial numbers", "faster rates")]
     assert steps == sorted(steps)

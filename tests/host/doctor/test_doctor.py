@@ -416,8 +416,8 @@ def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:
 
 
 def test_a_serial_number_that_nobody_has_names_those_there(capsys, monkeypatch) -> None:
-    there = [usb_port(PORT, "E6605838831F5B2C")]
-    monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: there)
+    found = [usb_port(PORT, "E6605838831F5B2C")]
+    monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: found)
     assert main(["doctor", "serial:0", "--json"]) == 1
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
     assert finding["code"] == "port_failed"

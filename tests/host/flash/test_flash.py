@@ -125,7 +125,7 @@ def test_a_backup_is_never_written_over(fake: FakeBoard, tmp_path: Path) -> None
 
 
 def test_the_old_version_coming_back_is_no_success(fake: FakeBoard, tmp_path: Path) -> None:
-    fake.takes = False
+    fake.accepts = False
     message = fails(fake, tmp_path)
     assert "is PICO, firmware 0.1.0; expected PICO, firmware 0.2.0" in message
     assert str(backups(tmp_path)[0]) in message
@@ -319,13 +319,13 @@ def test_the_whole_command_over_a_drive(
     monkeypatch.setattr(loader_drive.os, "fsync", fsync)
     fake.settings[9] = 250
     assert main(["flash", str(image), "--json"]) == 0
-    heard = capsys.readouterr()
-    facts = json.loads(heard.out)
+    output = capsys.readouterr()
+    facts = json.loads(output.out)
     assert (facts["firmware_before"], facts["firmware"]) == ("0.1.0", "0.2.0")
     assert (facts["boot_id_before"], facts["boot_id"]) == (7, 8)
     assert facts["settings_restored"] == ["idle_period_ms"]
     assert Path(facts["backup"]).is_file()
-    assert "writing 20 blocks to the drive RPI-RP2" in heard.err
+    assert "writing 20 blocks to the drive RPI-RP2" in output.err
 
 
 def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, tmp_path, monkeypatch) -> None:

@@ -78,16 +78,16 @@ def test_an_image_that_a_board_would_not_take_whole_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("heard", "why"),
+    ("content", "why"),
     [
         (b"", "0 times which board"),
         (note() + note(), "2 times which board"),
         (note()[:12] + b"\x03" + note()[13:], "layout 3"),
     ],
 )
-def test_an_image_that_does_not_say_its_board_is_refused(tmp_path: Path, heard: bytes, why: str) -> None:
+def test_an_image_that_does_not_say_its_board_is_refused(tmp_path: Path, content: bytes, why: str) -> None:
     with pytest.raises(InputError, match=why):
-        read_image(make_image(tmp_path, heard))
+        read_image(make_image(tmp_path, content))
 
 
 def test_no_flipped_bit_is_overlooked(tmp_path: Path) -> None:

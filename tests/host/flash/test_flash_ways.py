@@ -63,7 +63,7 @@ def test_a_drive_gets_the_whole_file_with_the_boot_block_last(tmp_path: Path, mo
     synced: list[int] = []
     monkeypatch.setattr(loader_drive.os, "fsync", lambda fd: synced.append((drive / "BIOTAC.UF2").stat().st_size))
     shown: list[int] = []
-    DriveLoader().write(image, lambda done, of: shown.append(done))
+    DriveLoader().write(image, lambda done, total: shown.append(done))
     assert (drive / "BIOTAC.UF2").read_bytes() == b"".join(image.boot_last())
     assert synced == [19 * BLOCK_BYTES, 20 * BLOCK_BYTES]  # the boot block goes out after all others are
     assert shown[-1] == 20
@@ -83,10 +83,10 @@ def test_a_drive_that_vanishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(loader_drive.os, "fsync", fsync)
     image = read_image(make_image(tmp_path))
     if call == 2:
-        DriveLoader().write(image, lambda done, of: None)
+        DriveLoader().write(image, lambda done, total: None)
     else:
         with pytest.raises(FlashError, match=r"took 19 of 20 blocks .*the board stays in its loader"):
-            DriveLoader().write(image, lambda done, of: None)
+            DriveLoader().write(image, lambda done, total: None)
 
 
 # ---- picotool ----------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def test_picotool_loads_verifies_and_starts(picotool: Callable[[str], Path], tmp
     image = read_image(make_image(tmp_path))
     loader = PicotoolLoader()
     assert loader.ready()
-    loader.write(image, lambda done, of: None)
+    loader.write(image, lambda done, total: None)
     assert log.read_text().splitlines() == ["info", f"load -v -x {image.path}"]
 
 
@@ -123,7 +123,7 @@ def test_picotool_that_finds_no_board(picotool: Callable[[str], Path], tmp_path:
     assert not loader.ready()
     assert loader.cure() == "picotool says: No accessible RP-series devices in BOOTSEL mode were found."
     with pytest.raises(FlashError, match=r"did not load .*No accessible"):
-        loader.write(read_image(make_image(tmp_path)), lambda done, of: None)
+        loader.write(read_image(make_image(tmp_path)), lambda done, total: None)
 
 
 def test_without_picotool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,9 +148,9 @@ def fake(scripted_board, hello) -> FakeBoard:
 def test_a_board_is_found_again_by_its_serial_number(ports: dict[str, str], fake: FakeBoard) -> None:
     ports |= {"/dev/ttyACM0": "E66", "/dev/ttyACM1": "F00"}
     target = SerialTarget("/dev/ttyACM0")
-    assert target.there()
+    assert target.port_exists()
     del ports["/dev/ttyACM0"]
-    assert not target.there()
+    assert not target.port_exists()
     ports[fake.port] = "E66"
     target.reopen().close()
     assert target.port == fake.port

@@ -54,7 +54,7 @@ class Rom:
             got += os.read(self._master, count - len(got))
         return got
 
-    def _say(self, data: bytes) -> None:
+    def _send(self, data: bytes) -> None:
         os.write(self._master, data)
 
     def _run(self) -> None:
@@ -65,11 +65,11 @@ class Rom:
                 if self.firmware is not None and not self.firmware.in_loader:
                     synchronized = False
                     for message in deframer.feed(byte):
-                        self._say(self.firmware._answer(*message))
+                        self._send(self.firmware._answer(*message))
                     continue
                 if not synchronized:
                     synchronized = byte == b"\x7f"
-                    self._say(ACK if synchronized else b"")
+                    self._send(ACK if synchronized else b"")
                     continue
                 command = byte[0]
                 good = self._read(1)[0] == command ^ 0xFF
@@ -82,9 +82,9 @@ class Rom:
                     0x44: self._erase,
                 }
                 if not good or command not in do:
-                    self._say(NACK)
+                    self._send(NACK)
                     continue
-                self._say(ACK)
+                self._send(ACK)
                 do[command]()
         except OSError:
             return
@@ -92,21 +92,21 @@ class Rom:
     def _address(self) -> int:
         *data, checksum = self._read(5)
         assert data[0] ^ data[1] ^ data[2] ^ data[3] == checksum
-        self._say(ACK)
+        self._send(ACK)
         return int(struct.unpack(">I", bytes(data))[0]) - BOOT_AT
 
     def _get(self) -> None:
         commands = bytes([0x00, 0x02, 0x11, 0x21, 0x31, 0x44])
-        self._say(bytes([len(commands), 0x31]) + commands + ACK)
+        self._send(bytes([len(commands), 0x31]) + commands + ACK)
 
     def _get_id(self) -> None:
-        self._say(b"\x01" + struct.pack(">H", self.chip) + ACK)
+        self._send(b"\x01" + struct.pack(">H", self.chip) + ACK)
 
     def _read_memory(self) -> None:
         at = self._address()
         count, checksum = self._read(2)
         assert count ^ 0xFF == checksum
-        self._say(ACK + bytes(self.flash[at : at + count + 1]))
+        self._send(ACK + bytes(self.flash[at : at + count + 1]))
 
     def _go(self) -> None:
         self.events.append(("go", self._address()))
@@ -126,7 +126,7 @@ class Rom:
             self.flash[at + k] &= byte  # programming only clears bits
             self.flash[at + k] &= 0 if at + k == self.stuck_at else 255
         self.events.append(("write", at))
-        self._say(ACK)
+        self._send(ACK)
 
     def _erase(self) -> None:
         (count,) = struct.unpack(">H", self._read(2))
@@ -134,7 +134,7 @@ class Rom:
             self.flash[SECTORS[sector] : SECTORS[sector + 1]] = b"\xff" * (SECTORS[sector + 1] - SECTORS[sector])
             self.events.append(("erase", sector))
         self._read(1)
-        self._say(ACK)
+        self._send(ACK)
 
 
 @pytest.fixture(autouse=True)
@@ -176,13 +176,13 @@ def test_the_image_is_written_the_settings_stay_and_where_to_begin_comes_last(ro
     loader = Stm32Loader(rom.device)
     assert loader.ready()
     shown: list[tuple[int, int]] = []
-    loader.write(read_image(path), lambda done, of: shown.append((done, of)))
+    loader.write(read_image(path), lambda done, total: shown.append((done, total)))
     data = path.read_bytes()
     at = IMAGE_AT - BOOT_AT
     assert rom.flash[at : at + len(data)] == data
     assert rom.flash[:8] == data[:8]
     assert bytes(rom.flash[SECTORS[1] : SECTORS[3]]) == settings
-    assert [sector for what, sector in rom.events if what == "erase"] == [0, 3, 4]  # 16 and 64 KiB from 0xC000 on
+    assert [sector for kind, sector in rom.events if kind == "erase"] == [0, 3, 4]  # 16 and 64 KiB from 0xC000 on
     assert rom.events[-2:] == [("write", 0), ("go", 0)]
     assert shown[-1][0] == shown[-1][1] == -(-len(data) // 256)
 
@@ -192,7 +192,7 @@ def test_a_supply_that_fails_leaves_nothing_to_begin_with(rom: Rom, image) -> No
     loader = Stm32Loader(rom.device)
     assert loader.ready()
     with pytest.raises(FlashError, match="reset the board with BOOT0 high, and flash again"):
-        loader.write(read_image(image(70_000)), lambda done, of: None)
+        loader.write(read_image(image(70_000)), lambda done, total: None)
     assert rom.flash[:8] == b"\xff" * 8
 
 

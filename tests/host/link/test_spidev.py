@@ -11,7 +11,7 @@ import fake_smbus
 import fake_spidev
 import numpy as np
 import pytest
-from overheard import Overheard
+from capture import Capture
 
 import biotac
 from biotac.keep import eeprom
@@ -140,11 +140,11 @@ def test_a_host_that_does_not_read_loses_whole_frames(board: Board, monkeypatch)
     monkeypatch.setattr(in_process, "OUTBOX_BYTES", 8192)
     hand, bus = board("press.toml", 1)
     hand.stream()
-    standstill = Overheard(still=True)
+    standstill = Capture(still=True)
     hand._reader.add(standstill)
     bus.clock.run(SECONDS)
     bus.clock.wait()
-    standstill.go_on.set()
+    standstill.resume.set()
     dropped = hand.status().messages_dropped
     assert dropped > 0
     assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)

@@ -31,7 +31,7 @@ def fault(at_s: float, seconds: float = 1, finger: int = 0, kind: str = "stuck_l
 
 
 BAD: list[tuple[str, str, int, str, str]] = [
-    # (case, text, line, who, what)
+    # (case, text, line, label, part)
     ("unknown step key", first("press", 'at = "E1"\nforcen = 2'), 6, "step 1", "did you mean 'force_n'?"),
     ("key of another step", second("hold", "celsius = 30"), 11, "step 2", "'celsius' is unknown for hold"),
     ("unknown do", step('[[step]]\nseconds = 1\ndo = "pres"\n'), 10, "step 2", "did you mean 'press'?"),
@@ -101,13 +101,13 @@ BAD: list[tuple[str, str, int, str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("text", "line", "who", "what"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
-def test_a_mistake_names_its_line_and_key(text: str, line: int, who: str, what: str) -> None:
+@pytest.mark.parametrize(("text", "line", "label", "part"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
+def test_a_mistake_names_its_line_and_key(text: str, line: int, label: str, part: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse_scenario(text.encode(), file="try.toml")
     message = str(caught.value)
-    assert message.startswith(f"try.toml:{line}: " + (f"{who}: " if who else "")), message
-    assert what in message and "\n" not in message and "expected" in message
+    assert message.startswith(f"try.toml:{line}: " + (f"{label}: " if label else "")), message
+    assert part in message and "\n" not in message and "expected" in message
 
 
 def test_text_that_is_not_utf8_names_its_line() -> None:

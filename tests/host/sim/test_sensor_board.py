@@ -43,7 +43,7 @@ class FakeSensorBoard:
             self.parts += 1
             if self.parts == self.deaf_to:
                 return b""
-            self._take(wire.EmuTape.unpack(payload))
+            self._add(wire.EmuTape.unpack(payload))
         elif message_id == wire.EmuSetFault.ID:
             fault = wire.EmuSetFault.unpack(payload)
             if fault.finger > 4:
@@ -68,7 +68,7 @@ class FakeSensorBoard:
         facts = (0x1F, len(self.rows), min(room, 0xFFFF), self.served, 0, 0, 0, 0, 0, 0, self.kept, 0, 0, 0)
         return encode(wire.EmuStatus.ID, wire.EmuStatus(payload[0], *facts).pack())
 
-    def _take(self, part: wire.EmuTape) -> None:
+    def _add(self, part: wire.EmuTape) -> None:
         samples = np.frombuffer(bytes(part.samples), "<u2")[: part.slots * part.fingers]
         fits = part.slots <= self.room - (len(self.rows) - self.served)
         if part.first_slot == len(self.rows) and fits:

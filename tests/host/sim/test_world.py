@@ -72,7 +72,7 @@ def test_a_course_goes_through_a_round_in_equal_parts() -> None:
 
 def test_several_contacts_add_as_in_the_model() -> None:
     both = (Touch(2.0, at="E17"), Touch(1.0, at="E1"))
-    parts = [touch.states(one)[0] for one in both]
+    parts = [touch.states(touched)[0] for touched in both]
     finger = SimFinger(4)
     deformed = [part.deformation for part in parts]
     expected = finger.counts_of(deformed[0][0] + deformed[1][0], deformed[0][1] + deformed[1][1], np.zeros(1))[0]
@@ -109,16 +109,16 @@ def course(fingers: int, rounds: int) -> tuple[bytes, list[Any], list[int]]:
     """All bytes that a board of so many fingers sends in so many rounds, its events, and the seq of each step."""
     names = [f"f{k}" for k in range(fingers)]
     with world({name: SimFinger(k + 1) for k, name in enumerate(names)}, settings=LIN) as w:
-        taken = bytearray()
+        received = bytearray()
         tap = type("Tap", (), {"put": lambda *_: None, "wake": lambda *_: None, "is_full": lambda *_: False})()
-        tap.put_raw = taken.extend
+        tap.put_raw = received.extend
         w.hand._board.reader.add(tap)
         nows = [
             w.step(**{name: pressed(k + 7 * n) if k > 150 else None for n, name in enumerate(names)})
             for k in range(rounds)
         ]
     events = [(event.t_us, event.kind, event.finger) for now in nows for event in now.events]
-    return bytes(taken), events, [now.seq for now in nows]
+    return bytes(received), events, [now.seq for now in nows]
 
 
 @pytest.mark.parametrize(

@@ -89,8 +89,8 @@ def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
         return served[-1]
 
     yield serve
-    for one in served:
-        one.close()
+    for view in served:
+        view.close()
 
 
 @pytest.fixture

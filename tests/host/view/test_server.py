@@ -147,13 +147,13 @@ def test_requests_that_are_none_are_refused_and_forgotten(make_player, view_of, 
     answers: Counter[bytes] = Counter()
     for k in range(tries):
         token = draw.choice([b"guess", viewing.server.token.encode()])
-        with socket.create_connection(("127.0.0.1", viewing.server.server_port)) as one:
+        with socket.create_connection(("127.0.0.1", viewing.server.server_port)) as connection:
             with contextlib.suppress(OSError):  # refused before all of it was read
-                one.sendall(malformed(draw, host, token))
-                one.shutdown(socket.SHUT_WR)
+                connection.sendall(malformed(draw, host, token))
+                connection.shutdown(socket.SHUT_WR)
             got = b""
             with contextlib.suppress(OSError):
-                while len(got) < 1 << 20 and (part := one.recv(1 << 16)):
+                while len(got) < 1 << 20 and (part := connection.recv(1 << 16)):
                     got += part
         reported = re.match(rb"HTTP/\S+ (\d+)", got) or re.search(
             rb"Error code: (\d+)", got
@@ -179,8 +179,8 @@ def test_connections_that_drip_make_room(make_player, view_of) -> None:
         dripping[-1].sendall(b"GET / HTTP/1.1\r\nHost: ")
     assert ask(viewing, "GET", "/")[0] == 200
     assert len(viewing.server._asking) <= MAX_CONNECTIONS
-    for one in dripping:
-        one.close()
+    for connection in dripping:
+        connection.close()
 
 
 def test_pages_are_few(make_player, view_of) -> None:
@@ -213,7 +213,7 @@ def test_a_page_that_is_too_slow_misses_frames_and_is_told_how_many(make_player,
     slow, quick = state.cursor(), state.cursor()
     rounds, got = 0, 0
     for _ in range(3):
-        state.take(touch, player)
+        state.add(touch, player)
         rounds += len(touch.frames)
         got += min(len(touch.frames), KEPT_ROWS)
         state.wait(quick, 0)
@@ -242,7 +242,7 @@ def test_a_browser_that_reads_nothing_does_not_hold_the_reader(make_player, view
 def test_events_are_marks_in_their_fingers_time(make_player, touch) -> None:
     event = wire.Event(3, int(touch.t_us[-1]) % 2**32, 1, 5, wire.EventKind.SLIP, 2, 0, 0, 99, 255)
     state = State("sim:")
-    state.take(replace(touch, messages=[event]), make_player())
+    state.add(replace(touch, messages=[event]), make_player())
     health = json.loads(state.wait(state.cursor(), 1.0))["health"]
     assert health["events"] == [{"finger": 1, "t_us": int(touch.t_us[-1]), "name": "slip"}]
 
@@ -337,8 +337,8 @@ def test_a_browser_gets_every_file_and_all_fingers() -> None:
 
 
 def test_a_taken_port_is_told(make_player, view_of, capsys) -> None:
-    taken = view_of(lambda: make_player()).server.server_port
-    assert main(["view", "sim:press.toml", "--no-browser", "--port", str(taken)]) == 3
+    port = view_of(lambda: make_player()).server.server_port
+    assert main(["view", "sim:press.toml", "--no-browser", "--port", str(port)]) == 3
     assert "use --port 0 for any free port" in capsys.readouterr().err
 
 

@@ -24,7 +24,7 @@ from ...version import __version__
 from ...wire.identity import serial_text, setting_text
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
-from ..outputs import say
+from ..outputs import report
 from ..recordings.loading import is_named_as_recording
 
 EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
@@ -73,10 +73,10 @@ KINDS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    verbs = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
 
     def add(name: str, action: Callable[..., int], text: str, example: str) -> argparse.ArgumentParser:
-        return values.add_subverb(what, name, action, text, f"biotac calibration {name} {example}")
+        return values.add_subverb(verbs, name, action, text, f"biotac calibration {name} {example}")
 
     which = f"an EEPROM, for one calibration, is {EEPROM}1:0x50:24c32, for example"
     show = add("show", _show, "What a board, a recording, a file or an EEPROM holds.", "index.json")
@@ -94,12 +94,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     clear = add("clear", _clear, "Back to the board's settings.", "/dev/ttyACM0 --finger index --save")
     clear.add_argument("where", metavar="PORT")
-    for one in (get, put, clear):
-        values.add_finger(one, required=one is clear, text="name or chip select, of a board")
-    for one in (get, clear):
-        one.add_argument("--kind", choices=KINDS, help="which of the two, for a finger that has both")
-    for one in (put, clear):
-        values.add_save(one)
+    for subverb in (get, put, clear):
+        values.add_finger(subverb, required=subverb is clear, text="name or chip select, of a board")
+    for subverb in (get, clear):
+        subverb.add_argument("--kind", choices=KINDS, help="which of the two, for a finger that has both")
+    for subverb in (put, clear):
+        values.add_save(subverb)
 
 
 def _show(args: argparse.Namespace) -> int:
@@ -107,7 +107,7 @@ def _show(args: argparse.Namespace) -> int:
     if is_file or args.where.startswith(EEPROM):
         kind, content = _load(Path(args.where)) if is_file else (KINDS["calibration"], _in_eeprom(args.where))
         lines = [f"{args.where}: {kind.title(content)}", *kind.lines(content)]
-        say(args, kind.file.to_dict(content), "\n".join(lines))
+        report(args, kind.file.to_dict(content), "\n".join(lines))
         return 0
     facts: dict[int, dict[str, Any]] = {}
     lines = []
@@ -123,7 +123,7 @@ def _show(args: argparse.Namespace) -> int:
                     lines += [f"finger {finger}: {kind.name} {force}; {kind.title(content)}", *kind.lines(content)]
             if finger in hand.fingers and len(lines) == before:
                 lines.append(f"finger {finger}: none, the board's settings apply")
-    say(args, facts, "\n".join(lines))
+    report(args, facts, "\n".join(lines))
     return 0
 
 
@@ -145,7 +145,7 @@ def _get(args: argparse.Namespace) -> int:
         print(text, end="")
         return 0
     write_new(args.file, text, overwrite=args.force)
-    say(args, kind.file.to_dict(content), f"{args.file}: {kind.title(content)}")
+    report(args, kind.file.to_dict(content), f"{args.file}: {kind.title(content)}")
     return 0
 
 
@@ -156,7 +156,7 @@ def _put(args: argparse.Namespace) -> int:
             raise InputError(f"{args.file} is a {kind.name}, which no EEPROM holds; expected a calibration")
         with Chip(*parse_chip(args.where.removeprefix(EEPROM))) as chip:
             more = "stored" if eeprom.store(chip, content) else "which it held already"
-        say(args, kind.file.to_dict(content), f"{args.where}: {kind.title(content)}, {more}")
+        report(args, kind.file.to_dict(content), f"{args.where}: {kind.title(content)}, {more}")
         return 0
     _check_named(args)
     with biotac.open(args.where) as hand:
@@ -165,7 +165,7 @@ def _put(args: argparse.Namespace) -> int:
         if args.save:
             hand.board.save_settings()
     text = f"finger {args.finger}: {kind.name} in force, {values.how_long(args)}; {kind.title(content)}"
-    say(args, kind.file.to_dict(content), text)
+    report(args, kind.file.to_dict(content), text)
     return 0
 
 
@@ -175,7 +175,7 @@ def _clear(args: argparse.Namespace) -> int:
             kind.remove(hand.board, args.finger)
         if args.save:
             hand.board.save_settings()
-    say(args, {"finger": args.finger}, f"finger {args.finger}: the board's settings apply, {values.how_long(args)}")
+    report(args, {"finger": args.finger}, f"finger {args.finger}: the board's settings apply, {values.how_long(args)}")
     return 0
 
 

@@ -24,7 +24,7 @@ from ...sim.sensor_board import SensorBoard
 from ...version import __version__
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
-from ..outputs import say, step
+from ..outputs import report, step
 
 EXAMPLE = "biotac doctor --fingers 5"
 PLAYED, PLAYED_S = "press.toml", 60.0
@@ -80,8 +80,8 @@ def run(args: argparse.Namespace) -> int:
         bringup_report.write(Path(args.report or "bringup.md"), seen, facts, findings)
     elif args.report is not None:
         with whole(Path(args.report), overwrite=True) as file:
-            file.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
-    say(args, summary(facts, findings), as_text(facts, findings))
+            file.write_text(json.dumps(full_report(facts, findings), indent=1, default=plain))
+    report(args, summary(facts, findings), as_text(facts, findings))
     return 1 if findings or facts.board is None else 0
 
 
@@ -90,7 +90,7 @@ def udev_rule(args: argparse.Namespace) -> int:
     if installed:
         udev.install()
         text = f"wrote {udev.RULES}; now run sudo udevadm control --reload, and plug the board in again"
-    say(args, {"path": str(udev.RULES), "installed": installed, "rule": udev.rule()}, text)
+    report(args, {"path": str(udev.RULES), "installed": installed, "rule": udev.rule()}, text)
     return 0
 
 
@@ -109,7 +109,7 @@ def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
     return {"port": facts.port, "measured": measured(facts), "findings": found}
 
 
-def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
+def full_report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
     """The report to send in: the findings and the facts behind them, except the frames."""
     board = facts.board
     return {

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     target, loaders = find_board(EMULATED if args.emulated else port)
     with closing(target), Progress() as progress, options(args, progress) as given:
         outcome = flash(image, target, loaders, backup_path=args.backup, restore_from=kept, **given)
-    outputs.say(args, facts(image, outcome), summary(outcome))
+    outputs.report(args, facts(image, outcome), summary(outcome))
     return 0
 
 
@@ -68,19 +68,19 @@ def options(args: argparse.Namespace, progress: Progress) -> Iterator[dict[str, 
     with ExitStack() as writing:
         looks: list[Callable[[], None]] = []
 
-        def show(done: int, of: int) -> None:
-            progress.show(f"{done} of {of} blocks")
-            if done < of and not looks:
+        def show(done: int, total: int) -> None:
+            progress.show(f"{done} of {total} blocks")
+            if done < total and not looks:
                 looks.append(writing.enter_context(ending.held()))
             for look in looks:
                 look()
-            if done >= of:
+            if done >= total:
                 looks.clear()
                 writing.close()
 
         given = {"keep": not args.no_backup, "downgrade": args.downgrade, "take_link": args.take_link}
         try:
-            yield given | {"say": outputs.step, "show": show}
+            yield given | {"log": outputs.step, "show": show}
         except KeyboardInterrupt:
             again = "run it again: a board whose image is not whole waits in its loader"
             if not args.no_backup:

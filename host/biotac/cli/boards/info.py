@@ -18,7 +18,7 @@ from ...recording.summary import lines, summary
 from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_name, maps_text, serial_text, setting_text, version_text
 from .. import values
-from ..outputs import say
+from ..outputs import report
 from ..recordings.loading import code, is_recording, load
 
 NO_BUS = "no bus, rounds come as messages"
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         own += f", wrench map {made_text(made_s_of(maps[finger]))}" if finger in maps else ""
         named = f"{s['serial'] or 'of unknown serial number'}, software {s['software'] or 'unknown'}"
         lines.append(f"finger {finger}: BioTac {named}{own}")
-    say(args, facts, "\n".join([*lines, *(setting_text(setting, value) for setting, value in settings.items())]))
+    report(args, facts, "\n".join([*lines, *(setting_text(setting, value) for setting, value in settings.items())]))
     return 0
 
 
@@ -80,5 +80,5 @@ def of_recording(args: argparse.Namespace) -> int:
     """What is in a recording; stderr says what it lacks. Return 1 if it is damaged."""
     recording = load(Path(args.port))
     facts = summary(recording, recording.frames[["finger", "flags"]])
-    say(args, facts, "\n".join(map(printable, lines(facts))))
+    report(args, facts, "\n".join(map(printable, lines(facts))))
     return code(recording)

@@ -17,7 +17,7 @@ from ...link.discovery import is_board, serial_ports
 from ...sim.loading import bundled_scenario, bundled_scenarios
 from ...sim.scenario import parse_scenario
 from ...wire.identity import board_name, serial_text, version_text
-from ..outputs import say
+from ..outputs import report
 
 EXAMPLE = "biotac list"
 
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         lines.append("no board is shared on the network; `biotac share PORT --zenoh NAME` shares one")
     if not any(port["is_board"] for port in ports):
         lines.append("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
-    say(
+    report(
         args,
         {"ports": ports, "simulated": running, "scenarios": scenarios, "zenoh": remote},
         "\n".join([*lines, *(f"{port:24}{clause}" for port, clause in scenarios.items())]),

@@ -11,6 +11,6 @@ EXAMPLE = wrench.EXAMPLE
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    verbs = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     for module in (wrench, press, population):
-        module.add_arguments(values.add_subverb(what, module.NAME, module.run, module.HELP, module.EXAMPLE))
+        module.add_arguments(values.add_subverb(verbs, module.NAME, module.run, module.HELP, module.EXAMPLE))

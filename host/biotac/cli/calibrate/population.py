@@ -16,7 +16,7 @@ from ...map.columns import ELECTRODES
 from ...map.population import in_force
 from ...wire import messages_gen as wire
 from .. import values
-from ..outputs import say
+from ..outputs import report
 
 NAME = "population"
 HELP = "Force of an uncalibrated finger from a map of other fingers: the firmware's, or one made by biotac-lab."
@@ -56,5 +56,5 @@ def run(args: argparse.Namespace) -> int:
     facts = {"finger": args.finger, "made_of": trained.fingers, "sigma_n": trained.sigma_n.tolist(), "saved": args.save}
     sigma = "  ".join(f"{value:.2f}" for value in trained.sigma_n)
     text = f"finger {args.finger}: map of {trained.fingers}, in force, {values.how_long(args)}"
-    say(args, facts, f"{text}\n  one sigma along x, y, z: {sigma} N")
+    report(args, facts, f"{text}\n  one sigma along x, y, z: {sigma} N")
     return 0

@@ -73,11 +73,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--presses", metavar="N", type=int, help="on a scale (default 5; 20 are better), or of a plate (default 20)"
     )
-    for name, default, metavar, what in (
+    for name, default, metavar, meaning in (
         ("--masses", weights.MASSES_G, "G,G", "weights in grams"),
         ("--tilts", weights.TILTS_DEG, "DEG,DEG", "degrees of the block under the weights"),
     ):
-        text = f"{what} (default {','.join(f'{value:g}' for value in default)})"
+        text = f"{meaning} (default {','.join(f'{value:g}' for value in default)})"
         parser.add_argument(name, metavar=metavar, type=values.numbers, default=default, help=text)
     parser.add_argument("--population", metavar="FILE", type=Path, help="another map than the package's own")
     parser.add_argument(
@@ -245,7 +245,7 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
         if args.save:
             hand.board.save_settings()
-    outputs.say(args, facts, "\n".join(_map_lines(facts, way.name)))
+    outputs.report(args, facts, "\n".join(_map_lines(facts, way.name)))
     return int(facts["refused"])
 
 
@@ -292,15 +292,15 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
     else:
         calibrated, not_saved = _on_board(args, made_s)
     written = []
-    for one in calibrated if args.out is not None else ():
+    for fitted in calibrated if args.out is not None else ():
         outputs.make_folder(args.out)
-        path = args.out / f"{stem}finger{one.fit.finger}.json"
-        write_new(path, calibration_file.dumps(one.calibration, one.provenance), overwrite=args.force)
+        path = args.out / f"{stem}finger{fitted.fit.finger}.json"
+        write_new(path, calibration_file.dumps(fitted.calibration, fitted.provenance), overwrite=args.force)
         written.append(str(path))
     lines = [*pressure.lines(calibrated), *(f"  written: {path}" for path in written)]
     if not recorded and (not args.save or not_saved is not None):
         lines.append("in force until the next reboot (--save keeps it)")
-    outputs.say(args, {"fingers": pressure.facts(calibrated), "written": written}, "\n".join(lines))
+    outputs.report(args, {"fingers": pressure.facts(calibrated), "written": written}, "\n".join(lines))
     if not_saved is not None:
         raise not_saved  # only now: the presses are not lost for this
     return 0

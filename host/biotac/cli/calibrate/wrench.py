@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         if args.share is not None:
             with whole(args.share, overwrite=args.force) as target:
                 share(loaded.run, target, plate=args.plate, licence=args.licence)
-        outputs.say(args, facts, _text(facts))
+        outputs.report(args, facts, _text(facts))
     return 0
 
 
@@ -124,7 +124,7 @@ def _live(args: argparse.Namespace) -> int:
         beside = path.with_suffix(".csv")
         loaded = load(path, (beside, read_reference(str(beside))), finger=args.finger)
         facts = _calibrate(args, loaded, None if args.no_upload else hand)
-        outputs.say(args, facts | {"not_covered": missing}, _text(facts))
+        outputs.report(args, facts | {"not_covered": missing}, _text(facts))
     return 0
 
 

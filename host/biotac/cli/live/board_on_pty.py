@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import PortError
-from ..outputs import say
+from ..outputs import report
 
 if TYPE_CHECKING:
     from ...recording.replay.pty import ReplayPty
@@ -49,7 +49,7 @@ def announce(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, 
             os.symlink(board.path, link)
         except OSError as error:
             raise PortError(f"link {link} cannot be created ({error.strerror}); choose another path") from error
-    say(args, {"port": board.path, **facts}, f"{board.path} plays {plays}; Ctrl-C stops")
+    report(args, {"port": board.path, **facts}, f"{board.path} plays {plays}; Ctrl-C stops")
 
 
 def announce_end(plays: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...demo.run import run_demo
 from .. import values
-from ..outputs import say
+from ..outputs import report
 from ..progress import Progress
 
 EXAMPLE = "biotac demo press.toml --out my-demo"
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     facts, check = demo.facts, demo.facts["crosscheck"]
     own_n = np.linalg.norm(facts["calibration_rmse_n"] or [])
     made = f"; own map as by `biotac calibrate wrench --live`, off by {own_n:.2f} N held out" if own_n else ""
-    felt = [f"  {name:14} {one}" for name, one in demo.felt.items() if str(one)]
+    felt = [f"  {name:14} {force}" for name, force in demo.felt.items() if str(force)]
     skipped = f"{facts['rows_skipped']} incomplete row(s) of the recording skipped"
     lines = [
         f"{facts['source']}: {facts['frames']} frames, fingers: {facts['fingers']}, {facts['frames_lost']} lost, "
@@ -45,5 +45,5 @@ def run(args: argparse.Namespace) -> int:
         *felt,
         f"picture {facts['picture']}",
     ]
-    say(args, facts, "\n".join(lines))
+    report(args, facts, "\n".join(lines))
     return 0 if demo.good else 1

@@ -11,7 +11,7 @@ import biotac
 
 from ...recording.felt import Felt
 from .. import ending, values
-from ..outputs import note, say
+from ..outputs import note, report
 from ..progress import Progress
 from .stream import batches
 
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     held = f"{args.out}: {recorder.frames} frames, {recorder.frames_lost} lost, {stats.gaps} gap(s)"
     lines = [f"{held}; `biotac check {args.out}` verifies them", *(f"fault during the recording: {f}" for f in faults)]
     lines += [f"felt (mean ± RMS error) along what was applied: {felt}"] if str(felt) else []
-    say(args, facts, "\n".join(lines))
+    report(args, facts, "\n".join(lines))
     if args.seconds is not None and recorded_s < args.seconds:
         note(f"{recorded_s:.1f} s were recorded, {args.seconds:g} s asked for: it ended before")
         return 1

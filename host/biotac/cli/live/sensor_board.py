@@ -16,7 +16,7 @@ from ...sim.play import with_fault
 from ...sim.sensor_board import SensorBoard
 from ...wire import messages_gen as wire
 from ...wire.sensor_gen import SLOT_HZ, SLOTS
-from ..outputs import say
+from ..outputs import report
 
 LOOK_S = 0.5
 NO_FAULT = "none"  # ends the one that the board has
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace, length_s: float | None) -> int:
         for finger, kind in on_bus:
             board.fault(finger, BUS_FAULTS.get(kind, wire.EmuFault.NONE))
         status = board.keep() if args.keep else board.status() if args.source is None else play(board)
-    say(args, asdict(status), summary(status))
+    report(args, asdict(status), summary(status))
     return 0
 
 
@@ -102,8 +102,8 @@ def summary(status: wire.EmuStatus) -> str:
             f"the gateway's clock is {(status.elapsed_us / tape_us - 1) * 1e6:+.0f} ppm slow against this board's"
         )
     if status.rounds_moved:
-        what = "skipped" if status.rounds_moved > 0 else "repeated"
-        lines.append(f"{abs(status.rounds_moved)} rounds of 10 ms were {what} to keep the tape on its clock")
+        change = "skipped" if status.rounds_moved > 0 else "repeated"
+        lines.append(f"{abs(status.rounds_moved)} rounds of 10 ms were {change} to keep the tape on its clock")
     if status.loop_slots:
         now = "playing now" if status.looping else "played from the next power-up"
         lines.append(f"{status.loop_slots / SLOT_HZ:.2f} s stored in its flash, {now}")

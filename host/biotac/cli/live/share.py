@@ -11,8 +11,8 @@ import biotac
 
 from ...errors import InputError
 from .. import values
-from ..outputs import note, say
-from .stream import batches, tell_lost
+from ..outputs import note, report
+from .stream import batches, report_lost
 
 EXAMPLE = "biotac share /dev/ttyACM0 --zenoh left"
 LOOK_S = 0.5
@@ -56,7 +56,7 @@ def serve(args: argparse.Namespace) -> int:
         closing(Share(hand, session, name)),
     ):
         facts = {"port": f"zenoh:{name}", "board": hand.port, "fingers": hand.fingers}
-        say(args, facts, f"{hand.port} is shared as zenoh:{name}; Ctrl-C stops")
+        report(args, facts, f"{hand.port} is shared as zenoh:{name}; Ctrl-C stops")
         try:
             while True:
                 hand.check()  # the bridge reads and publishes on its own
@@ -74,11 +74,11 @@ def publish(args: argparse.Namespace) -> int:
         streams = [{"name": info.name(), "rate_hz": info.nominal_srate()} for info in outlet.infos]
         rates = [f"{s['rate_hz']:g} samples per second" if s["rate_hz"] else "irregular" for s in streams]
         lines = [f"{s['name']}, {rate}" for s, rate in zip(streams, rates, strict=True)]
-        say(args, {"streams": streams}, "\n".join([*lines, *(["Ctrl-C stops"] if args.seconds is None else [])]))
+        report(args, {"streams": streams}, "\n".join([*lines, *(["Ctrl-C stops"] if args.seconds is None else [])]))
         with suppress(KeyboardInterrupt):
             for batch, _ in batches(hand, args.seconds):
                 outlet.push(batch)
         if outlet.by_arrival:
             note(f"{outlet.by_arrival} sample(s) stamped by arrival time: board clock unknown")
-        tell_lost(hand)
+        report_lost(hand)
     return 0

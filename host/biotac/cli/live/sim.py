@@ -19,7 +19,7 @@ from ...sim.play import with_fault
 from ...sim.ports import start_board
 from ...sim.process import SimBoard
 from .. import values
-from ..outputs import say
+from ..outputs import report
 from ..recordings.loading import load
 from . import sensor_board
 from .board_on_pty import announce, announce_end, until_ctrl_c
@@ -71,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the PORT once the board is ready; run for --seconds or until Ctrl-C. Or play on a sensor board."""
     if args.new is not None:
         write_new(args.new, bundled_scenario("verbs.toml").decode(), overwrite=args.force)
-        say(args, {"scenario": str(args.new)}, f"{args.new}: change it, and play it with `biotac view sim:{args.new}`")
+        text = f"{args.new}: change it, and play it with `biotac view sim:{args.new}`"
+        report(args, {"scenario": str(args.new)}, text)
         return 0
     seconds = args.seconds or (SCENARIO_S if (args.source or "").endswith(".toml") else None)
     if args.sensor_port is not None:
@@ -102,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         facts = {"source": source.name, "fingers": source.samples.shape[1]}
         announce(board, args, source.name, facts)
         while not board.over:
-            board.hear(LOOK_S)  # a signal just before an endless wait would not end that
+            board.receive(LOOK_S)  # a signal just before an endless wait would not end that
         if args.seconds is None:
             announce_end(source.name)
             while True:

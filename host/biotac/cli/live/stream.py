@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
             note(warning.text)
         hand.stream("results", *(["events"] if args.events else []), rest=not args.touched)
         show(hand, rate=args.rate, seconds=args.seconds, events=args.events, as_json=args.json)
-        tell_lost(hand)
+        report_lost(hand)
     return 0
 
 
@@ -61,7 +61,7 @@ def batches(hand: biotac.Hand, seconds: float | None) -> Iterator[tuple[biotac.B
             break
 
 
-def tell_lost(hand: biotac.Hand) -> None:
+def report_lost(hand: biotac.Hand) -> None:
     """Say on stderr how many frames were lost, if any."""
     if hand.stats.frames_lost:
         note(f"{hand.stats.frames_lost} frame(s) lost; close other programs, or use a faster computer")

@@ -10,7 +10,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...link.discovery import choose
 from ...view import DEFAULT_PORT
-from ..outputs import say
+from ..outputs import report
 
 EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
     viewing = Viewing(source, port=args.port, folder=args.folder, again=not args.once)
     with contextlib.closing(viewing):
-        say(args, {"url": viewing.url, "source": source}, f"{viewing.url} shows {source}; Ctrl-C stops")
+        report(args, {"url": viewing.url, "source": source}, f"{viewing.url} shows {source}; Ctrl-C stops")
         if not args.no_browser:
             webbrowser.open(viewing.url)
         with contextlib.suppress(KeyboardInterrupt):  # the usual way to stop it

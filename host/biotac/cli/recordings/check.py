@@ -10,7 +10,7 @@ from typing import Any
 from ...calibrate.wrench.share import check_shared
 from ...errors import printable
 from ...recording.crosscheck import CrossCheck
-from ..outputs import note, say
+from ..outputs import note, report
 from .loading import load
 
 EXAMPLE = "biotac check grasp.mcap"
@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recording.suffix.lower() == ".npz":
         about = check_shared(args.recording)
         origin = ", ".join(f"{name} {about[name]}" for name in ("sensor", "plate", "licence"))
-        say(args, about, printable(f"{args.recording}: {about['rows']} rows, good; {origin}"))
+        report(args, about, printable(f"{args.recording}: {about['rows']} rows, good; {origin}"))
         return 0
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck()
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         "problems": recording.problems,
         "crosscheck": outcome.as_dict(),
     }
-    say(args, facts, "\n".join(lines))
+    report(args, facts, "\n".join(lines))
     return 0 if good else 1
 
 

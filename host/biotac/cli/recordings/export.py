@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record, or SynTouch's .btd(.gz)"
     )
-    formats = "; ".join(f"{suffix} {kind.what}" for suffix, kind in FORMATS.items())
+    formats = "; ".join(f"{suffix} {kind.meaning}" for suffix, kind in FORMATS.items())
     # Without --lake the last word is OUT. It is here for argparse's help; run() takes it from the recordings.
     parser.add_argument(
         "out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}; .mcap of a .btd, or recomputed"
@@ -115,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
     names = [str(path) for path in written]
-    outputs.say(args, {"written": names} | made, printable(f"{text} to {', '.join(names)}"))
+    outputs.report(args, {"written": names} | made, printable(f"{text} to {', '.join(names)}"))
     return 0 if imports else code(recording)
 
 
@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
 def _recording_at(out: Path, source: Path, force: bool, written: list[Path]) -> Iterator[Path]:
     """Where to write a recording that becomes ``out``, or is exported there; ``written`` gets the files' paths."""
     if out.suffix.lower() == RECORDING:
-        with whole(out, overwrite=force, made_of=[source]) as target:
+        with whole(out, overwrite=force, sources=[source]) as target:
             yield target
         written.append(out)
         return
@@ -150,7 +150,7 @@ def import_btd(path: Path, out: Path) -> dict[str, Any]:
 def frames_of(given: list[str], names: Mapping[str, int]) -> dict[int, str]:
     """Coordinate frames by finger from FINGER=ID. Raises InputError for a finger that is unknown."""
     try:
-        parts = [one.partition("=") for one in given]
+        parts = [text.partition("=") for text in given]
         return {finger_of(int(finger) if finger.isdecimal() else finger, names): name for finger, _, name in parts}
     except KeyError as error:
         raise InputError(f"--frame: {error.args[0]}") from error

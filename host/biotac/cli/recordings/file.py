@@ -10,7 +10,7 @@ from ...partial_file import whole
 from ...recording.rewrite import cut
 from ...recording.summary import label_line, labels
 from .. import values
-from ..outputs import say
+from ..outputs import report
 from .loading import code, load
 
 EXAMPLE = "biotac file label grasp.mcap slip --at 12.5 --fact trial=3"
@@ -47,10 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_cut(args: argparse.Namespace) -> int:
     recording = load(args.recording)
-    with whole(args.out, overwrite=args.force, made_of=[args.recording]) as path:
+    with whole(args.out, overwrite=args.force, sources=[args.recording]) as path:
         begin_s, end_s = cut(recording, path, args.from_s, args.to_s)
     facts = {"written": str(args.out), "begin_s": begin_s, "end_s": end_s}
-    say(args, facts, printable(f"{begin_s:.2f} to {end_s:.2f} s of {args.recording} to {args.out}"))
+    report(args, facts, printable(f"{begin_s:.2f} to {end_s:.2f} s of {args.recording} to {args.out}"))
     return code(recording) if args.what == "cut" else 0
 
 
@@ -59,7 +59,7 @@ def run_label(args: argparse.Namespace) -> int:
     finger = int(args.finger) if (args.finger or "").isdecimal() else args.finger
     if args.text is None:
         facts = labels(recording)
-        say(args, facts, "\n".join(printable(label_line(fact)) for fact in facts) or f"{args.recording}: no labels")
+        report(args, facts, "\n".join(printable(label_line(fact)) for fact in facts) or f"{args.recording}: no labels")
         return 0
     if not args.text and not args.fact and not args.remove:
         raise InputError("a label without a word: expected TEXT or --fact NAME=VALUE")
@@ -71,5 +71,5 @@ def run_label(args: argparse.Namespace) -> int:
         except KeyError as error:
             raise InputError(str(error.args[0])) from None
     made = len(recording.labels)
-    say(args, {"labels": made}, printable(f"{args.recording}: {made} label(s); `biotac info` lists them"))
+    report(args, {"labels": made}, printable(f"{args.recording}: {made} label(s); `biotac info` lists them"))
     return 0

@@ -14,7 +14,7 @@ from typing import Any
 
 from ...errors import BiotacError, InputError, imported, printable
 from .. import values
-from ..outputs import note, say
+from ..outputs import note, report
 from ..progress import Progress
 from .check import largest_text
 
@@ -47,7 +47,7 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
     """Return 0 if all are in the lake, 2 if some are not: those are named, the others are in."""
     put = room("writing").put
     new: dict[str, int] = {}  # rows by recording
-    there: set[str] = set()
+    listed: set[str] = set()
     failed: list[str] = []
     with room("folder").writing(args.lake) as lake:
         todo, force = [str(path.absolute()) for path in dict.fromkeys(sources)], args.force
@@ -58,19 +58,19 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
                     lake.add(written.recording, written.sums)
                     new[written.recording] = written.rows
                 elif written.path in lake.sums:
-                    there.add(written.recording)
+                    listed.add(written.recording)
                 else:
                     again.append(source)  # a killed export wrote it, but did not list it
             todo, force = again, True
     facts = {
         "lake": str(args.lake),
         "exported": len(new),
-        "already_there": len(there - set(new)),
+        "already_there": len(listed - set(new)),
         "failed": failed,
         "rows": sum(new.values()),
     }
     text = f"{facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already there"
-    say(args, facts, f"{printable(str(args.lake))}: {text}, {len(failed)} failed")
+    report(args, facts, f"{printable(str(args.lake))}: {text}, {len(failed)} failed")
     return InputError.exit_code if failed else 0
 
 
@@ -100,7 +100,7 @@ def run_check(args: argparse.Namespace) -> int:
     verdict = "good" if good else f"{len(wrong) + len(failed)} problem(s)" if done else "empty"
     text = f"{printable(str(args.folder))}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; "
     lines = [*map(printable, wrong), text + largest_text(SimpleNamespace(**largest))]
-    say(args, facts, "\n".join(lines))
+    report(args, facts, "\n".join(lines))
     return 0 if good else 1
 
 

@@ -8,18 +8,18 @@ from typing import Any
 from biotac.wire.batches import Batch
 
 
-class Overheard:
+class Capture:
     """A tap (Hand.tap) that keeps the bytes and the messages, and stands still on demand, and the reader with it."""
 
     def __init__(self, *, still: bool = False) -> None:
         self.sent = bytearray()
         self.messages: list[Any] = []
-        self.go_on = threading.Event()
+        self.resume = threading.Event()
         if not still:
-            self.go_on.set()
+            self.resume.set()
 
     def put_raw(self, chunk: bytes) -> None:
-        self.go_on.wait()
+        self.resume.wait()
         self.sent += chunk
 
     def put(self, batch: Batch) -> None:
