@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 
 
-def of_topic(path: Path, topic: str) -> list[tuple[int, int, Any]]:
+def messages_of(path: Path, topic: str) -> list[tuple[int, int, Any]]:
     """(log time, seq, message) of each."""
     found = []
     with path.open("rb") as stream:

@@ -179,9 +179,9 @@ def _trained(content: dict[str, Any]) -> Trained:
         raise ValueError(f"its blocks are {content['blocks']}")
     rows = np.array(content["coefficients_n_and_variance"], dtype=np.float64)
     sigmas = [np.array(content[key], dtype=np.float64) for key in ("sigma_n", "sigma_scale5_n")]
-    if rows.shape != (COLUMNS, len(AXES) + 1) or any(one.shape != (len(AXES),) for one in sigmas):
+    if rows.shape != (COLUMNS, len(AXES) + 1) or any(sigma.shape != (len(AXES),) for sigma in sigmas):
         raise ValueError(f"its coefficients have shape {rows.shape}")
-    if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
+    if not all(np.isfinite(values).all() for values in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
         raise ValueError("a coefficient is not finite, or a variance is not above 0")
     (normal_mn, shear_mn), (normal_q8, shear_q8) = content["margin"]
     margin = Margin((int(normal_mn), int(shear_mn)), (int(normal_q8), int(shear_q8)))

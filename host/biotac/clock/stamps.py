@@ -42,7 +42,7 @@ class Stamps:
     def __init__(self, board: Board, now_s: Callable[[], float]) -> None:
         self._board = board
         self._now_s = now_s
-        self._asked_of_s = -math.inf
+        self._latest_now_s = -math.inf
         self._last_s: dict[Hashable, float] = {}  # by stream
         self.by_arrival = 0
         board.sync()
@@ -70,9 +70,9 @@ class Stamps:
         # The two clocks may step against each other at any time, so the offset is measured anew.
         before_s = time.monotonic()
         now_s = self._now_s()
-        if now_s < self._asked_of_s:
+        if now_s < self._latest_now_s:
             self._last_s.clear()  # the clock was set back
-        self._asked_of_s = now_s
+        self._latest_now_s = now_s
         offset_s = now_s - (before_s + time.monotonic()) / 2
         stamps_s: NDArray[np.float64] = self._board.clock.host_time_s(t_us) + offset_s
         if np.isfinite(stamps_s).all():

@@ -31,7 +31,7 @@ MAPPED_RESULT_DTYPE = np.dtype([*RESULT_DTYPE.descr, ("torsion_nmm", "<f8")])
 _COUNT = np.dtype(np.uint16)
 _TARE = np.dtype(np.float64)
 _ELECTRODES = len(sensor.ELECTRODE_NAMES)
-_ONE = (_ELECTRODES,)
+_FRAME_SHAPE = (_ELECTRODES,)
 _ALL_GOOD = -1
 _Q = wire.QuantityFlags
 _RESULTS = _Q.POC | _Q.FORCE | _Q.TORQUE
@@ -41,7 +41,7 @@ _QUANTITY |= dict.fromkeys(_NUMBERS, _Q.POC | _Q.FORCE)
 # Looked up once: a call with one frame takes less time than a few of these would.
 _buffer = ffi.from_buffer
 _compute = lib.bt_compute
-_compute_one = lib.bt_compute_frame
+_compute_frame = lib.bt_compute_frame
 
 
 def compute(
@@ -89,7 +89,7 @@ def compute(
     if tare is None:
         counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
     if settings is None and wrench_map is None:
-        refuse_results_of_others(given)
+        refuse_foreign_results(given)
     if wrench_map is not None:
         from ..map.float64 import by_map  # here: everybody would wait for it at `import biotac`
 
@@ -110,13 +110,13 @@ def compute(
     # The fast path for one frame with the types of a live frame: there the checks would take longer than the maths.
     # Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
-        one = counts.dtype is _COUNT and tare.dtype is _TARE and counts.shape == _ONE == tare.shape
+        is_frame = counts.dtype is _COUNT and tare.dtype is _TARE and counts.shape == _FRAME_SHAPE == tare.shape
     except AttributeError:
-        one = False
-    if one and (out is None or (out.dtype is RESULT_DTYPE and out.shape == () and out.flags.carray)):
+        is_frame = False
+    if is_frame and (out is None or (out.dtype is RESULT_DTYPE and out.shape == () and out.flags.carray)):
         if out is None:
             out = np.empty((), RESULT_DTYPE)
-        if not _compute_one(formulas, counts.tobytes(), tare.tobytes(), _buffer(out)):
+        if not _compute_frame(formulas, counts.tobytes(), tare.tobytes(), _buffer(out)):
             raise ValueError(_explain(0, counts, tare))
         return out
 
@@ -151,7 +151,7 @@ def _of_rows(rows: Any, pdc_above_rest: Any) -> tuple[NDArray[np.uint16], NDArra
 _UNLIKE = {"poc_mm": 0.02, "force_n": 0.01, "torque_nmm": 0.2}
 
 
-def refuse_results_of_others(counts: Any) -> None:
+def refuse_foreign_results(counts: Any) -> None:
     """Raise ValueError if ``counts``, rows or their field, come with results that the default settings do not give."""
     rows = counts if getattr(counts, "dtype", _COUNT).names else _rows_of_field(counts)
     if rows is None or not {"counts", "tare", "flags", "electrodes_out", *_UNLIKE} <= set(rows.dtype.names or ()):
@@ -166,9 +166,9 @@ def refuse_results_of_others(counts: Any) -> None:
         off = np.nan_to_num(np.abs(seen - ours) - within - 0.01 * np.abs(ours))
         if (off > 0).any():
             at, axis = np.unravel_index(off.argmax(), off.shape)
-            what = f"{name} {'xyz'[axis]} is {seen[at, axis]:.2f} in row seq {rows['seq'][at]} of finger"
+            found = f"{name} {'xyz'[axis]} is {seen[at, axis]:.2f} in row seq {rows['seq'][at]} of finger"
             raise ValueError(
-                f"{what} {rows['finger'][at]}, but default settings give {ours[at, axis]:.2f}: the board had others. "
+                f"{found} {rows['finger'][at]}, but default settings give {ours[at, axis]:.2f}: the board had others. "
                 "Give settings=hand.board.settings() or Recording.settings (finger_settings of a calibrated finger; "
                 "wrench_map, if it has one), or settings={} if you mean the defaults"
             )
@@ -193,10 +193,10 @@ def per_frame(
     what has to last. This saves half of the time that compute() takes for one frame. Raises ValueError as compute().
     """
     formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
-    base = _checked_tare(tare, _ONE)
+    base = _checked_tare(tare, _FRAME_SHAPE)
     out = np.empty((), RESULT_DTYPE)
-    compute(np.zeros(_ONE, _COUNT), base, settings, out)  # raises for a tare that is out of range
-    base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), _compute_one, _COUNT, _ONE
+    compute(np.zeros(_FRAME_SHAPE, _COUNT), base, settings, out)  # raises for a tare that is out of range
+    base_bytes, result, compute_frame, dtype, shape = base.tobytes(), _buffer(out), _compute_frame, _COUNT, _FRAME_SHAPE
 
     def results(counts: NDArray[np.uint16]) -> StructArray:
         if getattr(counts, "dtype", None) is not dtype or counts.shape != shape:
@@ -204,7 +204,7 @@ def per_frame(
                 f"{counts.dtype} of shape {counts.shape}" if isinstance(counts, np.ndarray) else type(counts).__name__
             )
             raise ValueError(f"counts are {seen}, expected uint16 of shape (19,)")
-        if not one_frame(formulas, counts.tobytes(), base_bytes, result):
+        if not compute_frame(formulas, counts.tobytes(), base_bytes, result):
             raise ValueError(_explain(0, counts, base))
         return out
 
@@ -245,7 +245,7 @@ def _checked_counts(counts: Any) -> NDArray[np.uint16]:
             raise ValueError(f"counts are {raw.dtype}, expected integers, preferably uint16")
         bad = np.argwhere(~_countlike(raw))
         if len(bad):
-            raise ValueError(_explain(int(bad[0, 0]) if raw.ndim == 2 else 0, raw, np.zeros(_ONE)))
+            raise ValueError(_explain(int(bad[0, 0]) if raw.ndim == 2 else 0, raw, np.zeros(_FRAME_SHAPE)))
         raw = raw.astype(_COUNT)
     return raw if raw.strides[-1] == _COUNT.itemsize else np.ascontiguousarray(raw)
 
@@ -253,7 +253,7 @@ def _checked_counts(counts: Any) -> NDArray[np.uint16]:
 def _checked_tare(tare: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """float64 (19,) or ``shape`` with adjacent columns. The range is checked in C."""
     base = np.asarray(tare)
-    if base.shape not in (_ONE, shape):
+    if base.shape not in (_FRAME_SHAPE, shape):
         raise ValueError(f"the tare has shape {base.shape}, expected (19,) or {shape}, like the counts")
     if base.dtype.kind not in "iuf":
         raise ValueError(f"the tare is {base.dtype}, expected numbers, preferably float64")

@@ -23,7 +23,7 @@ from ..wire.frames import StructArray, age_ms, frames_from_wire, tare_to_q4
 from ..wire.identity import is_foreign
 from ..wire.native import ffi, lib
 from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
-from .compute import refuse_results_of_others
+from .compute import refuse_foreign_results
 
 ROUND_US = 10_000
 #: An EVENT message's fields (protocol/MESSAGES.md), as the board sends them.
@@ -135,7 +135,7 @@ class Finger:
         self, counts: Any, pdc: Any, tac: Any, tdc: Any, pac: Any, t_us: Any
     ) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
         if self._by_default:
-            refuse_results_of_others(counts)
+            refuse_foreign_results(counts)
         electrodes = checked_words("counts", counts, None, _ELECTRODES)
         n = len(electrodes)
         words = np.full((n, slots.SLOTS_PER_FRAME), wire.INVALID_COUNT, np.uint16)

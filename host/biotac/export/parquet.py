@@ -56,9 +56,8 @@ def write_labelled(
     if made[0].finger is not None:
         fingers = np.array([table.finger for table in made], np.uint8)
         fields = [pa.field("finger", pa.uint8(), metadata={"unit": "1", "what": "chip select index"})]
-    fields += [
-        pa.field(label.name, pa.dictionary(pa.int8(), pa.string()), metadata={"what": label.what}) for label in labels
-    ]
+    kind = pa.dictionary(pa.int8(), pa.string())
+    fields += [pa.field(label.name, kind, metadata={"what": label.what}) for label in labels]
     for name, column, values in made[0].flat():
         about = {"unit": column.unit, "what": column.what}
         fields.append(pa.field(name, pa.from_numpy_dtype(values.dtype), metadata=about))

@@ -74,10 +74,10 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
         log = topic("log", log_kind) if logged else lambda stamp_ns, message: None
         for stamp_ns, level, text in logged:
             if ros1:
-                said: Any = (_header(store.types, stamp_ns, ""), LEVELS_1[level], "biotac", text, "", "", 0, [])
+                entry: Any = (_header(store.types, stamp_ns, ""), LEVELS_1[level], "biotac", text, "", "", 0, [])
             else:
-                said = (_time(store.types, stamp_ns), level, "biotac", text, "", "", 0)
-            log(stamp_ns, store.types[log_kind](*said))
+                entry = (_time(store.types, stamp_ns), level, "biotac", text, "", "", 0)
+            log(stamp_ns, store.types[log_kind](*entry))
 
 
 def _copy(source: Path, bag: Any, ros1: bool) -> None:

@@ -62,7 +62,7 @@ def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
         middle = (surface.ELECTRODE_MM[group] * weight[:, None]).sum(axis=0) / weight.sum()
         order = group[np.argsort(-weight)]
         found.append(Contact(surface.project(middle[None])[0], part_share / sum(part), tuple(order.tolist())))
-    return sorted(found, key=lambda one: -one.share)
+    return sorted(found, key=lambda contact: -contact.share)
 
 
 def _climb(force: Floats, pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:

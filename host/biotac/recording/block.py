@@ -121,8 +121,8 @@ class Rest:
 
     def without(self, fingers: Collection[int]) -> Rest:
         """A copy without the rows of ``fingers``."""
-        gone = np.isin(self.order & 0xFF, list(fingers)) & (self.order != OTHER)
-        return Rest(**{**vars(self), "order": self.order[~gone]})
+        excluded = np.isin(self.order & 0xFF, list(fingers)) & (self.order != OTHER)
+        return Rest(**{**vars(self), "order": self.order[~excluded]})
 
 
 def encode_block(

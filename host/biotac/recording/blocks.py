@@ -72,7 +72,7 @@ class Blocks:
         number = 0
         for record in self.scan:
             if isinstance(record, Metadata):
-                self._take_metadata(record)
+                self._add_metadata(record)
                 continue
             topic, message = record
             if message.sequence != number:
@@ -112,7 +112,7 @@ class Blocks:
             return finger.isdecimal() and (self._fingers is None or int(finger) in self._fingers)
         return topic == layout.REST
 
-    def _take_metadata(self, record: Metadata) -> None:
+    def _add_metadata(self, record: Metadata) -> None:
         try:
             facts = layout.verified(record.metadata)
         except ValueError:

@@ -156,8 +156,8 @@ class CrossCheck:
         marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
         wrong = (flagged != marked) & ~not_asked(messages, messages["poc_um"])
         self._find_all(messages, wrong, "the POC_INVALID flag contradicts the PoC")
-        for row, what in self.pressure.add(messages, settings):
-            self._find(messages, row, what)
+        for row, finding in self.pressure.add(messages, settings):
+            self._find(messages, row, finding)
         self.frames += len(messages)
 
     def _judge_model(self, messages: StructArray) -> None:
@@ -168,15 +168,15 @@ class CrossCheck:
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
         self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
 
-    def _find_all(self, messages: StructArray, wrong: NDArray[np.bool_], what: str) -> None:
+    def _find_all(self, messages: StructArray, wrong: NDArray[np.bool_], finding: str) -> None:
         for k in np.flatnonzero(wrong):
-            self._find(messages, int(k), what)
+            self._find(messages, int(k), finding)
 
-    def _find(self, messages: StructArray, k: int, what: str) -> None:
+    def _find(self, messages: StructArray, k: int, finding: str) -> None:
         self.violations += 1
         if len(self.findings) < FINDINGS:
             frame = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
-            self.findings.append(f"{frame}: {what}")
+            self.findings.append(f"{frame}: {finding}")
 
     def _judge(self, messages: StructArray, quantity: Quantity, error: NDArray[np.float64]) -> None:
         name, unit, sent, _, truth, bound = quantity

@@ -47,8 +47,8 @@ class Label:
         try:
             " ".join([self.text, *(f"{name}={value}" for name, value in self.facts.items())]).encode()
         except UnicodeEncodeError as error:
-            what = f"the label {self.text!r} with the facts {dict(self.facts)!r} is"
-            raise InputError(f"{what} not UTF-8 ({error.reason}); write it so") from None
+            subject = f"the label {self.text!r} with the facts {dict(self.facts)!r} is"
+            raise InputError(f"{subject} not UTF-8 ({error.reason}); write it so") from None
         object.__setattr__(self, "text", printable(self.text))
 
     def line(self) -> str:
@@ -63,13 +63,13 @@ def beside(recording: Path) -> Path:
 
 def append(recording: Path, begin_ns: int, label: Label, *, removed: bool = False) -> None:
     """Add a line for the recording that began at ``begin_ns``. Raises InputError where it cannot be written."""
-    gone = {"removed": True} if removed else {}
+    removal = {"removed": True} if removed else {}
     try:
         with beside(recording).open("a+b") as file:
             end = file.seek(0, 2)
             file.seek(max(0, end - 1))
             torn = file.read() not in (b"", b"\n")  # a kill in the middle of a line
-            line = json.dumps({"recording": begin_ns} | gone | asdict(label)).encode()
+            line = json.dumps({"recording": begin_ns} | removal | asdict(label)).encode()
             file.write(b"\n" * torn + line + b"\n")
     except OSError as error:
         raise InputError(f"{beside(recording)} cannot be written ({error.strerror})") from error

@@ -20,7 +20,7 @@ from ..link.base import AppliedN
 from ..version import __version__
 from ..wire.batches import StreamDecoder, join
 from ..wire.counters import nearest
-from ..wire.decoder import ONE_STEP_BYTES
+from ..wire.decoder import STEP_BYTES
 from ..wire.native import BUILT
 from . import layout
 from .block import Rest, encode_block, schema
@@ -91,8 +91,8 @@ class RecordingFile:
         self._last_ns = all_here_ns
         losses, before = len(decoder.lost_after), decoder.counts
         batches, ids, others = [], b"", b""
-        for at in range(0, len(data), ONE_STEP_BYTES):
-            batches.append(decoder.feed(data[at : at + ONE_STEP_BYTES]))
+        for at in range(0, len(data), STEP_BYTES):
+            batches.append(decoder.feed(data[at : at + STEP_BYTES]))
             step_ids, step_others = decoder.completed()
             ids, others = ids + step_ids, others + step_others
         damaged = Counter(rejected or {}) + Counter(vars(decoder.counts)) - Counter(vars(before))

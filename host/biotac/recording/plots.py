@@ -86,7 +86,7 @@ class Plots:
             return
         if end_us is not None and all_here_ns is not None:
             self._stamps.arrived(end_us, all_here_ns)
-        messages = [*_aside(chain(self._of_rows(batch), _logs(batch, decoder)))]
+        messages = [*_aside(chain(self._row_messages(batch), _logs(batch, decoder)))]
         messages.sort(key=lambda message: message.t_us)
         stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
         for message, stamp_ns in _aside(zip(messages, np.maximum(stamps, 0).tolist(), strict=True)):
@@ -107,13 +107,13 @@ class Plots:
         text = plot_ros.log(name, label.line(), stamp_ns)
         self._writer.add_message(self._channel("log", "/biotac/log"), stamp_ns, text, stamp_ns, 0)
 
-    def _of_rows(self, batch: Batch) -> Iterator[_Message]:
+    def _row_messages(self, batch: Batch) -> Iterator[_Message]:
         frames = batch.frames
         rows = frames[self._thinned("force", frames)]
         yield from _arrays("force", rows, np.column_stack([rows["force_n"], rows["pressure_force_n"]]))
         yield from _arrays("torque", rows, np.column_stack([rows["torque_nmm"], rows["torsion_nmm"]]) / 1000)
         for row in rows:
-            yield _Message("flags", *_whose(row), plot_ros.flags(int(row["flags"])))
+            yield _Message("flags", *_origin(row), plot_ros.flags(int(row["flags"])))
         chosen = self._thinned("counts", frames)
         rows = frames[chosen]
         counts = np.column_stack([rows["counts"], rows["pdc"], rows["tac"], rows["tdc"]])
@@ -124,7 +124,7 @@ class Plots:
         for row in frames[self._thinned("contact", frames)]:
             if not np.isnan(row["poc_mm"]).any():
                 pose = partial(plot_ros.contact, int(row["finger"]), row["poc_mm"] / 1000, row["force_n"])
-                yield _Message("contact", *_whose(row), pose)
+                yield _Message("contact", *_origin(row), pose)
 
     def _thinned(self, topic: str, rows: StructArray) -> list[int]:
         """Indices of the rows to show: each finger's first row in every period of device time."""
@@ -154,13 +154,13 @@ def _aside(items: Iterable[_Item]) -> Iterator[_Item]:
         yield item
 
 
-def _whose(row: Any) -> tuple[int, int, int]:
+def _origin(row: Any) -> tuple[int, int, int]:
     return int(row["finger"]), int(row["t_us"]), int(row["seq"])
 
 
 def _arrays(topic: str, rows: StructArray, values: Any) -> Iterator[_Message]:
     for row, own in zip(rows, values, strict=True):
-        yield _Message(topic, *_whose(row), plot_ros.array(_LABELS[topic], own))
+        yield _Message(topic, *_origin(row), plot_ros.array(_LABELS[topic], own))
 
 
 def _without_invalid(counts: Any) -> Any:

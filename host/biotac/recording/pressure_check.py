@@ -87,7 +87,7 @@ class PressureCheck:
             self.filter_max = max(self.filter_max, float(error.max()))
             self.filter_bound = max(self.filter_bound, bound)
         found = _findings("filtered pressure", "counts", 1, one_sided, error, bound)
-        return [(int(at[row]), what) for row, what in found]
+        return [(int(at[row]), finding) for row, finding in found]
 
 
 def _findings(

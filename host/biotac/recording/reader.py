@@ -91,10 +91,10 @@ class Recording:
             blocks = Blocks(self.path, {}, (), index=self._index)
             list(blocks)
             if blocks.metadata is not None and not blocks.scan.problems:
-                self._take_metadata(blocks.metadata)
+                self._set_metadata(blocks.metadata)
                 return
         self._contents = Contents(self.path, show) if show else Contents(self.path)
-        self._take_metadata(self._contents.metadata)
+        self._set_metadata(self._contents.metadata)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path,)  # another process opens it again
@@ -128,7 +128,7 @@ class Recording:
         """``applied_n`` of FRAMEs of fingers (n,) at times (n,), of which 32 bits count; NaN where there is none."""
         if self.applied_n is None:
             return np.full((len(finger), 3), np.nan)
-        own, asked = (t % 2**32 * 8 + of for t, of in ((self.frames["t_us"], self.frames["finger"]), (t_us, finger)))
+        own, asked = (t % 2**32 * 8 + f for t, f in ((self.frames["t_us"], self.frames["finger"]), (t_us, finger)))
         order = np.argsort(own)
         rows = order[np.searchsorted(own, asked, sorter=order).clip(0, len(own) - 1)]
         return np.where((own[rows] == asked)[:, None], self.applied_n[rows], np.nan)
@@ -313,7 +313,7 @@ class Recording:
         rows: StructArray = self.frames[self.frames["finger"] == finger_of(finger, self.names)]
         return rows
 
-    def _take_metadata(self, metadata: dict[str, str]) -> None:
+    def _set_metadata(self, metadata: dict[str, str]) -> None:
         layout.check_version(self.path, metadata)
         try:
             if int(metadata["wire"].partition(".")[0]) != wire.WIRE_MAJOR:

@@ -241,9 +241,9 @@ def _rounds(recording: Recording, at: NDArray[np.int64], own_map: BoardMap | Non
 
 def _is_foreign(recording: Recording, finger: int) -> bool:
     """Whether its sensor is no BioTac with 19 electrodes: by its serial number, or as the board said."""
-    said = [m for m in recording.messages if isinstance(m, wire.SensorStatus) and m.finger == finger]
+    statuses = [m for m in recording.messages if isinstance(m, wire.SensorStatus) and m.finger == finger]
     by_serial = any(is_foreign(info.serial) for info in recording.sensors if info.finger == finger)
-    return by_serial or any(m.sensor_fault == wire.SensorFault.OTHER_KIND for m in said)
+    return by_serial or any(m.sensor_fault == wire.SensorFault.OTHER_KIND for m in statuses)
 
 
 def _pac_at(t_us: NDArray[np.int64], rows: StructArray) -> NDArray[np.uint16]:

@@ -217,7 +217,7 @@ class Scan:
                     if isinstance(record, (DataEnd, Footer)):
                         self._verify_checksum(stream, record, at, length)
                     elif record is not None:
-                        yield from self._take([record])
+                        yield from self._process([record])
                     if not whole or opcode == _FOOTER:
                         break
                 good_until = at + length
@@ -239,8 +239,8 @@ class Scan:
         index.check(self.path)
         for at, length in index.metadata:
             record = self._read(Opcode.METADATA, _content(stream, at + _HEAD.size, length - _HEAD.size))
-            yield from self._take([record] if record is not None else [])
-        yield from self._take(index.records)
+            yield from self._process([record] if record is not None else [])
+        yield from self._process(index.records)
         for block in map(index.blocks.__getitem__, self._only):
             for topic, (at, length) in block.items():
                 if self._wanted(topic):
@@ -250,16 +250,16 @@ class Scan:
         """Verify the checksum in ``record``; 0 means that the program that wrote it made none."""
         if isinstance(record, DataEnd):
             self._data_end = at + length
-            what, begin, end, expected = "records", 0, at - _HEAD.size, record.data_section_crc
+            part, begin, end, expected = "records", 0, at - _HEAD.size, record.data_section_crc
         else:
-            what, begin, expected = "index", record.summary_start, record.summary_crc
+            part, begin, expected = "index", record.summary_start, record.summary_crc
             end = at - _HEAD.size + _FOOTER_BYTES
             if begin != self._data_end:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return
         if self._check and expected and _crc32(stream, begin, end) != expected:
             self.wrong_checksums += 1
-            self.problems.append(f"{self.path.name} is damaged: the checksum of its {what} is wrong")
+            self.problems.append(f"{self.path.name} is damaged: the checksum of its {part} is wrong")
 
     def _read(self, opcode: int, content: ReadDataStream) -> Any:
         """The record in ``content``; None if it is damaged, which is added to ``problems``."""
@@ -269,7 +269,7 @@ class Scan:
             self.problems.append(f"a record of {self.path.name} is damaged and was skipped ({error})")
             return None
 
-    def _take(self, records: Iterable[McapRecord]) -> Iterator[Metadata | tuple[str, Message]]:
+    def _process(self, records: Iterable[McapRecord]) -> Iterator[Metadata | tuple[str, Message]]:
         for record in records:
             if isinstance(record, Metadata):
                 self._metadata += 1
@@ -321,7 +321,7 @@ class Scan:
             self.damaged_chunks += 1
             self.problems.append(f"one second of {self.path.name} is damaged and was skipped ({error})")
             return
-        yield from self._take(records)
+        yield from self._process(records)
 
     def _check_size(self, chunk: Chunk) -> None:
         size = chunk.uncompressed_size

@@ -158,8 +158,8 @@ class Selection:
 
     def __repr__(self) -> str:
         fingers = ", ".join(self.names.get(f, str(f)) for f in np.unique(self.rows["finger"]).tolist())
-        what = ", ".join(f"{field.name} ({field.unit})" for field in self.fields if field.name not in _OF_ROW)
-        return f"<biotac.Selection: {len(self)} rows of {fingers or 'no finger'}: {what}>"
+        columns = ", ".join(f"{field.name} ({field.unit})" for field in self.fields if field.name not in _OF_ROW)
+        return f"<biotac.Selection: {len(self)} rows of {fingers or 'no finger'}: {columns}>"
 
     @property
     def label(self) -> NDArray[np.str_]:

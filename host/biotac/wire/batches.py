@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import messages_gen as wire
-from .decoder import FRAME, IDLE, NO_FRAME, ONE_STEP_BYTES, PAC, Buffer, counts_of, new, pairs
+from .decoder import FRAME, IDLE, NO_FRAME, PAC, STEP_BYTES, Buffer, counts_of, new, pairs
 from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
 from .framing import FramingCounts
 from .native import ffi, lib
@@ -189,11 +189,11 @@ class StreamDecoder:
 
     def _feed(self, chunk: Buffer) -> Batch:
         size = len(chunk)
-        if size <= ONE_STEP_BYTES:
+        if size <= STEP_BYTES:
             # cffi passes the address of bytes, which is faster than borrowing a buffer.
             _feed(self._state, bytes(chunk), size)
             return self._batch()
-        batch = join([self._feed(chunk[at : at + ONE_STEP_BYTES]) for at in range(0, size, ONE_STEP_BYTES)])
+        batch = join([self._feed(chunk[at : at + STEP_BYTES]) for at in range(0, size, STEP_BYTES)])
         self.taken, self.last_t_us = size, batch.last_t_us()
         return batch
 
@@ -217,7 +217,7 @@ class StreamDecoder:
     def completed(self) -> tuple[bytes, bytes]:
         """Ids of all messages that the last step completed, in order, and all but rows as (id, length, payload).
 
-        A step is a ``read``, or a ``feed`` of at most ONE_STEP_BYTES.
+        A step is a ``read``, or a ``feed`` of at most STEP_BYTES.
         """
         decoder, kinds = self._state.decoder, (lib.BT_DECODED_IDS, lib.BT_DECODED_OTHER)
         ids, others = (bytes(ffi.buffer(decoder.data[kind], decoder.filled[kind])) for kind in kinds)

@@ -26,7 +26,7 @@ FRAME, PAC, IDLE = (DTYPES[message_id] for message_id in STREAMED)
 NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC, IDLE))
 _KINDS = int(lib.BT_DECODED_KINDS)
 _ROWS = ("frames", "pacs", "idles")
-ONE_STEP_BYTES = int(lib.BT_DECODE_BYTES)
+STEP_BYTES = int(lib.BT_DECODE_BYTES)
 
 # Not cleared, because the reset sets what is read: most of the memory is never touched by a short connection.
 new = ffi.new_allocator(should_clear_after_alloc=False)
@@ -75,8 +75,8 @@ class Decoder:
     def feed(self, chunk: Buffer) -> Decoded:
         """Take any number of bytes; return what they complete."""
         size = len(chunk)
-        if size > ONE_STEP_BYTES:
-            parts = [self.feed(chunk[at : at + ONE_STEP_BYTES]) for at in range(0, size, ONE_STEP_BYTES)]
+        if size > STEP_BYTES:
+            parts = [self.feed(chunk[at : at + STEP_BYTES]) for at in range(0, size, STEP_BYTES)]
             frames, pacs, idles = (np.concatenate([getattr(d, name) for d in parts]) for name in _ROWS)
             others = [other for decoded in parts for other in decoded.others]
             return Decoded(frames, pacs, idles, others, b"".join(decoded.ids for decoded in parts))

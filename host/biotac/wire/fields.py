@@ -181,12 +181,12 @@ def sent_of(field: Field, values: Any, dtype: np.dtype[Any]) -> Any:
 
 def as_json(row: Any) -> dict[str, Any]:
     """One row, FRAME_DTYPE or an object with its fields as attributes, as JSON types; None where invalid."""
-    of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)
-    return {field.name: _json_value(np.asarray(of(field.name)), field) for field in FRAME_FIELDS}
+    value_of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)
+    return {field.name: _json_value(np.asarray(value_of(field.name)), field) for field in FRAME_FIELDS}
 
 
 def _json_value(value: Any, field: Field) -> Any:
     missing = np.isnan(value) if field.dtype[1] == "f" else value == field.invalid
     if not field.parts:
         return None if missing else value.item()
-    return [None if gone else part for part, gone in zip(value.tolist(), missing.tolist(), strict=True)]
+    return [None if is_missing else part for part, is_missing in zip(value.tolist(), missing.tolist(), strict=True)]

@@ -82,7 +82,7 @@ class Frame:
         if not isinstance(other, Frame):
             return NotImplemented
         pairs = [(getattr(self, value.name), getattr(other, value.name)) for value in fields(self)]
-        return all(np.array_equal(one, two, equal_nan=np.asarray(one).dtype.kind == "f") for one, two in pairs)
+        return all(np.array_equal(own, others, equal_nan=np.asarray(own).dtype.kind == "f") for own, others in pairs)
 
     def __hash__(self) -> int:
         return hash((self.finger, self.seq, self.t_us))
@@ -105,11 +105,11 @@ def bands_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]
 
 
 def _from_wire(
-    of: Sequence[Field], dtype: np.dtype[Any], messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]
+    columns: Sequence[Field], dtype: np.dtype[Any], messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]
 ) -> StructArray:
     out = np.empty(len(messages), dtype)
     out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
-    for column in of:
+    for column in columns:
         if column.sent:
             sent = messages[column.sent]
             out[column.name] = sent if column.per_unit is None else to_units(sent, column.per_unit)

@@ -57,8 +57,8 @@ def test_a_subscriber_hears_the_wrench_in_the_order_of_time(tmp_path: Path) -> N
     program = started(LISTENS, "sim:press.toml?seconds=4", tmp_path)
     output, errors = program.communicate()
     assert program.returncode == 0, errors
-    heard, in_order, frame_id, most_n = json.loads(output.splitlines()[-1])
-    assert heard > 350 and in_order and frame_id == "biotac_finger0"
+    received, in_order, frame_id, most_n = json.loads(output.splitlines()[-1])
+    assert received > 350 and in_order and frame_id == "biotac_finger0"
     assert most_n > 0.5
 
 

@@ -105,8 +105,8 @@ def test_a_reference_of_a_tenth_of_the_rate(
 def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: Board, reference: Reference) -> None:
     whole = join("board.mcap", board, reference)
     samples = reference.samples
-    gone = (samples.t_s > samples.t_s[0] + 135.0) & (samples.t_s < samples.t_s[0] + 137.0)
-    kept = Samples(samples.t_s[~gone], samples.wrench[~gone, :3])
+    missing = (samples.t_s > samples.t_s[0] + 135.0) & (samples.t_s < samples.t_s[0] + 137.0)
+    kept = Samples(samples.t_s[~missing], samples.wrench[~missing, :3])
     found = join("board.mcap", board, replace(reference, samples=kept))
     assert len(whole.run.truth) - len(found.run.truth) == pytest.approx(200, abs=10)
 

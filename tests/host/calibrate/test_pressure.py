@@ -49,15 +49,15 @@ def presses(*forces_n: float, **how: int) -> list[float]:
 
 def ran(rows: Any, count: int = 3) -> Presses:
     machine = Presses(0, count)
-    taken(machine, rows)
+    feed_rows(machine, rows)
     machine.finish()
     return machine
 
 
-def taken(machine: Presses, rows: Any) -> None:
+def feed_rows(machine: Presses, rows: Any) -> None:
     for row in rows:
         if not machine.done:
-            machine.take(row)
+            machine.add(row)
 
 
 def its_fit(rows: Any) -> Fit:
@@ -171,10 +171,10 @@ def test_presses_that_cannot_be_used_are_refused_with_a_number(rows: Any, messag
 
 def test_a_minute_in_vain_is_enough() -> None:
     machine = Presses(0, 3)
-    taken(machine, course([0.0] * 150))
+    feed_rows(machine, course([0.0] * 150))
     assert machine.phase is Phase.PRESS
     with pytest.raises(InputError, match=r"press 1 of 3 never came"):
-        taken(machine, course([0.0] * GIVE_UP_ROWS))
+        feed_rows(machine, course([0.0] * GIVE_UP_ROWS))
 
 
 # ---- the sequence --------------------------------------------------------------------------------

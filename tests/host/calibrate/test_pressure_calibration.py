@@ -61,16 +61,16 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     assert main(["calibrate", "press", port, "--pressure", "--save", "--json", "--out", str(tmp_path)]) == 0
     output = capsys.readouterr()
     facts = json.loads(output.out)
-    assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
-    for one in facts["fingers"]:
-        assert -K_LOW <= one["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
-        assert one["rest_counts"] == pytest.approx(Finger(one["finger"] + 1).pdc_rest, abs=1)
-        assert one["verification"]["board_error"] <= 0.059
-        assert one["verification"]["board_error"] == pytest.approx(one["verification"]["float_error"], abs=1e-4)
-        own = file.load(tmp_path / f"finger{one['finger']}.json")
-        assert (own.pressure_gain_nn, own.serial) == (one["pressure_gain_nn"], one["serial"])
-        assert own.serial == f"BTSIM{one['finger'] + 1:011d}"
-        provenance = json.loads((tmp_path / f"finger{one['finger']}.json").read_text())["provenance"]
+    assert [finger["finger"] for finger in facts["fingers"]] == [0, 1, 2, 3, 4]
+    for finger in facts["fingers"]:
+        assert -K_LOW <= finger["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
+        assert finger["rest_counts"] == pytest.approx(Finger(finger["finger"] + 1).pdc_rest, abs=1)
+        assert finger["verification"]["board_error"] <= 0.059
+        assert finger["verification"]["board_error"] == pytest.approx(finger["verification"]["float_error"], abs=1e-4)
+        own = file.load(tmp_path / f"finger{finger['finger']}.json")
+        assert (own.pressure_gain_nn, own.serial) == (finger["pressure_gain_nn"], finger["serial"])
+        assert own.serial == f"BTSIM{finger['finger'] + 1:011d}"
+        provenance = json.loads((tmp_path / f"finger{finger['finger']}.json").read_text())["provenance"]
         assert provenance["from"] == port and provenance["rows"] == 150
     assert output.err.splitlines()[:3] == [
         "let go of finger 0, and do not touch it",
@@ -185,8 +185,8 @@ def run(pressed: Path, *options: str) -> int:
 
 def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None:
     assert run(pressed, str(pressed / "plate.csv"), "--json", "--out", str(tmp_path)) == 0
-    (zero, one) = json.loads(capsys.readouterr().out)["fingers"]
-    for facts in (zero, one):
+    (zero, first) = json.loads(capsys.readouterr().out)["fingers"]
+    for facts in (zero, first):
         assert -K_LOW <= facts["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
         assert facts["verification"]["board_error"] <= 0.059
         assert abs(facts["alignment"]["offset_s"]) <= 0.02 and facts["alignment"]["peak"] > 0.9
@@ -196,8 +196,8 @@ def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None
 def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
     typed = ",".join(f"{force:g}" for force in FORCES)
     assert run(pressed, "--readings", typed, "--finger", "1", "--json") == 0
-    (one,) = json.loads(capsys.readouterr().out)["fingers"]
-    assert one["finger"] == 1 and one["verification"]["board_error"] <= 0.059
+    (finger,) = json.loads(capsys.readouterr().out)["fingers"]
+    assert finger["finger"] == 1 and finger["verification"]["board_error"] <= 0.059
     assert run(pressed, "--readings", typed) == 0
     table = capsys.readouterr().out.splitlines()
     assert len(table) == 3 and "BTSIM00000000011" in table[1]

@@ -58,10 +58,10 @@ def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> 
     procedure.frames(frames(5900, 600, counts_per_min))
     assert (procedure.step is Step.TARE) == warm
     assert procedure.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
-    lines = procedure.take_events()
+    lines = procedure.pop_events()
     assert lines[0] == "warming up: leave the finger alone"
     assert (lines[1:] == [f"warm: {procedure.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
-    assert procedure.take_events() == []
+    assert procedure.pop_events() == []
 
 
 def test_the_drift_is_the_last_minutes() -> None:
@@ -81,7 +81,7 @@ def test_the_drift_is_the_last_minutes() -> None:
 def test_other_fingers_and_touches_do_not_warm_it_up() -> None:
     procedure = Procedure(0, LIN)
     procedure.frames(frames(0, 12_000, finger=1))
-    assert procedure.take_events() == []
+    assert procedure.pop_events() == []
     procedure.frames(frames(0, 12_000, flags=FrameFlags.CONTACT))
     assert procedure.step is Step.WARM_UP
 
@@ -132,7 +132,7 @@ def test_a_reference_that_moves_is_not_zeroed() -> None:
     procedure.tared(accepted=True)
     procedure.frames(frames(at, TARE_FRAMES))
     assert procedure.step is Step.TARE and procedure.zero is None
-    assert "the reference moves by 0." in procedure.take_events()[-1]
+    assert "the reference moves by 0." in procedure.pop_events()[-1]
     procedure.samples(still(3.0, 5.0))
     procedure.frames(frames(at, TARE_FRAMES))
     assert procedure.step is Step.LOADS

@@ -146,7 +146,7 @@ def test_strips_add_up_to_the_rows_and_axes_keep_their_lags(finger: Path) -> Non
     )
     kept = blocks.kept_from([4, 5])
     rows = np.concatenate([blocks.strips[k] for k in np.flatnonzero(kept)])
-    some = strips.of(kept).axes([1])
+    some = strips.over(kept).axes([1])
     z = columns.with_one(moments.linear_columns(moments.at(signals, rows)))
     np.testing.assert_allclose(some.gram, z.T @ z, rtol=1e-9)
     np.testing.assert_allclose(some.cross[:, 0], z.T @ run.truth[np.minimum(rows + 3, 4999), 1], rtol=1e-9, atol=1e-6)

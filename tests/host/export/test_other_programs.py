@@ -47,8 +47,8 @@ def by_octave(path: Path) -> tuple[float, ...]:
         pytest.skip("reads CSV, and needs octave-cli (Debian: octave)")
     number = path.read_text().partition("\n")[0].split(",").index("force_z_n") + 1
     script = f"z = dlmread('{path}', ',', 1, 0)(:, {number}); printf('%.9g %d', max(z), sum(!isnan(z)))"
-    heard = subprocess.run(["octave-cli", "--eval", script], capture_output=True, text=True, check=True).stdout
-    return tuple(map(float, heard.split()))
+    output = subprocess.run(["octave-cli", "--eval", script], capture_output=True, text=True, check=True).stdout
+    return tuple(map(float, output.split()))
 
 
 @pytest.fixture(scope="module")

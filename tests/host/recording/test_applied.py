@@ -45,7 +45,7 @@ def test_it_is_known_at_each_row_until_the_board_restarts(tmp_path: Path) -> Non
 
 def test_recordings_keep_it_and_record_and_pictures_show_it(tmp_path: Path, capsys) -> None:
     port, whole, cut, again, late, replayed = played(tmp_path), *(str(tmp_path / f"{k}.mcap") for k in range(5))
-    said = [main(["record", port, whole]), capsys.readouterr().out.splitlines()[-1]][1]
+    output = [main(["record", port, whole]), capsys.readouterr().out.splitlines()[-1]][1]
     assert main(["file", "cut", whole, cut, "--from", "1"]) == 0
     assert main(["export", whole, again, "--recompute", "--keep-tare"]) == 0
     with biotac.open(port, pace=2.0) as hand:
@@ -56,9 +56,9 @@ def test_recordings_keep_it_and_record_and_pictures_show_it(tmp_path: Path, caps
         check_ramp(recording.applied_n, recording.frames)
     felt_n = biotac.Recording(whole)["middle"]["force_n"][-125:]  # over 2 N: 25 rows of 3 N, 100 of 4 N
     off_n = np.sqrt(((felt_n - biotac.Recording(whole).applied_n[-250:][1::2][-125:]) ** 2).sum(axis=1).mean())
-    assert said.startswith("felt (mean") and said.endswith(f", {felt_n[:, 2].mean():.2f} ± {off_n:.2f} of 3.80 N")
+    assert output.startswith("felt (mean") and output.endswith(f", {felt_n[:, 2].mean():.2f} ± {off_n:.2f} of 3.80 N")
     assert main(["record", f"replay:{whole}", replayed]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == said
+    assert capsys.readouterr().out.splitlines()[-1] == output
     check_ramp(biotac.Recording(replayed).applied_n, biotac.Recording(replayed).frames)
     real = tmp_path / "real.npz"
     np.savez(real, E=load_source("press.toml").samples[:, 0, ELECTRODE_SLOT])

@@ -69,14 +69,14 @@ def test_a_bag_is_not_written_over_the_one_it_is_beside(recorded: Path, tmp_path
 @pytest.mark.parametrize("name", ["a.mcap", "link.mcap"])
 def test_of_two_recorders_in_a_process_the_second_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "link.mcap").symlink_to(tmp_path / "a.mcap")
-    with biotac.open(SIM) as one, biotac.open(SIM) as two:
-        with one.record(tmp_path / "a.mcap", overwrite=True) as recorder:
+    with biotac.open(SIM) as first, biotac.open(SIM) as second:
+        with first.record(tmp_path / "a.mcap", overwrite=True) as recorder:
             with pytest.raises(InputError, match="is being recorded to"):
-                two.record(tmp_path / name, overwrite=True)
-            one.stream("results")
-            assert len(one.read(1.0))
+                second.record(tmp_path / name, overwrite=True)
+            first.stream("results")
+            assert len(first.read(1.0))
         assert biotac.Recording(tmp_path / "a.mcap").problems == [] and recorder.frames > 50
-        two.record(tmp_path / name, overwrite=True).close()  # the first is closed
+        second.record(tmp_path / name, overwrite=True).close()  # the first is closed
 
 
 def test_of_two_recorders_in_two_processes_the_second_is_refused(tmp_path: Path) -> None:
@@ -90,18 +90,18 @@ def test_of_two_recorders_in_two_processes_the_second_is_refused(tmp_path: Path)
     assert biotac.Recording(path).problems == []
 
 
-@pytest.mark.parametrize("what", ["cut", "emptied and written", "replaced", "deleted"])
-def test_a_file_that_another_program_changes_is_told(recorded: Path, tmp_path: Path, what: str) -> None:
+@pytest.mark.parametrize("change", ["cut", "emptied and written", "replaced", "deleted"])
+def test_a_file_that_another_program_changes_is_told(recorded: Path, tmp_path: Path, change: str) -> None:
     path = tmp_path / "a.mcap"
-    words = "was deleted" if what in ("replaced", "deleted") else "by another program"
+    words = "was deleted" if change in ("replaced", "deleted") else "by another program"
     with pytest.raises(OSError, match=words), biotac.open(SIM.replace("2", "8")) as hand, hand.record(path):
         hand.stream("results")
         hand.read(2.0)
-        if what == "cut":
+        if change == "cut":
             os.truncate(path, 100)
-        elif what == "deleted":
+        elif change == "deleted":
             path.unlink()
-        elif what == "replaced":
+        elif change == "replaced":
             os.replace(shutil.copy(recorded, tmp_path / "b.mcap"), path)
         else:
             path.write_bytes(recorded.read_bytes() * 9)
@@ -118,8 +118,8 @@ def test_a_verdict_is_not_better_than_the_file(recorded: Path, tmp_path: Path, c
     out = tmp_path / "a.csv"
     for words in (["check", str(rec)], ["info", str(rec)], ["export", str(rec), str(out)]):
         assert main(words) == 1, words
-        said = capsys.readouterr()
-        assert "it lacks its statistics" in said.err and ", good" not in said.out
+        output = capsys.readouterr()
+        assert "it lacks its statistics" in output.err and ", good" not in output.out
     assert out.exists()
     assert main(["check", str(rec), "--json"]) == 1
     assert '"good": false' in capsys.readouterr().out

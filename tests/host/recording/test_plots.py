@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from record_all import blocks_of, record_all
-from ros_topics import STORE, of_topic
+from ros_topics import STORE, messages_of
 from rosbags.typesys import get_types_from_msg
 
 import biotac
@@ -54,7 +54,7 @@ def test_numbers_are_those_of_the_frames_and_thinned(recorded: Path) -> None:
         stamps = dict(zip(frames["seq"].tolist(), recording.stamp_ns(frames["t_us"]).tolist(), strict=True))
         for topic, (period_us, values) in expected.items():
             row_of = dict(zip((pac if topic == "pac" else frames)["seq"].tolist(), values, strict=True))
-            messages = of_topic(recorded, f"/biotac/finger{finger}/{topic}")
+            messages = messages_of(recorded, f"/biotac/finger{finger}/{topic}")
             n = SECONDS * 1_000_000 // period_us
             assert len(messages) in (n, n + 1), topic  # the first period was under way already
             for stamp_ns, seq, message in messages:
@@ -65,7 +65,7 @@ def test_numbers_are_those_of_the_frames_and_thinned(recorded: Path) -> None:
 
 def test_a_contact_is_where_and_which_way(recorded: Path) -> None:
     rows = {int(row["seq"]): row for row in biotac.Recording(recorded)[1]}
-    poses = of_topic(recorded, "/biotac/finger1/contact")
+    poses = messages_of(recorded, "/biotac/finger1/contact")
     assert poses
     for stamp_ns, seq, message in poses:
         at, turn = message.pose.position, message.pose.orientation
@@ -105,10 +105,10 @@ def test_tares_events_and_gaps_are_logged(tmp_path: Path) -> None:
     for block in others:
         recorder.write(block)
     recorder.close()
-    (stamp_ns, _, message), *_ = of_topic(path, "/biotac/log")
+    (stamp_ns, _, message), *_ = messages_of(path, "/biotac/log")
     assert (stamp_ns, message.msg, message.level) == (gap.back_at_ns, gap.line(), plot_ros.WARN)
     tares = [m for m in biotac.Recording(path).messages if isinstance(m, wire.Tare)]
-    logs = of_topic(path, "/biotac/finger0/log")
+    logs = messages_of(path, "/biotac/finger0/log")
     assert [seq for _, seq, m in logs if m.msg.startswith("tare")] == [m.seq for m in tares]
     assert logs[0][2].msg.startswith("tare START")
 

@@ -63,9 +63,9 @@ def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: 
 
 def test_another_sensors_words_are_distrusted_again(folder) -> None:
     """By PAC and pressure, which both have to be given to the core."""
-    of = sensor_faults.press(1)
-    words = of.words.copy()
-    words[of.begins("rest") :] = of.other[of.begins("rest") :]
+    press = sensor_faults.press(1)
+    words = press.words.copy()
+    words[press.begins("rest") :] = press.other[press.begins("rest") :]
     slot = {"E": slots.ELECTRODE_SLOT, "PDC": slots.PDC_SLOT, "TDC": slots.TDC_SLOT, "PAC": slots.PAC_SLOT}
     np.savez(folder / "exchanged.npz", **{name: words[:, at] for name, at in slot.items()})
     was = record(folder / "exchanged.mcap", f"sim:{folder / 'exchanged.npz'}")

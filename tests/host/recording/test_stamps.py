@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from record_all import record_all, written
-from ros_topics import of_topic
+from ros_topics import messages_of
 
 import biotac
 from biotac.recording.mcap_file import RecordingFile
@@ -75,7 +75,7 @@ def test_exports_follow_the_measured_drift(drifting: Path) -> None:
 
 def test_topics_for_plotting_follow_it_too_and_tares_do_not_wrap(drifting: Path) -> None:
     truth_ns = {seq: true_ns for seq, _, true_ns in rows(DRIFT_PPM)}
-    forces, logs = (of_topic(drifting, f"/biotac/finger0/{topic}") for topic in ("force", "log"))
+    forces, logs = (messages_of(drifting, f"/biotac/finger0/{topic}") for topic in ("force", "log"))
     assert len(logs) == len(truth_ns) // 15
     start_ns = forces[0][0] - BEGIN_NS
     for stamp_ns, seq, _ in forces + logs:
@@ -86,7 +86,7 @@ def test_topics_for_plotting_follow_it_too_and_tares_do_not_wrap(drifting: Path)
 
 
 def test_a_missing_electrode_is_nan(drifting: Path) -> None:
-    counts = of_topic(drifting, "/biotac/finger0/counts")[0][2].data[: len(ELECTRODE_NAMES)]
+    counts = messages_of(drifting, "/biotac/finger0/counts")[0][2].data[: len(ELECTRODE_NAMES)]
     assert np.flatnonzero(np.isnan(counts)).tolist() == [MISSING]
 
 

@@ -50,16 +50,16 @@ def test_a_dataset_has_every_number_by_time_and_finger(recording) -> None:
     for name, finger in (("index", 0), ("middle", 1)):
         rows = recording[name]
         part = data.sel(finger=name)
-        there = np.isin(data["t_us"], rows["t_us"])
+        present = np.isin(data["t_us"], rows["t_us"])
         for field in FRAME_FIELDS[3:]:
             values = part[field.name].values
-            missing = np.isnan(values[there]) if values.dtype.kind == "f" else np.zeros(values[there].shape, bool)
+            missing = np.isnan(values[present]) if values.dtype.kind == "f" else np.zeros(values[present].shape, bool)
             was_missing = rows[field.name] == field.invalid if field.invalid is not None else np.isnan(rows[field.name])
             assert (missing == was_missing).all(), field.name
-            assert (values[there][~missing] == rows[field.name][~missing]).all(), field.name
-        gone = part.isel(time=~there)
-        assert (gone["flags"].values & int(biotac.FrameFlags.POC_INVALID) != 0).all() and finger in recording.fingers
-        assert np.isnan(gone["force_n"]).all()
+            assert (values[present][~missing] == rows[field.name][~missing]).all(), field.name
+        absent = part.isel(time=~present)
+        assert (absent["flags"].values & int(biotac.FrameFlags.POC_INVALID) != 0).all() and finger in recording.fingers
+        assert np.isnan(absent["force_n"]).all()
     assert data["flags"].dtype == np.uint32 and data["torque_nmm"].attrs["units"] == "N*mm"
     positions = [data["counts"][f"electrode_{axis}_mm"] for axis in "xyz"]
     np.testing.assert_array_equal(np.column_stack(positions), ELECTRODE_MM)

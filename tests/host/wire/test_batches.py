@@ -10,7 +10,7 @@ import pytest
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
-from biotac.wire.decoder import ONE_STEP_BYTES, STREAMED
+from biotac.wire.decoder import STEP_BYTES, STREAMED
 from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
 from biotac.wire.native import ffi, lib
@@ -101,8 +101,8 @@ def test_heartbeats_account_for_the_rounds_without_a_frame(together: bool) -> No
 
 
 def test_the_parts_of_a_long_read_keep_their_fingers() -> None:
-    sent = b"".join(frame(finger, seq, 10_000 * seq) for seq in range(ONE_STEP_BYTES // 150) for finger in (0, 3))
-    assert len(sent) > ONE_STEP_BYTES and StreamDecoder().feed(sent).fingers == 0b1001
+    sent = b"".join(frame(finger, seq, 10_000 * seq) for seq in range(STEP_BYTES // 150) for finger in (0, 3))
+    assert len(sent) > STEP_BYTES and StreamDecoder().feed(sent).fingers == 0b1001
 
 
 def test_a_newer_minor_may_append_fields_and_messages() -> None:

@@ -42,9 +42,9 @@ def test_json_says_null_where_there_is_no_value(rows) -> None:
         text = json.loads(json.dumps(as_json(row), allow_nan=False))
         assert text == json.loads(json.dumps(as_json(biotac.Frame.from_row(row)), allow_nan=False))
         for name in ("poc_mm", "force_n", "tare", "counts"):
-            gone = row[name] == 65535 if name == "counts" else np.isnan(row[name])
+            absent = row[name] == 65535 if name == "counts" else np.isnan(row[name])
             assert text[name] == [
-                None if g else expected for expected, g in zip(row[name].tolist(), gone, strict=True)
+                None if g else expected for expected, g in zip(row[name].tolist(), absent, strict=True)
             ], name
 
 

@@ -31,7 +31,7 @@ MOVING_SHARE = 0.01  # of the load
 NOISE_SIGMAS = 5.0
 SIGMA_FLOOR = 0.25  # counts: words are whole numbers, so a quiet sensor shows less noise than it has
 PRESS_COUNTS = 20.0  # above rest: some 0.2 N; the board's own contact needs 6
-LETTING_GO_COUNTS = PRESS_COUNTS / 2
+RELEASE_COUNTS = PRESS_COUNTS / 2
 GIVE_UP_ROWS = 60 * HZ
 
 
@@ -114,10 +114,10 @@ class Presses:
         """Whether every press was seen and released (after finish(), the last need not be)."""
         return self.phase is Phase.DONE
 
-    def take(self, row: Any) -> None:
+    def add(self, row: Any) -> None:
         """Take this finger's next row. Raises InputError that says why after a minute in one phase."""
         self._waited += 1
-        self._take(row)
+        self._follow(row)
         if self._waited >= GIVE_UP_ROWS:
             raise InputError(self.why())
 
@@ -172,7 +172,7 @@ class Presses:
         self._most_above = -np.inf
         self._steadiest = (np.inf, 0.0)  # motion, limit
 
-    def _take(self, row: Any) -> None:
+    def _follow(self, row: Any) -> None:
         above = float(row["pressure"] - row["rest"])
         self._railed += bool(row["railed"])
         if np.isnan(above):
@@ -183,7 +183,7 @@ class Presses:
             self._resting(row)
         elif self.phase is Phase.PRESS:
             self._pressing(row, above)
-        elif above < LETTING_GO_COUNTS:
+        elif above < RELEASE_COUNTS:
             self._enter(Phase.PRESS if len(self.presses) < self._count else Phase.DONE)
 
     def _begin_again(self) -> None:
@@ -317,7 +317,7 @@ class Procedure:
             if turn is None:
                 return
             if row["finger"] == turn[0].finger:
-                turn[0].take(row)
+                turn[0].add(row)
 
     def finish(self, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
         """End: no more rows come. The presses by finger, each with what a scale showed in asked()'s order, if given.

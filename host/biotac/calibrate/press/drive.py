@@ -81,12 +81,12 @@ def drive(
     held = through(Procedure(list(names), series[1]), touches[-1:]).presses
     source = {"from": hand.port, "touches": list(touches)}
     return {
-        names[one.finger]: Calibrated(one, verify(one, held[one.finger][0]), own[one.finger], source) for one in fits
+        names[fit.finger]: Calibrated(fit, verify(fit, held[fit.finger][0]), own[fit.finger], source) for fit in fits
     }
 
 
 def _rows(now: Round, plate_n: Callable[[], float]) -> StructArray:
-    frames = [one.frame for one in now.fingers.values() if one.frame is not None]
+    frames = [finger.frame for finger in now.fingers.values() if finger.frame is not None]
     out = np.zeros(len(frames), ROW_DTYPE)
     for k, frame in enumerate(frames):
         touched = bool(frame.flags & (FrameFlags.CONTACT | FrameFlags.FAULT))

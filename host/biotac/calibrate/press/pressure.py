@@ -201,15 +201,15 @@ def facts(fingers: Sequence[Calibrated]) -> list[dict[str, Any]]:
     """One object for each finger, in JSON types."""
     digits = {"force_n": 4, "board_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
     return [
-        _numbers(one.fit)
+        _numbers(finger.fit)
         | {
-            "serial": one.calibration.serial,
-            "pressure_gain_nn": one.fit.gain_nn,
-            "notes": list(one.fit.notes),
-            "verification": {key: round(getattr(one.verified, key), n) for key, n in digits.items()},
+            "serial": finger.calibration.serial,
+            "pressure_gain_nn": finger.fit.gain_nn,
+            "notes": list(finger.fit.notes),
+            "verification": {key: round(getattr(finger.verified, key), n) for key, n in digits.items()},
         }
-        | ({} if one.alignment is None else {"alignment": asdict(one.alignment)})
-        for one in fingers
+        | ({} if finger.alignment is None else {"alignment": asdict(finger.alignment)})
+        for finger in fingers
     ]
 
 
@@ -217,10 +217,10 @@ def lines(fingers: Sequence[Calibrated]) -> list[str]:
     """The table of K and P0, with the verification press."""
     out = ["finger  sensor            K N/count  P0 count     fit  force N  board N   error  float64"]
     notes: list[str] = []
-    for one in fingers:
-        fitted, seen = one.fit, one.verified
+    for finger in fingers:
+        fitted, seen = finger.fit, finger.verified
         out.append(
-            f"{fitted.finger:>6}  {one.calibration.serial or 'any':<16}  {fitted.gain_n:>9.6f}"
+            f"{fitted.finger:>6}  {finger.calibration.serial or 'any':<16}  {fitted.gain_n:>9.6f}"
             f"  {fitted.rest.counts:>8.1f}  {fitted.relative_error:>6.2%}  {seen.force_n:>7.3f}  {seen.board_n:>7.3f}"
             f"  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
         )
@@ -230,5 +230,5 @@ def lines(fingers: Sequence[Calibrated]) -> list[str]:
                 f"finger {fitted.finger}: {seen.board_error:.1%} off on the verification press (the paper's: "
                 f"{PAPER_ERROR:.2%}): was it at another place, or pressed in another way?"
             )
-    notes += dict.fromkeys(str(one.alignment) for one in fingers if one.alignment)
+    notes += dict.fromkeys(str(finger.alignment) for finger in fingers if finger.alignment)
     return [*out, *(f"  {note}" for note in notes)]

@@ -35,8 +35,8 @@ def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: in
     """
     absent = sorted(set(fingers) - set(hand.fingers))
     if absent or not hand.fingers:
-        there = f"{', '.join(map(str, hand.fingers))} are" if hand.fingers else "none is"
-        raise InputError(f"no sensor on finger {absent[0] if absent else '0 to 4'} ({there} there); check its cable")
+        present = f"{', '.join(map(str, hand.fingers))} are" if hand.fingers else "none is"
+        raise InputError(f"no sensor on finger {absent[0] if absent else '0 to 4'} ({present} there); check its cable")
     fingers = fingers or hand.fingers
     serials = {finger: _serial(hand, finger) for finger in fingers}
     reference = None if hand.link.source is None else Truth(hand)
@@ -108,12 +108,12 @@ def calibrate_recording(
             f"{len(asked)} forces given, expected {MIN_PRESSES + 1} or more: one per press, the last for verification"
         )
     rows = rows_of(recording.wire, recording.frames["t_us"])
-    there = np.unique(rows["finger"]).tolist()
-    absent = sorted(set(fingers) - set(there))
-    if absent or not there:
+    present = np.unique(rows["finger"]).tolist()
+    absent = sorted(set(fingers) - set(present))
+    if absent or not present:
         raise InputError(
             f"{recording.path} has no frames from finger {absent[0] if absent else 0}; fingers in it: "
-            f"{', '.join(map(str, there)) or 'none at all'}"
+            f"{', '.join(map(str, present)) or 'none at all'}"
         )
     serials = {sensor.finger: ascii_text(sensor.serial) for sensor in recording.sensors}
     source = {
@@ -123,7 +123,7 @@ def calibrate_recording(
     }
     alignment = None if reference is None else _add_force(str(recording.path), rows, reference)
     calibrated = []
-    for finger in fingers or there:
+    for finger in fingers or present:
         own_rows = rows[rows["finger"] == finger]
         # A procedure for each finger: a recording may have them in any order.
         procedure = Procedure([finger], asked, needs_force=reference is not None)

@@ -51,9 +51,9 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
         known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no messages"
         cure = "name one: --reference FILE:TOPIC" if rows else "record the sensor's topic too"
         raise RecordingError(f"{path}: holds {known}: expected one topic of {SCHEMAS[0]}; {cure}")
-    ((name, samples_of),) = rows.items()
-    samples_of.sort(key=lambda row: row[0])  # a bag is in order of arrival, not of the sensor's stamps
-    samples = Samples(np.array([t for t, _ in samples_of]), np.array([w for _, w in samples_of]))
+    ((name, stamped),) = rows.items()
+    stamped.sort(key=lambda row: row[0])  # a bag is in order of arrival, not of the sensor's stamps
+    samples = Samples(np.array([t for t, _ in stamped]), np.array([w for _, w in stamped]))
     check(f"{path} {name}", samples)
     return Reference(path.name, samples, mounting, name)
 

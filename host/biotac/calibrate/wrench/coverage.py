@@ -52,13 +52,13 @@ class Coverage:
         if not len(wrench):
             return
         found = contact.locate(wrench[:, :3], wrench[:, 3:])
-        there = found.on_skin & ~found.missed & (found.normal_force_n > TOUCH_N)
-        region, cell = cell_of(found.point_mm[there], found.normal[there])
+        touched = found.on_skin & ~found.missed & (found.normal_force_n > TOUCH_N)
+        region, cell = cell_of(found.point_mm[touched], found.normal[touched])
         np.add.at(self.cells_s, (region, cell), step_s)
-        normal, pressed = found.normal[there], found.normal_force_n[there]
+        normal, pressed = found.normal[touched], found.normal_force_n[touched]
         to_tip, to_side = surface.tangents_at(normal)
-        along, across = ((wrench[there, :3] * way).sum(axis=1) for way in (to_tip, to_side))
-        twist = found.torsion_nmm[there]
+        along, across = ((wrench[touched, :3] * way).sum(axis=1) for way in (to_tip, to_side))
+        twist = found.torsion_nmm[touched]
         seen = [along > SHEAR_N, along < -SHEAR_N, across > SHEAR_N, across < -SHEAR_N]
         seen += [twist > TWIST_NMM, twist < -TWIST_NMM]
         for way, hit in enumerate(seen):

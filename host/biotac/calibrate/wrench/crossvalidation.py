@@ -209,8 +209,8 @@ class _Timing:
             sums = self._sums_of(window, lag_rows)
             total = np.zeros(len(lag_rows))
             for kept, out in _folds(self._blocks, numbers, strips):
-                total += sums.of(out).errors(models.solve(sums.of(kept), LAMBDAS[0]))
-            error[window] = float((total / np.maximum(sums.of(strips).variance(), 1e-12)).mean())
+                total += sums.over(out).errors(models.solve(sums.over(kept), LAMBDAS[0]))
+            error[window] = float((total / np.maximum(sums.over(strips).variance(), 1e-12)).mean())
         return min(error, key=lambda window: error[window], default=self._windows[0])
 
     def _sums_of(self, window: int, lag_rows: tuple[int, ...]) -> Sums:
@@ -253,16 +253,16 @@ class _Trainer:
         every, air = self._sums[training.window_rows], self._air[training.window_rows]
         every = every.axes([self._late.index(late) for late in enumerate(training.lag_rows)])
         folds = _folds(self._blocks, training.blocks, training.strips)
-        tested = [every.of(out) for _, out in folds]
-        kept = [every.of(strips) for strips, _ in folds]
-        total = every.of(training.strips)
+        tested = [every.over(out) for _, out in folds]
+        kept = [every.over(strips) for strips, _ in folds]
+        total = every.over(training.strips)
         share = 0.0
         if air is not None:
             # it is a separate recording: part of every training and of no test
             share = self._air_share(kept, tested, air)
-            total, kept = total.plus(air, share), [one.plus(air, share) for one in kept]
-        rows = sum(one.rows for one in tested)
-        inner = [np.array(one) for one in zip(*(self._pulled(one, MODELS) for one in kept), strict=True)]
+            total, kept = total.plus(air, share), [fold.plus(air, share) for fold in kept]
+        rows = sum(fold.rows for fold in tested)
+        inner = [np.array(errors) for errors in zip(*(self._pulled(fold, MODELS) for fold in kept), strict=True)]
         alone = self._pulled(total, MODELS)
         by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)}
         for model, fits, whole in zip(MODELS, inner, alone, strict=False):
@@ -274,7 +274,7 @@ class _Trainer:
         by_model[POOLED] = _mean(weights, alone[FIRST_OF_POOL:])
         less = []
         for part in LESS:
-            sums = every.of(training.strips & self._blocks.own(training.blocks[:: round(1 / part)]))
+            sums = every.over(training.strips & self._blocks.own(training.blocks[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
             less.append(_mean(weights, self._pulled(sums, POOL)))
         return Fit(training.lag_rows, training.window_rows, share, by_model, weights, tuple(less))
@@ -292,12 +292,12 @@ class _Trainer:
         air = air.part(own)
 
         def error(share: float) -> Floats:
-            fits = [models.solve(one.plus(air, share), AIR_LAMBDA) for one in small]
+            fits = [models.solve(fold.plus(air, share), AIR_LAMBDA) for fold in small]
             errors = [out.errors(fit) for fit, out in zip(fits, outs, strict=True)]
             forces: Floats = np.sum(errors, axis=0)[:3]
             return forces
 
-        small, outs = [one.part(own) for one in kept], [one.part(own) for one in tested]
+        small, outs = [fold.part(own) for fold in kept], [fold.part(own) for fold in tested]
         without = error(0.0)
         return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), AIR_SHARES[-1])
 

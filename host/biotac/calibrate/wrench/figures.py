@@ -111,7 +111,7 @@ def weights(validation: Validation) -> tuple[list[dict[str, float]], list[float]
     """For each axis, means over the folds: each model's weight in the pool, and the part pulled to other fingers."""
     mean = np.mean([fit.weights for fit in validation.folds], axis=0)
     by_model = mean.reshape(len(mean), -1, len(POOL), len(LAMBDAS)).sum(axis=(1, 3))
-    named = [{model.name: float(one) for model, one in zip(POOL, shares, strict=True)} for shares in by_model]
+    named = [{model.name: float(share) for model, share in zip(POOL, shares, strict=True)} for shares in by_model]
     return named, mean[:, len(POOL) * len(LAMBDAS) :].sum(axis=1).tolist()
 
 

@@ -98,7 +98,7 @@ class Procedure:
             self.coverage.add(self.mounting.to_finger(samples.wrench - self.zero), step_s)
             text = self.status()
             if self.coverage.complete:
-                self._go(Step.DONE, f"covered: {self.coverage.summary()}")
+                self._enter(Step.DONE, f"covered: {self.coverage.summary()}")
             elif text != self._last_status:
                 self._last_status = text
                 self.events.append(text)
@@ -114,7 +114,7 @@ class Procedure:
     def finish(self, why: str) -> None:
         """End the procedure, complete or not: at the user's request, or because no more data comes."""
         if self.step is not Step.DONE:
-            self._go(Step.DONE, why)
+            self._enter(Step.DONE, why)
 
     def status(self) -> str:
         """One line of progress, for a display that is refreshed."""
@@ -124,7 +124,7 @@ class Procedure:
             return f"{self.coverage.summary()}; missing: {next(iter(self.coverage.missing()), 'nothing')}"
         return str(self.step.value)
 
-    def take_events(self) -> list[str]:
+    def pop_events(self) -> list[str]:
         """The events since the last call."""
         events, self.events = self.events, []
         return events
@@ -175,7 +175,7 @@ class Procedure:
         long_enough = mean_s - self._begin_s >= DRIFT_OVER_S
         enough = len(times) >= 0.8 * DRIFT_OVER_S * 100.0 / MEAN_FRAMES
         if long_enough and enough and abs(self.drift_counts_per_min) <= self.max_drift_counts_per_min:
-            self._go(Step.TARE, f"warm: {self.drift_counts_per_min:+.1f} counts/min over the last minute")
+            self._enter(Step.TARE, f"warm: {self.drift_counts_per_min:+.1f} counts/min over the last minute")
 
     def _zero_reference(self) -> None:
         wrench = np.concatenate([np.empty((0, 6)), *(samples.wrench for samples in self._recent)])
@@ -189,9 +189,9 @@ class Procedure:
             return
         self.zero = np.median(wrench, axis=0)
         self._recent.clear()
-        self._go(Step.LOADS, Step.LOADS.value)
+        self._enter(Step.LOADS, Step.LOADS.value)
 
-    def _go(self, step: Step, event: str) -> None:
+    def _enter(self, step: Step, event: str) -> None:
         self.last_step, self.step = self.step, step
         self.events.append(event)
 
@@ -234,7 +234,7 @@ def walk(
                         procedure.tared(accepted=True)
                     except CommandRefusedError:
                         procedure.tared(accepted=False)
-                for event in procedure.take_events():
+                for event in procedure.pop_events():
                     show(event)
                 progress(procedure.status())
                 if procedure.step is Step.DONE:
@@ -242,7 +242,7 @@ def walk(
             procedure.finish("the simulated source has ended")
         except KeyboardInterrupt:
             procedure.finish("stopped by Ctrl-C")
-    for event in procedure.take_events():
+    for event in procedure.pop_events():
         show(event)
     # needed even if the board's source has ended: it sends nothing more, but still refuses as busy
     hand.stop()

@@ -107,11 +107,11 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
         alignment = _align(where, board, reference.samples.t_s, wrench, zero)
         rows = means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
         zero = _zero(where, board, rows)
-    there: Mask = np.isfinite(rows.sum(axis=1))
-    check_rows(f"{where}, where counts and force are both known", int(there.sum()))
-    truth = reference.mounting.to_finger(rows[there] - zero)
-    check_clipping(where, "force", reference.mounting.sign * (rows[there] - zero)[:, :3])
-    covered = board.only(there)
+    referenced: Mask = np.isfinite(rows.sum(axis=1))
+    check_rows(f"{where}, where counts and force are both known", int(referenced.sum()))
+    truth = reference.mounting.to_finger(rows[referenced] - zero)
+    check_clipping(where, "force", reference.mounting.sign * (rows[referenced] - zero)[:, :3])
+    covered = board.only(referenced)
     counts, e = covered.counts, covered.e
     check_electrodes(where, counts)
     tare = np.median(counts - e, axis=0)
@@ -137,7 +137,7 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
         f"reference: {reference.name}" + (f", {reference.sensor}" if reference.sensor else ""),
         f"reference's zero: {zero_text}, from {int(board.quiet.sum())} rows in which the board saw no contact",
         str(alignment),
-        f"{int((~there).sum())} of {len(there)} frames left out, as the reference does not cover them",
+        f"{int((~referenced).sum())} of {len(referenced)} frames left out, as the reference does not cover them",
         *about_torque[:1],
         drift_note,
         *about_torque[1:],

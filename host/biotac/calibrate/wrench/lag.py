@@ -73,7 +73,7 @@ class Lags:
 
     def _unexplained(self, strips: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
         """Unexplained share of the truth's variance (lags, axes)."""
-        sums = self._sums.of(strips)
+        sums = self._sums.over(strips)
         share = sums.errors(solve(sums, LEAST_RIDGE)) / np.maximum(sums.rows * sums.variance(), 1e-12)
         return share.reshape(len(LAGS), self._axes)
 
@@ -82,7 +82,7 @@ class Lags:
         force = self._sums.axes(range(first, first + 3))
         total = np.zeros(3)
         for block in range(BLOCKS):
-            fitted = solve(force.of(self._blocks.kept_from([block])), LEAST_RIDGE)
-            total += force.of(self._blocks.own([block])).errors(fitted)
-        every = force.of(self._blocks.own(range(BLOCKS)))
+            fitted = solve(force.over(self._blocks.kept_from([block])), LEAST_RIDGE)
+            total += force.over(self._blocks.own([block])).errors(fitted)
+        every = force.over(self._blocks.own(range(BLOCKS)))
         return float(1.0 - total.sum() / max(every.rows * every.variance().sum(), 1e-12))

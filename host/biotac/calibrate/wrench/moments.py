@@ -51,7 +51,7 @@ class Sums:
         """Total weight of the rows."""
         return float(self.gram[-1, -1])
 
-    def of(self, strips: npt.NDArray[np.bool_]) -> Sums:
+    def over(self, strips: npt.NDArray[np.bool_]) -> Sums:
         """The sum over the strips where ``strips`` is true."""
         return Sums(_added(self.gram, strips), _added(self.cross, strips), _added(self.square, strips))
 
@@ -137,7 +137,7 @@ def strip_sums(
     signals: Signals,
     truth: Floats,
     drift: Floats,
-    columns_of: Columns = columns,
+    to_columns: Columns = columns,
     nodes: Nodes = DRIFT_NODES,
     weights: Floats | None = None,
 ) -> Sums:
@@ -149,7 +149,7 @@ def strip_sums(
     root = np.ones(1) if weights is None else np.sqrt(weights)
     truth = truth * root[:, None]
     for node, share in nodes:
-        z = with_one(columns_of(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift))) * root[:, None]
+        z = with_one(to_columns(signals.drifted(node * DRIFT_SIGMA_COUNTS * drift))) * root[:, None]
         gram = gram + share * (z.T @ z)
         cross = cross + share * (z.T @ truth)
     return Sums(gram, cross, (truth**2).sum(axis=0))
@@ -157,7 +157,7 @@ def strip_sums(
 
 def stacked(strips: Iterable[Sums]) -> Sums:
     every = list(strips)
-    return Sums(*(np.stack([getattr(one, name) for one in every]) for name in ("gram", "cross", "square")))
+    return Sums(*(np.stack([getattr(sums, name) for sums in every]) for name in ("gram", "cross", "square")))
 
 
 def air_sums(run: Run, window_rows: int) -> Sums | None:

@@ -122,7 +122,7 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
     worst, best = found[0], found[-1]
     gain = ", ".join(f"{axis} {g:.1f}" for axis, g in zip(validation.run.axes, facts["better_than_lin"], strict=True))
     curve = "; ".join(
-        f"{one['minutes']:.1f} min " + "/".join(f"{error:.3f}" for error in one["rmse"][:3]) for one in facts["minutes"]
+        f"{row['minutes']:.1f} min " + "/".join(f"{error:.3f}" for error in row["rmse"][:3]) for row in facts["minutes"]
     )
     x, y = facts["next_minute"]["x_mm"], facts["next_minute"]["y_mm"]
     r2 = facts["r2"]

@@ -87,7 +87,7 @@ def read_btd(path: Path) -> BtdFrames:
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
     samples[:, :, order] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
     serials = zip(_serials(header, len(present)), present, strict=True)
-    return BtdFrames(samples, table[starts, 0], skipped, tuple(serial for serial, there in serials if there))
+    return BtdFrames(samples, table[starts, 0], skipped, tuple(serial for serial, is_present in serials if is_present))
 
 
 def _serials(header: bytes, places: int) -> list[bytes]:

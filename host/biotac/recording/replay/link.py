@@ -59,10 +59,10 @@ class Pacer:
 
     def due(self) -> bytes:
         """All bytes due now, up to about CHUNK_BYTES."""
-        taken = bytearray()
-        while len(taken) < CHUNK_BYTES and self.wait_s() == 0.0:
-            taken += self.playback.take()
-        return bytes(taken)
+        data = bytearray()
+        while len(data) < CHUNK_BYTES and self.wait_s() == 0.0:
+            data += self.playback.pop()
+        return bytes(data)
 
 
 class ReplayLink(Link):

@@ -73,7 +73,7 @@ class Playback:
             self._next = None if data is None else (t_us - self.from_us, data)
         return None if self._next is None else self._next[0]
 
-    def take(self) -> bytes:
+    def pop(self) -> bytes:
         """The next bytes; empty when the playback is over."""
         self.next_us()
         data = b"" if self._next is None else self._next[1]
