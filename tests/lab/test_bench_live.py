@@ -28,6 +28,6 @@ def test_both_readers_get_what_the_slow_board_sends() -> None:
 
 
 def test_what_was_asked_is_judged() -> None:
-    taken = {(50_000, live.OURS): [live.Round(0.002, 99.0, 200.0, 61.0)],
+    rounds = {(50_000, live.OURS): [live.Round(0.002, 99.0, 200.0, 61.0)],
              (50_000, live.PYSERIAL): [live.Round(0.0, 50.0, 90.0, 100.0)]}  # fmt: skip
-    assert [row[3] for row in live.report(taken, 1.0)[1].rows] == ["NOT met", "met", "NOT met"]
+    assert [row[3] for row in live.report(rounds, 1.0)[1].rows] == ["NOT met", "met", "NOT met"]

@@ -110,17 +110,17 @@ def test_a_recorded_plate_has_the_figures_of_the_emulated_one(tmp_path: Path) ->
     path = save(tmp_path / "plate.npz", trial, z_dir=np.column_stack([-lin[:, 0], lin[:, 1], -lin[:, 2]]))
     theirs = plate_normal.run(Options(recording=path)).tables
     own = plate_normal.run(Options(seed=4)).tables
-    for one, other in zip(theirs, own, strict=True):
+    for found, other in zip(theirs, own, strict=True):
         rows = [row for row in other.facts()["rows"] if row[0] == "new"]
-        assert [row[1:] for row in one.facts()["rows"]] == [row[1:] for row in rows]
+        assert [row[1:] for row in found.facts()["rows"]] == [row[1:] for row in rows]
 
 
 def test_the_real_plate(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = shared_data / "robotic_finger" / "trial_15330.npz"
     assert main(["experiment", "plate-normal", str(path), "--json", "--check"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert [one["limit"] for one in facts["checks"]] == [8.9, 14.7]
-    median, p90 = (one["seen"] for one in facts["checks"])
+    assert [check["limit"] for check in facts["checks"]] == [8.9, 14.7]
+    median, p90 = (check["seen"] for check in facts["checks"])
     assert median <= 8.9 and p90 <= 14.7
     # what a correction by the other contacts leaves is less than half: the error is the formula's
     *_, corrected_median, _, corrected_p90 = facts["tables"][0]["rows"][-1]
@@ -209,7 +209,7 @@ def test_the_caption_of_figure_3_can_be_wrong() -> None:
     towards = {"E1": -90.0, "E4": -90.0, "E11": 90.0, "E14": 90.0, "E17": -50.0}
     away = {name: at[name] * 2 - value for name, value in towards.items()} | {"E17": -50.0}
     right = {"B": at, "C": towards, "D": at, "E": away, "F": at}
-    assert [one["met"] for one in shear.claims(right)] == [True] * 4
+    assert [claim["met"] for claim in shear.claims(right)] == [True] * 4
     for phase, name, value, fails in (
         ("B", "E14", -1.0, {0}),
         ("F", "E17", 1.0, {1}),
@@ -217,7 +217,7 @@ def test_the_caption_of_figure_3_can_be_wrong() -> None:
         ("C", "E11", 5.0, {3}),
     ):
         wrong = right | {phase: right[phase] | {name: value}}
-        assert {k for k, one in enumerate(shear.claims(wrong)) if not one["met"]} == fails
+        assert {k for k, claim in enumerate(shear.claims(wrong)) if not claim["met"]} == fails
 
 
 @pytest.mark.parametrize(
@@ -265,14 +265,14 @@ def test_a_table_says_the_same_on_a_page_and_in_json() -> None:
 def test_the_shipped_default_pokes_as_precisely_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["experiment", "poke", "--check", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert [one["limit"] for one in facts["checks"]] == [0.23, 0.23, 0.36, 0.36]
+    assert [check["limit"] for check in facts["checks"]] == [0.23, 0.23, 0.36, 0.36]
     default = [row[3] for row in facts["tables"][0]["rows"] if row[1].endswith("(default)")]
-    assert [one["seen"] for one in facts["checks"]] == default
+    assert [check["seen"] for check in facts["checks"]] == default
 
 
 def test_check_fails_with_its_own_code_when_a_figure_is_missed(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
     report = shear.run(Options())
-    assert all(one["met"] for one in report.checks)  # the emulated finger does what figure 3's caption says
+    assert all(check["met"] for check in report.checks)  # the emulated finger does what figure 3's caption says
     first, second, *_ = report.checks
     monkeypatch.setattr(shear, "run", lambda options: replace(report, checks=[first | {"met": False}, second]))
     assert main(["experiment", "shear"]) == 0
@@ -288,7 +288,7 @@ def test_check_fails_with_its_own_code_when_a_figure_is_missed(monkeypatch, caps
 def test_wettels2011_runs_to_the_end_with_the_paper_s_filter(tmp_path: Path, capsys) -> None:
     assert main(["experiment", "wettels2011", "--quick", "--filter", "--out", str(tmp_path), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert [one["correct"] for one in facts["roc"]] and facts["bars"]["test"] == 30
+    assert [row["correct"] for row in facts["roc"]] and facts["bars"]["test"] == 30
     assert (tmp_path / "wettels2011.png").stat().st_size > 10_000
 
 

@@ -15,11 +15,11 @@ from biotac import Frame, FrameFlags, Trust
 from biotac_lab.cli import main
 from biotac_lab.grasp import law, runs
 from biotac_lab.grasp.felt import Board, TrueForce
-from biotac_lab.grasp.plant import KINETIC, ROUND_S, Plant, Thing, things
+from biotac_lab.grasp.plant import KINETIC, ROUND_S, Item, Plant, items
 from biotac_lab.grasp.runs import Case
 from biotac_lab.grasp.trial import Slides
 
-THING = Thing(mass_kg=0.2, friction=0.5, stiffness=5.0, added_kg=0.1, knock_n=1.0, limit_n=50.0)
+ITEM = Item(mass_kg=0.2, friction=0.5, stiffness=5.0, added_kg=0.1, knock_n=1.0, limit_n=50.0)
 WEIGHT_N = 0.2 * 9.81
 CASE = Case("true", "", 0, 7, "numpy", 2, "new", "E17", "")
 IN_C = Path(__file__).resolve().parents[2] / "host/docs/guides/examples/grip_in_c.py"
@@ -27,7 +27,7 @@ IN_C = Path(__file__).resolve().parents[2] / "host/docs/guides/examples/grip_in_
 
 def lifted(press_n: float) -> Plant:
     """THING pressed with so much and lifted by 20 mm."""
-    plant = Plant(THING)
+    plant = Plant(ITEM)
     while plant.normal_n < press_n:
         plant.step(2.0, 0.0)
     for _ in range(10):
@@ -56,12 +56,12 @@ def test_a_slide_is_that_of_coulombs_friction() -> None:
 
 
 def test_the_things_are_the_same_however_many_and_within_what_is_said() -> None:
-    made = things(50, 7)
-    assert made[:20] == things(20, 7) != things(20, 8)
-    for thing in made:
-        worst_n = (thing.mass_kg + thing.added_kg) * 9.81 / (2 * thing.friction)
-        assert 0.05 <= thing.mass_kg <= 0.4 and 0.35 <= thing.friction <= 0.9 and 0.8 <= thing.stiffness <= 30
-        assert 1.6 <= thing.limit_n / max(worst_n, 0.8) <= 4
+    made = items(50, 7)
+    assert made[:20] == items(20, 7) != items(20, 8)
+    for item in made:
+        worst_n = (item.mass_kg + item.added_kg) * 9.81 / (2 * item.friction)
+        assert 0.05 <= item.mass_kg <= 0.4 and 0.35 <= item.friction <= 0.9 and 0.8 <= item.stiffness <= 30
+        assert 1.6 <= item.limit_n / max(worst_n, 0.8) <= 4
 
 
 def test_slides_and_slips_are_counted() -> None:
@@ -74,7 +74,7 @@ def test_slides_and_slips_are_counted() -> None:
 
 
 def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> None:
-    grip, plant, sense = law.load(law.EXAMPLE)(), Plant(THING), TrueForce(2)
+    grip, plant, sense = law.load(law.EXAMPLE)(), Plant(ITEM), TrueForce(2)
     speed = 10.0
     for _ in range(150):
         plant.step(speed, 0.0)
@@ -134,7 +134,7 @@ def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_more_fingers_on_a_side_share_its_force() -> None:
-    two, three = (runs.one(replace(CASE, fingers=n), 0, law.EXAMPLE) for n in (2, 3))
+    two, three = (runs.run_trial(replace(CASE, fingers=n), 0, law.EXAMPLE) for n in (2, 3))
     assert two == three
 
 
@@ -152,7 +152,7 @@ def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_the_law_in_c_is_the_same() -> None:
     """Round by round on the same frames, to what a wire message can say."""
-    python, in_c, plant, sense = law.load(law.EXAMPLE)(), law.load(IN_C)(), Plant(THING), TrueForce(2)
+    python, in_c, plant, sense = law.load(law.EXAMPLE)(), law.load(IN_C)(), Plant(ITEM), TrueForce(2)
     for k in range(400):
         plant.step(python.speed_mm_s, 2.0 if k > 200 else 0.0)
         felt = sense.feel(plant)
@@ -164,15 +164,15 @@ def test_the_law_in_c_is_the_same() -> None:
 
 def test_a_hand_on_a_board_grasps_and_does_so_again() -> None:
     case = replace(CASE, controller="default")
-    first = runs.one(case, 1, law.EXAMPLE)
-    assert first == runs.one(case, 1, law.EXAMPLE)  # lock-step: to the last digit
+    first = runs.run_trial(case, 1, law.EXAMPLE)
+    assert first == runs.run_trial(case, 1, law.EXAMPLE)  # lock-step: to the last digit
     assert not first["dropped"] and first["off_n"] is not None and FrameFlags.HELD & FrameFlags(first["flags"])
 
 
 @pytest.mark.parametrize("fault", ["still program", "restart", "cable", "open"])
 def test_a_fault_in_mid_grasp_is_seen_and_outlived(fault: str) -> None:
     """By the true force of the plant beside it: the board's own frames stop, or say so."""
-    plant, seen = Plant(THING), []
+    plant, seen = Plant(ITEM), []
     sense = Board(CASE.seeds, "new", "E17")
     try:
         for k in range(200):
@@ -228,10 +228,10 @@ def test_slip_counts_what_a_board_tells(capsys, tmp_path) -> None:
     pac[2, 50:300] = np.rint(300 * np.sin(np.arange(250) * 2 * np.pi * 160 / 2200))  # before the tap
     np.savez(tmp_path / "taps.npz", handover_rod_signals=pac)
     assert main(["slip", "--fingers", "1", "--seed", "3", "--taps", str(tmp_path / "taps.npz"), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    simulated, taps = (table["rows"] for table in told["tables"])
+    facts = json.loads(capsys.readouterr().out)
+    simulated, taps = (table["rows"] for table in facts["tables"])
     assert dict(taps) == {"handovers": 3, "with a SLIP, %": 66.6667, "before the tap, %": 33.3333}
-    percent = {(what, n_s): row for what, n_s, *row in simulated}
+    percent = {(case, n_s): row for case, n_s, *row in simulated}
     assert percent["slides at 20 mm/s: told within 50 ms", 0.0] == [100.0] * 3
     assert percent["at rest and in still holds: level 0", 0] == [100.0] * 3
-    assert len([what for what, _ in percent if what == "squeezed: SLIP"]) == 9
+    assert len([case for case, _ in percent if case == "squeezed: SLIP"]) == 9

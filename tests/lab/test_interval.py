@@ -22,7 +22,7 @@ ALL, BAND, OVER_RMS, OUT = (0.90, 0.99), (0.80, 0.995), 3.0, 0.90
 def fingers() -> list[interval.Finger]:
     if not all(path.exists() for path in RECORDINGS):
         pytest.skip("no ../shared/data: real recordings are not part of the project")
-    return [interval.Finger.of(load(path).run) for path in RECORDINGS]
+    return [interval.Finger.of_run(load(path).run) for path in RECORDINGS]
 
 
 def misses(judged: Judged) -> list[tuple]:
@@ -39,11 +39,11 @@ def misses(judged: Judged) -> list[tuple]:
 
 @pytest.mark.long
 def test_left_out_frames_of_two_real_fingers_are_within_their_intervals(fingers) -> None:
-    one, other = fingers
+    first, other = fingers
     _, by_population = interval.population_margin(fingers)
     assert misses(together(by_population)) == []
-    assert misses(together([interval.lin_rows(one, [other]), interval.lin_rows(other, [one])])) == []
-    for finger, rest in ((one, other), (other, one)):
+    assert misses(together([interval.lin_rows(first, [other]), interval.lin_rows(other, [first])])) == []
+    for finger, rest in ((first, other), (other, first)):
         whole, crossed, own_map = interval.own_rows(finger)
         assert misses(whole) == []
         # by a margin of every other block, 12 s each: over all; a band's few stretches may be all in the other half
@@ -51,7 +51,7 @@ def test_left_out_frames_of_two_real_fingers_are_within_their_intervals(fingers)
             line for line in crossed.touched().lines() if line[1] == "all" and not ALL[0] <= line[3] <= ALL[1]
         ] == []
         for given in (({}, own_map), ({}, None), (interval.lin_settings([rest]), None)):
-            assert min(interval.share_with_one_out(finger, *given)) >= OUT
+            assert min(interval.share_without_electrode(finger, *given)) >= OUT
 
 
 def test_a_margin_is_the_narrowest_that_holds_what_it_is_fitted_to() -> None:

@@ -103,8 +103,8 @@ def test_force_by_nets_of_classes_and_of_one() -> None:
 
     def held_out(kinds: np.ndarray | None) -> np.ndarray:
         def predict(training: np.ndarray, test: np.ndarray) -> np.ndarray:
-            of = None if kinds is None else kinds[training]
-            trained = force.train(x[training], truth[training], groups[training], of, steps=40)
+            classes = None if kinds is None else kinds[training]
+            trained = force.train(x[training], truth[training], groups[training], classes, steps=40)
             return trained(x[test], None if kinds is None else kinds[test])
 
         return force.cross_validated(x, groups, 2, predict)

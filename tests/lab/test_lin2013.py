@@ -54,8 +54,8 @@ def test_the_paper_s_tare_zeroes_what_is_slow_and_is_locked_out_by_what_is_fast(
     held, _ = lin_tare.renormalised(course(np.r_[np.zeros(20), slow]))
     # a mean over ten rows of a ramp of two counts a row is nine counts behind
     assert held[-1, 16] == pytest.approx(3000.0 - slow[-1] + 9.0)
-    held, taken = lin_tare.renormalised(course(fast))
-    assert (held[220:, 16] == 3000.0).all() and not taken[220:].any()
+    held, is_new = lin_tare.renormalised(course(fast))
+    assert (held[220:, 16] == 3000.0).all() and not is_new[220:].any()
     # 40 counts that stay after it are above the threshold, 31 are not
     for left, locked in ((40.0, True), (31.0, False)):
         held, _ = lin_tare.renormalised(course(np.r_[fast, np.full(100, left)]))
@@ -100,6 +100,6 @@ def test_the_default_weights_are_good_in_pokes_and_on_the_plate(shared_data: Pat
     path = shared_data / "robotic_finger" / "trial_15330.npz"
     assert main(["experiment", "weights", str(path), "--check", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert [round(one["limit"], 2) for one in facts["checks"]] == [0.36, 9.57]
+    assert [round(check["limit"], 2) for check in facts["checks"]] == [0.36, 9.57]
     rows = {row[0]: row for row in facts["tables"][0]["rows"]}
     assert len(rows) == 11 and sum("(default)" in name for name in rows) == 1

@@ -40,7 +40,7 @@ def played(hands: list[navarro.Hands], monkeypatch: pytest.MonkeyPatch) -> navar
 def test_the_verification_press_is_within_what_is_asked_on_both_profiles(hands, monkeypatch, tmp_path: Path) -> None:
     report = played(hands, monkeypatch)
     assert len(report.checks) == 6 and all(check["met"] for check in report.checks)
-    assert [one.seed for hand in hands for one in hand.fingers] == list(range(21, 31))
+    assert [finger.seed for hand in hands for finger in hand.fingers] == list(range(21, 31))
     page, picture, _ = write(report, tmp_path, "navarro", "", overwrite=False)
     assert "| thumb | 10." in page.read_text() and "5.91 %" in page.read_text()
     assert picture.read_bytes()[:4] == b"\x89PNG"
@@ -75,13 +75,13 @@ def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law() -> None:
 )
 def test_a_hand_calibrates_itself_finger_by_finger(fingers: tuple[str, ...], newtons: bool) -> None:
     found = navarro_active.calibrate(3, fingers, newtons=newtons)
-    assert [one.finger for one in found] == list(fingers)
+    assert [finger.finger for finger in found] == list(fingers)
     forces = (2.0, 3.5, 5.0, 4.0) if newtons else tuple((deg - 15.0) * 0.7 for deg in (18.0, 20.0, 22.0, 21.0))
-    for one in found:
-        assert (*one.fit.press_forces_n, one.verified.force_n) == pytest.approx(forces)
+    for finger in found:
+        assert (*finger.fit.press_forces_n, finger.verified.force_n) == pytest.approx(forces)
         law = 100 * (1 + 0.15 * np.tanh(geometry.ELECTRODE_MM[16, 0] / 8))  # the sensor's own, counts per N
-        assert -K_LOW <= one.fit.gain_n * law - 1 <= K_HIGH
-        assert one.verified.board_error < 0.01 and one.verified.board_n != one.verified.force_n
+        assert -K_LOW <= finger.fit.gain_n * law - 1 <= K_HIGH
+        assert finger.verified.board_error < 0.01 and finger.verified.board_n != finger.verified.force_n
 
 
 def test_a_hand_is_driven_in_the_paper_s_order_and_taken_back_when_it_fails() -> None:

@@ -68,8 +68,8 @@ def test_a_symmetric_map_says_the_mirrored_force_of_a_mirrored_finger(
 ) -> None:
     prior = training.train(fingers[:2], symmetric=True)
     other = training.mirrored(runs[2])
-    there = prior.force(other.counts, other.tare)
-    assert np.allclose(there, prior.force(runs[2].counts, runs[2].tare) * [1.0, -1.0, 1.0], atol=1e-6)
+    mirrored = prior.force(other.counts, other.tare)
+    assert np.allclose(mirrored, prior.force(runs[2].counts, runs[2].tare) * [1.0, -1.0, 1.0], atol=1e-6)
 
 
 def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(prior: Population, runs: list[Run]) -> None:

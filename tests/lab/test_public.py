@@ -57,7 +57,7 @@ def is_public(home: str, name: str, packages: set[str], modules: set[str]) -> bo
 
 @pytest.mark.parametrize("path", LAB, ids=lambda path: path.stem)
 def test_the_lab_uses_public_names_only(path: Path) -> None:
-    assert [f"{path.name}:{line}: {what}" for line, what in foreign(path.read_text(encoding="utf-8"))] == []
+    assert [f"{path.name}:{line}: {name}" for line, name in foreign(path.read_text(encoding="utf-8"))] == []
 
 
 def test_the_gateway_never_imports_the_lab() -> None:

@@ -72,15 +72,15 @@ def test_another_file_is_refused_and_the_pinned_one_taken(
     tool: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = log_of(np.arange(5) / 100, np.full(5, 2412), np.full((5, 19), 3000), np.tile([0.0, 0.6, 0.8], (5, 1)))
-    of = tool.RECORDINGS["trial_15330"]
-    at = tmp_path / of.repository.replace("/", "+") / tool.LOG
+    recording = tool.RECORDINGS["trial_15330"]
+    at = tmp_path / recording.repository.replace("/", "+") / tool.LOG
     at.parent.mkdir(parents=True)
     at.write_bytes(log)
     words = [str(tmp_path / "out"), "trial_15330", "--from", str(tmp_path)]
     with pytest.raises(OSError, match=r"SHA-256 is [0-9a-f]{64}, expected [0-9a-f]{64}; it is another file"):
         tool.main(words)
     assert not list((tmp_path / "out").glob("*.npz"))
-    pinned = of._replace(files={tool.LOG: hashlib.sha256(log).hexdigest()})
+    pinned = recording._replace(files={tool.LOG: hashlib.sha256(log).hexdigest()})
     monkeypatch.setitem(tool.RECORDINGS, "trial_15330", pinned)
     assert tool.main(words) == 0 and "5 rows of Alexis-" in capsys.readouterr().out
     assert np.load(tmp_path / "out/trial_15330.npz")["E"].shape == (5, 19)

@@ -63,8 +63,8 @@ def test_kept_figures_are_those_that_the_experiment_measures(name: str) -> None:
 
 def test_a_finding_that_turns_round_is_not_met(monkeypatch: pytest.MonkeyPatch) -> None:
     facts = load("shear").run(Options()).facts("shear")
-    (one,) = seeds.findings("shear", facts)
-    assert one["met"] and "E1 377 to -276 counts" in one["what"]
+    (finding,) = seeds.findings("shear", facts)
+    assert finding["met"] and "E1 377 to -276 counts" in finding["what"]
     row = next(row for row in seeds.ROWS["lin2013"] if row.get("experiment") == "shear")
     monkeypatch.setitem(row, "verdict", "differs, because it is a test")
     assert not seeds.findings("shear", facts)[0]["met"]

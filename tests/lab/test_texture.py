@@ -55,7 +55,7 @@ def test_what_is_held_is_told_by_real_taps() -> None:
     data = np.load(path)
     from sklearn.model_selection import cross_val_score
 
-    signals = {what: data[f"handover_{what}_signals"] for what in ("rod", "box", "plate")}
+    signals = {shape: data[f"handover_{shape}_signals"] for shape in ("rod", "box", "plate")}
     rows = texture.describe_all(pac for blocks in signals.values() for pac in blocks)
     labels = np.repeat(list(signals), [len(blocks) for blocks in signals.values()])
     assert cross_val_score(texture.classifier(), rows, labels, cv=5).mean() > 0.9

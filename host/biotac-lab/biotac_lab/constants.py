@@ -39,9 +39,9 @@ def presses(e: Array, pdc: Array, t_s: Array) -> Array:
     return made[made[:, 0] > PRESSED_COUNTS]
 
 
-def span(what: str, values: Array) -> None:
+def span(title: str, values: Array) -> None:
     low, middle, high = np.percentile(values, [0, 50, 100])
-    print(f"{what:40}{low:8.2f} to {high:.2f}, median {middle:.2f}, of {values.size}")
+    print(f"{title:40}{low:8.2f} to {high:.2f}, median {middle:.2f}, of {values.size}")
 
 
 def main(folder: Path) -> None:

@@ -100,24 +100,24 @@ class Report:
 
     def verdicts(self) -> list[str]:
         """The checks as lines of text."""
-        return [("met: " if one["met"] else "NOT met: ") + one["what"] + _against(one) for one in self.checks]
+        return [("met: " if item["met"] else "NOT met: ") + item["what"] + _against(item) for item in self.checks]
 
 
-def _against(one: Facts) -> str:
-    if "limit" not in one:
+def _against(item: Facts) -> str:
+    if "limit" not in item:
         return ""
-    seen = "-" if one["seen"] is None else f"{one['seen']:.3f}"
-    return f": {seen} {one['unit']}".rstrip() + f", at most {one['limit']:g}"
+    seen = "-" if item["seen"] is None else f"{item['seen']:.3f}"
+    return f": {seen} {item['unit']}".rstrip() + f", at most {item['limit']:g}"
 
 
-def check(what: str, seen: float, limit: float, unit: str) -> Facts:
+def check(subject: str, seen: float, limit: float, unit: str) -> Facts:
     """A check that ``seen`` is at most ``limit``; NaN fails."""
-    return {"what": what, "seen": plain(float(seen)), "limit": limit, "unit": unit, "met": bool(seen <= limit)}
+    return {"what": subject, "seen": plain(float(seen)), "limit": limit, "unit": unit, "met": bool(seen <= limit)}
 
 
-def claim(what: str, holds: bool) -> Facts:
+def claim(subject: str, holds: bool) -> Facts:
     """A check that something that the paper says, or that was asked for, holds."""
-    return {"what": what, "met": bool(holds)}
+    return {"what": subject, "met": bool(holds)}
 
 
 @contextlib.contextmanager

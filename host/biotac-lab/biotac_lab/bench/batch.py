@@ -31,8 +31,8 @@ LIN = {Setting.FORCE_MODEL: ForceModel.LIN}  # what all contestants compute
 
 WARM, FRESH = "compute, out= reused", "compute, new result"
 WHOLE, BEST = "NumPy, whole-array matrix products", "NumPy, blocked, buffers reused"
-ONE, ONE_WHOLE = "per_frame, one frame per call", "NumPy, whole-array code, one frame per call"
-ASKED: Asked = ((WARM, WHOLE, None), (WARM, BEST, None), (ONE, ONE_WHOLE, 50.0))
+FRAMEWISE, WHOLE_FRAMEWISE = "per_frame, one frame per call", "NumPy, whole-array code, one frame per call"
+ASKED: Asked = ((WARM, WHOLE, None), (WARM, BEST, None), (FRAMEWISE, WHOLE_FRAMEWISE, 50.0))
 
 Array = NDArray[np.float64]
 Three = tuple[Array, Array, Array]
@@ -40,8 +40,8 @@ Three = tuple[Array, Array, Array]
 R_MM, NORMAL, RADIUS_MM = geometry.ELECTRODE_MM, geometry.ELECTRODE_NORMAL, geometry.RADIUS_MM
 ARM_MM = np.cross(R_MM, NORMAL)
 FORCE_GAIN, TORQUE_GAIN = (
-    np.array([messages.SETTINGS[Setting[f"{what}_GAIN_{axis}_NN"]].default for axis in axes]) / 1e9
-    for what, axes in (("FORCE", "XYZ"), ("TORQUE", "YZ"))
+    np.array([messages.SETTINGS[Setting[f"{quantity}_GAIN_{axis}_NN"]].default for axis in axes]) / 1e9
+    for quantity, axes in (("FORCE", "XYZ"), ("TORQUE", "YZ"))
 )
 
 
@@ -72,8 +72,8 @@ class Blocked:
 
     def __init__(self, block: int) -> None:
         self.block = block
-        self._of_weights = np.ascontiguousarray(np.column_stack([np.ones(len(R_MM)), R_MM]).T)
-        self._of_signals = np.ascontiguousarray(np.column_stack([NORMAL * FORCE_GAIN, ARM_MM[:, 1:] * TORQUE_GAIN]).T)
+        self._weight_rows = np.ascontiguousarray(np.column_stack([np.ones(len(R_MM)), R_MM]).T)
+        self._signal_rows = np.ascontiguousarray(np.column_stack([NORMAL * FORCE_GAIN, ARM_MM[:, 1:] * TORQUE_GAIN]).T)
         self._e = np.empty((len(R_MM), block))
         self._w = np.empty((len(R_MM), block))
         self._sums = np.empty((9, block))
@@ -92,8 +92,8 @@ class Blocked:
             if np.max(some) == messages.INVALID_COUNT:
                 e[some.T == messages.INVALID_COUNT] = 0
             np.minimum(e, 0, out=w)
-            np.matmul(self._of_weights, w, out=sums[:4])
-            np.matmul(self._of_signals, e, out=sums[4:])
+            np.matmul(self._weight_rows, w, out=sums[:4])
+            np.matmul(self._signal_rows, e, out=sums[4:])
             self._finish(sums, n, *(array[first : first + n] for array in out))
         return out
 
@@ -149,9 +149,9 @@ def measure(frames: int = 200_000, show: Show = lambda text: None, rounds: int =
         Contestant(BEST, frames, lambda: best(counts, tare, arrays)),
     ]
     ones: list[tuple[str, Callable[[NDArray[np.uint16]], Any]]] = [
-        (ONE, prepared), (ONE_WHOLE, lambda row: whole_array(row[None], tare)),
+        (FRAMEWISE, prepared), (WHOLE_FRAMEWISE, lambda row: whole_array(row[None], tare)),
     ]  # fmt: skip
-    check([one.run() for one in many], "all frames")
+    check([contestant.run() for contestant in many], "all frames")
     for row in single[:50]:
         check([run(row) for _, run in ones], "one frame")
     many += [Contestant(name, len(single), partial(_each, run, single)) for name, run in ones]
@@ -164,10 +164,10 @@ def _each(run: Callable[[NDArray[np.uint16]], Any], rows: list[NDArray[np.uint16
         run(row)
 
 
-def check(results: list[Any], what: str) -> None:
+def check(results: list[Any], scope: str) -> None:
     """Compare all results with the first, which is compute()'s. Raises RuntimeError if one differs."""
     for other in results[1:]:
         for k, name in enumerate(COMPARED):
             values = other[k] if isinstance(other, tuple) else other[name]
             if not np.allclose(np.squeeze(values), results[0][name], rtol=0, atol=EQUAL, equal_nan=True):
-                raise RuntimeError(f"{what}: two contestants differ in {name}; do not compare their times")
+                raise RuntimeError(f"{scope}: two contestants differ in {name}; do not compare their times")

@@ -15,7 +15,7 @@ from ..report import Show, Table
 ABOUT = "Measure batch maths, decoding, the live path, recordings, force against cycles, physics in the loop."
 EXAMPLE = "biotac-lab bench batch"
 #: Each is a module beside this one with ``measure``, and the arguments that it takes.
-WHAT = {
+BENCHES = {
     "batch": ("biotac.compute on whole recordings, against NumPy", ("frames",)),
     "decode": ("the link's bytes to arrays, against pymavlink and Python", ("frames",)),
     "live": ("link to callback, against a pyserial thread", ("rounds",)),
@@ -30,8 +30,8 @@ LIMITS = {"frames": (1000, 1_000_000), "rounds": (1, 1_000_000), "fingers": (1, 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to measure, and how much of it."""
-    about = "; ".join(f"{name}: {text}" for name, (text, _) in WHAT.items())
-    parser.add_argument("what", metavar="WHAT", choices=list(WHAT), help=about)
+    about = "; ".join(f"{name}: {text}" for name, (text, _) in BENCHES.items())
+    parser.add_argument("what", metavar="WHAT", choices=list(BENCHES), help=about)
     parser.add_argument(
         "files", metavar="REC", nargs="*", type=Path, help="newtons: fingers on a force plate, as for calibrate wrench"
     )
@@ -47,16 +47,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, show: Show) -> int:
     """Print the tables and return 0 whatever they are: judging them is up to people."""
-    _, takes = WHAT[args.what]
+    _, accepted = BENCHES[args.what]
     for name, default in DEFAULTS.items():
         value = getattr(args, name)
-        if name not in takes and value != default:
+        if name not in accepted and value != default:
             raise InputError(
                 f"bench {args.what} does not use {'a recording' if name == 'files' else f'--{name}'}; drop it"
             )
         if value is not None and name in LIMITS and not LIMITS[name][0] <= value <= LIMITS[name][1]:
             raise InputError(f"--{name} is {value:g}, expected {LIMITS[name][0]} to {LIMITS[name][1]}")
-    given = {name: getattr(args, name) for name in takes if getattr(args, name) is not None}
+    given = {name: getattr(args, name) for name in accepted if getattr(args, name) is not None}
     tables: list[Table] = importlib.import_module(f"{__package__}.{args.what}").measure(**given, show=show)
     show("")
     if args.json:

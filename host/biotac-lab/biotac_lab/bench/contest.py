@@ -27,26 +27,26 @@ def timed(
     contestants: Sequence[Contestant], rounds: int, clock_ns: Callable[[], int] = time.perf_counter_ns
 ) -> dict[str, float]:
     """Median ns per frame or message, each timed right after an untimed run, which brings in its pages and caches."""
-    times: dict[str, list[float]] = {one.name: [] for one in contestants}
+    times: dict[str, list[float]] = {contestant.name: [] for contestant in contestants}
     for _ in range(rounds):
-        for one in contestants:
-            one.run()
+        for contestant in contestants:
+            contestant.run()
             start = clock_ns()
-            one.run()
-            times[one.name].append((clock_ns() - start) / one.count)
+            contestant.run()
+            times[contestant.name].append((clock_ns() - start) / contestant.count)
     return {name: statistics.median(ns) for name, ns in times.items()}
 
 
 def tables(title: str, per: str, times: dict[str, float], best: dict[str, float], asked: Asked) -> list[Table]:
     """``times`` in ns, and the ratios of ``best``, the slower ones' times, to them."""
-    ratios = [[fast, slow, best[slow] / times[fast], least, met(best[slow] / times[fast], least)] for fast, slow, least
-              in asked]  # fmt: skip
+    ratios = [[fast, slow, best[slow] / times[fast], least, judge(best[slow] / times[fast], least)]
+              for fast, slow, least in asked]  # fmt: skip
     return [
         Table(title, ["", f"median ns per {per}"], [[name, ns] for name, ns in times.items()], digits=1),
         Table(f"{title}: ratios", ["", "against", "times", "at least", ""], ratios, digits=1),
     ]
 
 
-def met(seen: float, least: float | None) -> str:
+def judge(seen: float, least: float | None) -> str:
     """Whether a requirement of at least that is met, in words."""
     return "" if least is None else "met" if seen >= least else "NOT met"

@@ -77,7 +77,7 @@ def measure(frames: int = 30_000, show: Show = lambda text: None, rounds: int = 
         (messages.MESSAGES[i].unpack(row.tobytes()), k) for i, rows in sent.items() for k, row in enumerate(rows)
     ]
     # in the board's order: in each round all FRAMEs, then all PACs
-    stream = [m for m, k in sorted(unpacked, key=lambda one: (one[1] // FINGERS, one[0].ID))]
+    stream = [m for m, k in sorted(unpacked, key=lambda pair: (pair[1] // FINGERS, pair[0].ID))]
     ours, theirs = b"".join(encode(m.ID, m.pack()) for m in stream), _mavlink_bytes(dialect, stream)
     live = {FRAME: "wire", PAC: "pac"}
     found = []
@@ -91,9 +91,9 @@ def measure(frames: int = 30_000, show: Show = lambda text: None, rounds: int = 
             STRUCT: (chunks, partial(_struct, cobs.decode)),
             NUMPY: (chunks, partial(_numpy, cobs.decode)),
         }
-        for name, (these, start) in starts.items():
-            check(name, these, start, sent)
-        contestants = [Contestant(name, len(stream), partial(_feed, *one)) for name, one in starts.items()]
+        for name, (data, start) in starts.items():
+            check(name, data, start, sent)
+        contestants = [Contestant(name, len(stream), partial(_feed, *start)) for name, start in starts.items()]
         show(f"chunks of {size} bytes")
         gc.collect()
         gc.freeze()  # so that no contestant pays for walking the benchmark's own objects

@@ -63,11 +63,11 @@ class Board:
         Written past the ring, an answer could land inside a frame, or end the flood when the pty is full.
         """
         try:
-            heard = self._decoder.feed(os.read(self._master, 4096))
+            batch = self._decoder.feed(os.read(self._master, 4096))
         except BlockingIOError:
             return False
         started = False
-        for message_id, payload in heard.others:
+        for message_id, payload in batch.others:
             message = wire.MESSAGES[message_id].unpack(payload)
             started |= isinstance(message, wire.Start)
             ring += answer(message)

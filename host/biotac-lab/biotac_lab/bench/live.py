@@ -170,7 +170,7 @@ def measure(
     except ImportError:
         raise InputError("bench live needs cobs for the pyserial reader; pip install 'biotac-lab[bench]'") from None
     contestants = {OURS: ours, PYSERIAL: pyserial_thread}
-    taken: dict[tuple[int, str], list[Round]] = {(rate, name): [] for rate in rates for name in contestants}
+    done_rounds: dict[tuple[int, str], list[Round]] = {(rate, name): [] for rate in rates for name in contestants}
     with tempfile.TemporaryDirectory(prefix="biotac-bench-") as folder:
         for rate in rates:
             show(f"{rate} frames a second")
@@ -180,29 +180,29 @@ def measure(
                     for name, contestant in contestants.items():
                         done = one_round(producer, contestant)
                         if number:
-                            taken[rate, name].append(done)
+                            done_rounds[rate, name].append(done)
             finally:
                 producer.close()
-    return report(taken, seconds)
+    return report(done_rounds, seconds)
 
 
-def report(taken: dict[tuple[int, str], list[Round]], seconds: float) -> list[Table]:
+def report(done_rounds: dict[tuple[int, str], list[Round]], seconds: float) -> list[Table]:
     """Medians over the rounds, but mean and worst loss as shares of the frames offered; then what is asked of us."""
     rows, asked = [], []
-    for (rate, name), rounds in taken.items():
-        loss = statistics.fmean(one.loss for one in rounds)
-        middle = [statistics.median(getattr(one, k) for one in rounds) for k in ("median_us", "p99_us", "cpu_percent")]
-        rows.append([rate, name, 100 * loss, 100 * max(one.loss for one in rounds), *middle])
+    for (rate, name), rounds in done_rounds.items():
+        loss = statistics.fmean(own.loss for own in rounds)
+        middle = [statistics.median(getattr(own, k) for own in rounds) for k in ("median_us", "p99_us", "cpu_percent")]
+        rows.append([rate, name, 100 * loss, 100 * max(own.loss for own in rounds), *middle])
         if name == OURS:
-            pairs = zip(rounds, taken[rate, PYSERIAL], strict=True)
+            pairs = zip(rounds, done_rounds[rate, PYSERIAL], strict=True)
             ratio = statistics.median(a.cpu_percent / b.cpu_percent for a, b in pairs)
-            for what, seen, most in (
+            for quantity, seen, most in (
                 (f"loss at {rate}/s", loss, ASKED_LOSS.get(rate)),
                 (f"us from write to callback at {rate}/s", middle[0], ASKED_LATENCY_US),
                 (f"CPU time over pyserial's at {rate}/s", ratio, ASKED_CPU.get(rate)),
             ):
                 verdict = "" if most is None else "met" if seen <= most else "NOT met"
-                asked.append([what, seen, most, verdict])
+                asked.append([quantity, seen, most, verdict])
     head = ["frames/s", "reader", "loss [%]", "worst [%]", "median [us]", "p99 [us]", "CPU [%]"]
     text = f"Rounds of {seconds:g} s in turn, a board with a 16 KiB ring buffer on a pty."
     return [Table("Live path", head, rows, text), Table("Asked", ["", "seen", "at most", ""], asked)]

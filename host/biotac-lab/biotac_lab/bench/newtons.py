@@ -86,8 +86,8 @@ def measure(files: Sequence[Path], picture: Path | None = None, show: Show = lam
         draw(outcome, picture)
     cores, names = outcome.cores, list(outcome.noise_n)
     rows = [
-        [one.name, one.knows, *[one.cycles[k] for k in cores], one.error_n, *[_three(one.rmse_n, k) for k in names]]
-        for one in outcome.points
+        [p.name, p.knows, *[p.cycles[k] for k in cores], p.error_n, *[_three(p.rmse_n, k) for k in names]]
+        for p in outcome.points
     ]
     floors = [[text, *[_three(getattr(outcome, field), name) for name in names]] for field, text, _ in FLOORS]
     titles = [f"cycles, {about['title']}" for about in cores.values()]
@@ -113,7 +113,7 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
     kept = json.loads(resources.files(__package__).joinpath(CYCLES).read_text(encoding="utf-8"))["data"]
     runs = {path.name: load(path).run for path in files}
     with threadpool_limits(limits=1, user_api="blas"):
-        others, notes = _of_others(files, list(runs.values()))
+        others, notes = _from_others(files, list(runs.values()))
     found: dict[str, dict[str, list[float]]] = {}
     noise, repeats = {}, {}
     for name, run in runs.items():
@@ -133,7 +133,7 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
         for key, knows, called, scene in listed
         if key in found
     ]
-    cores = {core: {what: about[what] for what in ("title", "cycles_by")} for core, about in kept.items()}
+    cores = {core: {key: about[key] for key in ("title", "cycles_by")} for core, about in kept.items()}
     return Outcome(points, noise, repeats, cores, notes)
 
 
@@ -146,7 +146,7 @@ UNTRAINED = (
 )
 
 
-def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Population], list[str]]:
+def _from_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Population], list[str]]:
     """For each recording the map of the others; for a single one the package's map, if not trained on it."""
     if len(runs) > 1:
         fingers = [training.sums_of(training.aligned(run)) for run in runs]
@@ -177,8 +177,8 @@ def _noise(validation: Validation) -> list[float]:
     map_of_all = validation.wrench_map
     counts = run.counts[rows]
     noisy = counts + rng.normal(size=counts.shape) * sigma
-    there, here = (map_of_all.predict(each, pdc)[:, :3] for each in (noisy, counts))
-    noise_n: list[float] = rmse(there, here).tolist()
+    noised, exact = (map_of_all.predict(each, pdc)[:, :3] for each in (noisy, counts))
+    noise_n: list[float] = rmse(noised, exact).tolist()
     return noise_n
 
 

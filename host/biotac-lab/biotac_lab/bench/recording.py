@@ -19,7 +19,7 @@ import biotac
 from biotac import InputError, Recording
 
 from ..report import Show, Table
-from .contest import met
+from .contest import judge
 
 ROUNDS = 3
 MB = 1e6
@@ -60,9 +60,9 @@ def measure(
         loaders[FORCE] = lambda: biotac.load(mcap, fields=["t_us", "force_n"], fingers=[0])
         times = load_times_s(loaders, show)
         size_mb, whole = mcap.stat().st_size / MB, (fingers, round(seconds)) == (5, 600)
-        verdict = met(ASKED_MCAP_MB, size_mb) if whole else ""
+        verdict = judge(ASKED_MCAP_MB, size_mb) if whole else ""
         sizes = [["MCAP", size_mb, verdict], ["MCAP with protobuf messages", protobuf.stat().st_size / MB, ""]]
-    rows = [[name, taken] for name, taken in times.items()]
+    rows = [[name, time_s] for name, time_s in times.items()]
     rows += [["protobuf / MCAP wire", times[PROTOBUF] / times[OURS]], ["force / all frames", times[FORCE] / times[ALL]]]
     return [
         Table(f"{source}, {fingers} finger(s), {seconds:g} s", ["", "MB", ""], sizes, digits=2),
@@ -72,14 +72,14 @@ def measure(
 
 def load_times_s(loaders: dict[str, Callable[[], Any]], show: Show) -> dict[str, float]:
     """Median CPU seconds of each; each has run before."""
-    taken: dict[str, list[float]] = {name: [] for name in loaders}
+    times_s: dict[str, list[float]] = {name: [] for name in loaders}
     for k in range(ROUNDS):
         for name, load in loaders.items():
             show(f"loading, round {k + 1} of {ROUNDS}: {name}")
             begin_s = time.process_time()
             load()
-            taken[name].append(time.process_time() - begin_s)
-    return {name: statistics.median(times) for name, times in taken.items()}
+            times_s[name].append(time.process_time() - begin_s)
+    return {name: statistics.median(times) for name, times in times_s.items()}
 
 
 def check_same(got: Any, expected: Any, name: str) -> None:

@@ -83,10 +83,10 @@ def _cases(path: Path) -> Iterator[Case]:
         rows = trial.touched & (trial.pressure > plate_normal.CONTACT_COUNTS) & np.isfinite(trial.signal).all(axis=1)
         yield Case(path.name, trial.signal[rows], -trial.plate_normal[rows])
     elif "F" in fields:
-        one = training.aligned(wrench.load(path).run)
-        e, light = one.counts - one.tare, is_light(one.truth)
-        yield Case(path.name, e, one.truth, in_n=True)
-        yield Case(f"{path.name}, {LIGHT}", e[light], one.truth[light], in_n=True)
+        aligned = training.aligned(wrench.load(path).run)
+        e, light = aligned.counts - aligned.tare, is_light(aligned.truth)
+        yield Case(path.name, e, aligned.truth, in_n=True)
+        yield Case(f"{path.name}, {LIGHT}", e[light], aligned.truth[light], in_n=True)
     elif "L" in fields and "R" in fields:
         for name in "LR":
             yield Case(f"{path.name}, {name}", fields[name], np.full((len(fields[name]), 3), np.nan))
@@ -106,8 +106,8 @@ def of_population(name: str, prior: population.Population, run: wrench.Run) -> T
     light = is_light(run.truth)
     every = [(name, slice(None))] + ([(f"{name}, {LIGHT}", light)] if light.any() else [])
     rows = [
-        [what, "published", *_judged(Case(what, None, run.truth[at], in_n=True), force_n[at], outside[at])]
-        for what, at in every
+        [part, "published", *_judged(Case(part, None, run.truth[at], in_n=True), force_n[at], outside[at])]
+        for part, at in every
     ]
     return Table("Direction of force", HEAD, rows)
 
@@ -142,5 +142,5 @@ def _judged(case: Case, force_n: Any, outside: Any | None = None) -> list[Any]:
             rmse]  # fmt: skip
 
 
-def _share(of: Any) -> float | None:
-    return float(of.mean()) if of.size else None
+def _share(mask: Any) -> float | None:
+    return float(mask.mean()) if mask.size else None

@@ -60,9 +60,9 @@ class Touched:
     def by(cls, seed: int, states: Sequence[States]) -> Touched:
         """Finger ``seed`` under ``states``, with its noise."""
         finger, rng = Finger(seed), np.random.default_rng([seed, 41])
-        counts = np.concatenate([finger.counts(one) for one in states])
+        counts = np.concatenate([finger.counts(part) for part in states])
         noisy = np.clip(np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape)), 0.0, 4095.0)
-        return cls(noisy, finger.rest_counts(np.zeros(1))[0], np.concatenate([one.wrench()[0] for one in states]))
+        return cls(noisy, finger.rest_counts(np.zeros(1))[0], np.concatenate([part.wrench()[0] for part in states]))
 
     def run(self, like: Run) -> Run:
         """As a recording, with the drift of ``like``."""
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
     with threadpool_limits(limits=2, user_api="blas"):
         show("fitting")
         runs = [training.aligned(load(path).run) for path in args.files]
-        fit = Fit([half for one in runs for half in halves(one)])
+        fit = Fit([half for recording in runs for half in halves(recording)])
         skin = completed(fit, runs)
         if args.out is not None:
             args.out.write_text(dumps(skin, args.source), encoding="utf-8")
@@ -104,9 +104,9 @@ def run(args: argparse.Namespace, show: Show) -> int:
 def _judged(population: Population, touched: Sequence[Touched]) -> tuple[Floats, float]:
     """RMSE (fingers, 3) in N as boards publish the force, and the share flagged OUTSIDE."""
     errors, outside = [], []
-    for one in touched:
-        likeness = population.judged(one.counts, one.tare)
-        errors.append(rmse(likeness.mixed(population.force(one.counts, one.tare)), one.truth))
+    for finger in touched:
+        likeness = population.judged(finger.counts, finger.tare)
+        errors.append(rmse(likeness.mixed(population.force(finger.counts, finger.tare)), finger.truth))
         outside.append(likeness.outside.mean())
     return np.array(errors), float(np.mean(outside))
 
@@ -119,7 +119,7 @@ def _default(touched: Sequence[Touched], seeds: range) -> tuple[Table, bool]:
     at, still = surface.project(surface.ELECTRODE_MM), np.zeros(n)
     pokes = States(at, np.full(n, PROBE_N), np.zeros((n, 3)), still, np.full(n, PROBE_MM), still)
     poked, unlike = _judged(population, [Touched.by(seed, [pokes]) for seed in seeds])
-    scaled = np.array([_pressed(population, one, seed) for one, seed in zip(touched, seeds, strict=True)])
+    scaled = np.array([_pressed(population, finger, seed) for finger, seed in zip(touched, seeds, strict=True)])
     rows: list[list[Any]] = [
         [f"{len(seeds)} fingers on a plate, all together", *pooled, outside],
         ["the median finger", *np.median(errors, axis=0), None],
@@ -134,21 +134,21 @@ def _default(touched: Sequence[Touched], seeds: range) -> tuple[Table, bool]:
     return Table("The default map on simulated fingers: RMSE [N]", HEAD, rows, digits=2), passed
 
 
-def _pressed(population: Population, one: Touched, seed: int) -> Floats:
+def _pressed(population: Population, finger: Touched, seed: int) -> Floats:
     """RMSE (3,) in N of the map alone after five straight presses where the plate touched."""
-    felt = population.force(one.counts, one.tare)
-    straight = np.hypot(one.truth[:, 0], one.truth[:, 1]) < 0.08 * one.truth[:, 2]
-    good = np.flatnonzero(straight & (one.truth[:, 2] > PRESS_N[0]) & (one.truth[:, 2] < PRESS_N[1]))
+    felt = population.force(finger.counts, finger.tare)
+    straight = np.hypot(finger.truth[:, 0], finger.truth[:, 1]) < 0.08 * finger.truth[:, 2]
+    good = np.flatnonzero(straight & (finger.truth[:, 2] > PRESS_N[0]) & (finger.truth[:, 2] < PRESS_N[1]))
     chosen = np.random.default_rng([seed, 42]).choice(good, PRESSES, replace=False)
-    pressed = one.truth[chosen] * [0.0, 0.0, 1.0]  # a scale shows z alone
-    return rmse(scale_of(felt[chosen], pressed).applied(felt), one.truth)
+    pressed = finger.truth[chosen] * [0.0, 0.0, 1.0]  # a scale shows z alone
+    return rmse(scale_of(felt[chosen], pressed).applied(felt), finger.truth)
 
 
 def _calibrated(fit: Fit, seeds: Sequence[int]) -> tuple[Table, bool]:
     """`biotac calibrate wrench` on simulated fingers pressed where and as the real ones were: its bias, held out."""
     rng = np.random.default_rng(43)
-    of = rng.integers(0, sum(map(len, fit.places)), LOADS)
-    place, force_n = np.concatenate(fit.places)[of], np.concatenate([half.force_n for half in fit.parts])[of]
+    drawn = rng.integers(0, sum(map(len, fit.places)), LOADS)
+    place, force_n = np.concatenate(fit.places)[drawn], np.concatenate([half.force_n for half in fit.parts])[drawn]
     size_n = BANDS_N[0] * (BANDS_N[-1] / BANDS_N[0]) ** rng.random(LOADS)
     force_n *= (size_n / np.linalg.norm(force_n, axis=1))[:, None]
     states = replace(fit.parts[0], force_n=force_n).states(place)
@@ -170,11 +170,11 @@ def _calibrated(fit: Fit, seeds: Sequence[int]) -> tuple[Table, bool]:
 
 def _back(touched: Sequence[Touched], runs: Sequence[Run], names: Sequence[str]) -> Table:
     """A map of simulated fingers alone on the real ones, beside the map of the other real finger."""
-    simulated = training.train([training.sums_of(one.run(runs[0])) for one in touched], symmetric=True)
-    real = [training.train([training.sums_of(one)], symmetric=True) for one in runs]
+    simulated = training.train([training.sums_of(finger.run(runs[0])) for finger in touched], symmetric=True)
+    real = [training.train([training.sums_of(recording)], symmetric=True) for recording in runs]
     rows: list[list[Any]] = []
     for run, name, other in zip(runs, names, reversed(real), strict=True):
-        by_other, by_simulated = (rmse(one.published(run.counts, run.tare), run.truth) for one in (other, simulated))
+        by_other, by_simulated = (rmse(fit.published(run.counts, run.tare), run.truth) for fit in (other, simulated))
         rows += [[f"{name} by the other", *by_other], [f"{name} by {len(touched)} simulated", *by_simulated]]
         rows += [[f"{name}, ratio", *(by_simulated / by_other)]]
     return Table("The other way round: RMSE [N]", HEAD[:4], rows, digits=2)
@@ -193,11 +193,11 @@ def _alike(parts: Sequence[Half], touched: Sequence[Touched], runs: Sequence[Run
     real = [np.concatenate([half.counts - half.tare for half in parts[k : k + 2]]) for k in (0, 2)]
     force = [np.concatenate([half.force_n for half in parts[k : k + 2]]) for k in (0, 2)]
     split = len(real[0])
-    model = [[(one.counts - one.tare)[:split], (one.counts - one.tare)[split:]] for one in touched]
-    columns = [*[f"{name}{of}" for name in names for of in ("", ", model")]]
+    model = [[(finger.counts - finger.tare)[:split], (finger.counts - finger.tare)[split:]] for finger in touched]
+    columns = [*[f"{name}{kind}" for name in names for kind in ("", ", model")]]
 
     def both(value: Any) -> list[float]:
-        return [float(x) for k in (0, 1) for x in (value(real[k], k), np.median([value(one[k], k) for one in model]))]
+        return [float(x) for k in (0, 1) for x in (value(real[k], k), np.median([value(e[k], k) for e in model]))]
 
     def per_n(e: Floats, k: int) -> Any:
         return np.median(np.linalg.norm(e, axis=1) / np.linalg.norm(force[k], axis=1))
@@ -212,7 +212,7 @@ def _alike(parts: Sequence[Half], touched: Sequence[Touched], runs: Sequence[Run
         return np.polyfit(force[k][:, 2], default.published(tare + e, tare)[:, 2], 1)[0]
 
     upper = np.triu_indices(19, 1)
-    corr = [np.corrcoef(one.T)[upper] for one in real]
+    corr = [np.corrcoef(e.T)[upper] for e in real]
 
     def pattern(e: Floats, k: int) -> Any:
         return np.corrcoef(np.corrcoef(e.T)[upper], corr[1 - k])[0, 1]

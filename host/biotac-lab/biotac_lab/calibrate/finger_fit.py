@@ -119,9 +119,9 @@ class Fit:
         self.places = [self._place(x, k) for k in range(len(parts))]
         self.own = np.array([x[self._own(k)][:19] for k in range(len(parts))])
         left = [part.counts - self._counts(x, k, self.skin) for k, part in enumerate(parts)]
-        self.rms_counts = np.array([np.sqrt((one**2).mean()) for one in left])
+        self.rms_counts = np.array([np.sqrt((off**2).mean()) for off in left])
         total = [((part.counts - part.counts.mean(axis=0)) ** 2).sum() for part in parts]
-        self.explained = np.array([1.0 - (one**2).sum() / of for one, of in zip(left, total, strict=True)])
+        self.explained = np.array([1.0 - (off**2).sum() / whole for off, whole in zip(left, total, strict=True)])
 
     def _place(self, x: Floats, k: int) -> Floats:
         place: Floats = x[self._ends[k] : self._ends[k + 1]].reshape(-1, 2)
@@ -136,7 +136,7 @@ class Fit:
 
     def _counts(self, x: Floats, k: int, skin: Skin) -> Floats:
         part, own = self.parts[k], x[self._own(k)]
-        compression, bulge = (np.exp(own[:19]) * one for one in deform(part.states(self._place(x, k)), skin=skin))
+        compression, bulge = (np.exp(own[:19]) * share for share in deform(part.states(self._place(x, k)), skin=skin))
         counts: Floats = counts_at(resistance_at(part.tare) * resistance_share(compression, bulge, skin.fixed_share))
         stale = (own[19] + own[20] * part.time) * DRIFT_SIGMA_COUNTS
         counts += stale[:, None] * part.drift
@@ -145,7 +145,7 @@ class Fit:
     def _residuals(self, x: Floats) -> Floats:
         skin = self._skin(x)
         off = [(part.counts - self._counts(x, k, skin)) / self._sigma for k, part in enumerate(self.parts)]
-        return np.concatenate([*(one.ravel() for one in off), (x[_N:] - self._mean) / self._sigmas])
+        return np.concatenate([*(rows.ravel() for rows in off), (x[_N:] - self._mean) / self._sigmas])
 
     def _sparsity(self) -> csr_matrix:
         """Which residual depends on which parameter: without it, every place would be tried alone."""
@@ -194,4 +194,4 @@ def dumps(skin: Skin, source: str) -> str:
 
 
 def _short(value: Any) -> Any:
-    return [_short(one) for one in value] if np.ndim(value) else float(f"{value:.4g}")
+    return [_short(number) for number in value] if np.ndim(value) else float(f"{value:.4g}")

@@ -70,7 +70,7 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
         for k, run in enumerate(runs):
             others = [finger for j, finger in enumerate(fingers) if j != k]
             found.append(worth_of_force(train(others, symmetric=symmetric), run))
-    raw, scaled = (np.sqrt(np.mean([one[k] ** 2 for one in found], axis=0)) for k in (0, 1))
+    raw, scaled = (np.sqrt(np.mean([errors[k] ** 2 for errors in found], axis=0)) for k in (0, 1))
     return raw, np.minimum(raw, scaled)
 
 

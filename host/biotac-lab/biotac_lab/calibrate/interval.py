@@ -61,7 +61,7 @@ class Judged:
 
 def together(parts: Sequence[Judged]) -> Judged:
     """The frames of several fingers."""
-    each = [(one.felt_n, one.half_n, one.truth_n, one.force_n) for one in parts]
+    each = [(part.felt_n, part.half_n, part.truth_n, part.force_n) for part in parts]
     return Judged(*(np.concatenate(columns) for columns in zip(*each, strict=True)))
 
 
@@ -75,10 +75,10 @@ class Finger:
     sums: FingerSums
 
     @classmethod
-    def of(cls, run: Run) -> Finger:
+    def of_run(cls, run: Run) -> Finger:
         """From a recording as loaded. Raises RecordingError when force and counts do not belong together."""
-        one = aligned(run)
-        return cls(run, one, np.clip(np.rint(one.counts), 0, 4095).astype(np.uint16), sums_of(one))
+        own = aligned(run)
+        return cls(run, own, np.clip(np.rint(own.counts), 0, 4095).astype(np.uint16), sums_of(own))
 
 
 def population_rows(finger: Finger, others: Sequence[Finger], *, symmetric: bool = True) -> tuple[Judged, Floats]:
@@ -96,22 +96,22 @@ def population_rows(finger: Finger, others: Sequence[Finger], *, symmetric: bool
 def population_margin(fingers: Sequence[Finger], *, symmetric: bool = True) -> tuple[Margin, list[Judged]]:
     """The population map's margin, fitted to each finger by the map of the others, and these frames with it."""
     each = [
-        population_rows(one, [other for other in fingers if other is not one], symmetric=symmetric) for one in fingers
+        population_rows(own, [other for other in fingers if other is not own], symmetric=symmetric) for own in fingers
     ]
-    rows, guess = together([one for one, _ in each]), np.concatenate([one for _, one in each])
+    rows, guess = together([judged for judged, _ in each]), np.concatenate([judged for _, judged in each])
     margin = fit_margin(rows.felt_n, rows.truth_n, rows.force_n, guess)
-    return margin, [replace(one, half_n=guess + margin.half_n(one.felt_n)) for one, guess in each]
+    return margin, [replace(judged, half_n=guess + margin.half_n(judged.felt_n)) for judged, guess in each]
 
 
 def lin_settings(others: Sequence[Finger]) -> Settings:
     """Lin's gains as fitted to other fingers, axis by axis."""
     unit = {Setting.FORCE_MODEL: ForceModel.LIN, **dict.fromkeys(GAINS, UNIT_NN)}
-    felt = np.concatenate([compute(one.words, one.aligned.tare, unit)["force_n"] for one in others])
-    truth = np.concatenate([one.aligned.truth for one in others])
+    felt = np.concatenate([compute(finger.words, finger.aligned.tare, unit)["force_n"] for finger in others])
+    truth = np.concatenate([finger.aligned.truth for finger in others])
     gain = (felt * truth).sum(axis=0) / (felt**2).sum(axis=0)
     return {
         Setting.FORCE_MODEL: ForceModel.LIN,
-        **{one: round(UNIT_NN * value) for one, value in zip(GAINS, gain, strict=True)},
+        **{setting: round(UNIT_NN * value) for setting, value in zip(GAINS, gain, strict=True)},
     }
 
 
@@ -141,7 +141,7 @@ def own_rows(finger: Finger) -> tuple[Judged, Judged, bytes]:
     return whole, replace(whole, half_n=half), found.wrench_map.on_board().blob
 
 
-def share_with_one_out(finger: Finger, settings: Settings, own_map: bytes | None) -> list[float]:
+def share_without_electrode(finger: Finger, settings: Settings, own_map: bytes | None) -> list[float]:
     """Of frames whose force is known as a healthy finger's, how many hold it with one electrode out: normal and shear.
 
     Of each electrode in turn, on a board where it is silent.

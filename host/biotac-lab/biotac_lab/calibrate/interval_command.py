@@ -20,7 +20,7 @@ from .interval import (
     lin_settings,
     own_rows,
     population_margin,
-    share_with_one_out,
+    share_without_electrode,
     together,
 )
 
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
     if len(args.files) < 2:
         raise InputError("one recording: expected at least two fingers, each to be left out of the others' map")
     with threadpool_limits(limits=1, user_api="blas"):
-        tables = judge([Finger.of(load(path).run) for path in args.files], [path.name for path in args.files], show)
+        tables = judge([Finger.of_run(load(path).run) for path in args.files], [path.name for path in args.files], show)
     facts = {"tables": [table.facts() for table in tables]}
     print(json.dumps(facts) if args.json else "\n".join(line for table in tables for line in table.page()))
     return 0
@@ -60,7 +60,7 @@ def judge(fingers: list[Finger], names: list[str], show: Show) -> list[Table]:
         show(f"{name}: electrodes out")
         by: tuple[tuple[str, Settings, bytes | None], ...]
         by = (("own map", {}, blob), ("population", {}, None), ("Lin", lin_settings(others), None))
-        out += [[source, name, *share_with_one_out(finger, *given)] for source, *given in by]
+        out += [[source, name, *share_without_electrode(finger, *given)] for source, *given in by]
     lin = [lin_rows(finger, [other for other in fingers if other is not finger]) for finger in fingers]
     for source, each in (("own map", own), ("population", by_population), ("Lin", lin)):
         rows += _rows(source, together(each))

@@ -74,11 +74,11 @@ def held_out(looks: Looks) -> Floats:
     return result
 
 
-def angles_deg(one: Floats, other: Floats) -> Floats:
+def angles_deg(own: Floats, other: Floats) -> Floats:
     """Angles (n,) in degrees between unit vectors (n, 3)."""
     # atan2 is exact for small angles, which acos rounds to 0
-    cross = np.linalg.norm(np.cross(one, other), axis=1)
-    result: Floats = np.degrees(np.arctan2(cross, (one * other).sum(axis=1)))
+    cross = np.linalg.norm(np.cross(own, other), axis=1)
+    result: Floats = np.degrees(np.arctan2(cross, (own * other).sum(axis=1)))
     return result
 
 
@@ -86,12 +86,12 @@ class _Fitting:
     """Sums for every contact, so that a fit to any choice of contacts is one solve for 22 unknowns."""
 
     def __init__(self, looks: Looks) -> None:
-        names, of = np.unique(looks.contact, return_inverse=True)
+        names, contact_of = np.unique(looks.contact, return_inverse=True)
         if len(names) < LEAST_CONTACTS:
             raise InputError(
                 f"{len(names)} contacts with the plate: expected {LEAST_CONTACTS} or more; press it from many sides"
             )
-        self.rows = [np.flatnonzero(of == k) for k in range(len(names))]
+        self.rows = [np.flatnonzero(contact_of == k) for k in range(len(names))]
         self._normals = looks.normals
         self._formula, inputs = _inputs(looks.points_mm, looks.e)
         self._z = np.column_stack([inputs, np.ones(len(inputs))])
@@ -131,6 +131,6 @@ def _inputs(points_mm: Floats, e: Floats) -> tuple[Floats, Floats]:
     return formula, np.column_stack([formula, _unit(e)])
 
 
-def _unit(of: Floats) -> Floats:
-    length = np.linalg.norm(of, axis=1, keepdims=True)
-    return of / np.where(length > 0.0, length, 1.0)
+def _unit(vectors: Floats) -> Floats:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, 1.0)

@@ -51,7 +51,7 @@ class PeerNet:
 
     def _conv(self, x: Any, name: str, norm: int) -> Any:
         """Cells of two voxels along each axis, without overlap."""
-        weights, biases = (self._w[f"Conv{name}/{what}"] for what in ("weights", "biases"))
+        weights, biases = (self._w[f"Conv{name}/{kind}"] for kind in ("weights", "biases"))
         n, *size, _ = x.shape
         cells = x.reshape([n, *(part for along in size for part in (along // 2, 2)), -1])
         cells = np.moveaxis(cells, range(2, 2 * len(size) + 1, 2), range(1 + len(size), 1 + 2 * len(size)))
@@ -62,7 +62,7 @@ class PeerNet:
         return x @ self._w[f"{name}/weights"] + self._w[f"{name}/biases"]
 
     def _norm(self, x: Any, k: int) -> Any:
-        gamma, beta = (self._w[f"LayerNorm{f'_{k}' if k else ''}/{what}"] for what in ("gamma", "beta"))
+        gamma, beta = (self._w[f"LayerNorm{f'_{k}' if k else ''}/{kind}"] for kind in ("gamma", "beta"))
         every = tuple(range(1, x.ndim))
         spread = np.sqrt(x.var(axis=every, keepdims=True) + 1e-12)
         return np.maximum((x - x.mean(axis=every, keepdims=True)) / spread * gamma + beta, 0.0)
@@ -90,7 +90,7 @@ def _layout(heads: int) -> dict[str, tuple[int, ...]]:
     found |= {"fcn32/weights": (64, 32), "fcn3/weights": (32, 3)} if heads > 1 else {}
     found |= {name.replace("weights", "biases"): shape[-1:] for name, shape in found.items()}
     for k, size in enumerate([64, 64, 64, 64, 128, 64] + [32] * heads):
-        found |= {f"LayerNorm{f'_{k}' if k else ''}/{what}": (size,) for what in ("beta", "gamma")}
+        found |= {f"LayerNorm{f'_{k}' if k else ''}/{kind}": (size,) for kind in ("beta", "gamma")}
     return found
 
 

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
     if args.out is not None and args.out.exists() and not args.force:
         raise InputError(f"{args.out} exists; overwrite it (--force) or name another")
     with threadpool_limits(limits=THREADS, user_api="blas"):
-        fingers = [Finger.of(load(path).run) for path in args.files]
+        fingers = [Finger.of_run(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
         trained = _calibrated(args, fingers)
         judged = _left_out(args, fingers)
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
 
 
 def _calibrated(args: argparse.Namespace, fingers: list[Finger]) -> Trained:
-    sums, runs = [one.sums for one in fingers], [one.aligned for one in fingers]
+    sums, runs = [finger.sums for finger in fingers], [finger.aligned for finger in fingers]
     population = training.train(sums, symmetric=args.symmetric)
     if len(fingers) > 1:
         population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
@@ -84,7 +84,7 @@ def _left_out(args: argparse.Namespace, fingers: list[Finger]) -> dict[str, Wort
     """Each finger by the map of the others, if there are others."""
     found = {}
     for k, path in enumerate(args.files if len(fingers) > 1 else []):
-        others = training.train([one.sums for j, one in enumerate(fingers) if j != k], symmetric=args.symmetric)
+        others = training.train([finger.sums for j, finger in enumerate(fingers) if j != k], symmetric=args.symmetric)
         found[f"{path.name} by the others"] = held_out_error.worth(others, fingers[k].aligned)
     return found
 
@@ -106,7 +106,7 @@ def _errors(facts: dict[str, Any], judged: dict[str, Worth]) -> Table:
     rows.append(["the same after five presses on a scale", *facts["sigma_scale5_n"]])
     for name, worth in judged.items():
         each = {"RMSE": worth.rmse_n, "five presses": worth.rmse_scale5_n, "a minute of plate": worth.rmse_60s_n}
-        rows += [[f"{name}, {what}", *rmse] for what, rmse in each.items() if rmse is not None]
+        rows += [[f"{name}, {way}", *rmse] for way, rmse in each.items() if rmse is not None]
     within = "".join(f" {share:.0%}" for share in facts.get("coverage", ()))
     text = f"Of the test, within one and two sigma:{within}." if within else ""
     return Table("Force error [N]", ["", "x", "y", "z"], rows, text)

@@ -113,7 +113,7 @@ def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: boo
 
 
 def _solve(fingers: Sequence[Sums]) -> tuple[Floats, Floats]:
-    gram, cross, mean = (np.mean([getattr(one, name) for one in fingers], axis=0) for name in ("gram", "cross", "mean"))
+    gram, cross, mean = (np.mean([getattr(f, name) for f in fingers], axis=0) for name in ("gram", "cross", "mean"))
     known = normals()
     spread = np.diag(gram) - mean**2
     variance = np.maximum(spread, VARIANCE_FLOOR * np.median(spread))

@@ -38,7 +38,7 @@ NAMES = {
 def load(name: str) -> ModuleType:
     """The module of the experiment ``name``, with a function run() from Options to a Report.
 
-    ``RECORDING`` says what a recording must hold; without it none makes sense. ``TAKES`` are the options among
+    ``RECORDING`` says what a recording must hold; without it none makes sense. ``ACCEPTS`` are the options among
     ``maps``, ``real``, ``quick`` and ``filter`` that apply, if any do.
     """
     return importlib.import_module(f"{__package__}.{name.replace('-', '_')}")
@@ -80,24 +80,24 @@ def run(args: argparse.Namespace, show: Show) -> int:
         finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, filter=args.filter,
         recording=args.recording, show=show,
     )  # fmt: skip
-    takes = getattr(experiment, "TAKES", ())
-    _check(name, hasattr(experiment, "RECORDING"), takes, options, args.seed)
+    accepted = getattr(experiment, "ACCEPTS", ())
+    _check(name, hasattr(experiment, "RECORDING"), accepted, options, args.seed)
     if args.out is not None:
         check_free(args.out, name, overwrite=args.force)
     report = experiment.run(replace(options, seed=1 if args.seed is None else args.seed))
     show("")
     if args.check and not report.checks:
-        cure = "give --map FILE" if "maps" in takes and args.recording is None else "drop --check"
+        cure = "give --map FILE" if "maps" in accepted and args.recording is None else "drop --check"
         raise InputError(f"--check: {name} on {report.source} has no figure with a target; {cure}")
     written = [] if args.out is None else write(report, args.out, name, NAMES[name], overwrite=args.force)
     if args.json:
         print(json.dumps(report.facts(name) | {"written": [str(path) for path in written]}))
     else:
         print(report.page(name, NAMES[name]) + "".join(f"\nwritten: {path}" for path in written))
-    return 1 if args.check and not all(one["met"] for one in report.checks) else 0
+    return 1 if args.check and not all(item["met"] for item in report.checks) else 0
 
 
-def _check(name: str, has_recordings: bool, takes: Collection[str], options: Options, seed: int | None) -> None:
+def _check(name: str, has_recordings: bool, accepted: Collection[str], options: Options, seed: int | None) -> None:
     """Raise InputError before seconds of work, not after."""
     if options.recording is not None and not has_recordings:
         raise InputError(f"{name} runs only on the emulated sensor, but got {options.recording}: drop it")
@@ -105,6 +105,6 @@ def _check(name: str, has_recordings: bool, takes: Collection[str], options: Opt
         raise InputError("--seed chooses an emulated finger, but a recording is given: drop one of them")
     if seed is not None and not 0 <= seed <= SEED_MAX:
         raise InputError(f"--seed is {seed}: expected 0 to {SEED_MAX}")
-    for what, option in (("maps", "map"), ("real", "real"), ("quick", "quick"), ("filter", "filter")):
-        if getattr(options, what) and what not in takes:
+    for field, option in (("maps", "map"), ("real", "real"), ("quick", "quick"), ("filter", "filter")):
+        if getattr(options, field) and field not in accepted:
             raise InputError(f"{name} does not use --{option}: drop it")

@@ -76,9 +76,9 @@ def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bo
     _require(path, needs, ("E", "PDC", "F") if own_force else ("E", "PDC"))
     own = recording.frames[recording.frames["finger"] == finger]
     if not len(own):
-        there = ", ".join(str(k) for k in np.unique(recording.frames["finger"])) or "none"
+        present = ", ".join(str(k) for k in np.unique(recording.frames["finger"])) or "none"
         raise RecordingError(
-            f"{path}: no frames from finger {finger}; fingers with frames: {there}; choose one with --finger"
+            f"{path}: no frames from finger {finger}; fingers with frames: {present}; choose one with --finger"
         )
     notes = ["tare: the board's own, from the recorded counts", *recording.problems]
     if own_force:

@@ -23,7 +23,7 @@ def renormalised(counts: Words, reading: str = READINGS[0]) -> tuple[Floats, Boo
     tare in force, "in the window" its second half with its first.
     """
     values = np.asarray(counts, np.float64)
-    tare, taken = np.full(values.shape, np.nan), np.zeros(len(values), np.bool_)
+    tare, is_new = np.full(values.shape, np.nan), np.zeros(len(values), np.bool_)
     base = np.full(values.shape[1], np.nan)
     half = WINDOW_ROWS // 2
     for k in range(WINDOW_ROWS - 1, len(values)):
@@ -31,6 +31,6 @@ def renormalised(counts: Words, reading: str = READINGS[0]) -> tuple[Floats, Boo
         mean = window.mean(axis=0)
         change = mean - base if reading == READINGS[0] else window[half:].mean(axis=0) - window[:half].mean(axis=0)
         if np.isnan(base[0]) or (change**2).sum() < THRESHOLD_COUNT2:
-            base, taken[k] = mean, True
+            base, is_new[k] = mean, True
         tare[k] = base
-    return tare, taken
+    return tare, is_new

@@ -92,7 +92,7 @@ def calibrate(
     """
     seeds = tuple(seed + k for k in range(len(fingers)))
     forces = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
-    series = [presses(fingers, these, [PLACE] * len(these)) for these in forces]
+    series = [presses(fingers, forces_n, [PLACE] * len(forces_n)) for forces_n in forces]
     text = scenario("navarro", seeds, profile, [*series[0], *series[1]])
     # The first series' length. The second begins later by the initial rest, which its first press needs as its rest.
     verify_s = len(fingers) * len(CALIBRATION_FORCES_N) * PRESS_S
@@ -117,10 +117,10 @@ def calibrate(
             second.feed(rows[rows["t_us"] - (begin_us or 0) >= verify_s * 1e6])
     second.finish()
     calibrated = []
-    for of_finger, finger in zip(seeds, fingers, strict=True):
+    for own_seed, finger in zip(seeds, fingers, strict=True):
         press = second.presses[finger][0]
         verified = verify(fits[finger], press)
-        calibrated.append(Calibrated(of_finger, fits[finger], first.presses[finger], press, verified))
+        calibrated.append(Calibrated(own_seed, fits[finger], first.presses[finger], press, verified))
     return Hands(profile, tuple(calibrated), outcome.frames, outcome.violations)
 
 
@@ -135,8 +135,8 @@ def places(seed: int) -> Table:
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]
     rows = [
-        [name, one.gain_n * 1e3, *[_error_percent(one.gain_nn, group) for group in groups]]
-        for name, one in zip(PLACES, fits, strict=True)
+        [name, fitted.gain_n * 1e3, *[_error_percent(fitted.gain_nn, group) for group in groups]]
+        for name, fitted in zip(PLACES, fits, strict=True)
     ]
     caption = (
         "K fitted at one place (row), and its relative error in % at each place (column), from the tip backwards. K is "
@@ -194,14 +194,14 @@ def scenario(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[
 def run(options: Options) -> Report:
     """Calibrate five fingers of each profile: new with seeds from ``options.seed`` on, worn with the next ones."""
     hands = [calibrate(options.seed + k * len(FINGERS), profile, options.show) for k, profile in enumerate(PROFILES)]
-    seeds = [one.seed for hand in hands for one in hand.fingers]
+    seeds = [finger.seed for hand in hands for finger in hand.fingers]
     checks = []
     for hand in hands:
-        worst = max(one.verified.board_error for one in hand.fingers)
-        what = f"relative error of the verification press, worst of five fingers, {hand.profile}, computed on board"
+        worst = max(finger.verified.board_error for finger in hand.fingers)
+        text = f"relative error of the verification press, worst of five fingers, {hand.profile}, computed on board"
         right = hand.violations == 0 and hand.frames_checked > 0
         checks += [
-            check(what, worst * 100, LIMIT_PERCENT, "%"),
+            check(text, worst * 100, LIMIT_PERCENT, "%"),
             claim(f"board and float64 agree in all {hand.frames_checked} frames, {hand.profile}", right),
         ]
     options.show("hands of two and of five fingers that press by themselves")
@@ -211,7 +211,7 @@ def run(options: Options) -> Report:
     }
     checks += [
         check(f"relative error of the verifying touch, worst of {len(names)} fingers that were driven by {how}",
-              max(one.verified.board_error for one in found) * 100, LIMIT_PERCENT, "%")
+              max(finger.verified.board_error for finger in found) * 100, LIMIT_PERCENT, "%")
         for (names, how), found in active.items()
     ]  # fmt: skip
     notes = [
@@ -232,9 +232,9 @@ def run(options: Options) -> Report:
 
 def _active(found: dict[tuple[tuple[str, ...], str], list[navarro_active.Active]]) -> Table:
     rows = [
-        [f"{len(names)}, by {how}", one.finger, one.fit.gain_n * 1e3, *one.fit.press_forces_n,
-         one.fit.relative_error * 100, one.verified.force_n, one.verified.board_error * 100]
-        for (names, how), active in found.items() for one in active
+        [f"{len(names)}, by {how}", own.finger, own.fit.gain_n * 1e3, *own.fit.press_forces_n,
+         own.fit.relative_error * 100, own.verified.force_n, own.verified.board_error * 100]
+        for (names, how), active in found.items() for own in active
     ]  # fmt: skip
     head = ["hand of fingers", "finger", "K [mN/count]", "touch 1 [N]", "2", "3", "fit [%]", "touch 4 [N]",
             "verified, board [%]"]  # fmt: skip
@@ -248,12 +248,12 @@ def _active(found: dict[tuple[tuple[str, ...], str], list[navarro_active.Active]
 def _fingers(hand: Hands) -> Table:
     """The table of K and P0, and the errors."""
     rows = []
-    for k, one in enumerate(hand.fingers):
-        rest_off = max(np.abs(press.rows["rest"] - one.fit.rest.counts).max() for press in one.presses)
-        verified = one.verified
-        errors = [one.fit.relative_error * 100, verified.board_error * 100, verified.float_error * 100]
+    for k, finger in enumerate(hand.fingers):
+        rest_off = max(np.abs(press.rows["rest"] - finger.fit.rest.counts).max() for press in finger.presses)
+        verified = finger.verified
+        errors = [finger.fit.relative_error * 100, verified.board_error * 100, verified.float_error * 100]
         rows.append([
-            NAMES[k], one.fit.gain_n * 1e3, PAPER_GAIN_N[k] * 1e3, one.fit.rest.counts, PAPER_REST_COUNTS[k],
+            NAMES[k], finger.fit.gain_n * 1e3, PAPER_GAIN_N[k] * 1e3, finger.fit.rest.counts, PAPER_REST_COUNTS[k],
             float(rest_off), *errors, verified.apart_n * 1e3,
         ])  # fmt: skip
     head = ["finger", "K [mN/count]", "paper's K", "P0 [count]", "paper's P0", "tare off [count]", "fit [%]",
@@ -267,14 +267,14 @@ def _draw(hands: Sequence[Hands], figure: Any) -> None:
     figure.set_size_inches(15, 3.4 * len(hands))
     axes = figure.subplots(len(hands), len(NAMES), squeeze=False)
     for hand, row in zip(hands, axes, strict=True):
-        for name, one, ax in zip(NAMES, hand.fingers, row, strict=True):
-            held, extra = np.concatenate([press.rows for press in one.presses]), one.verification.rows
+        for name, finger, ax in zip(NAMES, hand.fingers, row, strict=True):
+            held, extra = np.concatenate([press.rows for press in finger.presses]), finger.verification.rows
             for rows, color, label in ((held, "#1d4ed8", "calibration"), (extra, "#c2410c", "verification")):
                 ax.plot(rows["pressure"] - rows["rest"], rows["force_n"], ".", color=color, markersize=3, label=label)
             top = float((held["pressure"] - held["rest"]).max())
-            ax.plot([0, top], [0, top * one.fit.gain_n], color="#111111", linewidth=1, label="slope K")
-            error = one.verified.board_error
-            ax.set_title(f"{name}, {hand.profile}: {one.fit.gain_n * 1e3:.2f} mN/count, {error:.2%}", fontsize=9)
+            ax.plot([0, top], [0, top * finger.fit.gain_n], color="#111111", linewidth=1, label="slope K")
+            error = finger.verified.board_error
+            ax.set_title(f"{name}, {hand.profile}: {finger.fit.gain_n * 1e3:.2f} mN/count, {error:.2%}", fontsize=9)
             ax.set(xlabel="P - P0 [count]", ylabel="F [N]")
             ax.grid(alpha=0.25)
     axes[0][0].legend(fontsize=8)

@@ -70,4 +70,4 @@ def calibrate(seed: int, fingers: Sequence[str], profile: Profile = "new", *, ne
         hand = PlateHand(w, fingers)
         move, touches = (hand.to_n, TOUCHES_N) if newtons else (hand.to_deg, TOUCHES_DEG)
         found = drive(w.hand, move, hand.plate_n, touches, next_round=hand.step)
-    return [Active(name, one.fit, one.verified) for name, one in found.items()]
+    return [Active(name, own.fit, own.verified) for name, own in found.items()]

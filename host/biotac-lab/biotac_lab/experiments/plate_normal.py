@@ -143,8 +143,8 @@ def run(options: Options) -> Report:
     shipped = next(case for case in result.cases if case.weights == SHIPPED)
     angles = shipped.over(CONTACT_COUNTS)
     checks = [
-        check(f"{what}, default weights, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
-        for what, q, limit in (("median", 50, LIMIT_MEDIAN_DEG), ("90th percentile", 90, LIMIT_P90_DEG))
+        check(f"{name}, default weights, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
+        for name, q, limit in (("median", 50, LIMIT_MEDIAN_DEG), ("90th percentile", 90, LIMIT_P90_DEG))
     ]
     rows = [[case.profile, called(case.weights), *_summary(case.over(CONTACT_COUNTS))] for case in result.cases]
     rows += [
@@ -152,9 +152,9 @@ def run(options: Options) -> Report:
         for profile, angles in result.corrected_deg.items()
     ]
     others: list[list[Any]] = [
-        [case.profile, called(case.weights), what, *[_summary(case.over(counts))[k] for counts in THRESHOLDS_COUNTS]]
+        [case.profile, called(case.weights), name, *[_summary(case.over(counts))[k] for counts in THRESHOLDS_COUNTS]]
         for case in result.cases
-        for what, k in (("median", 1), ("90th percentile", 3))
+        for name, k in (("median", 1), ("90th percentile", 3))
     ]
     text = (
         "Angle between the normal at the board's point of contact and the plate's, degrees, over every frame in "

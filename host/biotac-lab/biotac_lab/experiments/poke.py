@@ -111,7 +111,7 @@ def spread(points_mm: Floats, contacts: Sequence[Bools]) -> Spread:
     return Spread(std, axis, bias, [int(n) for n in frames])
 
 
-def emulated(seed: int, profile: Profile, *, take: int = 0, slow: bool = False) -> Trial:
+def emulated(seed: int, profile: Profile, *, repeat: int = 0, slow: bool = False) -> Trial:
     """A trial of 19 pokes; ``slow`` rises to SLOW_PEAK_N in four seconds instead of to PEAK_N in 0.3."""
     script = Script()
     for name, (x_mm, y_mm, _) in zip(sensor.ELECTRODE_NAMES, TRUE_MM.tolist(), strict=True):
@@ -120,7 +120,7 @@ def emulated(seed: int, profile: Profile, *, take: int = 0, slow: bool = False) 
         script.phase("rest", 0.1, 1.4, rest, rest)
         script.phase(name, ramp_s, hold_s, Pose(x_mm, y_mm, force_n, tip_mm=PROBE_MM))
         script.phase("release", 0.2, 0.1, rest)
-    return play("poke", script, seed=seed, profile=profile, take=take)
+    return play("poke", script, seed=seed, profile=profile, repeat=repeat)
 
 
 def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> list[Bools]:
@@ -157,8 +157,8 @@ def measure(options: Options) -> Result:
     first: dict[str, Trial] = {}
     for profile in PROFILES:
         options.show(f"poking the {profile} sensor")
-        trials = [emulated(options.seed, profile, take=take) for take in (0, 1)]
-        slow = emulated(options.seed, profile, take=2, slow=True)
+        trials = [emulated(options.seed, profile, repeat=repeat) for repeat in (0, 1)]
+        slow = emulated(options.seed, profile, repeat=2, slow=True)
         cases += _cases(profile, trials, slow)
         first[profile] = trials[0]
     notes = [
@@ -211,12 +211,12 @@ def _tables(result: Result) -> list[Table]:
     )
     bands = [f"{low:g} to {high:g} N" for low, high in BANDS_N]
     banded: list[list[Any]] = [
-        [case.profile, called(case.weights), what, *[getattr(band, of).mean() for band in case.bands]]
+        [case.profile, called(case.weights), name, *[getattr(band, field).mean() for band in case.bands]]
         for case in result.cases
-        for what, of in (("std", "std_mm"), ("bias", "bias_mm"))
+        for name, field in (("std", "std_mm"), ("bias", "bias_mm"))
     ]
     shipped = [case for case in result.cases if case.weights == SHIPPED]
-    columns = [trial.std_mm.tolist() for case in shipped for trial in case.trials] + [list(one) for one in PAPER_MM]
+    columns = [trial.std_mm.tolist() for case in shipped for trial in case.trials] + [list(row) for row in PAPER_MM]
     names = [f"{case.profile} {k + 1}" for case in shipped for k in range(len(case.trials))]
     each: list[list[Any]] = [[name, *row] for name, *row in zip(sensor.ELECTRODE_NAMES, *columns, strict=True)]
     each.append(["**average**", *[float(np.mean(column)) for column in columns]])

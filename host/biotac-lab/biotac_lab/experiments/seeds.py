@@ -34,7 +34,7 @@ def names(row: Facts) -> list[str]:
 def figure(facts: Facts, name: str) -> float:
     """The figure of that name in an experiment's JSON. Raises KeyError that says what is missing."""
     first, *keys = name.split("|")
-    now: Any = facts.get(first) or next((one for one in facts["tables"] if one["title"].startswith(first)), None)
+    now: Any = facts.get(first) or next((found for found in facts["tables"] if found["title"].startswith(first)), None)
     for key in keys:
         now = _within(now, key)
     if not isinstance(now, int | float):
@@ -44,7 +44,7 @@ def figure(facts: Facts, name: str) -> float:
 
 def _within(now: Any, key: str) -> Any:
     if isinstance(now, list):
-        return now[int(key)] if key.isdigit() else next((one for one in now if key in _texts(one.values())), None)
+        return now[int(key)] if key.isdigit() else next((row for row in now if key in _texts(row.values())), None)
     if isinstance(now, dict) and "head" in now:
         rows = (row for row in now["rows"] if _texts(row).startswith(key))
         return next((dict(zip(now["head"], row, strict=True)) for row in rows), None)
@@ -61,20 +61,20 @@ def findings(experiment: str, facts: Facts) -> list[Facts]:
     for row in (row for rows in ROWS.values() for row in rows if row.get("experiment") == experiment and "less" in row):
         less, more = (figure(facts, name) for name in row["less"])
         ours = _filled(row, {name: figure(facts, name) for name in names(row)})
-        what = f"{row['item']}. Theirs: {row['his']}; ours: {ours}; {row['verdict']}"
-        found.append(claim(what, (less < more) == row["verdict"].startswith("right")))
+        text = f"{row['item']}. Theirs: {row['his']}; ours: {ours}; {row['verdict']}"
+        found.append(claim(text, (less < more) == row["verdict"].startswith("right")))
     return found
 
 
 def _filled(row: Facts, figures: dict[str, float]) -> str:
-    return FIGURE.sub(lambda one: format(figures[one[1]], one[2]) if one[1] in figures else "-", row["ours"])
+    return FIGURE.sub(lambda match: format(figures[match[1]], match[2]) if match[1] in figures else "-", row["ours"])
 
 
 def table(kept: dict[str, dict[str, float]]) -> Table:
     """All rows, with the figures by experiment."""
     rows = []
-    for paper, those in ROWS.items():
-        for row in those:
+    for paper, group in ROWS.items():
+        for row in group:
             ours = _filled(row, kept.get(row.get("experiment", ""), {}))
             command = row.get("command") or f"biotac-lab experiment {row['experiment']}"
             rows.append([NAMES[paper], row["item"], row["his"], ours, command.join("``") if command != "-" else "-",

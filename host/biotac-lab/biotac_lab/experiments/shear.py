@@ -15,7 +15,7 @@ from . import weight
 from .weight import WEIGHT_N
 
 RECORDING = "E and F"
-TAKES = ("maps",)
+ACCEPTS = ("maps",)
 
 SHEAR_N = 3.0
 HOLD_S = 2.5

@@ -101,12 +101,12 @@ def run(options: Options) -> Report:
                           at_rest(pressed, options.seed, profile)))  # fmt: skip
         ended, begun = pressed.phases[-1].begin_s, warmed.phases[-1].begin_s - WARMING_S
         for way in WAYS:
-            (tare, taken), (follows, _) = tares(pressed)[way], tares(warmed)[way]
+            (tare, is_new), (follows, _) = tares(pressed)[way], tares(warmed)[way]
             off, after = size(tare - at_rest(pressed, options.seed, profile)), pressed.time_s > ended
             near = np.flatnonzero(off[after] < ERROR_ASKED_COUNTS)
             away = size(follows - at_rest(warmed, options.seed, profile))[warmed.time_s > begun].max()
             left = float(off[pressed.time_s > pressed.phases[-1].end_s - 1.0].max())
-            found = left, int(taken[after].sum()), near[0] / 100 if len(near) else None, float(away)
+            found = left, int(is_new[after].sum()), near[0] / 100 if len(near) else None, float(away)
             locked.append([profile, way, *found])
     head = ["sensor", "tare by", *[f"{rate:g} N/s" for rate in RATES_N_S]]
     slow_rows = [row for way in WAYS for row in kept[way]]

@@ -14,7 +14,7 @@ from . import weight
 from .weight import WEIGHT_N
 
 RECORDING = "E, F and M"
-TAKES = ("maps",)
+ACCEPTS = ("maps",)
 
 TORSION_NMM = 6.0  # the paper gives none: this is what such a flat holds under 5 N at moderate friction
 HOLD_S = 4.5

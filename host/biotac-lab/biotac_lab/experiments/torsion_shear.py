@@ -21,7 +21,7 @@ from .trial import Bools, Floats, Trial
 from .weight import E17_MM, WEIGHT_N, Result
 
 RECORDING = "E, F and M"
-TAKES = ("maps",)
+ACCEPTS = ("maps",)
 
 SHEAR_N = 1.5  # the paper gives none
 REGIONS = {"I": 1.0, "II": 0.0, "III": -1.0}  # push along +y
@@ -70,10 +70,10 @@ def signs(trial: Trial, model: Estimate, at_mm: Floats) -> dict[str, bool]:
 def leakage(trial: Trial, model: Estimate) -> float:
     """Size of Fy in N per N mm of pure torsion, between the two turns of region II, where the true Fy is 0."""
     assert trial.torsion_nmm is not None
-    one, other = (_rows(trial, f"II {turn}") for turn in ("clockwise", "counter"))
+    clockwise, counter = (_rows(trial, f"II {turn}") for turn in ("clockwise", "counter"))
     lateral, torsion_nmm = model.force_n[:, 1], trial.torsion_nmm
-    leaked = lateral[other].mean() - lateral[one].mean()
-    return abs(float(leaked / (torsion_nmm[other].mean() - torsion_nmm[one].mean())))
+    leaked = lateral[counter].mean() - lateral[clockwise].mean()
+    return abs(float(leaked / (torsion_nmm[counter].mean() - torsion_nmm[clockwise].mean())))
 
 
 def together(trial: Trial, model: Estimate) -> tuple[float, float]:
@@ -93,7 +93,7 @@ def _rows(trial: Trial, name: str) -> Bools:
 def measure(options: Options) -> Result:
     """The trial and its estimates, on an emulated finger or a recording."""
     how = f"turned by {TORSION_NMM:g} N mm; pushed with {SHEAR_N:g} N to +y in region I, not in II, to -y in III"
-    before = (partial(shear.emulated, take=1), partial(torsion.emulated, take=2))
+    before = (partial(shear.emulated, repeat=1), partial(torsion.emulated, repeat=2))
     return weight.run(options, lambda seed: replay(seed=seed), how, torque=True, before=before)
 
 

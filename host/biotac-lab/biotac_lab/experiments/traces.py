@@ -54,28 +54,28 @@ def _electrodes(axes: Any, trial: Trial, marked: Sequence[str]) -> None:
 
 def _quantity(panel: Any, trial: Trial, estimates: Sequence[Estimate], axis: str) -> None:
     step = max(1, len(trial) // MAX_POINTS)
-    truth = _of(axis, trial.force_n, trial.torque_nmm, trial.torsion_nmm)
+    truth = _axis(axis, trial.force_n, trial.torque_nmm, trial.torsion_nmm)
     if truth is not None:
         panel.plot(trial.time_s[::step], truth[::step], color="#111111", linewidth=3, alpha=0.3, label="applied")
     colors = iter(MAP_COLORS)
     papers = iter((PAPER_COLOR, OTHER_PAPER_COLOR))
     for trace in estimates:
         at_contact = None if trial.at_mm is None or trace.torque_nmm is None else trace.torsion_nmm(trial.at_mm)
-        line = _of(axis, trace.force_n, trace.torque_nmm, at_contact)
+        line = _axis(axis, trace.force_n, trace.torque_nmm, at_contact)
         if line is None:
             continue
-        of_paper = trace.name.startswith(PAPER)
-        color = next(papers, PAPER_COLOR) if of_paper else next(colors, MAP_COLORS[-1])
+        is_paper = trace.name.startswith(PAPER)
+        color = next(papers, PAPER_COLOR) if is_paper else next(colors, MAP_COLORS[-1])
         # a map's line follows the noise of every count: drawn last, it would hide the others
         panel.plot(
-            trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=trace.name, zorder=3 + of_paper
+            trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=trace.name, zorder=3 + is_paper
         )
     panel.axhline(0.0, color="#111111", linewidth=0.6)
     panel.set_ylabel(f"{axis} [{'N' if axis.startswith('F') else 'N mm'}]")
     _legend(panel)
 
 
-def _of(axis: str, force_n: Floats | None, torque_nmm: Floats | None, torsion_nmm: Floats | None) -> Floats | None:
+def _axis(axis: str, force_n: Floats | None, torque_nmm: Floats | None, torsion_nmm: Floats | None) -> Floats | None:
     if axis == "torsion":
         return torsion_nmm
     values = force_n if axis.startswith("F") else torque_nmm

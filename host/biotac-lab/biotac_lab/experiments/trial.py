@@ -24,7 +24,7 @@ Rows = npt.NDArray[np.void]
 Settings = Mapping[Setting, int]
 Words = npt.NDArray[np.uint16]
 
-_TAKE_SEED_STEP = 100_003
+_REPEAT_SEED_STEP = 100_003
 SETTLE_S = 0.3  # means over a phase begin this late after its ramp
 
 
@@ -122,13 +122,13 @@ class Script:
         self.phases.append(Phase(name, begin_s, self.track.seconds))
 
 
-def play(name: str, script: Script, *, seed: int, profile: Profile = "new", take: int = 0) -> Trial:
+def play(name: str, script: Script, *, seed: int, profile: Profile = "new", repeat: int = 0) -> Trial:
     """The trial of an emulated finger that goes through ``script`` and is read by a board.
 
-    ``take`` counts how often the same finger was used before: its noise differs, the sensor does not.
+    ``repeat`` counts how often the same finger was used before: its noise differs, the sensor does not.
     """
     finger = sim.Finger(seed, profile)
-    finger.seed += _TAKE_SEED_STEP * take  # at this point it only seeds the noise
+    finger.seed += _REPEAT_SEED_STEP * repeat  # at this point it only seeds the noise
     frames = round(script.track.seconds / slots.FRAME_S)
     boundary_s: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S
     words = sim.sample(finger, script.track.states(boundary_s))

@@ -83,16 +83,16 @@ def run(options: Options) -> Report:
         pokes[f"noise {noise:g}"] = signal + rng.normal(0.0, more, signal.shape), contacts
     rows: list[list[Any]] = []
     for name, point in RULES.items():
-        spreads = {what: poke.spread(point(e), touched) for what, (e, touched) in pokes.items()}
+        spreads = {name: poke.spread(point(e), touched) for name, (e, touched) in pokes.items()}
         off = plate_normal.angles_deg(point(plate.signal), plate.plate_normal)
         seen = plate_normal.Angles("plate", poke.SHIPPED, off, plate.touched, plate.pressure)
         angle = seen.over(plate_normal.CONTACT_COUNTS)
         deg = [float(np.median(angle)), float(np.percentile(angle, 90))]
         worn = spreads["worn"]
-        rows.append([_called(name), *[float(one.std_mm.mean()) for one in spreads.values()],
+        rows.append([_called(name), *[float(spread.std_mm.mean()) for spread in spreads.values()],
                      float(worn.bias_mm.mean()), *deg])  # fmt: skip
     default = next(row for row in rows if row[0] == _called(DEFAULT))
-    head = ["weights", *[f"std, {what} [mm]" for what in pokes], "bias, worn [mm]", "plate, median [deg]", "90 % [deg]"]
+    head = ["weights", *[f"std, {name} [mm]" for name in pokes], "bias, worn [mm]", "plate, median [deg]", "90 % [deg]"]
     where = "recorded" if options.recording is not None else "emulated"
     text = (
         f"Pokes: mean standard deviation above {poke.FLOOR_N:g} N, as in table 2 (paper: .227 and .358); the worn "

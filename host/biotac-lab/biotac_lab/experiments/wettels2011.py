@@ -26,7 +26,7 @@ from .trial import Floats
 from .wettels import force, more, paf, roc
 from .wettels.tables import EQUATION, PAPER_PLACES, details, paf_row, text
 
-TAKES = ("real", "quick", "filter")
+ACCEPTS = ("real", "quick", "filter")
 
 ROC_ASKED, D_ASKED_MM, R_ASKED_MM, BAR_ASKED_DEG = 0.947, 2.3, 2.2, 5.0
 
@@ -108,14 +108,14 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
         "impedance": paf.impedance(finger),
         "correlations": paf.correlations(finger, PAPER_PLACES, seed),
         "roc": [*by_row.result(), by_contact.result(), *grown.result()],
-        "force": [{"how": how} | force.scores(one, rows.force_n) for how, one in estimates.items()],
+        "force": [{"how": how} | force.scores(own, rows.force_n) for how, own in estimates.items()],
         "force_places": list(size.force_places),
         "classes": force.by_class(estimates[force.A_PRIORI], rows),
         "table4": table4.result(),
         "reductions": reduced.result(),
         "pairs": pairs.result(),
         "bars": bars.result(),
-        "real": [one.result() for one in real],
+        "real": [net.result() for net in real],
     }
     notes = [
         f"emulated finger, seed {seed}: Hertzian footprints, like a BioTac but no particular one",
@@ -139,7 +139,7 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
 def _checks(parts: Facts) -> list[Facts]:
     firm = paf_row(parts, EQUATION, "force threshold")
     best = roc.chosen(parts["roc"])
-    one, four = parts["force"][0]["pooled_n"], parts["force"][1]["pooled_n"]
+    single, four = parts["force"][0]["pooled_n"], parts["force"][1]["pooled_n"]
     return [
         check("PAF d above 1 N, the paper's loads", firm["d"]["rmse"], D_ASKED_MM, "mm"),
         check("PAF r above 1 N, the paper's loads", firm["r"]["rmse"], R_ASKED_MM, "mm"),
@@ -149,7 +149,7 @@ def _checks(parts: Facts) -> list[Facts]:
             1 - ROC_ASKED,
             "of all",
         ),
-        claim(f"nets by class beat one net, pooled RMSE {text(four)} against {text(one)} N", four < one),
+        claim(f"nets by class beat one net, pooled RMSE {text(four)} against {text(single)} N", four < single),
         check("direction of a bar, RMSE", parts["bars"]["rmse_deg"], BAR_ASKED_DEG, "deg"),
         *seeds.findings("wettels2011", parts),
     ]

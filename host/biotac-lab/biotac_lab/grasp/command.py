@@ -85,7 +85,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
         print(json.dumps(report.facts(NAME) | {"written": [str(path) for path in written]}))
     else:
         print(report.page(NAME, ABOUT) + "".join(f"\nwritten: {path}" for path in written))
-    return 1 if args.check and not all(one["met"] for one in report.checks) else 0
+    return 1 if args.check and not all(item["met"] for item in report.checks) else 0
 
 
 def _report(outcomes: dict[Case, list[Facts]]) -> Report:

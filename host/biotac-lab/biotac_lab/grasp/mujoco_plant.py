@@ -12,7 +12,7 @@ import numpy as np
 
 from biotac import InputError
 
-from .plant import CLOSED_MM, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, SLIP_MM_S, G, Plant, Thing
+from .plant import CLOSED_MM, ROUND_S, SHEAR_N_PER_MM, SKIN_N_PER_MM, SLIP_MM_S, G, Item, Plant
 
 try:
     import mujoco
@@ -43,13 +43,13 @@ MODEL = """<mujoco>
 class MujocoPlant(Plant):
     """See Plant."""
 
-    def __init__(self, thing: Thing) -> None:
-        super().__init__(thing)
-        self._spring = 1e3 / (1 / SKIN_N_PER_MM + 1 / (2 * thing.stiffness)), 1e3 * SHEAR_N_PER_MM
-        values = dict(zip(("normal", "shear"), self._spring, strict=True), friction=thing.friction)
+    def __init__(self, item: Item) -> None:
+        super().__init__(item)
+        self._spring = 1e3 / (1 / SKIN_N_PER_MM + 1 / (2 * item.stiffness)), 1e3 * SHEAR_N_PER_MM
+        values = dict(zip(("normal", "shear"), self._spring, strict=True), friction=item.friction)
         off = (HALF_MM + CLOSED_MM + 2.0) / 1e3
         both = (SIDE.format(x=-axis * off, name=name, axis=axis, **values) for name, axis in (("L", 1), ("R", -1)))
-        text = MODEL.format(dt=ROUND_S / STEPS, mass=thing.mass_kg, sides="".join(both))
+        text = MODEL.format(dt=ROUND_S / STEPS, mass=item.mass_kg, sides="".join(both))
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
@@ -61,8 +61,8 @@ class MujocoPlant(Plant):
     @property
     def need_n(self) -> float:
         """See Plant; the knock is from the side."""
-        weight_n = (self.thing.mass_kg + self.extra_kg) * G
-        return float(np.hypot(weight_n, self.hit_n)) / (2 * self.thing.friction)
+        weight_n = (self.item.mass_kg + self.extra_kg) * G
+        return float(np.hypot(weight_n, self.hit_n)) / (2 * self.item.friction)
 
     def touch(self, side: int) -> tuple[float, float, float, float]:
         """See Plant."""

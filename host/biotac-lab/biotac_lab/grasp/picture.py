@@ -9,7 +9,7 @@ import numpy as np
 
 from ..report import Facts
 from . import runs
-from .plant import things
+from .plant import items
 from .runs import CONTROLLERS, TRUE, Case
 
 
@@ -20,9 +20,9 @@ def draw(figure: Any, cases: list[Case], outcomes: dict[tuple[Case, int], Facts]
     figure.set_size_inches(10.0, 4.2 + 0.35 * len(names))
     above, below = figure.subplots(2, 1, height_ratios=(10, 2 + len(names)))
     trace: list[Any] = []
-    runs.one(case, 0, law_file, outcomes.get((case.calibration, 0)), trace)
+    runs.run_trial(case, 0, law_file, outcomes.get((case.calibration, 0)), trace)
     _grasp(above, trace, CONTROLLERS[case.controller])
-    above.axhline(things(1, case.seed + case.pair)[0].limit_n, color="tab:red", label="crushes")
+    above.axhline(items(1, case.seed + case.pair)[0].limit_n, color="tab:red", label="crushes")
     above.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, frameon=False)
     for name in reversed(names):
         tried = [case for case in cases if case.controller == name and not case.fault]

@@ -21,7 +21,7 @@ DROPPED_MM, SLIP_MM_S = 15.0, 200.0  # the latter is the fastest that a simulate
 
 
 @dataclass(frozen=True)
-class Thing:
+class Item:
     """``stiffness`` in N/mm; ``added_kg`` is put on it in the air, ``knock_n`` hits it, ``limit_n`` crushes it."""
 
     mass_kg: float
@@ -37,16 +37,16 @@ class Thing:
         return (self.mass_kg + self.added_kg) * G / (2 * self.friction)
 
 
-def things(count: int, seed: int) -> list[Thing]:
+def items(count: int, seed: int) -> list[Item]:
     """The first ``count`` of a seed's: 50 to 400 g, of which a two-finger grip needs at least .4 and less than 6 N."""
-    rng, made = np.random.default_rng(seed), list[Thing]()
+    rng, made = np.random.default_rng(seed), list[Item]()
     while len(made) < count:
         mass_kg, friction = math.exp(rng.uniform(math.log(0.05), math.log(0.4))), rng.uniform(0.35, 0.9)
         stiffness, added_kg = math.exp(rng.uniform(math.log(0.8), math.log(30))), mass_kg * rng.uniform(0.3, 0.8)
-        thing = Thing(mass_kg, friction, stiffness, added_kg, rng.uniform(0.2, 0.5) * (mass_kg + added_kg) * G, 0.0)
-        thing = replace(thing, limit_n=max(thing.worst_n, 0.8) * rng.uniform(1.6, 4))
-        if 0.4 < thing.worst_n < 6:
-            made.append(thing)
+        item = Item(mass_kg, friction, stiffness, added_kg, rng.uniform(0.2, 0.5) * (mass_kg + added_kg) * G, 0.0)
+        item = replace(item, limit_n=max(item.worst_n, 0.8) * rng.uniform(1.6, 4))
+        if 0.4 < item.worst_n < 6:
+            made.append(item)
     return made
 
 
@@ -57,15 +57,15 @@ class Plant:
     altogether, ``in_air``, and ``most_n`` that it was pressed with. ``extra_kg`` and ``hit_n`` are set from outside.
     """
 
-    def __init__(self, thing: Thing) -> None:
-        self.thing, self.extra_kg, self.hit_n, self.normal_n, self.most_n = thing, 0.0, 0.0, 0.0, 0.0
+    def __init__(self, item: Item) -> None:
+        self.item, self.extra_kg, self.hit_n, self.normal_n, self.most_n = item, 0.0, 0.0, 0.0, 0.0
         self.slip_mm_s, self.slid_mm, self.in_air = 0.0, 0.0, False
         self._closed_mm = self._speed_mm_s = self._hand_mm = self._slide_mm_s = self._shear_n = 0.0
 
     @property
     def need_n(self) -> float:
         """The least that each side has to press with now, in the air."""
-        return ((self.thing.mass_kg + self.extra_kg) * G + self.hit_n) / (2 * self.thing.friction)
+        return ((self.item.mass_kg + self.extra_kg) * G + self.hit_n) / (2 * self.item.friction)
 
     def touch(self, side: int) -> tuple[float, float, float, float]:
         """Of a side, on its finger: normal N, shear N by which the thing pulls down and across, torsion N mm."""
@@ -73,14 +73,14 @@ class Plant:
 
     def step(self, close_mm_s: float, up_mm_s: float) -> None:
         """A round of 10 ms: the fingers close at this speed, the hand goes up at that."""
-        dt, mass_kg, self.slip_mm_s = ROUND_S / STEPS, self.thing.mass_kg + self.extra_kg, 0.0
+        dt, mass_kg, self.slip_mm_s = ROUND_S / STEPS, self.item.mass_kg + self.extra_kg, 0.0
         pull_n, spring = mass_kg * G + self.hit_n, 2 * SHEAR_N_PER_MM
-        stiffness = 1 / (2 / SKIN_N_PER_MM + 1 / self.thing.stiffness)
+        stiffness = 1 / (2 / SKIN_N_PER_MM + 1 / self.item.stiffness)
         for _ in range(STEPS):
             self._actuate(dt, close_mm_s, up_mm_s)
             self.normal_n = max(stiffness * (self._closed_mm - CLOSED_MM), 0.0)
             self.most_n = max(self.most_n, self.normal_n)
-            can_n = 2 * self.thing.friction * self.normal_n * (KINETIC if self._slide_mm_s > 0 else 1)
+            can_n = 2 * self.item.friction * self.normal_n * (KINETIC if self._slide_mm_s > 0 else 1)
             if self.in_air:
                 if pull_n > can_n or self._slide_mm_s > 0:
                     self._slide_mm_s = max(self._slide_mm_s + (pull_n - can_n) / mass_kg * 1e3 * dt, 0.0)

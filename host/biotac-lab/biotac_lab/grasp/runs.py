@@ -17,7 +17,7 @@ from ..report import Facts, Show
 from . import law
 from .calibrations import calibrate
 from .felt import FINGERS, SHARES, Board, TrueForce, towards
-from .plant import Plant, things
+from .plant import Plant, items
 from .trial import grasp
 
 CONSTANT_N = 3.0
@@ -62,7 +62,7 @@ def digest(law_file: Path) -> str:
     return sha256(b"".join([compiled, *(path.read_bytes() for path in (law_file, *sorted(python)))])).hexdigest()[:16]
 
 
-def one(case: Case, number: int, law_file: Path, made: Any = None, trace: list[Any] | None = None) -> Facts:
+def run_trial(case: Case, number: int, law_file: Path, made: Any = None, trace: list[Any] | None = None) -> Facts:
     """The outcome of a thing in a hand with the calibration ``made``; ``trace`` is trial.grasp's."""
     true, press = case.controller in TRUE, {}
     if case.controller == "constant":
@@ -74,9 +74,9 @@ def one(case: Case, number: int, law_file: Path, made: Any = None, trace: list[A
     else:
         own = {"own": "maps", "lin": "gains"}.get(case.controller, "")
         sense = Board(case.seeds, case.profile, case.at, **({own: made[own]} if own else {}))
-    thing = things(number + 1, case.seed + case.pair)[number]
+    item = items(number + 1, case.seed + case.pair)[number]
     try:
-        return grasp(_plant(case.plant)(thing), rule, sense, case.fault, trace)
+        return grasp(_plant(case.plant)(item), rule, sense, case.fault, trace)
     finally:
         sense.close()
 
@@ -107,22 +107,22 @@ def run(
             (case.calibration, 0): (calibrate, dict(zip(FINGERS[case.fingers], case.seeds, strict=True)), case.profile)
             for case in cases if case.controller in ("own", "lin")
         },
-        {(case, number): (one, case, number, law_file) for case in cases for number in range(objects)},
+        {(case, number): (run_trial, case, number, law_file) for case in cases for number in range(objects)},
     ]  # fmt: skip
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        for what, todo in zip(("calibrations", "grasps"), calls, strict=True):
+        for stage, todo in zip(("calibrations", "grasps"), calls, strict=True):
             waiting = {
-                pool.submit(*call, *([done.get((key[0].calibration, 0))] if call[0] is one else [])): key
+                pool.submit(*call, *([done.get((key[0].calibration, 0))] if call[0] is run_trial else [])): key
                 for key, call in todo.items() if key not in done
             }  # fmt: skip
             try:
                 for number, ready in enumerate(as_completed(waiting), 1):
-                    case, thing = key = waiting[ready]
+                    case, item = key = waiting[ready]
                     done[key] = ready.result()
                     if kept is not None:
                         with kept.open("a", encoding="utf-8") as file:
-                            file.write(json.dumps({"case": asdict(case), "thing": thing, "outcome": done[key]}) + "\n")
-                    show(f"{what}: {number} of {len(waiting)}")
+                            file.write(json.dumps({"case": asdict(case), "thing": item, "outcome": done[key]}) + "\n")
+                    show(f"{stage}: {number} of {len(waiting)}")
             except BaseException:
                 pool.shutdown(cancel_futures=True)
                 raise

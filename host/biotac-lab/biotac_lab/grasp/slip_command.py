@@ -25,7 +25,7 @@ SLOW_N_S, FAST_N_S = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (8.0, 10.0)
 RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of what biotac.sim draws from
 PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
 REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED, HELD_S = 3.0, 0.1, 0.05, 0.002, 95, 4.2
-SQUEEZED, LET_GO, CALM = ("squeezed: SLIP", 5), ("let go: SLIP", 5), ("at rest and in still holds: level 0", 99)
+SQUEEZED, RELEASED, CALM = ("squeezed: SLIP", 5), ("let go: SLIP", 5), ("at rest and in still holds: level 0", 99)
 Found = dict[tuple[str, float, float], list[bool]]  # by what, N/s and rattle
 
 
@@ -51,25 +51,25 @@ def run(args: argparse.Namespace, show: Show) -> int:
             _press(found, finger, place)
     show("")
     percent = {key: 100 * float(np.mean(hits)) for key, hits in found.items()}
-    kinds = sorted({(what, n_s) for what, n_s, _ in found})
-    rows = [(what, n_s, *[percent[what, n_s, rattle] for rattle in RATTLES]) for what, n_s in kinds]
+    kinds = sorted({(case, n_s) for case, n_s, _ in found})
+    rows = [(case, n_s, *[percent[case, n_s, rattle] for rattle in RATTLES]) for case, n_s in kinds]
     tables = [Table("Simulated", ("% of", "N/s", *[f"rattle {rattle:g}" for rattle in RATTLES]), rows, digits=1)]
     checks = []
-    for what, most in (SQUEEZED, LET_GO):
+    for case, most in (SQUEEZED, RELEASED):
         for rates, limit in ((SLOW_N_S, most), (FAST_N_S, 20)):
-            worst = max(np.mean([percent[what, n_s, rattle] for n_s in rates]) for rattle in RATTLES)
-            checks.append(check(f"{what}, {rates[0]:g} to {rates[-1]:g} N/s", float(worst), limit, "%"))
-    for what, n_s in kinds:
-        if what not in (SQUEEZED[0], LET_GO[0], "poked: SLIP"):
-            seen, least = min(percent[what, n_s, rattle] for rattle in RATTLES), CALM[1] if what == CALM[0] else 80
-            checks.append(claim(f"{what}, {n_s:g} N/s: {seen:.1f} %, at least {least}", seen >= least))
+            worst = max(np.mean([percent[case, n_s, rattle] for n_s in rates]) for rattle in RATTLES)
+            checks.append(check(f"{case}, {rates[0]:g} to {rates[-1]:g} N/s", float(worst), limit, "%"))
+    for case, n_s in kinds:
+        if case not in (SQUEEZED[0], RELEASED[0], "poked: SLIP"):
+            seen, least = min(percent[case, n_s, rattle] for rattle in RATTLES), CALM[1] if case == CALM[0] else 80
+            checks.append(claim(f"{case}, {n_s:g} N/s: {seen:.1f} %, at least {least}", seen >= least))
     for path, play in ((args.slides, _real_slides), (args.taps, _real_taps)):
         if path is not None:
             tables.append(Table(path.stem, ("real", ""), play(np.load(path)), digits=1))
     source = f"{args.fingers} simulated fingers from seed {args.seed}, on the pad and off it"
     report = Report(source, tables, checks, [], lambda figure: None)
     print(json.dumps(report.facts("slip")) if args.json else report.page("slip", ABOUT))
-    return 1 if args.check and not all(one["met"] for one in checks) else 0
+    return 1 if args.check and not all(item["met"] for item in checks) else 0
 
 
 def _felt(finger: SimFinger, at: tuple[float, float], *legs: tuple[float, float], mm_s: float = 0.0) -> Any:
@@ -102,9 +102,9 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
         up = (high_n - 0.5) / n_s
         legs = (0.2, 0.5), (1.3, 0.5), (up, high_n), (0.6, high_n), (up, 0.5), (0.6, 0.5), (0.5 / n_s, 0), (0.5, 0)
         ends_s, slips_s, level = _felt(finger, at, *legs)
-        for what, leg in ((SQUEEZED[0], 2), (LET_GO[0], 4), (LET_GO[0], 6)):
+        for case, leg in ((SQUEEZED[0], 2), (RELEASED[0], 4), (RELEASED[0], 6)):
             during = (slips_s >= ends_s[leg]) & (slips_s < ends_s[leg + 1] + AGAIN_S)
-            found[what, n_s, rattle].append(bool(during.any()))
+            found[case, n_s, rattle].append(bool(during.any()))
         still = [k for leg in (1, 3, 5) for k in range(round(ends_s[leg] * 100) + 20, round(ends_s[leg + 1] * 100))]
         found[CALM[0], 0, rattle] += (level[[*range(100, round(REST_S * 100)), *still]] == 0).tolist()
     for n_s, mm_s in ((n_s, mm_s) for n_s in (0.0, *SLOW_N_S[1:-1]) for mm_s in (5.0, 20.0)):

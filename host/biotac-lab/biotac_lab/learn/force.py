@@ -37,15 +37,15 @@ class ForceNets:
 
         Raises InputError for a class that no net was trained for.
         """
-        of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
-        unknown = sorted(set(of.tolist()) - set(self.by_class))
+        labels = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
+        unknown = sorted(set(labels.tolist()) - set(self.by_class))
         if unknown:
             raise InputError(
                 f"class {unknown[0]} has no net: expected one of {sorted(self.by_class)}; train one for it"
             )
         result = np.empty((len(above), 3))
         for c, parts in self.by_class.items():
-            rows = of == c
+            rows = labels == c
             if rows.any():
                 result[rows] = np.hstack([net(reduction(above[rows])) for reduction, net in parts])
         return result
@@ -68,10 +68,10 @@ def train(
     With ``kind`` (n,) each class has its own net. With ``by_spearman`` each axis has its own net, fed with the
     electrodes that correlate with that axis.
     """
-    of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
+    labels = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
     made: dict[int, list[tuple[inputs.Reduction, nets.Net]]] = {}
-    for c in np.unique(of).tolist():
-        x, f, names = above[of == c], force_n[of == c], groups[of == c]
+    for c in np.unique(labels).tolist():
+        x, f, names = above[labels == c], force_n[labels == c], groups[labels == c]
         if by_spearman:
             kept = inputs.correlated(x, f)
             kept[:, ~kept.any(axis=0)] = True  # an axis that no electrode correlates with gets all of them

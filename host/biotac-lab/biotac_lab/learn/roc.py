@@ -118,10 +118,10 @@ def decide(outputs: Floats, together: npt.NDArray[np.generic] | None = None) -> 
     Rows with the same number in ``together`` (n,) are decided together, by the sum of their outputs.
     """
     if together is not None:
-        _, of = np.unique(together, return_inverse=True)
-        sums = np.zeros((of.max() + 1, outputs.shape[1]))
-        np.add.at(sums, of, outputs)
-        outputs = sums[of]
+        _, group = np.unique(together, return_inverse=True)
+        sums = np.zeros((group.max() + 1, outputs.shape[1]))
+        np.add.at(sums, group, outputs)
+        outputs = sums[group]
     result: Integers = outputs.argmax(axis=1)
     return result
 

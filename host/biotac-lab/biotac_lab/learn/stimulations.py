@@ -53,7 +53,7 @@ class Stimulations:
 
     def where(self, rows: npt.NDArray[np.bool_]) -> Stimulations:
         """The rows selected by ``rows`` (n,)."""
-        return Stimulations(*(getattr(self, one.name)[rows] for one in fields(self)))
+        return Stimulations(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
 def stimulate(
@@ -86,10 +86,10 @@ def stimulate(
     states = States(each(contact_mm), normal_n, each(shear) * normal_n[:, None], zeros, zeros, zeros)
     of_row = each(np.repeat(probe, tilts)).astype(np.int64)
     compression, bulge = np.empty((len(states), 19)), np.empty((len(states), 19))
-    for k, one in enumerate(PROBES):
+    for k, shape in enumerate(PROBES):
         rows = of_row == k
         some = states.of(rows)
-        compression[rows], bulge[rows] = deform(some, footprints(one, some.contact_mm, some.force_n))
+        compression[rows], bulge[rows] = deform(some, footprints(shape, some.contact_mm, some.force_n))
     exact = finger.counts_of(compression, bulge, zeros)
     noisy = np.rint(exact + rng.normal(0.0, finger.noise_counts, exact.shape))
     return Stimulations(

@@ -24,7 +24,7 @@ FRAMES, UP = 5, 3  # of a press; its way up
 FOLDS = 5
 LEAST_N = 1.0  # Eq 6 divides by the force
 AXES = ("Fx", "Fy", "Fz")
-ONE, A_PRIORI, CASCADE = "one net", "four nets, classes known", "four nets, rear or forward by PAF"
+SINGLE, A_PRIORI, CASCADE = "one net", "four nets, classes known", "four nets, rear or forward by PAF"
 CHAINED = "four nets, chained: classifier's probe and PAF's place"
 HIS_CLASS = 1  # "rear, large": the one that table 4 is of
 REDUCTIONS: dict[str, dict[str, Any]] = {
@@ -43,7 +43,7 @@ def load(finger: Finger, places: tuple[int, ...], seed: int) -> Stimulations:
 
 
 def networks(rows: Stimulations, steps: int, seed: int) -> dict[str, Floats]:
-    """Held-out force (n, 3) of ONE, A_PRIORI, CASCADE and CHAINED in five folds by contact."""
+    """Held-out force (n, 3) of SINGLE, A_PRIORI, CASCADE and CHAINED in five folds by contact."""
     above = rows.counts - rows.tare
     large = rows.probe >= 2
     grown, press = roc.trajectories(above, rows.tare, rows.stimulation)
@@ -68,7 +68,7 @@ def networks(rows: Stimulations, steps: int, seed: int) -> dict[str, Floats]:
         return nets(above[test], known[test])
 
     return {
-        ONE: _held_out(above, rows.force_n, rows.contact, steps=steps, seed=seed),
+        SINGLE: _held_out(above, rows.force_n, rows.contact, steps=steps, seed=seed),
         A_PRIORI: force.cross_validated(above, rows.contact, FOLDS, four),
         CASCADE: cascade,
         CHAINED: chained,

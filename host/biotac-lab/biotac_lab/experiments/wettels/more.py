@@ -47,7 +47,7 @@ def pairs(finger: Finger, each: int, seed: int) -> list[Facts]:
             if len(found) != len(true_mm):
                 continue
             right += 1
-            at = np.array([one.poc_mm for one in found])
+            at = np.array([contact.poc_mm for contact in found])
             far = np.linalg.norm(at[:, None] - true_mm[None], axis=2)
             swapped = len(found) == 2 and far[0, 1] + far[1, 0] < far[0, 0] + far[1, 1]
             order = [1, 0] if swapped else list(range(len(found)))

@@ -83,4 +83,4 @@ def impedance(finger: Finger) -> list[Facts]:
     counts = counts_of(finger, [(states, footprints(PROBES[0], contact, states.force_n))])[:, 17]
     rest = finger.rest_counts(np.zeros(1))[0, 17]
     ratio = (4095.0 / counts - 1.0) / (4095.0 / rest - 1.0)
-    return [{"mm": float(mm), "ratio": plain(float(one))} for mm, one in zip(at, ratio, strict=True)]
+    return [{"mm": float(mm), "ratio": plain(float(value))} for mm, value in zip(at, ratio, strict=True)]

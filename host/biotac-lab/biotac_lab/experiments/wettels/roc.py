@@ -49,12 +49,12 @@ def his_rows(
     targets = np.eye(len(PROBES))[kind]
     given = x[training], targets[training], (x[stopping], targets[stopping])
     found = []
-    for what, net in (
+    for name, net in (
         (HIS, levenberg.train(*given, seed=seed, steps=steps[0])),
         (QUICK, nets.train(*given, seed=seed, steps=steps[1])),
     ):
         right = float((roc.decide(net(x[stopping])) == kind[stopping]).mean())
-        found.append(_facts(what, BY_ROW, right, roc.decide(net(x[test])), kind[test], places))
+        found.append(_facts(name, BY_ROW, right, roc.decide(net(x[test])), kind[test], places))
     return found
 
 
@@ -87,7 +87,7 @@ def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int)
     # judged on the rows kept aside before it learns from them, too: the method is chosen by ``validated`` alone
     before = roc.machine().fit(columns[training], kind[training])
     machine = roc.machine().fit(columns[~test], kind[~test])
-    _, one = np.unique(contact[test], return_index=True)
+    _, at = np.unique(contact[test], return_index=True)
     found = []
     for aside, outputs, by in (
         (net.outputs(columns[stopping]), net.outputs(columns[test]), ""),
@@ -97,7 +97,7 @@ def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int)
         alone, together = roc.decide(outputs), roc.decide(outputs, contact[test])
         found += [
             _facts("press" + by, BY_CONTACT, float(rights[0].mean()), alone, kind[test], places),
-            _facts("contact of five presses" + by, BY_CONTACT, float(rights[1].mean()), together[one], kind[test][one],
+            _facts("contact of five presses" + by, BY_CONTACT, float(rights[1].mean()), together[at], kind[test][at],
                    places),
         ]  # fmt: skip
     return found
@@ -105,15 +105,15 @@ def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int)
 
 def chosen(found: list[Facts]) -> Facts:
     """The way that does best on the contacts kept aside, among those held out by contact: test data have no say."""
-    return max((one for one in found if one["split"] == BY_CONTACT), key=lambda one: one["validated"])
+    return max((fact for fact in found if fact["split"] == BY_CONTACT), key=lambda fact: fact["validated"])
 
 
 def _facts(
-    what: str, split: str, validated: float, decided: roc.Integers, truth: roc.Integers, places: tuple[int, ...]
+    name: str, split: str, validated: float, decided: roc.Integers, truth: roc.Integers, places: tuple[int, ...]
 ) -> Facts:
     """The figures of one classifier; rows of ``confusion`` are what it decided, ``validated`` is from rows aside."""
     return {
-        "what": what, "split": split, "places": list(places), "validated": plain(validated),
+        "what": name, "split": split, "places": list(places), "validated": plain(validated),
         "correct": plain(float((decided == truth).mean())),
         "confusion": confusion_matrix(decided, truth, labels=range(len(PROBES))).tolist(),
     }  # fmt: skip

@@ -20,23 +20,23 @@ def details(facts: Facts) -> list[Table]:
         for row in facts["paf"]
     ]
     paf += [
-        ["paper", "as printed", name, *[" / ".join(map(str, one)) for one in both], None]
+        ["paper", "as printed", name, *[" / ".join(map(str, score)) for score in both], None]
         for name, both in PAPER_TABLE3.items()
     ]
-    roc = [[one["what"], one["split"], " ".join(map(str, one["places"])), f"{100 * one['validated']:.1f} %",
-            _percent(one)]
-           for one in facts["roc"]]  # fmt: skip
+    roc = [[row["what"], row["split"], " ".join(map(str, row["places"])), f"{100 * row['validated']:.1f} %",
+            _percent(row)]
+           for row in facts["roc"]]  # fmt: skip
     names = ["1 mm", "3.6 mm", "10 mm", "flat"]
     confusion = [
-        [f"{one['what']}, {one['split']}", name, *row]
-        for one in facts["roc"]
-        for name, row in zip(names, one["confusion"], strict=True)
+        [f"{fact['what']}, {fact['split']}", name, *row]
+        for fact in facts["roc"]
+        for name, row in zip(names, fact["confusion"], strict=True)
     ]
     named = [(row.get("how") or row["class"], row) for row in [*facts["force"], *facts["classes"]]]
     named += [("rear, large, rows at random, Levenberg-Marquardt", facts["table4"])]
     named += [(f"figure 10: {row['how']}", row) for row in facts["reductions"]]
-    for one in facts["real"]:
-        named += [(f"{one['file']}: {name}", one[name]) for name in ("net", "calibrated map", "population map")]
+    for file in facts["real"]:
+        named += [(f"{file['file']}: {name}", file[name]) for name in ("net", "calibrated map", "population map")]
     force = [[name, row["pooled_n"], *[_five(row["axes"][axis]) for axis in row["axes"]]] for name, row in named]
     about = f"Contacts per probe: {facts['force_places']}; paper: {PAPER_PLACES}. Five folds."
     if facts["real"]:
@@ -74,14 +74,14 @@ def paf_row(facts: Facts, equation: str, technique: str) -> Facts:
     return found
 
 
-def _three(one: Facts) -> str:
-    return f"{text(one['rmse'], 2)} / {text(one['smse'])} / {text(one['r2'])}"
+def _three(row: Facts) -> str:
+    return f"{text(row['rmse'], 2)} / {text(row['smse'])} / {text(row['r2'])}"
 
 
-def _five(one: Facts) -> str:
+def _five(row: Facts) -> str:
     digits = {"rmse": 3, "smse": 3, "r2": 3, "percent": 1, "printed": 0}
-    return " / ".join(text(one[name], k) for name, k in digits.items())
+    return " / ".join(text(row[name], k) for name, k in digits.items())
 
 
-def _percent(one: Facts) -> str:
-    return f"{100 * one['correct']:.1f} %"
+def _percent(row: Facts) -> str:
+    return f"{100 * row['correct']:.1f} %"
