@@ -66,7 +66,7 @@ UNITS = {
 COUNTS = ("counts", "pdc", "tac", "tdc", "pac")
 
 
-def explain(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+def explain(app: Any, kind: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Add to a docstring what stands in the code as a table: an enum's values, an array's fields."""
     if isinstance(obj, type) and issubclass(obj, enum.IntEnum | enum.IntFlag) and obj.__module__ == wire.__name__:
         meanings = MEANINGS.get(obj, {})

@@ -45,38 +45,38 @@ FIGURES = [
 
 @pytest.mark.parametrize(("page", "words", "code", "constant", "unit"), FIGURES)
 def test_a_page_has_the_codes_figure(page: str, words: str, code: str, constant: str, unit: float) -> None:
-    told = re.search(words, (ROOT / page).read_text(encoding="utf-8"))
+    stated = re.search(words, (ROOT / page).read_text(encoding="utf-8"))
     done = re.search(constant, (ROOT / code).read_text(encoding="utf-8"))
-    assert told is not None and done is not None, (told, done)
-    assert (WORDS.get(told[1]) or float(told[1])) == float(done[1].replace("_", "")) / unit
+    assert stated is not None and done is not None, (stated, done)
+    assert (WORDS.get(stated[1]) or float(stated[1])) == float(done[1].replace("_", "")) / unit
 
 
-KEPT = [pytest.param(one, id=one.name, marks=[pytest.mark.nightly] * one.slow) for one in figures.found()]
+KEPT = [pytest.param(figure, id=figure.name, marks=[pytest.mark.nightly] * figure.slow) for figure in figures.found()]
 
 
-@pytest.mark.parametrize("one", KEPT)
-def test_a_figure_is_what_its_command_measures(one: figures.Figures) -> None:
-    missing = [word for word in one.command.split() if word.startswith("../") and not (ROOT / word).exists()]
-    if one.command.startswith("tools/bench") and not shutil.which("arm-none-eabi-gcc"):
+@pytest.mark.parametrize("figure", KEPT)
+def test_a_figure_is_what_its_command_measures(figure: figures.Figures) -> None:
+    missing = [word for word in figure.command.split() if word.startswith("../") and not (ROOT / word).exists()]
+    if figure.command.startswith("tools/bench") and not shutil.which("arm-none-eabi-gcc"):
         missing.append("arm-none-eabi-gcc")
     if missing and not (os.environ.get("BIOTAC_CI") and missing == ["arm-none-eabi-gcc"]):
-        pytest.skip(f"{one.name} needs {', '.join(missing)}")
-    assert one.differences(one.measured()) == [], f"run tools/make/figures.py {one.file.name}"
+        pytest.skip(f"{figure.name} needs {', '.join(missing)}")
+    assert figure.differences(figure.measured()) == [], f"run tools/make/figures.py {figure.file.name}"
 
 
-@pytest.mark.parametrize("one", [pytest.param(*kept.values, id=kept.id) for kept in KEPT])
-def test_nobody_edited_a_figure_or_drew_its_picture_otherwise(one: figures.Figures) -> None:
-    assert one.hashes.split(", ")[1] == one.made_of(one.text).split(", ")[1]
+@pytest.mark.parametrize("figure", [pytest.param(*kept.values, id=kept.id) for kept in KEPT])
+def test_nobody_edited_a_figure_or_drew_its_picture_otherwise(figure: figures.Figures) -> None:
+    assert figure.hashes.split(", ")[1] == figure.hashes_of(figure.text).split(", ")[1]
 
 
 def test_a_difference_is_named() -> None:
     text = "| PoC | 1,476 | .92 |\n| force | 402 | - |"
-    one = figures.Figures(ROOT / "page.md", "echo", "", "LICENSE", False, 1.0, "?", text)
-    assert one.differences(text) == one.differences(text.replace("402", "405")) == []
-    assert one.differences(text.replace("402", "407")) == ["402 is 407 now, more than 1 % off"]
-    assert one.differences(text.replace("1,476", "1,400")) == ["1476 is 1400 now, more than 1 % off"]
-    assert one.differences(text + "\n| torque | 7 |") == one.differences(text.replace("- |", "none |"))
-    assert one.differences(text + "\n| torque | 7 |") == ["other words or rows"]
+    figure = figures.Figures(ROOT / "page.md", "echo", "", "LICENSE", False, 1.0, "?", text)
+    assert figure.differences(text) == figure.differences(text.replace("402", "405")) == []
+    assert figure.differences(text.replace("402", "407")) == ["402 is 407 now, more than 1 % off"]
+    assert figure.differences(text.replace("1,476", "1,400")) == ["1476 is 1400 now, more than 1 % off"]
+    assert figure.differences(text + "\n| torque | 7 |") == figure.differences(text.replace("- |", "none |"))
+    assert figure.differences(text + "\n| torque | 7 |") == ["other words or rows"]
 
 
 def test_a_block_is_written_once_and_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,10 +85,10 @@ def test_a_block_is_written_once_and_read_back(tmp_path: Path, monkeypatch: pyte
     page.write_text(f"7\n{head.replace('COMMAND', 'echo 7 page.md')}\n-\n<!-- end of figures -->\n", encoding="utf-8")
     for words in (["git", "init", "-q"], ["git", "add", "page.md"]):
         figures.subprocess.run(words, cwd=tmp_path, check=True)
-    (one,) = figures.found(["page"])
-    one.write(one.measured())
+    (figure,) = figures.found(["page"])
+    figure.write(figure.measured())
     (again,) = figures.found(["page"])
     assert again.text == "7 page.md" == again.measured()
-    assert again.hashes == again.made_of(again.text)
-    assert dataclasses.replace(again, text="8 page.md").hashes != again.made_of("8 page.md")
+    assert again.hashes == again.hashes_of(again.text)
+    assert dataclasses.replace(again, text="8 page.md").hashes != again.hashes_of("8 page.md")
     assert page.read_text(encoding="utf-8").startswith("7\n<!-- figures: echo 7 page.md |")

@@ -50,6 +50,6 @@ def test_the_losses_that_the_controllers_page_states_are_the_tables() -> None:
 def test_the_force_error_to_state_is_the_default_maps() -> None:
     page = (ROOT / "host/docs/reference/accuracy.md").read_text(encoding="utf-8")
     row = re.search(r"error (0\.\d+) N along the finger, (0\.\d+) N sideways, (0\.\d+) N into the pad", README)
-    said = re.search(r"(0\.\d+) N towards the tip, (0\.\d+) N sideways and (0\.\d+) N normal", page.replace("\n", " "))
-    for told in (row, said):
-        assert told and list(map(float, told.groups())) == population.load(None).sigma_n.round(2).tolist()
+    match = re.search(r"(0\.\d+) N towards the tip, (0\.\d+) N sideways and (0\.\d+) N normal", page.replace("\n", " "))
+    for figures in (row, match):
+        assert figures and list(map(float, figures.groups())) == population.load(None).sigma_n.round(2).tolist()

@@ -34,12 +34,12 @@ WEIGHTS = ("abs n=2", "compress n=1", "compress n=2")  # in the order of enum bt
 OPTIONS = json.loads((FIRMWARE / "boards" / "compile_options.json").read_text(encoding="utf-8"))["files"]
 
 
-def of_room(source: Path) -> str:
+def option_key(source: Path) -> str:
     """The file's name in compile_options.json."""
     return f"{source.parent.name}/{source.name}"
 
 
-APART = [path for path in (FIRMWARE / "core").rglob("*.c") if of_room(path) in OPTIONS]
+APART = [path for path in (FIRMWARE / "core").rglob("*.c") if option_key(path) in OPTIONS]
 CORE = sorted(set((FIRMWARE / "core").rglob("*.c")) - set(APART))
 JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(ROOT / "tools/bench/kernels").glob("*.c")])
 SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).rglob("*.c"))
@@ -113,7 +113,7 @@ def build(board: Board, name: str, *sources: object) -> Path:
     apart = []
     for source in APART:
         apart.append(elf.with_suffix(f".{source.parent.name}_{source.stem}.o"))
-        command(*compiler, *OPTIONS[of_room(source)], "-c", source, "-o", apart[-1])
+        command(*compiler, *OPTIONS[option_key(source)], "-c", source, "-o", apart[-1])
     command(*compiler, "-O3", *link, "-T", board.script, *board.start, *sources, *CORE, *JUDGED, *apart,
             "-lm", "-o", elf)  # fmt: skip
     return elf
@@ -135,7 +135,7 @@ def run_rp2040(elf: Path) -> tuple[list[Row], list[int]]:
     return [tuple(row) for row in answer["rows"]], answer["results"]
 
 
-def qemu_says(elf: Path) -> list[str]:
+def qemu_output(elf: Path) -> list[str]:
     """The lines that the image printed."""
     code, output = qemu.run(elf)
     if code:
@@ -145,7 +145,7 @@ def qemu_says(elf: Path) -> list[str]:
 
 def run_m4f(elf: Path) -> list[Row]:
     """Rows. QEMU runs twice: for the names of the runs, and for the instructions in them."""
-    names = [tuple(line.split("\t")) for line in qemu_says(elf)]
+    names = [tuple(line.split("\t")) for line in qemu_output(elf)]
     model = Model(command("arm-none-eabi-objdump", "-d", elf))
     rows: list[Row] = []
     try:
@@ -208,11 +208,11 @@ def counts() -> dict[str, Any]:
 
     Kept in build/bench, because several figures are made of them, for as long as the sources and the compiler stay.
     """
-    made_of = hashlib.sha256(command("arm-none-eabi-gcc", "--version").encode())
+    inputs = hashlib.sha256(command("arm-none-eabi-gcc", "--version").encode())
     sources = (p for folder in (FIRMWARE, HERE, REFERENCE) for p in folder.rglob("*.*") if p.suffix != ".pyc")
     for path in sorted(p for p in sources if p.is_file()):
-        made_of.update(path.read_bytes())
-    kept = BUILD / f"counts_{made_of.hexdigest()[:16]}.json"
+        inputs.update(path.read_bytes())
+    kept = BUILD / f"counts_{inputs.hexdigest()[:16]}.json"
     if not kept.exists():
         found = {
             board.key: {"title": board.title, "cycles_by": board.cycles_by, "kernels": tally(count(board))}
@@ -225,7 +225,7 @@ def counts() -> dict[str, Any]:
 def bits(board: Board) -> int:
     """The hash of the shipped kernels' results on this board."""
     elf = build(board, "bits", HERE / "bits_image.c")
-    return int(qemu_says(elf)[0], 16) if board.machine == M4F else run_rp2040(elf)[1][0]
+    return int(qemu_output(elf)[0], 16) if board.machine == M4F else run_rp2040(elf)[1][0]
 
 
 def bits_here() -> int:

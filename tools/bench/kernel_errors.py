@@ -83,8 +83,8 @@ def errors(name: str, weights: PocWeights, e_q4: Signals) -> Floats:
     """(n, 4); NaN where the judge has no point, infinite where only one of the two has."""
     got, want = computed(name, weights, e_q4), exact(weights, e_q4)
     out = distances(got - want)
-    one_only = np.isnan(got[:, 0]) != np.isnan(want[:, 0])
-    out[np.ix_(one_only, [0, 3])] = np.inf
+    nan_differs = np.isnan(got[:, 0]) != np.isnan(want[:, 0])
+    out[np.ix_(nan_differs, [0, 3])] = np.inf
     return out
 
 

@@ -149,8 +149,8 @@ def main() -> int:
         wrong = check(args.elf, args.objdump, read_limits(args.limits), PORTS / args.port)
     except stack.Unknown as unknown:
         wrong = [str(unknown)]
-    for what in wrong:
-        print(f"tools/image/check.py: {what}", file=sys.stderr)
+    for problem in wrong:
+        print(f"tools/image/check.py: {problem}", file=sys.stderr)
     return 1 if wrong else 0
 
 

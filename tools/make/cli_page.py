@@ -40,7 +40,7 @@ def page() -> str:
 def exit_codes(text: str) -> Iterator[str]:
     """The epilog's exit codes as a table."""
     text = " ".join(text.removeprefix("exit codes:").split())
-    rows = [(code, what.strip()) for code, what in re.findall(r"(\d+) (\D+)", text)]
+    rows = [(code, meaning.strip()) for code, meaning in re.findall(r"(\d+) (\D+)", text)]
     yield "\n".join(table(["code", "meaning"], rows))
 
 
@@ -87,9 +87,9 @@ def in_cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
 
-def subparsers(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+def subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
     """The subverbs' parsers by name."""
-    for action in of._actions:
+    for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             return dict(action.choices)
     return {}

@@ -53,7 +53,7 @@ class Figures:
         """Page or picture, and where its figures are from."""
         return f"{self.file.relative_to(ROOT)}: {self.command}" + (f" ## {self.section}" if self.section else "")
 
-    def made_of(self, text: str) -> str:
+    def hashes_of(self, text: str) -> str:
         """The hashes of the inputs as they are and of ``text``, with the picture."""
         drawn = self.file.with_suffix(".png").read_bytes() if "{picture}" in self.command else b""
         return f"{inputs_hash(self.inputs)}, {_hash(text.encode(), drawn)}"
@@ -87,13 +87,13 @@ class Figures:
         whole = self.file.read_text(encoding="utf-8")
         if self.file.suffix == ".json":
             document = {"figures": json.loads(whole)["figures"], "data": json.loads(now)}
-            document["figures"]["made of"] = self.made_of(json.dumps(document["data"]))
+            document["figures"]["made of"] = self.hashes_of(json.dumps(document["data"]))
             whole = json.dumps(document, indent=1) + "\n"
         else:
             old = next(m for m in BLOCK.finditer(whole) if m["text"] == self.text and m["hashes"] == self.hashes)
             hashes, text = old.span("hashes"), old.span("text")
             between = whole[hashes[1] : text[0]]
-            whole = whole[: hashes[0]] + self.made_of(now) + between + now + whole[text[1] :]
+            whole = whole[: hashes[0]] + self.hashes_of(now) + between + now + whole[text[1] :]
         self.file.write_text(whole, encoding="utf-8")
 
 
@@ -111,7 +111,7 @@ def found(names: list[str] | None = None) -> list[Figures]:
         for m in BLOCK.finditer(whole) if file.suffix == ".md" else ():
             out.append(Figures(file, m["command"], m["section"] or "", m["inputs"], bool(m["slow"]),
                                float(m["within"]), m["hashes"], m["text"]))  # fmt: skip
-    return [one for one in out if not names or any(name in one.name for name in names)]
+    return [figure for figure in out if not names or any(name in figure.name for name in names)]
 
 
 @cache
@@ -146,12 +146,12 @@ def main() -> int:
     parser.add_argument("names", metavar="NAME", nargs="*", help="those with NAME in their file or command")
     args = parser.parse_args()
     off = 0
-    for one in found(args.names):
-        now = one.measured(draw=not args.check)
+    for figure in found(args.names):
+        now = figure.measured(draw=not args.check)
         if not args.check:
-            one.write(now)
-        for line in one.differences(now) if args.check else ():
-            print(f"{one.name}: {line}", file=sys.stderr)
+            figure.write(now)
+        for line in figure.differences(now) if args.check else ():
+            print(f"{figure.name}: {line}", file=sys.stderr)
             off = 1
     return off
 

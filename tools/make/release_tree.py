@@ -37,7 +37,7 @@ def complete(tree: Path, project: dict[str, Any]) -> None:
         r'(.*)\n\[tool[\w.]*wheel.force-include\]\n"(.*)" = "(.*)".*', (lab / "pyproject.toml").read_text(), re.S
     ).groups()  # type: ignore[union-attr]
     (lab / inside).write_bytes((lab / example).read_bytes())
-    people = ["{ " + ", ".join(f'{key} = "{value}"' for key, value in one.items()) + " }" for one in project["authors"]]
+    people = ["{ " + ", ".join(f'{key} = "{value}"' for key, value in own.items()) + " }" for own in project["authors"]]
     text = text.replace("\ndependencies", f"\nauthors = [{', '.join(people)}]\ndependencies", 1)
     links = "".join(f'{name} = "{address}"\n' for name, address in urls.items())
     (lab / "pyproject.toml").write_text(f"{text}\n[project.urls]\n{links}")
@@ -58,7 +58,7 @@ def complete(tree: Path, project: dict[str, Any]) -> None:
 def main(argument: str) -> int:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     if argument == "--missing":
-        sys.stderr.writelines(f"pyproject.toml, [project]: no {what}\n" for what in missing(project))
+        sys.stderr.writelines(f"pyproject.toml, [project]: no {field}\n" for field in missing(project))
         return int(bool(missing(project)))
     Path(argument).mkdir(parents=True)
     files = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout

@@ -218,6 +218,6 @@ def unpack(message: Message) -> list[str]:
     out = [f"void {struct}_unpack({struct} *msg, const uint8_t in[BT_{message.name}_BYTES])", "{"]
     out += ["    const uint8_t *at = in;", "    uint32_t value;"]
     for field in message.fields:
-        take = f"at = get(at, &value, {TYPE_BYTES[field.type]});"
-        out += each(field, take, f"msg->{{ref}} = ({C_TYPE[field.type]})value;")
+        read = f"at = get(at, &value, {TYPE_BYTES[field.type]});"
+        out += each(field, read, f"msg->{{ref}} = ({C_TYPE[field.type]})value;")
     return [*out, "    (void)at;", "}", ""]

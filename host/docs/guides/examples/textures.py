@@ -26,5 +26,5 @@ folds = StratifiedKFold(5, shuffle=True, random_state=0)
 for samples in (220, 1100, 2200, None):
     rows = texture.describe_all(trial_pac[:samples] for trial_pac in pac)
     found = cross_val_predict(texture.classifier(), rows, materials, cv=folds)
-    what = "whole slides" if samples is None else f"the first {samples / 2200:g} s"
-    print(f"{what}: {np.mean(found == np.array(materials)):.0%} of {len(pac)} slides recognised")
+    scope = "whole slides" if samples is None else f"the first {samples / 2200:g} s"
+    print(f"{scope}: {np.mean(found == np.array(materials)):.0%} of {len(pac)} slides recognised")
