@@ -156,11 +156,11 @@ def wrong(arrows: Iterable[Arrow], table: Table) -> list[str]:
     """What points the wrong way, each with file and line."""
     found = []
     for arrow in arrows:
-        here, there = table.room(arrow.source), table.room(arrow.target)
-        if None in (here, there):
-            found.append(f"{arrow.source}:{arrow.line}: {arrow.source if here is None else arrow.target} has no room")
-        elif here != there and there not in table.rooms[str(here)] and not hooked(arrow, table):
-            found.append(f"{arrow.source}:{arrow.line}: {here} may not import {there} ({arrow.target})")
+        own, other = table.room(arrow.source), table.room(arrow.target)
+        if None in (own, other):
+            found.append(f"{arrow.source}:{arrow.line}: {arrow.source if own is None else arrow.target} has no room")
+        elif own != other and other not in table.rooms[str(own)] and not hooked(arrow, table):
+            found.append(f"{arrow.source}:{arrow.line}: {own} may not import {other} ({arrow.target})")
     return found
 
 

@@ -58,7 +58,7 @@ UNSEEN: dict[str, tuple[str, dict[str, tuple[str, ...]]]] = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_half_a_newton_is_flagged_within_a_tenth_of_a_second(fault: str, when: str) -> None:
     _, unseen = UNSEEN.get(fault, ("", {}))
-    late = {m for m in MODELS if max(outcome(of, fault, when, m).silent_rounds for of in PRESSES) > SILENT_ROUNDS}
+    late = {m for m in MODELS if max(outcome(press, fault, when, m).silent_rounds for press in PRESSES) > SILENT_ROUNDS}
     assert late == {model for model, times in unseen.items() if when in times}, "of UNSEEN: more, or to be taken off"
 
 
@@ -80,16 +80,16 @@ def condemned(rows: np.ndarray) -> np.ndarray:
 
 def test_another_fingers_words_are_not_trusted_until_a_host_tares() -> None:
     """Whatever the board itself tares to afterwards, also in a later contact."""
-    of = PRESSES[0]
-    other = np.concatenate([of.words[: of.begins("rest")], *[of.other[of.begins("rest") :]] * 2])
+    press = PRESSES[0]
+    other = np.concatenate([press.words[: press.begins("rest")], *[press.other[press.begins("rest") :]] * 2])
     finger, e = Finger(), slots.ELECTRODE_SLOT
     rows = finger.feed(
         other[:, e], other[:, slots.PDC_SLOT], tdc=other[:, slots.TDC_SLOT], pac=other[:, slots.PAC_SLOT]
     )
     distrusted = (rows["flags"] & FrameFlags.SENSOR_FAULT) != 0
-    assert int(distrusted.argmax()) == of.begins("rest") + 1 and distrusted[of.begins("rest") + 1 :].all()
+    assert int(distrusted.argmax()) == press.begins("rest") + 1 and distrusted[press.begins("rest") + 1 :].all()
     finger.tare_now()
-    rows = finger.feed(of.other[:50, e], of.other[:50, slots.PDC_SLOT])
+    rows = finger.feed(press.other[:50, e], press.other[:50, slots.PDC_SLOT])
     assert not (rows["flags"] & FrameFlags.SENSOR_FAULT).any()
 
 
@@ -239,13 +239,13 @@ def test_the_force_stays_useful_without_an_electrode(fault: str, model: str) -> 
     """Whichever electrode it is: within 30 % or 0.5 N of the healthy finger's in 9 of 10 places."""
     useful = []
     for seed in range(20, 25):
-        of, rng = sensor_faults.press(seed, "worn" if seed % 2 else "new", force_n=3.0), np.random.default_rng(seed)
-        held, begin = slice(of.hold + 50, of.free), of.begins("rest")
-        truth = of.healthy(model)["force_100un"][held].mean(axis=0) / 1e4
+        press, rng = sensor_faults.press(seed, "worn" if seed % 2 else "new", force_n=3.0), np.random.default_rng(seed)
+        held, begin = slice(press.hold + 50, press.free), press.begins("rest")
+        truth = press.healthy(model)["force_100un"][held].mean(axis=0) / 1e4
         for electrode in slots.ELECTRODE_SLOT:
-            bad = of.words.copy()
+            bad = press.words.copy()
             bad[begin:, electrode] = BROKEN[fault](bad[begin:, electrode], rng)
-            force = sensor_faults.run(bad, of.settings(model))["force_100un"][held].mean(axis=0) / 1e4
+            force = sensor_faults.run(bad, press.settings(model))["force_100un"][held].mean(axis=0) / 1e4
             useful.append(np.linalg.norm(force - truth) <= max(0.5, 0.3 * float(np.linalg.norm(truth))))
     assert np.mean(useful) >= 0.9
 
@@ -322,7 +322,7 @@ SQUEEZED_DRIFTS = ("all drift 12 counts/s", "all drift -20 counts/s", "all drift
 def test_drift_of_all_alike_is_flagged_within_half_a_second(fault: str) -> None:
     """Also where it is too fast for the signals ever to come to rest."""
     for when in WHEN:
-        assert max(outcome(of, fault, when, "fitted").silent_rounds for of in PRESSES) <= 50
+        assert max(outcome(press, fault, when, "fitted").silent_rounds for press in PRESSES) <= 50
 
 
 LEFT_OUT = "widens its margins, and looks at `biotac doctor`"
@@ -407,7 +407,7 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
 @pytest.mark.parametrize("cause", CAUSES)
 def test_the_page_says_what_a_broken_sensor_makes_of_a_calibrated_force(cause: str) -> None:
     faults, flag, do = CAUSES[cause]
-    seen = [outcome(of, fault, when, "fitted") for fault in faults for when in WHEN for of in PRESSES]
+    seen = [outcome(press, fault, when, "fitted") for fault in faults for when in WHEN for press in PRESSES]
     wrong_by.row(cause, max(one.worst_n for one in seen), max(one.silent_n for one in seen), flag, do)
 
 
@@ -415,7 +415,7 @@ def test_the_page_says_what_sticks_before_the_board_knows_its_sensor() -> None:
     """A board learns in ten seconds how often a sensor's words repeat: these begin six after power-up, at rest."""
     pressed = [sensor_faults.press(seed, rest_s=4.0) for seed in (1, 2, 3)]
     faults = [f"{n} neighbours stuck" for n in ("three", "four", "five")]
-    stuck = [outcome(of, fault, "rest", "fitted") for of in pressed for fault in faults]
+    stuck = [outcome(press, fault, "rest", "fitted") for press in pressed for fault in faults]
     wrong_by.row(
         "three to five neighbouring electrodes stick in the first ten seconds",
         max(one.worst_n for one in stuck), max(one.silent_n for one in stuck),

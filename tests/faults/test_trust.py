@@ -91,13 +91,13 @@ def acted_on(lay: Fault) -> tuple[int, int]:
     """Frames since the fault that say ACT, at each of its moments, with a finger's own gains; and how many are off."""
     act = off = 0
     for when in WHEN:
-        for of in PRESSES:
-            begin = of.begins(when)
-            bad = sensor_faults.spoil(of, lay, begin, np.random.default_rng([of.seed, 0, 7]))
-            good, rows = of.healthy("fitted")[begin:], sensor_faults.run(bad, of.settings("fitted"))[begin:]
+        for case in PRESSES:
+            begin = case.begins(when)
+            bad = sensor_faults.spoil(case, lay, begin, np.random.default_rng([case.seed, 0, 7]))
+            good, rows = case.healthy("fitted")[begin:], sensor_faults.run(bad, case.settings("fitted"))[begin:]
             error = np.linalg.norm((rows["force_100un"] - good["force_100un"].astype(float)) / 1e4, axis=1)
-            says = (rows["trust"] == Trust.ACT) & (good["trust"] > Trust.NONE)
-            act, off = act + int(says.sum()), off + int((says & (error > OFF_N)).sum())
+            acts = (rows["trust"] == Trust.ACT) & (good["trust"] > Trust.NONE)
+            act, off = act + int(acts.sum()), off + int((acts & (error > OFF_N)).sum())
     return act, off
 
 
@@ -121,9 +121,9 @@ def test_frames_to_act_on_when_more_electrodes_break(fault: str) -> None:
 @pytest.mark.parametrize("n", [3, 4, 5])
 @pytest.mark.parametrize("when", WHEN)
 def test_neighbours_that_stick_are_a_fault_within_a_second_of_the_others_move(when: str, n: int) -> None:
-    for of in PRESSES:
-        begin = of.begins(when)
-        moves = {"rest": of.squeeze, "touch": begin, "hold": of.free}[when]
-        rows = sensor_faults.run(sensor_faults.spoil(of, sensor_faults.stuck(n), begin, np.random.default_rng(0)), {})
+    for case in PRESSES:
+        begin = case.begins(when)
+        moves = {"rest": case.squeeze, "touch": begin, "hold": case.free}[when]
+        rows = sensor_faults.run(sensor_faults.spoil(case, sensor_faults.stuck(n), begin, np.random.default_rng(0)), {})
         assert (rows["flags"][moves + 100 : moves + 150] & FrameFlags.FAULT).all()
         assert (rows["trust"][moves + 100 : moves + 150] == Trust.NONE).all()

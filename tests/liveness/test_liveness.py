@@ -81,13 +81,13 @@ class Program:
         for line in self._process.stdout:
             self.events.append(json.loads(line))
 
-    def of(self, what: str) -> list[dict[str, Any]]:
-        return [one for one in list(self.events) if what in one]
+    def reported(self, kind: str) -> list[dict[str, Any]]:
+        return [event for event in list(self.events) if kind in event]
 
     def wait_for_rows(self) -> None:
         """Until it has said as many new values as make its clock settle."""
         end_s, before = time.monotonic() + 300, len(self.events)
-        while sum(bool(one.get("shown") or one.get("t_us")) for one in self.events[before:]) < STEADY_FRAMES:
+        while sum(bool(event.get("shown") or event.get("t_us")) for event in self.events[before:]) < STEADY_FRAMES:
             assert time.monotonic() < end_s
             time.sleep(0.01)
 
@@ -138,17 +138,17 @@ def running(program: Program, board: BoardBehindProxy) -> int:
 
 def offset_s(program: Program) -> float:
     """This computer's time at the board's time 0, by the quickest row that was ever seen."""
-    rows = [(one["at_s"], one.get("t_us", one.get("shown"))) for one in program.events]
+    rows = [(event["at_s"], event.get("t_us", event.get("shown"))) for event in program.events]
     return min(at_s - t_us * 1e-6 for at_s, t_us in rows if t_us)
 
 
 def no_old_value_was_shown_as_new(program: Program, first_s: float, begin: int = 0) -> None:
     """A view shows nothing older than it may; batches tell their true age."""
-    for one in program.events[begin:]:
-        if one.get("shown") is not None:
-            assert one["at_s"] - first_s - one["shown"] * 1e-6 <= MAX_AGE_S + TOLERANCE_S, one
-        if one.get("age_s") is not None:
-            assert one["age_s"] >= one["at_s"] - first_s - one["t_us"] * 1e-6 - TOLERANCE_S, one
+    for event in program.events[begin:]:
+        if event.get("shown") is not None:
+            assert event["at_s"] - first_s - event["shown"] * 1e-6 <= MAX_AGE_S + TOLERANCE_S, event
+        if event.get("age_s") is not None:
+            assert event["age_s"] >= event["at_s"] - first_s - event["t_us"] * 1e-6 - TOLERANCE_S, event
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
     before = len(board.passed)
     board.wait_for(lambda: program.has_ended() or len(board.passed) >= before + STEADY_FRAMES)
     program.end()
-    assert not program.of("lost")
+    assert not program.reported("lost")
     stamps_us = [t_us for t_us, _ in board.passed]
     at = max(range(1, len(stamps_us)), key=lambda k: stamps_us[k] - stamps_us[k - 1])
     last_us, next_us = stamps_us[at - 1], stamps_us[at]
@@ -182,20 +182,20 @@ def test_a_program_that_was_stopped_goes_on_and_is_told(
         assert first_s + next_us * 1e-6 <= resumed_s + 1.0 * PATIENCE  # of the board's time
         no_old_value_was_shown_as_new(program, first_s, begin)
     if way == "record":
-        (path,) = program.of("paths")[0]["paths"]
+        (path,) = program.reported("paths")[0]["paths"]
         recording = biotac.Recording(path)
         gaps = recording.gaps
-        assert program.of("frames")[0]["frames"] == len(recording.frames)
+        assert program.reported("frames")[0]["frames"] == len(recording.frames)
     elif way == "views":
-        assert program.of("counted") or next_us - last_us <= JUMP_US
+        assert program.reported("counted") or next_us - last_us <= JUMP_US
         return
     elif way == "page":
-        assert program.of("marked") or next_us - last_us <= JUMP_US
+        assert program.reported("marked") or next_us - last_us <= JUMP_US
         return
     else:
-        gaps = [biotac.Gap(**one["gap"]) for one in program.of("gap")]
+        gaps = [biotac.Gap(**report["gap"]) for report in program.reported("gap")]
     if way == "callbacks":
-        assert len(program.of("on_gap")) == len(gaps)
+        assert len(program.reported("on_gap")) == len(gaps)
     if next_us - last_us <= JUMP_US:  # on a busy computer the board may have stopped, too, and been started at once
         assert pause_s < 1.0 and all(gap.reason == "paused" for gap in gaps)
         return
@@ -212,7 +212,7 @@ def stops(board: BoardBehindProxy, cause: str) -> None:
     elif cause == "silent":
         board.silent = True
     elif cause == "taken":
-        board.take_over()
+        board.stop_stream()
     else:
         board.unplug()
 
@@ -248,15 +248,15 @@ def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_pat
         nonlocal known, stopped_s, taken_again
         if cause == "taken" and board.starts > known:  # this computer was busy for a second, and so it had paused
             known, stopped_s, taken_again = board.starts, time.monotonic(), 1
-            board.take_over()
-        return bool(program.of("lost"))
+            board.stop_stream()
+        return bool(program.reported("lost"))
 
     board.wait_for(is_lost)
     program.end()
-    (lost,) = program.of("lost")
+    (lost,) = program.reported("lost")
     assert re.search(CAUSES[cause], lost["lost"])
     if cause == "taken":  # a link that another took is not taken back, unless it says that it was this program's pause
-        reported = len([*program.of("gap"), *program.of("counted")])
+        reported = len([*program.reported("gap"), *program.reported("counted")])
         assert way == "record" or board.starts <= starts + max(reported, taken_again)
     elif cause == "silent" and way != "page":  # which opens the board again
         assert board.starts == starts + 1
@@ -295,14 +295,14 @@ def test_with_reconnect_it_comes_back_with_a_gap(board: BoardBehindProxy, tmp_pa
     if way == "views":
         board.wait_for(lambda: program.events[-1].get("shown") is not None)
     program.end()
-    assert not program.of("lost")
+    assert not program.reported("lost")
     if way == "views":
-        assert program.of("counted")
+        assert program.reported("counted")
         return
     if way == "record":
-        gaps = [gap for path in program.of("paths")[0]["paths"] for gap in biotac.Recording(path).gaps]
+        gaps = [gap for path in program.reported("paths")[0]["paths"] for gap in biotac.Recording(path).gaps]
     else:
-        gaps = [biotac.Gap(**one["gap"]) for one in program.of("gap")]
+        gaps = [biotac.Gap(**report["gap"]) for report in program.reported("gap")]
     assert [gap.reason for gap in gaps] == [{"reset": "rebooted"}.get(cause, "silence" if cause == "silent" else cause)]
 
 
@@ -321,16 +321,16 @@ def test_a_finger_that_falls_silent_is_stale_and_its_gap_is_told(tmp_path: Path,
     board.wait_for(lambda: len(board.passed) >= before + STEADY_FRAMES)
     program.end()
     board.close()
-    assert not program.of("lost")
+    assert not program.reported("lost")
     if way != "record":
         no_old_value_was_shown_as_new(program, offset_s(program))
     if way == "views":
-        assert program.of("counted") and program.events[-1]["shown"] is not None
+        assert program.reported("counted") and program.events[-1]["shown"] is not None
         return
     if way == "record":
-        (gap,) = biotac.Recording(program.of("paths")[0]["paths"][0]).gaps
+        (gap,) = biotac.Recording(program.reported("paths")[0]["paths"][0]).gaps
     else:
-        (gap,) = (biotac.Gap(**one["gap"]) for one in program.of("gap"))
+        (gap,) = (biotac.Gap(**report["gap"]) for report in program.reported("gap"))
     assert (gap.reason, gap.fingers, (gap.last_t_us, gap.next_t_us)) == ("finger", 0b10, hole())
 
 
@@ -391,7 +391,7 @@ def test_a_reader_of_a_shared_board_that_was_stopped(served: Served, tmp_path: P
     program.pause(pause_s)
     resumed_s = time.monotonic()
     program.wait_for_rows()
-    rows = [one for one in program.events if (one.get("shown") or one.get("t_us")) and one["at_s"] > resumed_s]
+    rows = [row for row in program.events if (row.get("shown") or row.get("t_us")) and row["at_s"] > resumed_s]
     program.end()
     no_old_value_was_shown_as_new(program, first_s)
-    assert not program.of("lost") and rows
+    assert not program.reported("lost") and rows

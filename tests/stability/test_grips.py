@@ -249,8 +249,8 @@ def test_a_hot_or_cold_cup_makes_no_force_wrong_without_a_flag_and_lets_the_fing
         flagged = (rows["flags"][part] & (FrameFlags.TEMP | FrameFlags.DOUBT)) != 0
         silent_n = max(silent_n, off_n[~flagged].max())
         flagged_n = max(flagged_n, off_n.max()) if seed < 60 else flagged_n
-        let_go = rows["tare_state"][hold.free : hold.free + 500]
-        assert np.isin(let_go, (TareState.REST, TareState.DOUBT)).any(), f"seed {seed}"
+        released = rows["tare_state"][hold.free : hold.free + 500]
+        assert np.isin(released, (TareState.REST, TareState.DOUBT)).any(), f"seed {seed}"
     assert silent_n <= 0.3
     if pdc_per_c == 0:
         cause = f"the finger {'warms' if sign > 0 else 'cools'} by up to 6 C in a hold"

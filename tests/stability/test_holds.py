@@ -93,13 +93,13 @@ def test_a_hold_keeps_its_force(profile: str, place: int, squeeze_n: float, shar
     case = grasp(profile, place, squeeze_n, 0.02 if held else share, HOLD_S)
     finger = Finger(LIN)
     parts = []
-    for first, end, say in (
+    for first, end, act in (
         (0, 1000, None),
         (1000, case.free, finger.hold),
         (case.free, len(case.course), finger.release),
     ):
-        if held and say is not None:
-            say()
+        if held and act is not None:
+            act()
         parts.append(finger.feed(**{name: channel[first:end] for name, channel in case.course.words.items()}))
     rows = np.concatenate(parts)
 
@@ -121,6 +121,6 @@ def test_a_hold_keeps_its_force(profile: str, place: int, squeeze_n: float, shar
         assert (after[100:150] == TareState.DOUBT).any() and above[
             50:100
         ].mean() > 4  # the model's pressure still creeps
-        gone = np.flatnonzero(np.convolve(above, np.ones(100) / 100, "valid") < 4)
-        if len(gone) and gone[0] + 1100 < len(after):
-            assert (after[: gone[0] + 1100] == TareState.REST).any()
+        low = np.flatnonzero(np.convolve(above, np.ones(100) / 100, "valid") < 4)
+        if len(low) and low[0] + 1100 < len(after):
+            assert (after[: low[0] + 1100] == TareState.REST).any()

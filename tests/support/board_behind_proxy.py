@@ -35,7 +35,7 @@ class BoardBehindProxy:
         self.passed: list[tuple[int, int]] = []
         self.starts = 0  #: how many START commands came
         self.silent = False  #: rows do not pass; answers do
-        self.gone = False
+        self.unplugged = False
         self._wires: tuple[int, int] | None = None  # the proxy's side of its pty, and the board's port
         self._over = threading.Event()
         self._changing = threading.Lock()
@@ -68,17 +68,17 @@ class BoardBehindProxy:
             self.path.unlink(missing_ok=True)
             self.path.symlink_to(os.ttyname(far))
             self._far = far
-            self.gone = False
+            self.unplugged = False
 
     def unplug(self) -> None:
         """As the kernel does: whoever reads the port gets an error from now on, and its name is gone."""
         with self._changing:
-            self.gone = True
+            self.unplugged = True
             self.path.unlink()
             os.close(self._far)
             os.close(self._near)
 
-    def take_over(self) -> None:
+    def stop_stream(self) -> None:
         """Another program stops the stream."""
         with self._changing:
             os.write(self._port, encode(wire.Stop.ID, wire.Stop(77).pack()))
@@ -86,19 +86,19 @@ class BoardBehindProxy:
     def _run(self) -> None:
         while not self._over.is_set():
             with self._changing:
-                watched = [self._port] if self.gone else [self._port, self._near]
+                watched = [self._port] if self.unplugged else [self._port, self._near]
                 ready, _, _ = select.select(watched, [], [], 0)
                 try:
                     if self._port in ready:
                         self._pass_on(os.read(self._port, 4096))
-                    if not self.gone and self._near in ready:
-                        self._hear(os.read(self._near, 4096))
+                    if not self.unplugged and self._near in ready:
+                        self._receive(os.read(self._near, 4096))
                 except OSError:
                     ready = []  # it hangs up just now
             if not ready:
                 time.sleep(0.001)
 
-    def _hear(self, chunk: bytes) -> None:
+    def _receive(self, chunk: bytes) -> None:
         starts = sum(message_id == wire.Start.ID for message_id, _ in self._from_host.feed(chunk))
         os.write(self._port, chunk)
         if starts and not self.starts:
@@ -109,7 +109,7 @@ class BoardBehindProxy:
     def _pass_on(self, chunk: bytes) -> None:
         for message_id, payload in self._from_board.feed(chunk):
             is_row = message_id in ROWS or (message_id == wire.Status.ID and payload[6] == 0)
-            if self.gone or (self.silent and is_row):
+            if self.unplugged or (self.silent and is_row):
                 continue
             try:
                 data = encode(message_id, payload)
@@ -121,7 +121,7 @@ class BoardBehindProxy:
                 self.passed.append((t_us, payload[DTYPES[wire.Frame.ID].fields["finger"][1]]))  # type: ignore[index]
 
     def wait_for(self, condition: Callable[[], bool]) -> None:
-        """Until ``so`` is true; only a failing test waits for minutes."""
+        """Until ``condition`` is true; only a failing test waits for minutes."""
         end_s = time.monotonic() + 300
         while not condition():
             assert time.monotonic() < end_s
@@ -131,7 +131,7 @@ class BoardBehindProxy:
         """End it."""
         self._over.set()
         self._thread.join()
-        if not self.gone:
+        if not self.unplugged:
             self.unplug()
         os.close(self._port)
         assert self._board is not None

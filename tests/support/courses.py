@@ -60,7 +60,7 @@ class Course:
         self, settings: dict[wire.Setting, int] | None = None, *, pdc: bool = True, tdc: bool = True
     ) -> StructArray:
         """The board's rows for this course, with or without the pressure and the thermometer."""
-        skipped = {name for name, there in (("pdc", pdc), ("tdc", tdc)) if not there}
+        skipped = {name for name, is_present in (("pdc", pdc), ("tdc", tdc)) if not is_present}
         return Finger(settings).feed(**{name: words for name, words in self.words.items() if name not in skipped})
 
     def kept(self, rows: StructArray) -> Floats:

@@ -43,9 +43,9 @@ class Ros:
 def blank(kind: str) -> Any:
     """A message with ROS' defaults, and no room for other fields."""
     values = {}
-    for name, (what, detail) in STORE.fielddefs[kind][1]:
-        one = blank(detail) if what.name == "NAME" else {"string": "", "float64": 0.0}.get(detail[0], 0)
-        values[name] = [] if what.name == "SEQUENCE" else one
+    for name, (kind_of_field, detail) in STORE.fielddefs[kind][1]:
+        value = blank(detail) if kind_of_field.name == "NAME" else {"string": "", "float64": 0.0}.get(detail[0], 0)
+        values[name] = [] if kind_of_field.name == "SEQUENCE" else value
     maker = type(kind.rsplit("/", 1)[1], (), {"__slots__": (*values, "_kind")})
     message = maker()
     message._kind = kind

@@ -23,21 +23,21 @@ LOOK_S = 0.01
 over = threading.Event()
 
 
-def report(**what: Any) -> None:
+def report(**facts: Any) -> None:
     """One observation, at the time of this computer that all processes share."""
-    print(json.dumps({"at_s": time.monotonic()} | what), flush=True)
+    print(json.dumps({"at_s": time.monotonic()} | facts), flush=True)
 
 
-def say_gaps(batch: biotac.Batch) -> None:
+def report_gaps(batch: biotac.Batch) -> None:
     """The gaps that a batch tells."""
     for message in batch.messages:
         if isinstance(message, biotac.Gap):
             report(gap=asdict(message))
 
 
-def say_batch(batch: biotac.Batch) -> None:
+def report_batch(batch: biotac.Batch) -> None:
     """What a reader of batches has in hand: how old it is by its own account, and of when it is."""
-    say_gaps(batch)
+    report_gaps(batch)
     if len(batch.t_us):
         at_s, age_s = time.monotonic(), batch.age_s
         report(at_s=at_s, t_us=int(batch.t_us[-1]), age_s=None if math.isnan(age_s) else age_s)
@@ -45,7 +45,7 @@ def say_batch(batch: biotac.Batch) -> None:
 
 def pull(hand: biotac.Hand) -> None:
     while not over.is_set():
-        say_batch(hand.read_batch(0.02))
+        report_batch(hand.read_batch(0.02))
 
 
 def views(hand: biotac.Hand) -> None:
@@ -62,7 +62,7 @@ def views(hand: biotac.Hand) -> None:
 
 
 def callbacks(hand: biotac.Hand) -> None:
-    hand.on_batch(say_batch)
+    hand.on_batch(report_batch)
     hand.on_gap(lambda gap: report(on_gap=gap.reason))
     hand.stream()
     while not over.wait(LOOK_S):
@@ -91,7 +91,7 @@ def lsl(hand: biotac.Hand) -> None:
         outlet._outlets[hand.fingers[0], ""].push_chunk = pushed  # type: ignore[method-assign]
         for batch in hand.batches():
             outlet.push(batch)
-            say_batch(batch)
+            report_batch(batch)
             if over.is_set():
                 return
 
@@ -99,7 +99,7 @@ def lsl(hand: biotac.Hand) -> None:
 async def aio(port: str, reconnect: bool) -> None:
     async with biotac.aio.open(port, reconnect=reconnect) as hand:
         async for batch in hand.batches():
-            say_batch(batch)
+            report_batch(batch)
             if over.is_set():
                 return
 
@@ -142,7 +142,7 @@ def ros(port: str) -> None:
         publish_row(row, stamp_ns)
 
     def published_all(batch: biotac.Batch) -> None:
-        say_gaps(batch)
+        report_gaps(batch)
         publish(batch)
         if over.is_set():
             raise KeyboardInterrupt
@@ -153,7 +153,7 @@ def ros(port: str) -> None:
 
 
 WAYS = {"pull": pull, "views": views, "callbacks": callbacks, "record": record, "lsl": lsl}
-WITH_HANDS_OF_THEIR_OWN = {"page": page, "ros": ros}
+OWN_HAND_WAYS = {"page": page, "ros": ros}
 
 
 def main() -> None:
@@ -163,8 +163,8 @@ def main() -> None:
     try:
         if way == "aio":
             asyncio.run(aio(port, reconnect))
-        elif way in WITH_HANDS_OF_THEIR_OWN:
-            WITH_HANDS_OF_THEIR_OWN[way](port)
+        elif way in OWN_HAND_WAYS:
+            OWN_HAND_WAYS[way](port)
         else:
             with biotac.open(port, reconnect=reconnect) as hand:
                 report(opened=True)

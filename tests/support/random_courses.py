@@ -21,7 +21,7 @@ from biotac.wire.frames import StructArray
 # With pressure, after a release: at rest within a second, or in doubt while the press's residue still shows; and at
 # rest after at most ten seconds in a row in which the residue is no touch. It may become one again: pressure is low
 # for a second after a press, and what then comes back of it stays above the tare for minutes.
-LET_GO_WITHIN = 100
+RELEASED_WITHIN = 100
 TARED_WITHIN = 1000
 PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; what noise may add in three rounds
 HELD_N = 1.0  # a load above this is never tared away
@@ -53,7 +53,7 @@ class Outcome:
     poc_um: float = 0.0
     force_mn: float = 0.0
     torque_share: float = 0.0
-    let_go_frames: int = 0  # with pressure, the longest from a release to rest or doubt
+    release_frames: int = 0  # with pressure, the longest from a release to rest or doubt
     tared_frames: int = 0  # the longest that a residue was no touch before it was tared
     releases: int = 0
     held_frames: int = 0  # with a load over HELD_N
@@ -171,7 +171,7 @@ def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outc
     tares = rows["tare_q4"][(rows["flags"] & FrameFlags.UNTARED) == 0]
     known = tares[tares != wire.INVALID_COUNT]
     limit = settings[Setting.CONTACT_ENERGY_COUNT2]
-    for held, what in (
+    for held, problem in (
         (bool((known <= 65520).all()), "a tare is out of range"),
         # 19 electrodes of 4095 counts; and three times the noise, which is capped at the setting
         (bool((rows["energy_count2"] <= 19 * 4095**2).all()), "an energy wrapped"),
@@ -180,7 +180,7 @@ def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outc
         (bool(np.isin(rows["tare_state"], list(TareState)).all()), "a tare state is unknown"),
     ):
         if not held:
-            outcome.broken.append(what)
+            outcome.broken.append(problem)
 
 
 def _judge_touches(course: Course, rows: StructArray, outcome: Outcome) -> None:
@@ -223,13 +223,13 @@ def _judge_releases(course: Course, rows: StructArray, outcome: Outcome) -> None
     for k in (np.flatnonzero(loaded[:-1] & ~loaded[1:]) + 1).tolist():
         end = next(e for e in ends if e >= k) + 1
         state = rows["tare_state"][k:end]
-        if len(state) < LET_GO_WITHIN:
+        if len(state) < RELEASED_WITHIN:
             continue
         outcome.releases += 1
         free = np.flatnonzero(np.isin(state, (TareState.REST, TareState.DOUBT)))
-        outcome.let_go_frames = max(outcome.let_go_frames, int(free[0]) if len(free) else len(state))
-        if not len(free) or free[0] > LET_GO_WITHIN:
-            outcome.broken.append(f"frame {k}: released, but in contact for more than {LET_GO_WITHIN} frames")
+        outcome.release_frames = max(outcome.release_frames, int(free[0]) if len(free) else len(state))
+        if not len(free) or free[0] > RELEASED_WITHIN:
+            outcome.broken.append(f"frame {k}: released, but in contact for more than {RELEASED_WITHIN} frames")
         tared = int(np.argmax(np.append(state == TareState.REST, True)))
         touched = np.flatnonzero(np.append(touch[k : k + tared], True))
         waited = int(np.diff(touched, prepend=-1).max()) - 1

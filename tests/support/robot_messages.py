@@ -115,11 +115,11 @@ def serve(port: int, seconds: float, kind: str, fingers: int) -> None:
     begin_s, begin_ns, published, stopped = time.monotonic(), time.time_ns(), 0, False
     for k in range(int(seconds * 100)):
         time.sleep(max(0.0, begin_s + k / 100 - time.monotonic()))
-        said = commands.pop(0) if commands else ""
-        stopped = said == "stop" or (stopped and said != "go")
-        if said == "quit":
+        command = commands.pop(0) if commands else ""
+        stopped = command == "stop" or (stopped and command != "go")
+        if command == "quit":
             break
-        if said == "change":
+        if command == "change":
             topic.close()
             robot, topic = channel(False)
         if not stopped:

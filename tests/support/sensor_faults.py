@@ -126,17 +126,17 @@ def run(words: Words, settings: dict[wire.Setting, int]) -> np.ndarray:
 # ---- faults ----------------------------------------------------------------------------------------------
 
 
-def most_pressed(of: Press) -> int:
+def most_pressed(press: Press) -> int:
     """The electrode that the press moves most."""
-    counts = of.words[:, slots.ELECTRODE_SLOT].astype(float)
-    return int(np.abs(counts[of.hold : of.free].mean(axis=0) - counts[: of.squeeze].mean(axis=0)).argmax())
+    counts = press.words[:, slots.ELECTRODE_SLOT].astype(float)
+    return int(np.abs(counts[press.hold : press.free].mean(axis=0) - counts[: press.squeeze].mean(axis=0)).argmax())
 
 
-def spoil(of: Press, lay: Fault, begin: int, rng: np.random.Generator) -> Words:
+def spoil(press: Press, lay: Fault, begin: int, rng: np.random.Generator) -> Words:
     """The press's words with a fault laid on its most pressed electrode from a round on."""
-    rest, other_rest = (words[: of.squeeze, slots.ELECTRODE_SLOT].mean(axis=0) for words in (of.words, of.other))
-    bad = of.words.copy()
-    bad[begin:] = lay(Faulty(most_pressed(of), rest, other_rest, rng), of.words[begin:], of.other[begin:])
+    rest, other_rest = (w[: press.squeeze, slots.ELECTRODE_SLOT].mean(axis=0) for w in (press.words, press.other))
+    bad = press.words.copy()
+    bad[begin:] = lay(Faulty(most_pressed(press), rest, other_rest, rng), press.words[begin:], press.other[begin:])
     return bad
 
 
@@ -209,11 +209,11 @@ def longest(mask: np.ndarray) -> int:
     return int((edges[1::2] - edges[0::2]).max(initial=0))
 
 
-def outcome(of: Press, name: str, when: str, model: str, seed: int = 0) -> Outcome:
+def outcome(press: Press, name: str, when: str, model: str, seed: int = 0) -> Outcome:
     """Run a fault of FAULTS or MORE."""
-    begin = of.begins(when)
-    bad = spoil(of, (FAULTS | MORE)[name], begin, np.random.default_rng([of.seed, seed, 7]))
-    good, rows = of.healthy(model)[begin:], run(bad, of.settings(model))[begin:]
+    begin = press.begins(when)
+    bad = spoil(press, (FAULTS | MORE)[name], begin, np.random.default_rng([press.seed, seed, 7]))
+    good, rows = press.healthy(model)[begin:], run(bad, press.settings(model))[begin:]
     new = rows["flags"] & WARNINGS & ~good["flags"]
     given = (rows["force_100un"] != wire.INVALID_I32).all(axis=1) & (good["force_100un"] != wire.INVALID_I32).all(
         axis=1
@@ -225,7 +225,7 @@ def outcome(of: Press, name: str, when: str, model: str, seed: int = 0) -> Outco
     lasting = np.lib.stride_tricks.sliding_window_view(silent, SILENT_ROUNDS + 1)
     flagged = np.flatnonzero(new)
     seen = np.bitwise_or.reduce(new)
-    last = error[of.free - 100 - begin : of.free - begin]
+    last = error[press.free - 100 - begin : press.free - begin]
     return Outcome(
         float(error.max()), float(lasting.min(axis=1).max()), longest(silent > OFF_N),
         int(flagged[0]) if len(flagged) else -1, FrameFlags(int(seen)), float(last.mean()),

@@ -13,7 +13,7 @@ PAGE = Path(__file__).resolve().parents[2] / "host/docs/reference/wrong_by.md"
 def trust_of(flag: str) -> str:
     """The lowest trust that the flags named in ``flag`` leave, by the board's own table; "-" where none is."""
     named = {FrameFlags[name] for name in re.findall(r"[A-Z_]+", flag) if name in FrameFlags.__members__}
-    levels = [level for level, flags in TRUST_FLAGS.items() if any(one in flags for one in named)]
+    levels = [level for level, flags in TRUST_FLAGS.items() if any(member in flags for member in named)]
     return min(levels).name if levels else "-"
 
 
