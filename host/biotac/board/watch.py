@@ -184,6 +184,7 @@ class StreamWatch:
                     board.command(tare)
             self._stream.resume()
             self._answered_us = None
+            self._started = None  # look at once: until a STATUS has come, nobody knows how old a row is
 
     def _found(self, before: wire.Hello) -> bool:
         board = self._board

@@ -272,16 +272,21 @@ class Hand(Commands, Subscriptions):
         """The frames of all fingers of one round and the events up to its end, starting the stream if need be.
 
         Waits for a round later than ``after``, or without it for one that is complete after this call; returns the
-        newest, and says how many were passed over. A loop that gives its last round each time gets every event once,
-        whatever it computes meanwhile. A finger that sends heartbeats (``rest=False``) has no frame. One thread at a
-        time may call this. Adds events to what is streamed. Raises TimeoutError when no round comes in time, also while
-        a board is away that ``reconnect`` looks for; DeviceLostError when it is lost for good.
+        newest, never one older than ``max_age_s`` (biotac.open), and says how many were passed over. A loop that gives
+        its last round each time gets every event once, whatever it computes meanwhile. A finger that sends heartbeats
+        (``rest=False``) has no frame. One thread at a time may call this. Adds events to what is streamed. Raises
+        TimeoutError when no round comes in time, also while a board is away that ``reconnect`` looks for;
+        DeviceLostError when it is lost for good.
         """
         self._reading.stop_buffering()
         if self._rounds is None:
-            self._stream.imply(wire.Event)
             self._rounds = Rounds(self._reader, self._latest)
-        self._start()
+        try:
+            self._stream.imply(wire.Event)
+            self._start()
+        except DeviceLostError:
+            if self._reader.lost is None:  # else it is being looked for, and that is no reason to leave a loop
+                raise
         return self._rounds.wait(after, timeout_s)
 
     # ---- recording -----------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from ..board.reader import Consumer, Reader
 from ..wire.batches import ROUND_US, Batch
 from ..wire.frames import Frame
 from ..wire.messages_gen import Event
-from .views import Latest
+from .views import Latest, checked_timeout_s
 
 MOST_EVENTS = 1024
 
@@ -54,7 +54,7 @@ class Rounds(Consumer):
         self._latest = latest
         self._rows: dict[int, dict[int, tuple[Batch, int]]] = {}  # by t_us, by finger
         self._events: list[tuple[int, Event]] = []
-        self._expected: set[int] = set()  # fingers of the round before: with them a round is complete
+        self._expected = set(FINGERS_IN[reader.present])  # fingers that have rows: with these a round is complete
         self._news = threading.Condition()
         self._given_us = -1  # the latest round that was given
         self._after_us = -1  # a later one is waited for
@@ -66,9 +66,14 @@ class Rounds(Consumer):
     def put(self, batch: Batch) -> None:
         with self._news:
             if any(type(m) is Gap and m.reason == "rebooted" for m in batch.messages):  # its clock began anew
-                self._rows, self._events, self._given_us, self._after_us = {}, [], -1, -1
+                self._rows, self._given_us, self._after_us = {}, -1, -1
+                self._expected = set(FINGERS_IN[self._reader.present])
+                self._events = [(-1, event) for _, event in self._events]  # come with the next round, whatever its time
             for row, (t_us, finger) in enumerate(zip(batch.t_us.tolist(), batch.wire["finger"].tolist(), strict=True)):
-                self._rows.setdefault(t_us, {})[finger] = batch, row
+                if t_us > self._given_us:
+                    self._rows.setdefault(t_us, {})[finger] = batch, row
+                else:  # it came in a read of its own, after that round was given without it: the next one awaits it
+                    self._expected.add(finger)
             for old in sorted(self._rows)[:-2]:  # a program that is behind gets the newest
                 del self._rows[old]
             events = [(self._reader.unwrap_t_us(m.t_us), m) for m in batch.messages if type(m) is Event]
@@ -86,8 +91,10 @@ class Rounds(Consumer):
         reader = self._reader
 
         def is_complete() -> bool:
-            ended = reader.failure is not None or reader.closing.is_set()
-            return ended or self._complete_us() > self._after_us
+            if reader.failure is not None or reader.closing.is_set():
+                return True
+            t_us = self._complete_us()  # what waited while this program stood still is too old to act on
+            return t_us > self._after_us and not self._latest.is_too_old(t_us, self._arrived_s(t_us))
 
         with self._news:
             # All that the first call finds has come since it was made. What was given before the board restarted is
@@ -95,7 +102,7 @@ class Rounds(Consumer):
             before_us = -1 if self._is_new else max(self._rows, default=-1)
             self._after_us = before_us if after is None else min(after.t_us, self._given_us)
             self._is_new = False
-            came = self._news.wait_for(is_complete, timeout_s)
+            came = self._news.wait_for(is_complete, checked_timeout_s(timeout_s))
         if reader.closing.is_set():
             reader.raise_closed()
         self._latest.report()
@@ -104,10 +111,14 @@ class Rounds(Consumer):
         return self.pop(self._complete_us())
 
     def _complete_us(self) -> int:
+        """The time of the newest round that has all expected fingers, or that a later one has followed; -1: none."""
         times = sorted(self._rows)
-        if times and (not self._expected or set(self._rows[times[-1]]) >= self._expected):
+        if times and set(self._rows[times[-1]]) >= self._expected:
             return times[-1]
         return times[-2] if len(times) > 1 else -1
+
+    def _arrived_s(self, t_us: int) -> float:
+        return next(batch.arrived_s for batch, _ in self._rows[t_us].values())
 
     def pop(self, t_us: int | None = None) -> Round:
         """The round at ``t_us``, by default the newest that has come, and the events up to its end."""

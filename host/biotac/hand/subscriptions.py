@@ -85,7 +85,8 @@ class Subscriptions:
 
         @wraps(fn)
         def call(message: Any) -> None:
-            if kind in (None, getattr(message, "kind", None)) and reader.age_s(message.t_us) <= max_age_s:
+            is_old = reader.age_s(message.t_us) > max_age_s  # of unknown age is what comes first after a restart
+            if kind in (None, getattr(message, "kind", None)) and not is_old:
                 fn(message)
 
         return call

@@ -54,6 +54,13 @@ def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
     raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
 
 
+def checked_timeout_s(timeout_s: float) -> float:
+    """``timeout_s``, or as long as a thread can wait. Raises InputError for what is no time."""
+    if not timeout_s >= 0:
+        raise InputError(f"timeout_s is {timeout_s}, expected seconds, 0 or more")
+    return min(timeout_s, threading.TIMEOUT_MAX)
+
+
 class Latest(Consumer):
     """The newest frame or heartbeat of each finger, and how old it is.
 
@@ -67,7 +74,7 @@ class Latest(Consumer):
         self._troubles = troubles
         self._reader = reader
         self._batches: dict[int, Batch] = {}  # by finger: the latest that has it
-        self._framed: dict[int, Batch] = {}  # likewise, of those with FRAMEs
+        self._trusted: dict[int, Batch] = {}  # likewise, of those with a FRAME whose force may be acted on
         self._news = threading.Condition()
         self._waiters = 0
 
@@ -98,19 +105,21 @@ class Latest(Consumer):
         return index(fingers)
 
     def put(self, batch: Batch) -> None:
+        frames_only = len(batch.wire) > 0 and len(batch.idle) == 0
+        all_trusted = frames_only and bool(batch.wire["trust"].min() >= Trust.INTERVAL)  # most are: no search
         for finger in FINGERS_IN[batch.fingers]:
             self._batches[finger] = batch
-            if len(batch.wire):
-                self._framed[finger] = batch
+            if all_trusted or len(_trusted_rows(batch, finger)):
+                self._trusted[finger] = batch
         if self._waiters:
             self.wake()
 
     def tares(self) -> list[TareSet]:
         """The commands that give a board that restarted the latest tares with trust, and their age."""
         commands = []
-        for finger, batch in self._framed.items():
-            rows = batch.wire[(batch.wire["finger"] == finger) & (batch.wire["trust"] >= Trust.INTERVAL)]
-            if len(rows) and (rows["tare_q4"][-1] != INVALID_COUNT).all():
+        for finger, batch in self._trusted.items():
+            rows = _trusted_rows(batch, finger)
+            if (rows["tare_q4"][-1] != INVALID_COUNT).all():
                 tare_q4, pdc_q4 = tuple(rows["tare_q4"][-1].tolist()), int(rows["pdc_tare_q4"][-1])
                 commands.append(TareSet(0, finger, tare_q4, pdc_q4, age_ms(time.monotonic() - batch.arrived_s)))
         return commands
@@ -139,6 +148,10 @@ class Latest(Consumer):
             return ((reader.last_t_us or t_us) - t_us) * 1e-6
         return time.monotonic() - reader.taken_s(t_us, arrived_s)
 
+    def is_too_old(self, t_us: int, arrived_s: float) -> bool:
+        """Whether a row is older than ``max_age_s``; false while the board's clock is not known yet."""
+        return self._age_s(t_us, arrived_s) > self.max_age_s
+
     def _why_stale(self, age_s: float) -> str:
         if self._reader.closing.is_set():
             return "the hand is closed"
@@ -166,7 +179,7 @@ class Latest(Consumer):
         with self._news:
             self._waiters += 1
             try:
-                came = self._news.wait_for(has_come, timeout_s)
+                came = self._news.wait_for(has_come, checked_timeout_s(timeout_s))
             finally:
                 self._waiters -= 1
         if reader.closing.is_set():
@@ -174,6 +187,11 @@ class Latest(Consumer):
         self.report()
         if not came:
             raise TimeoutError(f"no new frame of finger {self.name(finger)!r} in {timeout_s:g} s: {why or 'none came'}")
+
+
+def _trusted_rows(batch: Batch, finger: int) -> StructArray:
+    rows: StructArray = batch.wire[(batch.wire["finger"] == finger) & (batch.wire["trust"] >= Trust.INTERVAL)]
+    return rows
 
 
 def _latest_row(batch: Batch, finger: int) -> StructArray:

@@ -179,6 +179,8 @@ class LockStep(World):
 
     def unplug(self, seconds: float) -> None:
         """Take the cable to the host out for so long. The board has its power from elsewhere, and goes on."""
+        if self.hand is not None:
+            self.hand.ping()  # as the keep-alive of a stream in real time: a HOLD lapses no sooner here
         self._pull()
         self._away = _rounds_of(seconds)
 

@@ -233,6 +233,15 @@ def test_a_program_that_dies_in_the_middle_of_a_step_takes_its_board_along() -> 
     assert not os.path.exists(f"/proc/{board}")
 
 
+def test_a_hold_outlasts_a_cable_that_is_out_for_less_than_its_timeout() -> None:
+    with world({"index": SimFinger(1)}) as hand:
+        hand.hand.hold("index")
+        hand.run(3.0)  # in which this side said nothing
+        hand.unplug(1.0)
+        hand.run(3.0)
+        assert hand.step()["index"].frame.flags & FrameFlags.HELD
+
+
 # ---- rounds of any hand --------------------------------------------------------------------------------
 
 
