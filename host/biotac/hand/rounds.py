@@ -128,9 +128,10 @@ class Rounds(Consumer):
             end_us = None if t_us is None else t_us + ROUND_US
             due = [event for at_us, event in self._events if end_us is None or at_us < end_us]
             self._events = self._events[len(due) :]
-            if rows:
-                self._expected = set(rows)
-                self._rows = {at: row for at, row in self._rows.items() if newest is not None and at > newest}
+            before_us = self._given_us
+            if rows and newest is not None:
+                self._expected, self._given_us = set(rows), newest
+                self._rows = {at: row for at, row in self._rows.items() if at > newest}
         frames = {finger: Frame.from_row(batch.frames[row]) for finger, (batch, row) in rows.items()}
         fingers = {}
         for finger in sorted({*frames, *(event.finger for event in due), *FINGERS_IN[self._reader.present]}):
@@ -139,6 +140,5 @@ class Rounds(Consumer):
         seq = next((frame.seq for frame in frames.values()), -1)
         if not frames or newest is None:
             return Round(-1, -1, 0, fingers, tuple(due))
-        missed = round((newest - self._given_us) / ROUND_US) - 1 if self._given_us >= 0 else 0
-        self._given_us = newest
+        missed = round((newest - before_us) / ROUND_US) - 1 if before_us >= 0 else 0
         return Round(seq, newest, missed, fingers, tuple(due))
