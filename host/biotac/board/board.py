@@ -39,6 +39,7 @@ class Board:
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
         self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
+        self.unreleased = 0  #: bit mask of the fingers whose RELEASE the board has not answered
         try:
             hello = self.handshake()
         except BaseException:
@@ -184,6 +185,17 @@ class Board:
         self.ask(request, answers)
         if lasting is not None:
             self.remember(lasting, lambda: self.ask(request, answers))
+
+    def release(self) -> None:
+        """Send RELEASE for ``unreleased``, if there are any; while nobody answers, they stay in it."""
+        with self.turn():
+            mask, self.unreleased = self.unreleased, 0
+            if mask:
+                try:
+                    self.command(wire.Release(0, mask))
+                except (DeviceLostError, KeyboardInterrupt):  # the board may not have received it
+                    self.unreleased |= mask
+                    raise
 
     def remember(self, subject: tuple[str, int], again: Callable[[], object]) -> None:
         """Remember to send a restarted board ``subject`` (kind, number) anew, by ``again``; the latest goes last."""

@@ -101,10 +101,15 @@ class StreamWatch:
                 self._looks, self._restarts, self._answered_us = 0, 0, None
                 if self._has_restarted():  # while nothing streamed, so that nobody looked
                     return
+            self._repeat_release()
             if board.link.owns_stream or board.link.keeps_time:  # a recording has pauses of its own
                 self._judge(started, status)
             self._rows, self._idle, self._faults = self._reader.rows, status.frames_idle, status.faults
             self._answered_us = status.t_us
+
+    def _repeat_release(self) -> None:
+        with suppress(CommandRefusedError):  # a recording has no HOLD to end
+            self._board.release()
 
     def _judge(self, started: wire.Start, status: wire.Status) -> None:
         if self._stream.started is not started:
@@ -179,6 +184,8 @@ class StreamWatch:
             # Before START, because rows may come with its reply.
             reader.gaps.begin(reason)
             board.restore()
+            # Whatever the boot, as HOLD outlives a watchdog's reset; before the tares, which RELEASE would call likely.
+            self._repeat_release()
             for tare in self._tares() if reason == "rebooted" else []:
                 with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
                     board.command(tare)

@@ -126,25 +126,35 @@ class Commands:
         for a finger that is not there, and then changes nothing.
         """
         mask = self._mask(fingers)
-        self._board.command(wire.Hold(0, mask))
+        with self._board.turn():  # so that no RELEASE is repeated after it
+            self._board.command(wire.Hold(0, mask))
+            self._board.unreleased &= ~mask
         self._board.reader.gaps.held |= mask & self._board.reader.present
         self._latest.report()
 
     def release(self, *fingers: Finger) -> None:
-        """Say that these fingers hold nothing any more, so that a press's residue is tared. See ``hold``."""
+        """Say that these fingers hold nothing any more, so that a press's residue is tared. See ``hold``.
+
+        A board that could not be reached is told once it is back (``reconnect``), unless ``hold`` is called before.
+        """
         mask = self._mask(fingers)
         self._board.reader.gaps.held &= ~mask
-        self._requests.command(wire.Release(0, mask))
+        self._board.unreleased |= mask
+        self._board.release()
+        self._latest.report()
 
     @contextmanager
     def grasp(self, *fingers: Finger) -> Iterator[None]:
-        """``with hand.grasp("thumb", "index"):`` calls ``hold`` and, however the block ends, ``release``."""
+        """``with hand.grasp("thumb", "index"):`` calls ``hold`` and, however the block ends, ``release``.
+
+        A board that is away is told once it is back.
+        """
         self._mask(fingers)  # an absent finger is refused before anything is held
         try:
             self.hold(*fingers)
             yield
         finally:
-            with suppress(DeviceLostError):  # the board cannot be told; its hold lapses
+            with suppress(DeviceLostError):  # the watch repeats RELEASE
                 self.release(*fingers)
 
     def _mask(self, fingers: tuple[Finger, ...]) -> int:

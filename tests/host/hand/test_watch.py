@@ -563,3 +563,18 @@ def test_rows_wait_for_what_held_fingers_say_but_not_for_ever_and_come_once(live
     until(lambda: 10 + gap_module.BATCHES_HELD_BACK in seqs)
     assert [gap.holds_lapsed for gap in gaps()] == [0b10]
     assert seqs[-gap_module.BATCHES_HELD_BACK - 1 :] == sorted(set(seqs))[-gap_module.BATCHES_HELD_BACK - 1 :]
+
+
+@pytest.mark.parametrize("boot_id", [1, 2])
+def test_a_release_that_a_lost_board_did_not_hear_is_repeated_once_it_is_back(world, boot_id) -> None:
+    """Also to another boot: on silicon, HOLD goes on after a watchdog's reset."""
+    live, left, back = world.opened(plugged := world.plug(boot_id=1)), threading.Event(), []
+    world.clock.while_away = lambda pauses: left.wait() and back.append(world.plug(boot_id=boot_id).firmware)
+    live.hand.stream()
+    with live.hand.grasp(0):
+        world.unplug(plugged)
+        until(lambda: not live.hand.connected)
+    left.set()
+    until(lambda: back and back[0].received(wire.Start))
+    release, _ = back[0].received((wire.Release, wire.Start))  # before START: no row says that it is still held
+    assert isinstance(release, wire.Release) and release.fingers == 0b1
