@@ -6,7 +6,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import cycle
 from typing import Any, TypeVar
@@ -196,6 +196,12 @@ class Board:
                 except (DeviceLostError, KeyboardInterrupt):  # the board may not have received it
                     self.unreleased |= mask
                     raise
+
+    def release_unanswered(self, mask: int) -> None:
+        """Send RELEASE without waiting for its answer, for another command, or for a board that is away."""
+        if self.connected:
+            with suppress(DeviceLostError):
+                self._write_numbered(wire.Release(0, mask))
 
     def remember(self, subject: tuple[str, int], again: Callable[[], object]) -> None:
         """Remember to send a restarted board ``subject`` (kind, number) anew, by ``again``; the latest goes last."""

@@ -137,9 +137,7 @@ class Commands:
 
         A board that could not be reached is told once it is back (``reconnect``), unless ``hold`` is called before.
         """
-        mask = self._mask(fingers)
-        self._board.reader.gaps.held &= ~mask
-        self._board.unreleased |= mask
+        self._let_go(self._mask(fingers))
         self._board.release()
         self._latest.report()
 
@@ -147,15 +145,23 @@ class Commands:
     def grasp(self, *fingers: Finger) -> Iterator[None]:
         """``with hand.grasp("thumb", "index"):`` calls ``hold`` and, however the block ends, ``release``.
 
-        A board that is away is told once it is back.
+        An exception of the block does not wait for the board, and goes before what has failed since the last call,
+        which the next call raises. A board that is away is told once it is back.
         """
-        self._mask(fingers)  # an absent finger is refused before anything is held
+        mask = self._mask(fingers)  # an absent finger is refused before anything is held
         try:
             self.hold(*fingers)
             yield
-        finally:
-            with suppress(DeviceLostError):  # the watch repeats RELEASE
-                self.release(*fingers)
+        except BaseException:
+            self._let_go(mask)
+            self._board.release_unanswered(mask)
+            raise
+        with suppress(DeviceLostError):  # the watch repeats RELEASE
+            self.release(*fingers)
+
+    def _let_go(self, mask: int) -> None:
+        self._board.reader.gaps.held &= ~mask
+        self._board.unreleased |= mask
 
     def _mask(self, fingers: tuple[Finger, ...]) -> int:
         named = [f if isinstance(f, str) else operator.index(f) for f in fingers]

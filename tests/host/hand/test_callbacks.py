@@ -193,6 +193,18 @@ def test_what_a_callback_raises_is_raised_by_the_next_call_of_any_kind(live: Liv
     live.hand.close()
 
 
+def test_what_the_body_of_a_grasp_raises_goes_before_what_a_callback_raised(live: Live, caplog) -> None:
+    live.hand.on_batch(not_my_day)
+    live.hand.stream()
+    with pytest.raises(ZeroDivisionError), live.hand.grasp(0):
+        live.send(frame(0))
+        until(lambda: live.hand._troubles._first)
+        _ = 1 / 0
+    live.firmware.wait_for(wire.Release)
+    with pytest.raises(biotac.CallbackError, match="not my day"):
+        live.hand.check()
+
+
 def test_sys_exit_in_a_callback_is_raised_and_ends_no_thread(live: Live) -> None:
     def leaves(batch: Batch) -> None:
         if len(batch.wire):

@@ -578,3 +578,32 @@ def test_a_release_that_a_lost_board_did_not_hear_is_repeated_once_it_is_back(wo
     until(lambda: back and back[0].received(wire.Start))
     release, _ = back[0].received((wire.Release, wire.Start))  # before START: no row says that it is still held
     assert isinstance(release, wire.Release) and release.fingers == 0b1
+
+
+def test_an_exception_leaves_a_grasp_at_once_and_release_is_repeated_until_it_is_answered(live: Live, quick) -> None:
+    live.firmware.mute = {wire.Release}
+    with pytest.raises(ZeroDivisionError), live.hand.grasp(0):
+        _ = 1 / 0
+    live.firmware.wait_for(wire.Release)
+    live.firmware.mute = set()
+    live.hand.stream()
+    live.firmware.wait_for_looks(3)
+    assert [release.fingers for release in live.firmware.received(wire.Release)] == [0b1, 0b1]
+
+
+def test_a_new_hold_takes_the_place_of_a_release_that_was_not_answered(live: Live, quick) -> None:
+    with pytest.raises(ZeroDivisionError), live.hand.grasp(0, 1):
+        _ = 1 / 0
+    live.hand.hold(0)
+    live.hand.stream()
+    live.firmware.wait_for_looks(3)
+    assert [release.fingers for release in live.firmware.received(wire.Release)] == [0b11, 0b10]
+
+
+def test_a_release_that_the_board_refuses_is_not_repeated(live: Live, quick) -> None:
+    live.firmware.refuses[wire.Release] = wire.Error.NOT_HERE
+    with pytest.raises(ZeroDivisionError), live.hand.grasp(0):
+        _ = 1 / 0
+    live.hand.stream()
+    live.firmware.wait_for_looks(5)
+    assert live.hand.connected and len(live.firmware.received(wire.Release)) == 2
