@@ -122,8 +122,8 @@ class Commands:
 
         A streaming hand keeps the hold alive. It lapses when the board has heard nothing for
         ``hold_timeout_ms`` (2 s by default), and when the board restarts; the ``Gap`` that follows says so, and nothing
-        renews it. Raises KeyError
-        for a finger that is not there, and then changes nothing.
+        renews it. While nothing streams, only ``ping`` and other commands keep it alive, and no Gap follows when it
+        lapses: later frames just lack HELD. Raises KeyError for a finger that is not there, and then changes nothing.
         """
         mask = self._mask(fingers)
         with self._board.turn():  # so that no RELEASE is repeated after it
