@@ -137,7 +137,7 @@ class Commands:
 
         A board that could not be reached is told once it is back (``reconnect``), unless ``hold`` is called before.
         """
-        self._let_go(self._mask(fingers))
+        self._end_hold(self._mask(fingers))
         self._board.release()
         self._latest.report()
 
@@ -153,13 +153,13 @@ class Commands:
             self.hold(*fingers)
             yield
         except BaseException:
-            self._let_go(mask)
+            self._end_hold(mask)
             self._board.release_unanswered(mask)
             raise
         with suppress(DeviceLostError):  # the watch repeats RELEASE
             self.release(*fingers)
 
-    def _let_go(self, mask: int) -> None:
+    def _end_hold(self, mask: int) -> None:
         self._board.reader.gaps.held &= ~mask
         self._board.unreleased |= mask
 
