@@ -2,6 +2,7 @@
 // main loop. The three functions that a chip has of its own are declared; firmware/port/stm32f405/uart.c is
 // how one defines them. The two after them are the controller's: host/docs/guides/examples/grip.c is one.
 #include "biotac_client.h"
+#include <string.h>
 
 // Puts bytes into the UART's transmit ring. Whole commands, or the board refuses what is left of one.
 void uart_send(const uint8_t *data, size_t bytes);
@@ -18,6 +19,7 @@ void act_on_event(const bt_msg_event *event);
 #define KEEPALIVE_MS 500 // the board stops its streams when it has heard nothing for so long
 #define PING_MS      150
 #define FINGERS      5
+#define NONCE        7
 
 static bt_client board;
 static bt_client_rounds rounds[FINGERS];
@@ -25,6 +27,8 @@ static uint32_t lost;    // rounds, on the link
 static uint32_t ping_ms; // when the board last heard from here
 static uint32_t rx_ms;   // and when it last told of a finger
 static uint8_t streaming;
+static uint8_t unsubscribed; // a FRAME says that no EVENTS are
+static bt_msg_subscribe wanted = {4, 0, BT_QUANTITY_FLAGS};
 
 void hand_send(uint8_t id, const void *msg)
 {
@@ -42,13 +46,14 @@ static void dispatch(int id)
     bt_msg_event event;
     bt_msg_frame frame;
     bt_msg_idle idle;
-    if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello)
-        && hello.wire_major == BT_WIRE_MAJOR) {
+    if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello) && hello.wire_major == BT_WIRE_MAJOR
+        && hello.nonce == NONCE) {
         bt_msg_start start = {2, BT_STREAM_FLAG_FRAMES, 0, KEEPALIVE_MS};
-        start.fingers = (uint8_t)((1u << hello.fingers) - 1u);
-        const bt_msg_subscribe all = {4, start.fingers, BT_QUANTITY_FLAGS};
+        start.fingers = (uint8_t)((1u << (hello.fingers < FINGERS ? hello.fingers : FINGERS)) - 1u);
+        wanted.fingers = start.fingers;
         board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
-        hand_send(BT_SUBSCRIBE_ID, &all);
+        memset(rounds, 0, sizeof rounds); // a board that restarted counts anew
+        hand_send(BT_SUBSCRIBE_ID, &wanted);
         hand_send(BT_START_ID, &start);
         rx_ms = now_ms();
         streaming = 1;
@@ -56,6 +61,7 @@ static void dispatch(int id)
         lost += bt_client_lost(&rounds[idle.finger], idle.seq, idle.frames);
     } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame) && frame.finger < FINGERS) {
         lost += bt_client_lost(&rounds[frame.finger], frame.seq, 1);
+        unsubscribed = frame.slip_level == 255;
         act_on(&frame);
     } else if (id == BT_EVENT_ID && bt_client_read(&board, BT_EVENT_ID, &event)) {
         act_on_event(&event);
@@ -73,9 +79,15 @@ void hand_poll(void)
         streaming = 0;
     }
     if (now_ms() - ping_ms >= PING_MS) {
-        const bt_msg_hello_request hello = {1, 7};
+        const bt_msg_hello_request hello = {1, NONCE};
         const bt_msg_ping ping = {3};
-        streaming ? hand_send(BT_PING_ID, &ping) : hand_send(BT_HELLO_REQUEST_ID, &hello);
+        if (!streaming) {
+            hand_send(BT_HELLO_REQUEST_ID, &hello);
+        } else if (unsubscribed) { // it was lost or damaged on the way: without it no slip is told
+            hand_send(BT_SUBSCRIBE_ID, &wanted);
+        } else {
+            hand_send(BT_PING_ID, &ping);
+        }
     }
 }
 

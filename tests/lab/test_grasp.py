@@ -118,6 +118,24 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
     assert sum(0.01 * grip.step(blind, False) for _ in range(40)) * grip.stiffness == pytest.approx(0.09, abs=0.05)
 
 
+def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
+    """A hand's clock beats against the board's: three rounds of sixteen without a frame, of a thing of 1 N/mm."""
+    (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
+    grip, way_mm, most_n = law.load(law.EXAMPLE)(), -3.0, 0.0
+    for k in range(3000):
+        press_n = max(way_mm, 0.0)
+        flags = FrameFlags.CONTACT if press_n > 0.05 else FrameFlags(0)
+        shown = replace(frame, force_n=np.array([0.0, 0.0, press_n]), flags=flags, trust=Trust.ACT)
+        way_mm += 0.01 * grip.step([None, None] if k % 16 < 3 else [shown, shown], False)
+        most_n = max(most_n, press_n)
+    assert grip.holds and 0.7 < press_n < most_n < 1.5
+    grip = law.load(law.EXAMPLE)()
+    pressed = replace(frame, force_n=np.array([0.0, 0.0, 30.0]), flags=FrameFlags.CONTACT, trust=Trust.ACT)
+    assert (
+        grip.step([pressed, replace(frame, flags=FrameFlags(0), trust=Trust.ACT)], False) == 0.0
+    )  # one alone is pressed
+
+
 def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kept, case = tmp_path / "grasps.jsonl", replace(CASE, seed=3)
 

@@ -1,5 +1,5 @@
 // The law of grip.py on a hand's own controller. firmware/client/example_bare.c talks to the gateway for it;
-// call grip_begin before each grasp, hand_poll often, grip_round every 10 ms, grip_end to let go.
+// call grip_begin before each grasp, hand_poll often, grip_round every 10 ms, also after grip_end: it opens.
 #include "biotac_client.h"
 #include <math.h>
 
@@ -10,18 +10,27 @@ void close_at(float mm_s);                   // the hand's own: both fingers; ne
 #define MARGIN(half_mn) ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
 struct grip {
     float least_n, most_n, slip_n, slip_shear_n, power, stiffness, speed_mm_s, normal_n, shear_n, margin_n,
-        way_mm, first_n;
-    int round, blind, reflex_until, pending_until, holds, settled, slips;
+        way_mm, first_n, wanted_n;
+    int round, blind, reflex_until, pending_until, holds, settled, slips, opens;
 } grip;
 static struct felt {
     float normal_n, shear_n, margin_n, half_n; // sums
-    int frames, strong, lifted;
-} felt; // since the last grip_round
+    float most_n;
+    int frames, strong, lifted, unheld;
+    int touched; // 1: a finger is, 2: one is not, 3: both
+} felt;          // since the last grip_round
 
 void act_on(const bt_msg_frame *frame)
 {
     const int32_t *force = frame->force_100un;
-    if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[2])) {
+    if (!(FINGERS >> frame->finger & 1)) {
+        return; // the board's other fingers touch other things
+    }
+    felt.touched |= frame->flags & BT_FRAME_FLAG_CONTACT ? 1 : 2;
+    felt.unheld |= !(frame->flags & BT_FRAME_FLAG_HELD);
+    if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[0]) && bt_valid_i32(force[1])
+        && bt_valid_i32(force[2])) {
+        felt.most_n = fmaxf(felt.most_n, (float)force[2] / 1e4f);
         felt.normal_n += (float)force[2] / 1e4f;
         felt.shear_n += hypotf((float)force[0], (float)force[1]) / 1e4f;
         felt.margin_n += frame->trust == BT_TRUST_ACT ? 0 : MARGIN(frame->normal_half_mn) / 2;
@@ -34,19 +43,20 @@ void act_on(const bt_msg_frame *frame)
 
 void act_on_event(const bt_msg_event *event)
 {
-    if (event->kind == BT_EVENT_KIND_SLIP)
+    if (event->kind == BT_EVENT_KIND_SLIP && FINGERS >> event->finger & 1)
         grip.pending_until = grip.round + 4; // the next round, and two
 }
 
 void grip_begin(float least_n, float most_n) // grip.py: 0.8, 12
 {
     grip = (struct grip){.least_n = least_n, .most_n = most_n, .slip_n = 0.9f, .slip_shear_n = 0.6f};
-    grip.power = 1, grip.stiffness = 0.8f, grip.speed_mm_s = 10;
+    grip.power = 1, grip.stiffness = 0.8f, grip.speed_mm_s = 10, grip.wanted_n = least_n;
+    felt = (struct felt){0};
 }
 
 void grip_end(void)
 {
-    hand_send(BT_RELEASE_ID, &(bt_msg_release){4, FINGERS});
+    grip.opens = 1;
     close_at(-20);
 }
 
@@ -61,10 +71,8 @@ static void learn_from_slip(float shear_n, float half_n)
 
 static float step(float shear_n)
 {
-    if (!grip.holds) {
-        hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});
+    if (!grip.holds)
         grip.holds = 1, grip.first_n = grip.normal_n;
-    }
     grip.way_mm += grip.speed_mm_s * 0.01f;
     if (grip.way_mm > 0.3f && grip.normal_n - grip.first_n > 0.3f)
         grip.stiffness = fminf(fmaxf((grip.normal_n - grip.first_n) / grip.way_mm, 0.2f), 3);
@@ -73,6 +81,7 @@ static float step(float shear_n)
         learn_from_slip(shear_n, felt.half_n / (float)felt.frames);
     const float needed_n = grip.slip_n / 0.9f * powf(grip.shear_n / grip.slip_shear_n, grip.power);
     const float wanted_n = fminf(fmaxf(grip.least_n, RESERVE * needed_n), grip.most_n);
+    grip.wanted_n = wanted_n;
     const float before = grip.speed_mm_s * grip.stiffness; // N/s
     const float missing_n = wanted_n - grip.normal_n - 0.03f * before;
     const int reflex = grip.round < grip.reflex_until, near = fabsf(missing_n) <= 0.05f * wanted_n;
@@ -84,16 +93,26 @@ static float step(float shear_n)
 void grip_round(void)
 {
     const float frames = (float)felt.frames;
-    grip.round++, grip.blind = felt.frames ? 0 : grip.blind + 1;
-    if (felt.frames) {
+    grip.round++;
+    if (grip.opens) { // RELEASE once nothing is touched: what is left over then is residue
+        grip.speed_mm_s = -20;
+        if (grip.opens == 1 && felt.touched == 2)
+            hand_send(BT_RELEASE_ID, &(bt_msg_release){4, FINGERS}), grip.opens = 2;
+    } else if (felt.frames) {
+        grip.speed_mm_s = grip.blind ? 0 : grip.speed_mm_s; // what it did blindly is no rate to go on from
+        grip.blind = 0;
         grip.margin_n += 0.1f * (felt.margin_n / frames - grip.margin_n);
         grip.normal_n = felt.normal_n / frames + grip.margin_n;
-        grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : grip.speed_mm_s;
+        const float closing_mm_s = felt.most_n < grip.most_n ? 10 : 0;
+        grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : closing_mm_s;
     } else { // after three rounds harder by two fifths, as it may get heavier; then it stays
-        const float more_n = fminf(0.4f * grip.normal_n, grip.most_n - grip.normal_n);
+        const float more_n = fminf(1.4f * fminf(grip.normal_n, grip.wanted_n), grip.most_n) - grip.normal_n;
+        grip.blind++;
         const int harder = grip.holds && grip.blind >= 3 && 0.05f * (float)(grip.blind - 3) < more_n;
         grip.speed_mm_s = harder ? 5 / grip.stiffness : 0;
     }
+    if (grip.holds && !grip.opens && felt.unheld) // again if it was lost, or lapsed with a restart
+        hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});
     felt = (struct felt){0};
     close_at(grip.speed_mm_s);
 }

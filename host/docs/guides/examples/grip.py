@@ -25,7 +25,7 @@ class Grip:
 
     def __init__(self, towards=((0, 0, 1), (0, 0, 1)), shares=(1.0, 1.0), least_n=0.8, most_n=12.0) -> None:
         self.towards, self.shares = [np.asarray(to, float) for to in towards], shares
-        self.least_n, self.most_n = least_n, most_n
+        self.least_n, self.most_n, self.wanted_n = least_n, most_n, least_n
         self.stiffness = 0.8  # N/mm in front of the fingers, until it is felt
         self.slip_n, self.slip_shear_n, self.power = LATE, FRICTION, 1.0  # of the latest slip: see needed_n
         self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = CLOSING_MM_S, 0.0, 0.0, 0.0
@@ -41,13 +41,20 @@ class Grip:
         sides = zip(frames, self.towards, self.shares, strict=True)
         known = [(f, to, w) for f, to, w in sides if f and f.trust >= Trust.INTERVAL and np.isfinite(f.force_n).all()]
         if not known:
-            more_n = self.holds * min(BLIND_SHARE * self.normal_n, self.most_n - self.normal_n)
+            most_n = min((1 + BLIND_SHARE) * min(self.normal_n, self.wanted_n), self.most_n)  # once, in many gaps, too
+            more_n = self.holds * (most_n - self.normal_n)
             harder = 0 <= self._blind - BLIND_ROUNDS < more_n / (CALM[1] * ROUND_S)
             self.speed_mm_s = CALM[1] / self.stiffness if harder else 0.0
-        if not known or (not self.holds and not all(f.flags & FrameFlags.CONTACT for f, *_ in known)):
+            return self.speed_mm_s
+        if self._blind > 1:
+            self.speed_mm_s = 0.0  # what it did blindly is no rate to go on from
+        self._blind = 0
+        if not self.holds and not all(f.flags & FrameFlags.CONTACT for f, *_ in known):
+            most_n = max(f.force_n @ to / share for f, to, share in known)
+            self.speed_mm_s = CLOSING_MM_S if most_n < self.most_n else 0.0
             return self.speed_mm_s
         normal_n, shear_n, margin_n, half_n = np.nan_to_num(np.mean([self._parts(*k) for k in known], 0)).tolist()
-        self._blind, self.margin_n = 0, self.margin_n + 0.1 * (margin_n - self.margin_n)
+        self.margin_n += 0.1 * (margin_n - self.margin_n)
         self.normal_n = normal_n + self.margin_n
         self._first_n, self.holds = self._first_n if self.holds else self.normal_n, True
         self._way_mm += self.speed_mm_s * ROUND_S
@@ -76,7 +83,7 @@ class Grip:
         self.slips, self._pending_until, self._reflex_until = self.slips + 1, 0, self._round + REFLEX_ROUNDS
 
     def _squeeze(self) -> float:
-        wanted_n = min(max(self.least_n, RESERVE * self.needed_n(self.shear_n)), self.most_n)
+        self.wanted_n = wanted_n = min(max(self.least_n, RESERVE * self.needed_n(self.shear_n)), self.most_n)
         before_n_s = self.speed_mm_s * self.stiffness
         missing_n = wanted_n - self.normal_n - LAG_S * before_n_s
         self.settled = self.settled + 1 if abs(missing_n) < 0.15 * wanted_n else 0
