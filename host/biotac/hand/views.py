@@ -105,12 +105,10 @@ class Latest(Consumer):
         return index(fingers)
 
     def put(self, batch: Batch) -> None:
-        frames_only = len(batch.wire) > 0 and len(batch.idle) == 0
-        all_trusted = frames_only and bool(batch.wire["trust"].min() >= Trust.INTERVAL)  # most are: no search
         for finger in FINGERS_IN[batch.fingers]:
             self._batches[finger] = batch
-            if all_trusted or len(_trusted_rows(batch, finger)):
-                self._trusted[finger] = batch
+        for finger in set(batch.wire["finger"][batch.wire["trust"] >= Trust.INTERVAL].tolist()):
+            self._trusted[finger] = batch
         if self._waiters:
             self.wake()
 
@@ -118,7 +116,7 @@ class Latest(Consumer):
         """The commands that give a board that restarted the latest tares with trust, and their age."""
         commands = []
         for finger, batch in self._trusted.items():
-            rows = _trusted_rows(batch, finger)
+            rows = batch.wire[(batch.wire["finger"] == finger) & (batch.wire["trust"] >= Trust.INTERVAL)]
             if (rows["tare_q4"][-1] != INVALID_COUNT).all():
                 tare_q4, pdc_q4 = tuple(rows["tare_q4"][-1].tolist()), int(rows["pdc_tare_q4"][-1])
                 commands.append(TareSet(0, finger, tare_q4, pdc_q4, age_ms(time.monotonic() - batch.arrived_s)))
@@ -187,11 +185,6 @@ class Latest(Consumer):
         self.report()
         if not came:
             raise TimeoutError(f"no new frame of finger {self.name(finger)!r} in {timeout_s:g} s: {why or 'none came'}")
-
-
-def _trusted_rows(batch: Batch, finger: int) -> StructArray:
-    rows: StructArray = batch.wire[(batch.wire["finger"] == finger) & (batch.wire["trust"] >= Trust.INTERVAL)]
-    return rows
 
 
 def _latest_row(batch: Batch, finger: int) -> StructArray:
