@@ -54,10 +54,8 @@ def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
     with TemporaryDirectory(prefix="biotac-demo-") as folder:
         path = Path(folder) / f"{finger.serial}.mcap"
         with shake_hands(SimLink(f"sim:{LOADS}", SimBoard(source, pace=0.0, hold=True))) as hand:
-            procedure = Procedure(0, nano17.nano17.mounting)
-            walk(hand, nano17, procedure, path)
-        if not procedure.coverage.complete:
-            raise KeyboardInterrupt  # it ends a walk, which keeps what was recorded until then: too little for a map
+            if not walk(hand, nano17, Procedure(0, nano17.nano17.mounting), path):
+                raise KeyboardInterrupt  # a walk keeps what was recorded until then, and a demo needs all of it
         reference = path.with_suffix(".csv")
         loaded = load(path, (reference, read_reference(str(reference))))
         others, _ = population.load(None).others_than(loaded.files)

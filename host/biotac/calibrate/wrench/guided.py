@@ -208,14 +208,15 @@ def walk(
     overwrite: bool = False,
     show: Show = lambda event: None,
     progress: Show = lambda text: None,
-) -> None:
-    """Run the procedure until it is done, the board's source ends, or a KeyboardInterrupt, which ends it.
+) -> bool:
+    """Run the procedure until it is done or the board's source ends (returns True), or a KeyboardInterrupt ends it.
 
     The board is recorded to ``path``, the reference to a .csv beside it. The board does not stream afterwards. Raises
     InputError when a file exists or cannot be written, when the finger keeps drifting or the reference has no torque,
     and DeviceLostError when the board or the reference is lost; what was recorded until then is kept.
     """
     reference = CsvWriter(path.with_suffix(".csv"), procedure.mounting, reader.sensor, overwrite=overwrite)
+    interrupted = False
     with closing(reference) as writer, closing(hand.record(path, overwrite=overwrite)):
         try:
             first_us: int | None = None
@@ -241,8 +242,10 @@ def walk(
                     break
             procedure.finish("the simulated source has ended")
         except KeyboardInterrupt:
+            interrupted = True
             procedure.finish("stopped by Ctrl-C")
     for event in procedure.pop_events():
         show(event)
     # needed even if the board's source has ended: it sends nothing more, but still refuses as busy
     hand.stop()
+    return not interrupted
