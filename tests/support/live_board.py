@@ -151,6 +151,13 @@ def gaps_in(batches: list[Batch]) -> list[Gap]:
     return [m for batch in batches for m in batch.messages if isinstance(m, Gap)]
 
 
+def gaps_of(hand: Hand) -> Callable[[], list[Gap]]:
+    """All gaps from now on."""
+    gaps: list[Gap] = []
+    hand.on_gap(gaps.append)
+    return lambda: gaps
+
+
 def until(condition: Callable[[], Any]) -> None:
     """Wait."""
     end_s = time.monotonic() + WAIT_S

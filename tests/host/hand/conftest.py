@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from types import SimpleNamespace
 
 import pytest
-from live_board import Firmware, Live
+from live_board import Clock, Firmware, Live, point, until
 
 import biotac
 from biotac.board import watch
 from biotac.link.serial_port import SerialLink
+
+SERIAL = (7,) * 12
 
 
 @pytest.fixture
@@ -28,3 +32,44 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     monkeypatch.setattr(watch, "LOOK_S", 0.005)
     monkeypatch.setattr(SerialLink, "patience", 12_000.0)
     return lambda: None
+
+
+@pytest.fixture
+def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
+    """A port that is a symbolic link, boards that can be behind it, and a hand that was opened on it."""
+    world = SimpleNamespace(path=tmp_path / "ttyBOARD", clock=Clock(), hand=None)
+
+    def plug(**facts: object) -> SimpleNamespace:
+        firmware = Firmware(hello, **({"board_serial": SERIAL} | facts))
+        board = scripted_board(firmware)
+        point(world.path, board.path)
+        return SimpleNamespace(board=board, firmware=firmware)
+
+    def unplug(plugged: SimpleNamespace) -> None:
+        point(world.path, "")
+        plugged.board.hang_up()  # as the kernel does: whoever reads the port gets an error from now on
+
+    def away(plugged: SimpleNamespace, *steps: Callable[[], object]) -> None:
+        """Unplug, and take a step in each pause of the search, on a thread as a program's, until the board is back."""
+
+        def step(pauses: int) -> None:
+            if pauses <= len(steps):
+                thread = threading.Thread(target=steps[pauses - 1])
+                thread.start()
+                thread.join()
+
+        world.clock.while_away = step
+        unplug(plugged)
+        until(lambda: world.hand.connected and world.clock.pauses == len(steps))
+
+    def opened(plugged: SimpleNamespace, reconnect: bool = True) -> Live:
+        link = SerialLink(str(world.path))
+        live = Live(plugged.board, plugged.firmware, link, reconnect=reconnect, host_clock=world.clock)
+        world.hand = live.hand
+        return live
+
+    world.plug, world.unplug, world.away, world.opened = plug, unplug, away, opened
+    yield world
+    if world.hand is not None:
+        with suppress(biotac.BiotacError):
+            world.hand.close()

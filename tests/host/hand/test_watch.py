@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import termios
 import threading
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from types import SimpleNamespace
 
 import pytest
-from live_board import Clock, Firmware, Live, frame, heartbeat, packed, point, until
+from live_board import Firmware, Live, frame, gaps_of, heartbeat, until
 
 import biotac
 from biotac.board import gap as gap_module
 from biotac.board import watch
-from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 
-OURS, OTHER = (7,) * 12, (8,) * 12
+OTHER = (8,) * 12
 HELD = int(wire.FrameFlags.HELD)
-
-
-def gaps_of(hand: biotac.Hand) -> Callable[[], list[biotac.Gap]]:
-    """All gaps from now on."""
-    gaps: list[biotac.Gap] = []
-    hand.on_gap(gaps.append)
-    return lambda: gaps
 
 
 def stops_at_the_next_look(firmware: Firmware, after_us: int) -> None:
@@ -206,34 +197,6 @@ def test_heartbeats_cover_their_time_and_short_losses_are_only_counted(live: Liv
 # ---- a board that was lost -----------------------------------------------------------------------
 
 
-@pytest.fixture
-def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
-    """A port that is a symbolic link, boards that can be behind it, and a hand that was opened on it."""
-    world = SimpleNamespace(path=tmp_path / "ttyBOARD", clock=Clock(), hand=None)
-
-    def plug(**facts: object) -> SimpleNamespace:
-        firmware = Firmware(hello, **({"board_serial": OURS} | facts))
-        board = scripted_board(firmware)
-        point(world.path, board.path)
-        return SimpleNamespace(board=board, firmware=firmware)
-
-    def unplug(plugged: SimpleNamespace) -> None:
-        point(world.path, "")
-        plugged.board.hang_up()  # as the kernel does: whoever reads the port gets an error from now on
-
-    def opened(plugged: SimpleNamespace, reconnect: bool = True) -> Live:
-        link = SerialLink(str(world.path))
-        live = Live(plugged.board, plugged.firmware, link, reconnect=reconnect, host_clock=world.clock)
-        world.hand = live.hand
-        return live
-
-    world.plug, world.unplug, world.opened = plug, unplug, opened
-    yield world
-    if world.hand is not None:
-        with suppress(biotac.BiotacError):
-            world.hand.close()
-
-
 def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:
     live = world.opened(plugged := world.plug(), reconnect=False)
     live.hand.stream()
@@ -337,92 +300,6 @@ def test_a_reboot_behind_the_same_port_is_an_error_or_is_mended(world, quick) ->
     assert live.hand.stats.disordered == 0  # numbers that begin anew are no step back
 
 
-# ---- rounds of a board that goes away and comes back ---------------------------------------------
-
-
-def slip_at(t_us: int) -> bytes:
-    return packed(wire.Event(0, t_us, 0, 0, wire.EventKind.SLIP, 0, t_us, 0, 100, wire.Trust.ACT))
-
-
-@pytest.mark.parametrize("waiting", [False, True])
-def test_the_next_round_after_a_reboot_comes_at_once_with_the_events_before(world, quick, waiting: bool) -> None:
-    """Whatever the clock said before, and whether or not a round was awaited meanwhile."""
-    live = world.opened(plugged := world.plug(boot_id=1, fingers_present=1))
-    gaps = gaps_of(live.hand)
-    plugged.firmware.after[wire.Start] = frame(1000) + frame(1001) + slip_at(10_020_000)
-    last = live.hand.next_round(timeout_s=20)
-    assert plugged.firmware.received(wire.Subscribe)[-1].quantities & wire.QuantityFlags.EVENTS
-    plugged.firmware.wait_for_looks()
-    plugged.firmware.facts["boot_id"], plugged.firmware.streams = 2, 0
-    plugged.firmware.t_us = 0
-    plugged.firmware.after[wire.Start] = frame(1)
-    if not waiting:
-        until(gaps)
-    now = live.hand.next_round(last, timeout_s=20)
-    assert (now.seq, now.t_us, now.missed, [event.kind for event in now.events]) == (
-        1,
-        10_000,
-        0,
-        [wire.EventKind.SLIP],
-    )
-
-
-def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: Live) -> None:
-    """From the second on, also if a loop was given the first before the other finger's frame had come."""
-    with live.hand as hand:
-
-        def send(seq: int, finger: int) -> None:
-            live.send(frame(seq, finger))
-            until(lambda: hand._latest.state(finger)[0]["seq"][0] == seq)
-
-        hand.stream()
-        threading.Thread(target=lambda: [send(seq, 0) for seq in (1, 2, 3)]).start()
-        now = hand.next_round(timeout_s=20)
-        until(lambda: hand._latest.state(0)[0]["seq"][0] == 3)
-        rest = [(3, 1), *((seq, finger) for seq in range(4, 40) for finger in (0, 1))]
-        sender = threading.Thread(target=lambda: [send(*row) for row in rest])
-        sender.start()
-        while now.seq < 39:
-            now = hand.next_round(now, timeout_s=20)
-            assert now.seq < 5 or (now["index"].frame and now["middle"].frame)
-        sender.join()
-
-
-def test_no_round_comes_while_a_board_is_away_and_that_is_no_lost_board(world) -> None:
-    live = world.opened(plugged := world.plug(boot_id=1))
-    waits: list[str] = []
-
-    def await_round() -> None:
-        with pytest.raises(TimeoutError, match="no new round") as timed_out:
-            live.hand.next_round(timeout_s=0)
-        waits.append(str(timed_out.value))
-
-    def while_away(pauses: int) -> None:
-        if pauses == 1:
-            thread = threading.Thread(target=await_round)
-            thread.start()
-            thread.join()
-        if pauses == 2:
-            world.plug(boot_id=1)
-
-    world.clock.while_away = while_away
-    world.unplug(plugged)
-    until(lambda: live.hand.connected and world.clock.pauses == 2)
-    assert len(waits) == 1
-
-
-def test_a_round_is_never_older_than_a_view_may_be(scripted_board, hello) -> None:
-    firmware = Firmware(hello, fingers_present=1)
-    live = Live(scripted_board(firmware), firmware, max_age_s=1e-9)
-    with live.hand as hand:
-        firmware.after[wire.Start] = frame(1) + frame(2)
-        with pytest.raises(TimeoutError):
-            hand.next_round(timeout_s=0.1)
-        assert hand.stats.frames == 2
-        with pytest.raises(biotac.InputError, match="timeout_s is nan"):
-            hand.next_round(timeout_s=float("nan"))
-
-
 def test_a_tare_is_given_back_though_the_last_round_had_no_trust_and_the_finger_rested(world) -> None:
     """Power that sags spoils words first; and heartbeats of a resting finger come with others' frames."""
     live = world.opened(plugged := world.plug(boot_id=1))
@@ -454,19 +331,9 @@ def test_a_stranger_on_the_same_port_gets_no_commands(world) -> None:
             live.hand.ping()
         refusals.append(live.hand[0].stale)
 
-    def others(pauses: int) -> None:
-        if pauses == 1:
-            strangers.append(world.plug(board_serial=OTHER))
-        if pauses == 2:
-            thread = threading.Thread(target=command)
-            thread.start()
-            thread.join()
-        if pauses == 3:
-            world.plug(boot_id=1)
-
-    world.clock.while_away = others
-    world.unplug(plugged)
-    until(lambda: live.hand.connected and world.clock.pauses == 3)
+    world.away(
+        plugged, lambda: strangers.append(world.plug(board_serial=OTHER)), command, lambda: world.plug(boot_id=1)
+    )
     assert {type(m) for m in strangers[0].firmware.commands} == {wire.Stop, wire.HelloRequest}
     assert refusals == ["the board is away and being looked for"]
     live.hand.ping()
