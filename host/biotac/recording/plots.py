@@ -86,10 +86,10 @@ class Plots:
             return
         if end_us is not None and all_here_ns is not None:
             self._stamps.arrived(end_us, all_here_ns)
-        messages = [*_aside(chain(self._row_messages(batch), _logs(batch, decoder)))]
+        messages = [*_with_pauses(chain(self._row_messages(batch), _logs(batch, decoder)))]
         messages.sort(key=lambda message: message.t_us)
         stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
-        for message, stamp_ns in _aside(zip(messages, np.maximum(stamps, 0).tolist(), strict=True)):
+        for message, stamp_ns in _with_pauses(zip(messages, np.maximum(stamps, 0).tolist(), strict=True)):
             channel = self._channel(message.topic, f"/biotac/finger{message.finger}/{message.topic}")
             data = message.data if isinstance(message.data, bytes) else message.data(stamp_ns)
             self._writer.add_message(channel, stamp_ns, data, stamp_ns, message.seq)
@@ -146,8 +146,8 @@ class Plots:
         return self._channels[name]
 
 
-def _aside(items: Iterable[_Item]) -> Iterator[_Item]:
-    """These, with pauses in which other threads go on: who waits for the interpreter's lock gets it after 5 ms else."""
+def _with_pauses(items: Iterable[_Item]) -> Iterator[_Item]:
+    """These, with pauses for other threads, which otherwise wait 5 ms each time for the interpreter's lock."""
     for n, item in enumerate(items):
         if n % STEP_MESSAGES == 0:
             time.sleep(STEP_PAUSE_S)

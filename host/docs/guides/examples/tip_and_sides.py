@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 import biotac
@@ -20,7 +22,7 @@ for row, seed in enumerate(FINGERS):
     with world({"index": SimFinger(seed)}) as w:
         w.run(3.0)
         for electrode in range(1, 20):
-            for load, (before_n, force_n) in enumerate(zip((0.0, *LOADS_N), LOADS_N, strict=False)):
+            for load, (before_n, force_n) in enumerate(pairwise((0.0, *LOADS_N))):
                 for press_n in np.arange(before_n, force_n, 0.2):  # 20 N/s
                     w.step(index=Touch(press_n, at=f"E{electrode}"))
                 now = w.run(0.15, index=Touch(force_n, at=f"E{electrode}"))
