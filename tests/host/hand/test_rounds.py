@@ -47,15 +47,26 @@ def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: 
             until(lambda: hand._latest.state(finger)[0]["seq"][0] == seq)
 
         hand.stream()
-        threading.Thread(target=lambda: [send(seq, 0) for seq in (1, 2, 3)]).start()
+        given = threading.Event()
+        sent: list[int] = []
+
+        def send_first_finger() -> None:
+            while not given.is_set():
+                sent.append(len(sent) + 1)
+                send(sent[-1], 0)
+
+        alone = threading.Thread(target=send_first_finger)
+        alone.start()
         now = hand.next_round(timeout_s=20)
-        until(lambda: hand._latest.state(0)[0]["seq"][0] == 3)
-        rest = [(3, 1), *((seq, finger) for seq in range(4, 40) for finger in (0, 1))]
+        given.set()
+        alone.join()
+        first = sent[-1]
+        rest = [(first, 1), *((seq, finger) for seq in range(first + 1, first + 37) for finger in (0, 1))]
         sender = threading.Thread(target=lambda: [send(*row) for row in rest])
         sender.start()
-        while now.seq < 39:
+        while now.seq < first + 36:
             now = hand.next_round(now, timeout_s=20)
-            assert now.seq < 5 or (now["index"].frame and now["middle"].frame)
+            assert now.seq < first + 2 or (now["index"].frame and now["middle"].frame)
         sender.join()
 
 

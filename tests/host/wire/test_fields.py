@@ -16,7 +16,7 @@ from biotac.wire.fields import FRAME_FIELDS, IDLE_FIELDS, as_json
 
 @pytest.fixture(scope="module")
 def rows() -> np.ndarray:
-    with biotac.open("sim:faults.toml?fingers=2&pace=fast") as hand:
+    with biotac.open("sim:fingers.toml?fingers=2&pace=fast") as hand:
         hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         return hand.read(seconds=3.0)
 
