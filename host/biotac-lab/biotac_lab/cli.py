@@ -36,7 +36,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         "bench": bench,
     }
     for name, module in known.items():
-        verb = verbs.add_parser(name, help=module.ABOUT, description=module.ABOUT, allow_abbrev=False)
+        about = module.ABOUT.replace("%", "%%")
+        verb = verbs.add_parser(name, help=about, description=module.ABOUT, allow_abbrev=False)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")
         verb.epilog = f"example: {module.EXAMPLE}"
         module.add_arguments(verb)

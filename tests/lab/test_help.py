@@ -1,0 +1,16 @@
+"""What `biotac-lab --help` shows, whatever stands in its texts."""
+
+from __future__ import annotations
+
+import pytest
+
+from biotac_lab.calibrate import interval_command
+from biotac_lab.cli import main
+
+
+@pytest.mark.parametrize("verb", [[], ["interval"]])
+def test_help_shows_what_each_verb_does(verb, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([*verb, "--help"])
+    assert ended.value.code == 0
+    assert interval_command.ABOUT in " ".join(capsys.readouterr().out.split())
