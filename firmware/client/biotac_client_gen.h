@@ -73,7 +73,7 @@ enum bt_tare_reason {
     BT_TARE_REASON_RESTORED = 13, // the tare from before a reset of the board, with HELD as it was
 };
 
-// What a force is good for: the lowest level that a flag of the round allows (trust in [flags.frame]); without such a flag ACT, or INTERVAL if half of the force's 95 % interval is unknown, or exceeds both 0.4 N and a quarter of the force; NONE without a force.
+// What a force is good for: the lowest level that a flag of the round allows (trust in [flags.frame]); without such a flag ACT, or INTERVAL if the half width of the normal part is unknown, or exceeds both 0.4 N and a quarter of that part; shear's is not judged; NONE without a force.
 enum bt_trust {
     BT_TRUST_NONE = 0, // there is no force, or none to go by: hold the actuators where they are, and grasp nothing
     BT_TRUST_HOLD = 1, // there is a number, but do not act on it: hold what you have

@@ -22,7 +22,7 @@ def messages(contract: Contract) -> str:
         "| id | message | direction, and streams that carry it | payload | on the wire | answered by |",
         "|---|---|---|---|---|---|",
     ]
-    for m in contract.messages:
+    for m in sorted(contract.messages, key=lambda m: m.id):
         direction = "host to board" if m.id & 0x80 else ", ".join(["board to host", *(f"`{s}`" for s in m.streams)])
         whole = m.payload_bytes + 1 + 4 + 1 + 1  # id, CRC, COBS code byte, delimiter
         reply = f"`{m.reply}`" if m.reply else ""

@@ -46,15 +46,15 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     return flags;
 }
 
-// An interval that lets a force be acted on: 0.4 N to either side, or a quarter of the force.
+// An interval that lets a force be acted on: 0.4 N to either side of its normal part, or a quarter of that.
 #define NARROW_MN    400
 #define NARROW_SHARE 4
 
-uint8_t bt_trust(uint32_t flags, uint16_t force_mn, uint16_t half_mn)
+uint8_t bt_trust(uint32_t flags, uint16_t normal_mn, uint16_t half_mn)
 {
     if (flags & (BT_TRUST_FLAGS_NONE | BT_TRUST_FLAGS_HOLD)) {
         return flags & BT_TRUST_FLAGS_NONE ? BT_TRUST_NONE : BT_TRUST_HOLD;
     }
-    bool wide = half_mn > NARROW_MN && half_mn > force_mn / NARROW_SHARE; // as one that is unknown
+    bool wide = half_mn > NARROW_MN && half_mn > normal_mn / NARROW_SHARE; // as one that is unknown
     return wide || flags & BT_TRUST_FLAGS_INTERVAL ? BT_TRUST_INTERVAL : BT_TRUST_ACT;
 }

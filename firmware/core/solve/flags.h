@@ -9,6 +9,6 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare);
 
 // An enum bt_trust: the lowest level that a flag allows (trust in protocol/link.toml); without such a flag,
 // INTERVAL if the normal force's interval is wide or unknown. half_mn: half of it.
-uint8_t bt_trust(uint32_t flags, uint16_t force_mn, uint16_t half_mn);
+uint8_t bt_trust(uint32_t flags, uint16_t normal_mn, uint16_t half_mn);
 
 #endif

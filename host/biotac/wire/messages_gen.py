@@ -92,7 +92,7 @@ class TareReason(IntEnum):
 
 
 class Trust(IntEnum):
-    """What a force is good for: the lowest level that a flag of the round allows (trust in [flags.frame]); without such a flag ACT, or INTERVAL if half of the force's 95 % interval is unknown, or exceeds both 0.4 N and a quarter of the force; NONE without a force."""
+    """What a force is good for: the lowest level that a flag of the round allows (trust in [flags.frame]); without such a flag ACT, or INTERVAL if the half width of the normal part is unknown, or exceeds both 0.4 N and a quarter of that part; shear's is not judged; NONE without a force."""
 
     NONE = 0  # there is no force, or none to go by: hold the actuators where they are, and grasp nothing
     HOLD = 1  # there is a number, but do not act on it: hold what you have

@@ -105,8 +105,9 @@ void grip_round(void)
         grip.normal_n = felt.normal_n / frames + grip.margin_n;
         const float closing_mm_s = felt.most_n < grip.most_n ? 10 : 0;
         grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : closing_mm_s;
-    } else { // after three rounds harder by two fifths, as it may get heavier; then it stays
-        const float more_n = fminf(1.4f * fminf(grip.normal_n, grip.wanted_n), grip.most_n) - grip.normal_n;
+    } else { // after three rounds harder by two fifths, as it may get heavier, and by the interval's width
+        const float enough_n = 1.4f * fminf(grip.normal_n, grip.wanted_n) + 4 * grip.margin_n;
+        const float more_n = fminf(enough_n, grip.most_n) - grip.normal_n;
         grip.blind++;
         const int harder = grip.holds && grip.blind >= 3 && 0.05f * (float)(grip.blind - 3) < more_n;
         grip.speed_mm_s = harder ? 5 / grip.stiffness : 0;

@@ -13,7 +13,7 @@ REFLEX, REFLEX_ROUNDS = (40.0, 40.0, 1.0), 8  # the same after a slip, and for h
 SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
 LATE = 0.9  # of what is needed: pressed when a slip is felt
 DOUBT, DOUBT_RESERVE = 0.45, 0.65  # of shear's half width; of what pressed, on top where shear says nothing
-BLIND_ROUNDS, BLIND_SHARE = 3, 0.4  # who feels nothing for so long presses harder by that, as it may get heavier
+BLIND_ROUNDS, BLIND_SHARE, BLIND_MARGINS = 3, 0.4, 4  # who feels nothing for so long presses harder: see _blind_n
 
 
 class Grip:
@@ -41,8 +41,7 @@ class Grip:
         sides = zip(frames, self.towards, self.shares, strict=True)
         known = [(f, to, w) for f, to, w in sides if f and f.trust >= Trust.INTERVAL and np.isfinite(f.force_n).all()]
         if not known:
-            most_n = min((1 + BLIND_SHARE) * min(self.normal_n, self.wanted_n), self.most_n)  # once, in many gaps, too
-            more_n = self.holds * (most_n - self.normal_n)
+            more_n = self.holds * (self._blind_n() - self.normal_n)
             harder = 0 <= self._blind - BLIND_ROUNDS < more_n / (CALM[1] * ROUND_S)
             self.speed_mm_s = CALM[1] / self.stiffness if harder else 0.0
             return self.speed_mm_s
@@ -71,6 +70,12 @@ class Grip:
         normal_n = frame.force_n @ to
         margin_n = 0.0 if frame.trust == Trust.ACT else frame.normal_half_n / 2
         return np.array([normal_n, np.linalg.norm(frame.force_n - normal_n * to), margin_n, frame.shear_half_n]) / share
+
+    def _blind_n(self) -> float:
+        """What it presses with at most where it feels nothing: more by a share, as things may get heavier, and by
+        the width of the interval that it was felt with. Once, in many gaps, too."""
+        enough_n = (1 + BLIND_SHARE) * min(self.normal_n, self.wanted_n)
+        return min(enough_n + BLIND_MARGINS * self.margin_n, self.most_n)
 
     def needed_n(self, shear_n: float) -> float:
         """What each side has to press with at this shear, by the latest slip; where shear says nothing, as then."""
