@@ -15,13 +15,25 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
         bt_signals_q4(frame.counts, frame.tare_q4, e_q4);
         torsion_mnmm[k] = BT_INVALID_I32; // only a map gives it
         if (settings->map != NULL) {
-            flags[k] =
-                bt_solve_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc, force, torque, torsion_mnmm + k);
+            flags[k] = bt_solve_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc, force, torque,
+                                       torsion_mnmm + k, guess_mn);
         } else if (settings->population) {
             flags[k] = bt_solve_uncalibrated(e_q4, settings, BT_WANT_ALL, poc, force, torque, guess_mn);
         } else {
             flags[k] = bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque);
         }
+    }
+}
+
+void bt_map_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
+                   const int32_t *pdc_above_rest_q4, const bt_map *map, int32_t *force_100un,
+                   int32_t *torque_mnmm, int32_t *torsion_mnmm)
+{
+    for (int64_t k = 0; k < n; k++) {
+        torsion_mnmm[k] = torque_mnmm[3 * k] = BT_INVALID_I32;
+        torque_mnmm[3 * k + 1] = torque_mnmm[3 * k + 2] = BT_INVALID_I32;
+        bt_map_wrench(map, counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, pdc_above_rest_q4[k],
+                      force_100un + 3 * k, torque_mnmm + 3 * k, torsion_mnmm + k);
     }
 }
 

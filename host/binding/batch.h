@@ -16,6 +16,11 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
                       const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags);
 
+// What a map makes of them by itself, likewise; what it does not have is BT_INVALID_I32.
+void bt_map_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
+                   const int32_t *pdc_above_rest_q4, const bt_map *map, int32_t *force_100un,
+                   int32_t *torque_mnmm, int32_t *torsion_mnmm);
+
 // The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
                         int32_t *force_100un);

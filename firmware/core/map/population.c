@@ -129,18 +129,29 @@ static void mix(const bt_likeness *likeness, int32_t force_100un[3])
     }
 }
 
+bool bt_population_like(const bt_map *map)
+{
+    return map->axes == BT_MAP_AXES_FORCE && map->block_count == BT_POPULATION_BLOCKS
+           && map->kinds == BT_POPULATION_KINDS && map->gates == BT_POPULATION_GATES;
+}
+
 bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
+{
+    bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
+    return bt_population_judge(e_q4, force_100un);
+}
+
+bt_likeness bt_population_judge(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
 {
     touch sums = touch_of(e_q4);
     uint32_t firm_100un = STRENGTH(sums.sum_q4);
     bt_likeness likeness = {.outside = sums.sum_q4 < LEAST_Q4, .gain = GAIN(sums.sum_q4)};
     likeness.strength_100un = firm_100un * likeness.gain >> 8;
-    force_100un[0] = force_100un[1] = force_100un[2] = 0;
     if (sums.sum_q4 == 0) {
+        force_100un[0] = force_100un[1] = force_100un[2] = 0;
         return likeness;
     }
     along_normals(&sums, firm_100un, likeness.otherwise_100un);
-    bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
     uint32_t off = furthest(force_100un, likeness.otherwise_100un), far = FAR_8 * firm_100un;
     if (off < far / 8) {
         uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;

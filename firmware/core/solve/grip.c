@@ -58,8 +58,9 @@ static uint32_t square_root(uint32_t square)
 
 // ---- the interval --------------------------------------------------------------------------------------
 
-// guess_mn of a source: the strength of all signals is at most 30.3 N (map/population.c).
-#define GUESS_MAX_MN 40000u
+// guess_mn of a source: the strength of all signals is at most 30.3 N (map/population.c), and what electrodes
+// that are out had of a map is at most 12.3 N (results.c).
+#define GUESS_MAX_MN 43000u
 #define SIZE_MAX_MN  (2 * (BT_GRIP_MAX_MN * 1733ll / 1000 + 64))
 _Static_assert(SIZE_MAX_MN *(BT_MARGIN_SHARE_MAX_Q8 + OUT_Q8 * BT_ELECTRODES) + 128 <= INT32_MAX,
                "a share must fit");

@@ -81,12 +81,17 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
     }
 }
 
+static uint32_t outside(const bt_likeness *likeness, uint32_t guess_mn[2])
+{
+    bt_population_guess(likeness->share, likeness->outside, likeness->strength_100un, guess_mn);
+    return likeness->outside ? BT_FRAME_FLAG_OUTSIDE : 0;
+}
+
 static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3],
                                  uint32_t guess_mn[2])
 {
     bt_likeness likeness = bt_population_force(e_q4, force_100un);
-    bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
-    return BT_FRAME_FLAG_POPULATION | (likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0);
+    return BT_FRAME_FLAG_POPULATION | outside(&likeness, guess_mn);
 }
 
 // Force comes from the gains, or from the population map if guess_mn is given; all else is the same.
@@ -133,9 +138,11 @@ uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve
 
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                          const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                         int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm)
+                         int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm,
+                         uint32_t guess_mn[2])
 {
     bt_point point;
+    uint32_t flags = 0;
     bool derived = wanted & BT_WANT_TORQUE && settings->map->axes == BT_MAP_AXES_FORCE;
     bool asked = wanted & BT_WANT_POC || derived;
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
@@ -144,6 +151,10 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
                       wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm);
+        if (bt_population_like(settings->map)) {
+            bt_likeness likeness = bt_population_judge(e_q4, force_100un);
+            flags = outside(&likeness, guess_mn);
+        }
     }
     if (derived) {
         bool possible = located && force_100un[0] != BT_INVALID_I32;
@@ -155,5 +166,5 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
     if (!(wanted & BT_WANT_FORCE)) {
         mark(force_100un);
     }
-    return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+    return flags | (asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0);
 }

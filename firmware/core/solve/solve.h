@@ -38,7 +38,8 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
 
 // The same with settings->map, for a frame whose signals are e_q4. Force comes from the map, and torque if
 // the map has it; otherwise torque y and z are Eq 4's, and x is derived from the map's force. Torsion comes
-// only from a map, and only if torque is wanted.
+// only from a map, and only if torque is wanted. A map of the population map's blocks is judged as that one:
+// its force is mixed, OUTSIDE is returned and guess_mn written as below.
 typedef struct {
     const uint16_t *counts;    // [BT_ELECTRODES]
     const uint16_t *tare_q4;   // [BT_ELECTRODES]
@@ -46,7 +47,8 @@ typedef struct {
 } bt_map_input;
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                          const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                         int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm);
+                         int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm,
+                         uint32_t guess_mn[2]);
 
 // The same without a map, for settings->population: force comes from the population map and from what it is
 // mixed with. Torque y and z are Eq 4's, and x is derived from that force. Also returns POPULATION if a force

@@ -47,12 +47,10 @@ def on_board_q4(
     poc_um, force_100un, torque_mnmm, each (n, 3), torsion_mnmm, which only a map gives, and the kernel's flags (n,).
     Raises ValueError for other shapes or ranges.
     """
-    raw = integers("counts", counts, np.uint16, None, ELECTRODES)
-    n = len(raw)
-    tare_q4 = integers("tare_q4", tare_q4, np.uint16, n, ELECTRODES)
+    n = len(counts)
     if pdc_above_rest_q4 is None:
         pdc_above_rest_q4 = np.full(n, wire.INVALID_I32, np.int32)
-    pdc = integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, n)
+    raw, tare_q4, pdc = _checked(counts, tare_q4, pdc_above_rest_q4)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
     kernel.map = own_map
     poc_um, torsion_mnmm, flags = np.empty((n, 3), np.int16), np.empty(n, np.int32), np.empty(n, np.uint32)
@@ -60,6 +58,24 @@ def on_board_q4(
     results = c_pointers(poc_um, force_100un, torque_mnmm, torsion_mnmm, flags)
     lib.bt_kernel_frames(n, *c_pointers(raw, tare_q4, pdc), kernel, *results)
     return poc_um, force_100un, torque_mnmm, torsion_mnmm, flags
+
+
+def map_results_q4(
+    counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32], own_map: Any
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """What a struct bt_map makes of frames by itself: force_100un, torque_mnmm (n, 3), torsion_mnmm (n,)."""
+    given = _checked(counts, tare_q4, pdc_above_rest_q4)
+    n = len(given[0])
+    force_100un, torque_mnmm = np.empty((2, n, 3), np.int32)
+    torsion_mnmm = np.empty(n, np.int32)
+    lib.bt_map_frames(n, *c_pointers(*given), own_map, *c_pointers(force_100un, torque_mnmm, torsion_mnmm))
+    return force_100un, torque_mnmm, torsion_mnmm
+
+
+def _checked(counts: Any, tare_q4: Any, pdc_above_rest_q4: Any) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    raw = integers("counts", counts, np.uint16, None, ELECTRODES)
+    tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
+    return raw, tare_q4, integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, len(raw))
 
 
 def pressure_force_100un(

@@ -91,7 +91,7 @@ def compute(
     if settings is None and wrench_map is None:
         refuse_foreign_results(given)
     if wrench_map is not None:
-        from ..map.float64 import by_map  # here: everybody would wait for it at `import biotac`
+        from ..map.published import by_map  # here: everybody would wait for it at `import biotac`
 
         by_lin = {**(settings or {}), wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # the map replaces any force
         plain = compute(counts, tare, by_lin)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import compiled
-from ..core.compiled import BoardResults, Settings, default_settings, integers
+from ..core.compiled import BoardResults, Settings, integers
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
@@ -23,6 +23,7 @@ from ..wire.frames import StructArray
 from ..wire.identity import ascii_text
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
+from .columns import GATED
 from .margin import UNKNOWN, Margin
 
 Integers = NDArray[np.int64]
@@ -104,6 +105,11 @@ class BoardMap:
         return any(block.kind == Kind.PRESSURE for block in self.blocks)
 
     @property
+    def is_population(self) -> bool:
+        """Whether boards judge it as the population map, whose blocks it has."""
+        return self.axes == _map.AXES_FORCE and {(block.kind, block.gate) for block in self.blocks} == set(GATED)
+
+    @property
     def handle(self) -> Any:
         """The C struct bt_map, valid as long as this object lives."""
         return self._open[0]
@@ -115,16 +121,12 @@ class BoardMap:
     def results(
         self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-        """force_100un, torque_mnmm (n, 3), torsion_mnmm (n,) as on the board; counts, tare_q4 (n, 19), pressure (n,).
+        """force_100un, torque_mnmm (n, 3), torsion_mnmm (n,) by the board's code, before on_board_q4() mixes them.
 
-        A result is -2^31 where invalid: if the map does not have it, and in rows where the map needs pressure and that
-        is missing (-2^31). Raises ValueError for other shapes or ranges.
+        counts and tare_q4 are (n, 19), pressure (n,). A result is -2^31 where invalid: if the map does not have it, and
+        in rows where the map needs pressure and that is missing (-2^31). Raises ValueError for other shapes or ranges.
         """
-        given = counts, tare_q4, default_settings(), self.handle, pdc_above_rest_q4
-        _, force_100un, torque_mnmm, torsion_mnmm, _ = compiled.on_board_q4(*given)
-        if self.axes == _map.AXES_FORCE:
-            torque_mnmm[:] = wire.INVALID_I32
-        return force_100un, torque_mnmm, torsion_mnmm
+        return compiled.map_results_q4(counts, tare_q4, pdc_above_rest_q4, self.handle)
 
 
 def from_blob(blob: bytes) -> BoardMap:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +10,10 @@ import numpy.typing as npt
 from ..core.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
-from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArray, tare_to_q4
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT
 from ..wire.map_gen import Gate, Kind
 from .board_map import BoardMap
 from .columns import PRESSURE_COUNTS, SIGNAL_COUNTS, Signals, summed, tared
-from .margin import published_parts
 
 _CHUNK_ROWS = 4096
 #: Real coefficients (columns, axes) of each block, in the results' units.
@@ -42,30 +40,6 @@ def unit(kind: Kind, gate: Gate) -> float:
 def result_units(axes: int) -> Floats:
     """How many of the board's units make 1 N or 1 N mm, for each axis (axes,)."""
     return np.array(([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4)[:axes], dtype=np.float64)
-
-
-def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
-    """Replace in ``results`` of biotac.compute, MAPPED_RESULT_DTYPE, what the map has; returns the same array.
-
-    Shapes are as there. ``pdc_above_rest``, in counts, is (n,), one number, or None: missing. Raises ValueError for a
-    pressure of another shape.
-    """
-    rows = results.reshape(-1)
-    raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)
-    tare_q4 = tare_to_q4(np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape))
-    pressure = np.asarray(np.nan if pdc_above_rest is None else pdc_above_rest, dtype=np.float64)
-    if pressure.shape not in ((), (len(rows),)):
-        raise ValueError(f"pdc_above_rest has shape {pressure.shape}, expected ({len(rows)},) or one number")
-    known = np.rint(16 * np.nan_to_num(np.broadcast_to(pressure, len(rows))))
-    pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
-    wrench = exact(board_map, raw, tare_q4, pdc_q4)
-    replace_gains(board_map, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
-    parts = published_parts(rows["force_n"], rows["poc_mm"])
-    half = board_map.margin.half_n(parts)
-    half[np.isnan(rows["normal_half_n"])] = np.nan  # a count is missing
-    rows["normal_n"], rows["shear_n"] = parts.T
-    rows["normal_half_n"], rows["shear_half_n"] = half.T
-    return results
 
 
 def replace_gains(

@@ -114,6 +114,14 @@ class Likeness:
         part = self.map_part
         return (part / ALL)[:, None] * force_n + ((self.gain - part) / ALL)[:, None] * self.otherwise_n
 
+    def bound(self, off_n: Floats) -> Floats:
+        """Of mixed(), where the map is off by at most ``off_n`` (n, 3); what it is mixed with is exact."""
+        part = (self.map_part / ALL)[:, None]
+        half = (
+            0.5 + 1e-6
+        )  # what the normals make alone is often off by just a half, give or take float64's own rounding
+        return np.where(part > 0, part * off_n, 0.0) + half / FORCE_LSB_PER_N
+
 
 def likeness(e: Floats, force_100un: Integers) -> Likeness:
     """How like the training the signals ``e`` (n, 19) in counts are, of which the map makes ``force_100un`` (n, 3)."""
@@ -149,10 +157,12 @@ def _gain(total_q4: Integers) -> Integers:
     return gain
 
 
-def board_force_100un(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Integers:
-    """The map's force (n, 3) as boards compute it, before it is mixed."""
+def board_force_100un(
+    counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], used: BoardMap | None = None
+) -> Integers:
+    """The force (n, 3) of the package's map, or of one like it, as boards compute it, before it is mixed."""
     pressure = np.zeros(len(counts), np.int32)
-    return on_board().results(counts, tare_q4, pressure)[0].astype(np.int64)
+    return (used or on_board()).results(counts, tare_q4, pressure)[0].astype(np.int64)
 
 
 @cache

@@ -18,7 +18,8 @@ from ..map import population
 from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
 from ..map.bound import bound_of, error_bound
 from ..map.columns import tared
-from ..map.float64 import exact, replace_gains
+from ..map.float64 import replace_gains
+from ..map.published import published
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, UM_PER_MM, StructArray, electrode_signals, to_units
@@ -125,9 +126,11 @@ class CrossCheck:
         if own_map is not None:
             force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, own_map, truth, settings)
             self.mapped += len(messages)
+            if own_map.is_population:
+                self._judge_model(messages, own_map)
         elif population.in_force(settings):
             force_bound, torque_bound = _by_population(messages, truth, settings)
-            self._judge_model(messages)
+            self._judge_model(messages, population.on_board())
         else:
             torque_bound = torque_bound_nmm(messages, truth, settings)
         if not isinstance(force_bound, float):
@@ -160,12 +163,13 @@ class CrossCheck:
             self._find(messages, row, finding)
         self.frames += len(messages)
 
-    def _judge_model(self, messages: StructArray) -> None:
-        """With a force POPULATION must be set, and OUTSIDE exactly where the signals are unlike the training."""
+    def _judge_model(self, messages: StructArray, used: BoardMap) -> None:
+        """With a force POPULATION or MAPPED must be set, and OUTSIDE where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
-        unlike = _likeness(messages).outside
-        wanted = wire.FrameFlags.POPULATION | np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
-        seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
+        unlike = _likeness(messages, used).outside
+        own = wire.FrameFlags.POPULATION if used is population.on_board() else wire.FrameFlags.MAPPED
+        wanted = own | np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
+        seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.MAPPED | wire.FrameFlags.OUTSIDE)
         self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
 
     def _find_all(self, messages: StructArray, wrong: NDArray[np.bool_], finding: str) -> None:
@@ -202,7 +206,9 @@ def _by_map(
     and 0 for a map without torsion.
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    wrench, off = exact(own_map, *frames), error_bound(own_map, None, *frames)
+    (wrench, judged), off = published(own_map, *frames), error_bound(own_map, None, *frames)
+    if judged is not None:
+        off = judged.bound(off)
     torsion = np.empty((len(messages), 1))
     replace_gains(own_map, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
@@ -226,18 +232,16 @@ def _by_population(
     return 1e3 * off, torque_off
 
 
-def _likeness(messages: StructArray) -> population.Likeness:
+def _likeness(messages: StructArray, used: BoardMap) -> population.Likeness:
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    return population.likeness(tared(counts, tare_q4).e, population.board_force_100un(counts, tare_q4))
+    return population.likeness(tared(counts, tare_q4).e, population.board_force_100un(counts, tare_q4, used))
 
 
 def _population_bound_n(messages: StructArray) -> NDArray[np.float64]:
-    """Bound (n, 3) of the population map's force in N from its formats; what it is mixed with is exact."""
-    part = (_likeness(messages).map_part / population.ALL)[:, None]
+    """Bound (n, 3) of the population map's force in N from its formats."""
     wanted = {block: values * FORCE_LSB_PER_N for block, values in population.blocks().items()}
     off = bound_of(population.on_board(), wanted, tared(messages["counts"], messages["tare_q4"])) / FORCE_LSB_PER_N
-    half = 0.5 + 1e-6  # what the normals make alone is often off by just a half, give or take float64's own rounding
-    return np.where(part > 0, part * off, 0.0) + half / FORCE_LSB_PER_N
+    return _likeness(messages, population.on_board()).bound(off)
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

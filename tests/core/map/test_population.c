@@ -126,6 +126,38 @@ TEST(the_likeness_is_what_it_is_defined_as)
     assert_true(at_rest.share == 0 && at_rest.outside && at_rest.strength_100un == 0);
 }
 
+// A map fitted to presses of a finger has the same blocks, and extrapolates beyond these presses likewise.
+TEST(a_map_of_the_same_blocks_is_judged_alike)
+{
+    bt_map same = bt_population, other = bt_population;
+    bt_solve_settings settings = bt_solve_settings_from(&(bt_settings){0});
+    other.gates |= 1u << BT_MAP_GATE_XX;
+    assert_true(bt_population_like(&same) && !bt_population_like(&other));
+    uint32_t seed = 1, outside = 0;
+    for (int k = 0; k < 2000; k++) {
+        uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+        int32_t e_q4[BT_ELECTRODES], force[2][3], torque[3], torsion;
+        uint32_t guess[2][2], flags[2];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            seed = seed * 1664525u + 1013904223u;
+            tare_q4[i] = 16 * 2000;
+            counts[i] = (uint16_t)(2000 + ((int32_t)(seed >> 16) - 32768) * (k % 20) / 400);
+            e_q4[i] = 16 * counts[i] - tare_q4[i];
+        }
+        int16_t poc[3];
+        bt_map_input frame = {counts, tare_q4, 0};
+        settings.map = &same;
+        flags[0] =
+            bt_solve_mapped(e_q4, &frame, &settings, BT_WANT_ALL, poc, force[0], torque, &torsion, guess[0]);
+        flags[1] = bt_solve_uncalibrated(e_q4, &settings, BT_WANT_ALL, poc, force[1], torque, guess[1]);
+        assert_int_equal(flags[0] | BT_FRAME_FLAG_POPULATION, flags[1]);
+        assert_memory_equal(force[0], force[1], sizeof force[0]);
+        assert_memory_equal(guess[0], guess[1], sizeof guess[0]);
+        outside += flags[0] & BT_FRAME_FLAG_OUTSIDE ? 1 : 0;
+    }
+    assert_in_range(outside, 100, 1900);
+}
+
 TEST(a_mirrored_finger_is_as_like)
 {
     uint32_t seed = 9;

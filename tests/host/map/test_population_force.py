@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import biotac
@@ -9,6 +11,7 @@ from biotac.calibrate import population as population_map
 from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.map import population
+from biotac.map.board_map import BoardMap
 from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
@@ -32,13 +35,13 @@ def pressed(n: int, seed: int) -> np.ndarray:
     return np.clip(TARE + e, 0, 4095).astype(np.uint16)
 
 
-def judged(counts: np.ndarray) -> population.Likeness:
+def judged(counts: np.ndarray, own: BoardMap | None = None) -> population.Likeness:
     tare_q4 = np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)
-    return population.likeness(counts - TARE, population.board_force_100un(counts, tare_q4))
+    return population.likeness(counts - TARE, population.board_force_100un(counts, tare_q4, own))
 
 
-def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
-    finger = Finger(settings, quantities=wire.QuantityFlags(0x7F))
+def rows_of(settings: dict, counts: np.ndarray, wrench_map: BoardMap | None = None) -> np.ndarray:
+    finger = Finger(settings, quantities=wire.QuantityFlags(0x7F), wrench_map=wrench_map)
     rest = np.tile(TARE.astype(int), (50, 1))
     finger.feed(rest)
     finger.set_tare(TARE)
@@ -70,6 +73,30 @@ def test_the_board_keeps_the_bound_and_says_what_it_did() -> None:
     assert outcome.force_mn_max > 0.1
     facts = outcome.as_dict()
     assert facts["force_mn_max"] <= facts["force_mn_bound"]
+
+
+def test_a_fingers_own_map_of_its_blocks_is_judged_alike() -> None:
+    """By the integers, by float64 and by `biotac check`; what presses taught of it stays."""
+    trained, counts = population_map.load(None).population, pressed(4000, 2)
+    own = replace(trained, coefficients=1.2 * trained.coefficients).wrench_map(TARE).on_board()
+    rows, plain = rows_of({}, counts, own), rows_of(POPULATION, counts)
+    outcome = CrossCheck()
+    outcome.add(rows, population_settings(), maps={0: own})
+    assert outcome.violations == 0 and outcome.mapped == len(counts), outcome.findings
+    by_map, outside = (rows["flags"] & flag != 0 for flag in (wire.FrameFlags.MAPPED, wire.FrameFlags.OUTSIDE))
+    assert by_map.all() and 400 < outside.sum() < 3900
+    firm = (judged(counts).share == population.ALL) & (judged(counts, own).share == population.ALL)
+    np.testing.assert_allclose(rows["force_100un"][firm], 1.2 * plain["force_100un"][firm], rtol=0.02, atol=100)
+    far = (np.abs(rows["force_100un"]).max(axis=1) > 3 * np.abs(plain["force_100un"]).max(axis=1)) & ~firm
+    assert not far.any()
+    got = biotac.compute(counts, TARE, wrench_map=own)
+    whole = rows["electrodes_out"] == 0
+    known = whole & ~np.isnan(got["normal_half_n"]) & (rows["normal_half_mn"] != wire.INVALID_COUNT)
+    np.testing.assert_allclose(got["force_n"][whole], rows["force_100un"][whole] / 1e4, atol=0.02)
+    assert np.median(np.abs(got["normal_half_n"] - rows["normal_half_mn"] / 1e3)[known]) < 0.01
+    rows["flags"][np.flatnonzero(outside)[0]] &= ~np.uint32(wire.FrameFlags.OUTSIDE)
+    outcome.add(rows, population_settings(), maps={0: own})
+    assert outcome.violations == 1
 
 
 def population_settings() -> dict:

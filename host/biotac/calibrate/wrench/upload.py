@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from ...core.compiled import default_settings
 from ...core.geometry import Floats
 from ...errors import PortError
 from ...hand.hand import Hand
-from ...map.board_map import pdc_above_rest_q4
+from ...map.board_map import on_board_q4
 from ...map.bound import compare
 from ...map.fitted import WrenchMap
 from ...wire import messages_gen as wire
@@ -54,7 +55,7 @@ def upload(
             f"expected at most {comparison.force_mn_bound:.3f} mN; do not use this map, and report this"
         )
     frames = _mapped_frames(hand, finger)
-    force_100un, _, torsion_mnmm = on_board.results(frames["counts"], frames["tare_q4"], pdc_above_rest_q4(frames))
+    _, force_100un, _, torsion_mnmm, _ = on_board_q4(frames, default_settings(), on_board)
     differs = (force_100un != frames["force_100un"]).any(axis=1) | (torsion_mnmm != frames["torsion_mnmm"])
     wrong = int(differs.sum())
     if wrong or not (len(frames) or hand.ended):
