@@ -112,7 +112,8 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
         grip.step(frames, False)
         ways_mm = [0.01 * grip.step(none, False) for _ in range(80)]
         assert ways_mm[:2] == ways_mm[-20:-18] == [0.0, 0.0] and ways_mm[-1] == 0.0
-        harder_n = 1.4 * min(grip.normal_n, grip.wanted_n) + 4 * grip.margin_n - grip.normal_n  # an interval more
+        pressed_n = min(grip.normal_n, grip.wanted_n)
+        harder_n = 1.4 * pressed_n + min(4 * grip.margin_n, pressed_n) - grip.normal_n  # by an interval's width
         assert harder_n > 0.4 and sum(ways_mm) * grip.stiffness == pytest.approx(harder_n, abs=0.05)  # once
     grip.step(frames, False)
     grip.most_n = grip.normal_n + 0.09

@@ -381,6 +381,16 @@ def put(name: str, rows: Any, value: Any, dtype: Any = None) -> Callable[[dict[s
             r"not aligned: .* lag of -?\d+ rows, .* held-out R2 of -?\d\.\d\d:",
         ),
         (lambda a: {"F": np.roll(a["F"], -30, axis=0)}, r"counts lag the force by 30 rows .* at most 20"),
+        (
+            lambda a: {"F": -a["F"]},
+            r"force along x has the default map's sign in \d+% of \d{3} rows, .* check sign, axes",
+        ),
+        (lambda a: {"F": a["F"] * [1, -1, 1]}, r"force along x has the default map's sign in \d+% of"),  # Y is Lin's x
+        (lambda a: {"F": a["F"][:, [1, 0, 2]]}, r"force along x has the default map's sign in \d+% of"),
+        (
+            scaled(9.80665),
+            r"the force is [\d.]+ times what the default map feels, expected 0.25 to 3: is it in newtons",
+        ),
         (scaled(0.0), r"F is 0 in every row"),
         (lambda a: {"E": a["E"] + 0.5}, r"field E row 0 holds \d+\.5: expected whole counts"),
         (

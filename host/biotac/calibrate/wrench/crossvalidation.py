@@ -26,6 +26,7 @@ from . import models
 from .lag import Lags
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
+from .plausible import check_sense
 from .run import Run
 from .splits import BLOCKS, Blocks
 
@@ -140,6 +141,7 @@ def validate(
         axes = run.truth.shape[1]
         lags = Lags(run, blocks)
         lag_rows, affine_r2 = lags.check()
+        check_sense(run)
         every = list(range(BLOCKS))
         timing = _Timing(run, blocks, windows)
         trainings = []

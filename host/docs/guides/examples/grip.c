@@ -106,7 +106,8 @@ void grip_round(void)
         const float closing_mm_s = felt.most_n < grip.most_n ? 10 : 0;
         grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : closing_mm_s;
     } else { // after three rounds harder by two fifths, as it may get heavier, and by the interval's width
-        const float enough_n = 1.4f * fminf(grip.normal_n, grip.wanted_n) + 4 * grip.margin_n;
+        const float pressed_n = fminf(grip.normal_n, grip.wanted_n);
+        const float enough_n = 1.4f * pressed_n + fminf(4 * grip.margin_n, pressed_n);
         const float more_n = fminf(enough_n, grip.most_n) - grip.normal_n;
         grip.blind++;
         const int harder = grip.holds && grip.blind >= 3 && 0.05f * (float)(grip.blind - 3) < more_n;

@@ -73,9 +73,9 @@ class Grip:
 
     def _blind_n(self) -> float:
         """What it presses with at most where it feels nothing: more by a share, as things may get heavier, and by
-        the width of the interval that it was felt with. Once, in many gaps, too."""
-        enough_n = (1 + BLIND_SHARE) * min(self.normal_n, self.wanted_n)
-        return min(enough_n + BLIND_MARGINS * self.margin_n, self.most_n)
+        the interval that it was felt with, at most by as much again. Once, in many gaps, too."""
+        pressed_n = min(self.normal_n, self.wanted_n)
+        return min((1 + BLIND_SHARE) * pressed_n + min(BLIND_MARGINS * self.margin_n, pressed_n), self.most_n)
 
     def needed_n(self, shear_n: float) -> float:
         """What each side has to press with at this shear, by the latest slip; where shear says nothing, as then."""

@@ -1,0 +1,47 @@
+"""Whether a run's forces are those of this finger: against the default map's, which needs no calibration.
+
+A map learns whatever it is given, and its held-out error shows no wrong sign, axis or unit: the default map does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.compute import compute
+from ...errors import RecordingError
+from ...wire.sensor_gen import FULL_SCALE_COUNT
+from .run import Run
+
+FIRM_N = 1.0
+# Where both say that an axis has so much of the force, they agree on its sign in at least .91 of the rows (F1, F2 and
+# simulated fingers), with exchanged axes in at most .70, with a mirrored one in at most .09.
+MARKED_SHARE = 0.3
+LEAST_AGREEING, LEAST_ROWS = 0.8, 100
+# Their medians of |F| over the default's: .51, where tip and sides were loaded, too, to 1.08; in pounds .11 to .23, in
+# kilograms times 9.8 4.9 to 9.9.
+LEAST_RATIO, MOST_RATIO = 0.25, 3.0
+
+
+def check_sense(run: Run) -> None:
+    """Raise RecordingError where the forces, in Lin's axes, cannot be those of the counts."""
+    firm = np.linalg.norm(run.truth[:, :3], axis=1) > FIRM_N
+    if not firm.any():
+        return
+    whole = np.clip(np.rint(run.counts[firm]), 0, FULL_SCALE_COUNT).astype(np.uint16)
+    felt_n, force_n = compute(whole, run.tare)["force_n"], run.truth[firm, :3]
+    felt_size_n, size_n = (np.linalg.norm(rows, axis=1, keepdims=True) for rows in (felt_n, force_n))
+    ratio = float(np.median(size_n / np.maximum(felt_size_n, 0.05)))
+    if not LEAST_RATIO < ratio < MOST_RATIO:
+        raise RecordingError(
+            f"{run.name}: the force is {ratio:.2g} times what the default map feels, expected {LEAST_RATIO:g} to "
+            f"{MOST_RATIO:g}: is it in newtons (1 kgf is 9.8, 1 lbf 4.4), of these rows?"
+        )
+    marked = (np.abs(felt_n) > MARKED_SHARE * felt_size_n) & (np.abs(force_n) > MARKED_SHARE * size_n)
+    for axis, rows, same in zip("xyz", marked.T, (felt_n * force_n > 0).T, strict=True):
+        if rows.sum() >= LEAST_ROWS and same[rows].mean() < LEAST_AGREEING:
+            raise RecordingError(
+                f"{run.name}: force along {axis} has the default map's sign in {same[rows].mean():.0%} of {rows.sum()} "
+                f"rows, expected at least {LEAST_AGREEING:.0%}, of the force on the finger with x to the tip, y to "
+                "E11's side and z dorsal; check sign, axes and mounting (in .npz files F has X lateral, Y to the tip, "
+                "Z out of the pad)"
+            )
