@@ -32,15 +32,20 @@ def exists_error(path: object) -> InputError:
     return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")
 
 
+def installing(extra: str) -> str:
+    """The command that installs what the ``extra`` needs."""
+    return f"pip install 'biotac-gateway[{extra}]', in a clone pip install '.[{extra}]'"
+
+
 def imported(module: str, purpose: str, extra: str) -> ModuleType:
     """A module that needs the ``extra``, for ``purpose``. Raises InputError where a package of it is missing."""
     try:
         return import_module(module)
     except (ImportError, AttributeError) as error:
-        cure = f"pip install 'biotac-gateway[{extra}]'"
+        cure = installing(extra)
         if not isinstance(error, ModuleNotFoundError):  # a name is missing in it, or a library that it loads
             broken = f"cannot use what is installed ({error}): too old, or not whole"
-            raise InputError(f"{purpose} {broken}; {cure.replace('install', 'install --upgrade')}") from error
+            raise InputError(f"{purpose} {broken}; {cure.replace(' install', ' install --upgrade')}") from error
         raise InputError(f"{purpose} needs {error.name}, which is not installed; {cure}") from error
 
 

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, installing
 
 
 def check_drawable() -> None:
     """Raise InputError where matplotlib is missing: to be asked before minutes of work, not after them."""
     if importlib.util.find_spec("matplotlib") is None:
-        raise InputError("a picture needs matplotlib, which is not installed; pip install 'biotac-gateway[plot]'")
+        raise InputError(f"a picture needs matplotlib, which is not installed; {installing('plot')}")
 
 
 @contextlib.contextmanager

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..clock import electrode_t_us, pac_t_us
 from ..clock.stamps import Stamps
-from ..errors import InputError
+from ..errors import InputError, installing
 from ..export.columns import COLUMNS, PAC_COLUMNS
 from ..hand.hand import Hand
 from ..wire import messages_gen as wire
@@ -151,7 +151,7 @@ def _pylsl() -> Any:
     try:
         import pylsl
     except ImportError as error:
-        raise InputError("LSL needs pylsl, which is not installed; pip install 'biotac-gateway[lsl]'") from error
+        raise InputError(f"LSL needs pylsl, which is not installed; {installing('lsl')}") from error
     except RuntimeError as error:  # the wheel of some systems, and every pylsl before 1.18, has no liblsl in it
         cure = "pip install --upgrade pylsl, or liblsl from conda-forge or github.com/sccn/liblsl, named by PYLSL_LIB"
         raise InputError(f"pylsl is installed, and finds no liblsl; {cure}") from error

@@ -12,7 +12,7 @@ import io
 from itertools import pairwise
 from typing import Any
 
-from ..errors import BiotacError, DeviceLostError, FlashError, NotAGatewayError
+from ..errors import BiotacError, DeviceLostError, FlashError, NotAGatewayError, installing
 from ..hand.hand import Hand
 from ..link.ports import open_link
 from .image import Image
@@ -69,9 +69,7 @@ class Stm32Loader(Loader):
         try:
             from stm32loader import bootloader, uart
         except ImportError as error:
-            raise FlashError(
-                "an STM32 is flashed by the package stm32loader: pip install 'biotac-gateway[stm32]'"
-            ) from error
+            raise FlashError(f"an STM32 is flashed by the package stm32loader: {installing('stm32')}") from error
         self.close()
         connection = uart.SerialConnection(self._device, LOADER_BAUD, "E")
         connection.connect()

@@ -11,7 +11,7 @@ import errno
 import re
 from typing import Any, NamedTuple
 
-from ..errors import InputError, PortError
+from ..errors import InputError, PortError, installing
 
 
 class Kind(NamedTuple):
@@ -77,9 +77,7 @@ class Chip:
         try:
             import smbus2
         except ImportError as error:
-            raise PortError(
-                f"{self.name} needs smbus2 ({error}); on Linux, pip install 'biotac-gateway[bus]'"
-            ) from error
+            raise PortError(f"{self.name} needs smbus2 ({error}); on Linux: {installing('bus')}") from error
         self._message: Any = smbus2.i2c_msg
         try:
             self._bus = smbus2.SMBus(bus)

@@ -17,7 +17,7 @@ import time
 from contextlib import ExitStack, suppress
 from typing import Any
 
-from ..errors import PortError
+from ..errors import PortError, installing
 from ..wire import sensor_gen as sensor
 from ..wire.native import lib
 from .in_process import InProcessLink
@@ -65,7 +65,7 @@ def open_devices(port: str) -> list[Any]:
     try:
         import spidev
     except ImportError as error:
-        raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[bus]'") from error
+        raise PortError(f"{port} needs spidev ({error}); on Linux: {installing('bus')}") from error
     opened = [spidev.SpiDev() for _ in devices]
     with ExitStack() as on_failure:
         for spi, (bus, device) in zip(opened, devices, strict=True):
