@@ -121,6 +121,7 @@ def test_the_controllers_page_has_every_flag() -> None:
     assert [flag.name for flag in biotac.FrameFlags if f"`{flag.name}`" not in table] == []
 
 
+@pytest.mark.nightly
 def test_the_drawings_signs_are_what_a_calibrated_board_measures(tmp_path: Path) -> None:
     drawing = html.unescape((ROOT / "host/docs/reference/frames.svg").read_text(encoding="utf-8"))
     pressed = re.findall(r">pressed at (E\d+): ([^<]*(?:[<>] 0,? ?[^<]*)*)</text>", drawing)
