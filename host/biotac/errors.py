@@ -27,6 +27,11 @@ class InputError(BiotacError):
     exit_code = 2
 
 
+def said(error: Exception) -> str:
+    """What an error says: a KeyError would quote its text."""
+    return str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error) or type(error).__name__
+
+
 def exists_error(path: object) -> InputError:
     """What to raise when ``path`` exists and may not be overwritten."""
     return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")

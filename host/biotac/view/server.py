@@ -20,7 +20,7 @@ from importlib import resources
 from typing import Any
 
 from ..documents import parse_json
-from ..errors import BiotacError, PortError
+from ..errors import BiotacError, PortError, said
 from .reader import Reader
 from .rows import compact, facts
 from .state import State
@@ -29,7 +29,8 @@ HOST = "127.0.0.1"
 TOKEN_HEADER = "X-Biotac-Token"
 EVENT_S = 1 / 60  # browsers do not draw more often
 QUIET_S = 1.0  # after so long without news a comment is sent, to notice a browser that left
-# Small, so that a slow browser lags by a fraction of a second and then misses rows, instead of lagging by megabytes.
+# Small, so that a slow browser misses rows instead of lagging by megabytes. Behind a slow line, with the buffers of a
+# browser and a tunnel, it lags by seconds all the same, and says so: it compares when news were sent (State.wait).
 SEND_BUFFER_BYTES = 1 << 16
 SEND_TIMEOUT_S = 10.0
 MAX_BODY_BYTES = 1000
@@ -121,19 +122,22 @@ class Handler(BaseHTTPRequestHandler):
         """Static files and events."""
         if not self._known_name():
             return
-        path = self.path.partition("?")[0]
-        name = "index.html" if path == "/" else path.removeprefix("/")
-        if path == "/events":
+        name = self._file_name()
+        if name == "events":
             self._events()
         elif name in self.server.files:
             self._answer(200, TYPES[name[name.rindex(".") :]], self.server.files[name])
         else:
-            self._words(404, f"nothing at {path}")
+            self._words(404, f"nothing at /{name}")
 
     def do_HEAD(self) -> None:
-        """Whether the page is served."""
+        """Whether something is served there."""
         if self._known_name():
-            self._head(200, "text/html; charset=utf-8", {})
+            is_there = self._file_name() in ("events", *self.server.files)
+            self._head(200 if is_there else 404, "text/html; charset=utf-8", {})
+
+    def _file_name(self) -> str:
+        return self.path.partition("?")[0].removeprefix("/") or "index.html"
 
     def do_POST(self) -> None:
         """Commands: ``{"do": "tare", "finger": 0}``, answered with ``{"words": ...}``."""
@@ -149,7 +153,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             self._words(200, self.server.reader.ask(*parse_command(self._body())))
         except (ValueError, KeyError) as error:  # of a finger that there is not
-            self._words(400, str(error.args[0]))
+            self._words(400, said(error))
         except (BiotacError, OSError) as error:
             self._words(409, str(error))
 

@@ -1,7 +1,7 @@
 """The state that the page shows, shared by the one reading thread and the many serving threads.
 
 The reader never waits for a browser: rows go into ring buffers, and a browser that is too slow misses the oldest rows
-and is told how many.
+and is told how many. When its news were sent is said by this computer's clock: behind a slow line they are old.
 """
 
 from __future__ import annotations
@@ -203,7 +203,8 @@ class State:
             cursor.frames, cursor.pac, cursor.health = self._frames.end, self._pac.end, self._health_number
         cursor.dropped += lost
         parts = f'"frames":[{",".join(frames)}],"pac":[{",".join(pac)}]'
-        return f'{{{parts},"health":{health},"dropped":{cursor.dropped}}}'
+        sent_ms = round(time.monotonic() * 1000)
+        return f'{{{parts},"health":{health},"dropped":{cursor.dropped},"sent_ms":{sent_ms}}}'
 
     def _is_news(self, cursor: Cursor) -> bool:
         return (cursor.frames, cursor.pac, cursor.health) != (self._frames.end, self._pac.end, self._health_number)

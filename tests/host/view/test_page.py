@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -311,6 +313,52 @@ def test_a_finger_without_news_does_not_look_touched(make_player, view_of, open_
     player.script.put(touch)
     page.wait_for_selector("body[data-stale] #touched:text('not known')")
     assert "what is shown is old" in page.text_content("#link-words")
+    player.script.put(touch)
+    page.wait_for_selector("body:not([data-stale]) #touched:text-is('contact')")
+
+
+def test_nothing_is_shown_of_a_board_that_came_back_without_its_sensor(make_player, view_of, open_page, touch) -> None:
+    ready = [make_player() for _ in range(2)]
+    before = ready[0]
+    page = open_page(view_of(lambda: ready.pop(0)))
+    assert page.text_content("#touched") == "not known"
+    before.script.put(touch)
+    page.wait_for_selector("#touched:text-is('contact')")
+    before.script.put(biotac.DeviceLostError("it was reset"))
+    await_text(page, "The board is connected again.")
+    page.wait_for_selector("body[data-stale] #touched:text('not known')")
+    assert page.text_content("#link-words") == "No frames come from this finger."
+    seen = page.evaluate(SNAPSHOT)
+    told = [*seen["force_n"], *seen["torque_nmm"], *seen["poc_mm"], *seen["grip_n"], *(v for _, v in seen["signals"])]
+    assert np.isnan(numbers([*told, seen["pdc"], seen["slip"]])).all()
+    assert seen["trust"] == ["trust: NONE", wire.TRUST_DOC[wire.Trust.NONE]]
+    assert page.locator("#flags li, #notices li").count() == 0
+
+
+def test_a_finger_of_the_list_says_why_it_has_no_force(make_player, view_of, open_page, touch) -> None:
+    """Not that of a second ago, and no missing tare where something else is missing."""
+    player, says = make_player(), ".finger[data-finger='1'] .force:text-is('{}')"
+    page = open_page(view_of(lambda: player))
+    player.script.put(touch)
+    page.wait_for_selector(says.format("\u2013"))
+    for flags, words in ((biotac.FrameFlags.FAULT, "no force"), (biotac.FrameFlags.UNTARED, "no tare")):
+        blind = replace(touch, wire=touch.wire.copy())
+        blind.wire["flags"], blind.wire["force_100un"] = int(flags), wire.INVALID_I32
+        player.script.put(blind)
+        page.wait_for_selector(says.format(words))
+
+
+def test_a_page_behind_a_slow_line_says_how_old_it_is(make_player, view_of, open_page, touch, monkeypatch) -> None:
+    player, late_s, monotonic = make_player(), [0.0], time.monotonic
+    monkeypatch.setattr("biotac.view.state.time", SimpleNamespace(monotonic=lambda: monotonic() - late_s[0]))
+    page = open_page(view_of(lambda: player))
+    player.script.put(touch)
+    page.wait_for_selector("#touched:text-is('contact')")
+    late_s[0] = 30.0
+    player.script.put(touch)
+    until(page, "() => document.getElementById('link-words').textContent.startsWith('What is shown is 30 s old')")
+    page.wait_for_selector("body[data-stale] #touched:text('not known')")
+    late_s[0] = 0.0
     player.script.put(touch)
     page.wait_for_selector("body:not([data-stale]) #touched:text-is('contact')")
 

@@ -54,6 +54,9 @@ def test_commands_need_the_secret_the_origin_and_sense(make_player, view_of) -> 
     assert ask(viewing, "POST", "/command", tare, **good, Origin="http://example.org")[0] == 403
     assert ask(viewing, "POST", "/command", tare, **good, Host="example.org")[0] == 403
     assert ask(viewing, "POST", "/elsewhere", tare, **good)[0] == 404
+    assert [ask(viewing, "HEAD", path)[0] for path in ("/", "/main.js?v", "/nothing")] == [200, 200, 404]
+    not_utf8 = ask(viewing, "POST", "/command", b"\xff\xfe{".decode("latin-1"), **good)
+    assert not_utf8[0] == 400 and b"decode" in not_utf8[1]
     for nonsense in (
         "",
         "{",

@@ -1,7 +1,7 @@
 // The fingers side by side, each a button that shows it large.
 
 import { Fingertip } from "./fingertip.js";
-import { make, number } from "./readout.js";
+import { NONE, make, number } from "./readout.js";
 
 export class HandRow {
   constructor(place, about, pick) {
@@ -42,12 +42,13 @@ export class HandRow {
     for (const [index, { tip }] of this.entries) tip.draw(fingers.get(index), theme, limit);
   }
 
-  read(fingers) {
+  read(model, untared) {
     for (const [index, { button, force }] of this.entries) {
-      const { latest } = fingers.get(index);
+      const { latest } = model.fingers.get(index);
       button.toggleAttribute("data-untouched", !latest.touched);
       const newtons = Math.hypot(...latest.forceN);
-      force.textContent = Number.isFinite(newtons) ? `${number(newtons, 1)} N` : "no tare";
+      const words = Number.isFinite(newtons) ? `${number(newtons, 1)} N` : latest.flags & untared ? "no tare" : "no force";
+      force.textContent = model.isSilent(index) ? NONE : words;
     }
   }
 }

@@ -12,7 +12,6 @@ import { Stream } from "./stream.js";
 import { Timeline, savePicture } from "./timeline.js";
 
 const READ_MS = 100; // numbers that change faster cannot be read
-const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
 
 class Page {
   constructor() {
@@ -126,17 +125,14 @@ class Page {
 
   // ---- what it shows -----------------------------------------------------------------------
 
-  // Whether the shown finger, or this page's program, stands still: its last force is not to look like the present one.
-  isSilent() {
-    const finger = this.model.fingers.get(this.shown);
-    return Boolean(finger?.latest) && performance.now() - finger.addedMs > STALE_MS;
-  }
-
+  // The last force of a finger, or of a program, that stands still is not to look like the present one.
   showState() {
-    const { health } = this.model;
+    const { health, lateMs } = this.model;
     if (!health) return;
+    const isThere = this.model.fingers.has(this.shown);
     if (this.frozen && health.link === "live") showLink("paused", "Paused: the picture is frozen; the board and any recording keep running.");
-    else if (health.link === "live" && this.isSilent()) showLink("live", "No new frames come from this finger: what is shown is old.", true);
+    else if (this.model.isLate) showLink(health.link, `What is shown is ${number(lateMs / 1000, 0)} s old: the line from the viewer program is slow.`, true);
+    else if (health.link === "live" && this.model.isSilent(this.shown)) showLink("live", isThere ? "No new frames come from this finger: what is shown is old." : "No frames come from this finger.", true);
     else showLink(health.link, health.words);
     this.showButtons();
   }
@@ -210,13 +206,13 @@ class Page {
     const facts = health?.fingers.find(({ finger }) => finger === this.shown);
     showTare(about, facts);
     showFaults(about, facts);
-    const frame = fingers.get(this.shown)?.latest;
-    if (!frame) return;
+    const latest = fingers.get(this.shown)?.latest;
+    const frame = latest ?? this.model.blank;
     this.results.show(frame);
     this.flags.show(frame.flags);
-    this.hand.read(fingers);
+    this.hand.read(this.model, this.masks.UNTARED);
     const touched = byId("touched");
-    const isKnown = !document.body.hasAttribute("data-stale");
+    const isKnown = latest && !document.body.hasAttribute("data-stale");
     touched.textContent = !isKnown ? "not known" : frame.flags & this.masks.CONTACT ? "contact" : "no contact";
     touched.dataset.kind = isKnown && frame.flags & this.masks.CONTACT ? "on" : "calm";
     byId("numbers").toggleAttribute("data-untouched", !(frame.flags & this.masks.CONTACT));

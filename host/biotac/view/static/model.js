@@ -5,6 +5,8 @@ import { amplitudes } from "./spectrum.js";
 export const HISTORY_S = 10;
 export const zoom = { s: HISTORY_S }; // that the charts show of it
 export const SPECTRUM_SAMPLES = 1024;
+const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
+const LATE_MS = 1000;
 const HISTORY_ROWS = 1100; // a little more than HISTORY_S of frames
 const TRAIL_POINTS = 40;
 const COLUMN_SAMPLES = 128; // of the spectrogram: 58 ms
@@ -18,6 +20,24 @@ export class Model {
     this.fingers = new Map();
     this.health = null;
     this.dropped = 0;
+    this.beganMs = this.newestMs = performance.now(); // of this playing, and of its newest frame, by the browser's clock
+    this.aheadMs = Infinity; // of the viewer program's clock, as far as the fastest news tell
+    this.lateMs = 0; // how much slower the latest news were: behind a slow line they are old
+  }
+
+  get isLate() {
+    return this.lateMs > LATE_MS;
+  }
+
+  // Whether a finger stands still, by now or, as a recording may be paused, beside the others. Its force is an old one.
+  isSilent(index) {
+    const nowMs = this.health?.live ? performance.now() : this.newestMs;
+    return nowMs - (this.fingers.get(index)?.addedMs ?? this.beganMs) > STALE_MS;
+  }
+
+  // The numbers of a finger that has sent nothing.
+  get blank() {
+    return this.inUnits([]);
   }
 
   finger(index) {
@@ -27,13 +47,20 @@ export class Model {
 
   update(news) {
     const health = news.health;
+    const apartMs = performance.now() - news.sent_ms;
+    this.aheadMs = Math.min(this.aheadMs, apartMs);
+    this.lateMs = apartMs - this.aheadMs;
     if (health) {
-      if (this.health && this.health.epoch !== health.epoch) this.fingers.clear(); // another playing has begun
+      if (this.health && this.health.epoch !== health.epoch) { // another playing has begun
+        this.fingers.clear();
+        this.beganMs = performance.now();
+      }
       this.health = health;
     }
     for (const row of news.frames) {
       const frame = this.inUnits(row);
       this.finger(frame.finger).add(frame);
+      this.newestMs = performance.now();
     }
     // A finger is there once it has sent a frame.
     for (const [finger, , tUs, pac] of news.pac) this.fingers.get(finger)?.addPac(tUs / 1e6, pac);
@@ -48,11 +75,11 @@ export class Model {
     };
     const plain = (name) => row[column[name]] ?? NaN;
     return {
-      finger: row[column.finger],
-      seq: row[column.seq],
+      finger: plain("finger"),
+      seq: plain("seq"),
       tUs: row[column.t_us],
-      flags: row[column.flags],
-      trust: row[column.trust],
+      flags: row[column.flags] ?? 0,
+      trust: row[column.trust] ?? 0,
       signal: scaled("signal_q4"),
       pdc: plain("pdc"),
       tac: plain("tac"),

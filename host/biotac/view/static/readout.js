@@ -1,7 +1,7 @@
 // Numbers and words. Every number also stands unrounded in data-value, for tests and other programs.
 
 const MINUS = "−";
-const NONE = "–";
+export const NONE = "–";
 
 export function number(value, digits) {
   if (!Number.isFinite(value)) return NONE;
