@@ -31,6 +31,7 @@ from ..wire.fields import Field
 from ..wire.frames import StructArray
 from ..wire.identity import serial_text
 from ..wire.sensor_gen import SLOTS
+from .silence import Silence
 
 TYPE = "Tactile"
 EVENTS = " events"
@@ -42,13 +43,15 @@ _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
 
 
 class Outlet:
-    """Three streams for each finger of ``hand``; use as a context manager, and push every batch.
+    """Three streams for each finger of ``hand``, also one that is plugged in later; push every batch.
 
-    ``BioTac finger0``: one sample per round, 100 per second, of force (N), torque (N*mm), point of contact (mm), normal
-    and shear with half their intervals (N), flags, trust, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where
-    invalid, as in exports. ``BioTac finger0 PAC``: counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a
-    marker, the name of its kind (EventKind), which come only if the hand is subscribed to events. The first two streams
-    are double64; their descriptions hold labels, units and meanings.
+    Use it as a context manager. ``BioTac finger0``: one sample per round, 100 per second, of 37 channels: force (N),
+    torque (N*mm), point of contact (mm), normal and shear with half their intervals (N), flags, trust, and counts of
+    E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports, and once when the finger has had no frame for
+    0.1 s (with ``hand.batches(every_s=0.05)`` also when no finger has). ``BioTac finger0 PAC``: counts, 2200 per
+    second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind), which come only if the
+    hand is subscribed to events. The first two streams are double64; their descriptions hold labels, units and
+    meanings.
 
     Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each
     sample's own time for PAC. If the clock cannot convert (a simulated board has no real clock), a batch is stamped
@@ -65,18 +68,16 @@ class Outlet:
         self.infos: list[Any] = []  #: pylsl.StreamInfo of each stream
         self._outlets: dict[tuple[int, str], Any] = {}
         # 0, no bus, is LSL's IRREGULAR_RATE.
-        rounds_hz = hand.info.slot_hz / len(SLOTS)
-        for finger in hand.fingers:
-            frame = [(name, column) for column in _FRAME_COLUMNS for name in column.flat_names()]
-            self._add(finger, "", rounds_hz, frame)
-            self._add(finger, " PAC", rounds_hz * _PAC_PER_ROUND, [("PAC", _PAC_COLUMN)])
-        for finger in hand.fingers:
-            self._add(finger, EVENTS, self._lsl.IRREGULAR_RATE, [])
+        self._rounds_hz = hand.info.slot_hz / len(SLOTS)
+        self._silence = Silence()
+        self._add_fingers(hand.fingers)
 
     def push(self, batch: Batch) -> None:
         """Send what ``batch`` holds. Raises DeviceLostError when the board no longer answers."""
         self._stamps.keep()
-        for finger in self._hand.fingers:
+        fingers = np.union1d(batch.wire["finger"], batch.pac["finger"]).tolist()
+        self._add_fingers([finger for finger in fingers if (finger, "") not in self._outlets])
+        for finger in fingers:
             frames = batch.frames[batch.frames["finger"] == finger]
             if len(frames):
                 self._push(finger, "", samples(frames), frames["t_us"].astype(np.float64))
@@ -84,7 +85,10 @@ class Outlet:
             pac = batch.pac[batch.pac["finger"] == finger]
             if len(pac):
                 self._push(finger, " PAC", pac["pac"].reshape(-1, 1), pac_t_us(pac["t_us"]).ravel())
-
+        silent = self._silence.rows(batch)
+        for finger in silent["finger"].tolist():
+            row = silent[silent["finger"] == finger]
+            self._push(finger, "", samples(row), row["t_us"].astype(np.float64))
         for event in batch.messages:
             if isinstance(event, wire.Event) and (event.finger, EVENTS) in self._outlets:
                 t_us = np.array([nearest(event.t_us, batch.last_t_us() or event.t_us)], np.float64)
@@ -101,6 +105,14 @@ class Outlet:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    def _add_fingers(self, fingers: list[int]) -> None:
+        for finger in fingers:
+            frame = [(name, column) for column in _FRAME_COLUMNS for name in column.flat_names()]
+            self._add(finger, "", self._rounds_hz, frame)
+            self._add(finger, " PAC", self._rounds_hz * _PAC_PER_ROUND, [("PAC", _PAC_COLUMN)])
+        for finger in fingers:
+            self._add(finger, EVENTS, self._lsl.IRREGULAR_RATE, [])
 
     def _add(self, finger: int, suffix: str, rate_hz: float, labels: list[tuple[str, Field]]) -> None:
         lsl, is_marker = self._lsl, not labels
@@ -129,7 +141,7 @@ class Outlet:
 
 
 def samples(frames: StructArray) -> NDArray[np.float64]:
-    """FRAME_DTYPE (n,) as samples of a frame stream, float64 (n, 33)."""
+    """FRAME_DTYPE (n,) as samples of a frame stream, float64 (n, 37)."""
     return np.column_stack([frames[name].astype(np.float64) for name in _SENT])
 
 

@@ -8,8 +8,10 @@ import json
 import os
 import re
 import struct
+import threading
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 from ..documents import parse_json
 from ..errors import InputError, PortError, imported, printable
@@ -30,6 +32,8 @@ COUNT = struct.Struct("<Q")  # of a writer's commands; begins a signature
 SIGNATURE_BYTES = COUNT.size + 32
 SECRET_BYTES = 32
 GRANTED = b"\0"  # begins the answer to a claim, before the secret; no name does
+
+_open: WeakSet[Any] = WeakSet()
 
 #: Precedes each batch: its number, which tells a reader how many it missed.
 NUMBER = struct.Struct("<Q")
@@ -95,6 +99,19 @@ def open_session(
             f"{where}: cannot reach Zenoh ({_short(error)}); check the endpoint, that `biotac share` is running, and, "
             "if it asks for a password or a certificate, your Zenoh configuration"
         ) from error
+
+
+def close_at_exit(user: Any) -> None:
+    """Close ``user`` of a session when the program ends, before Python waits for the threads that Zenoh calls."""
+    _open.add(user)
+
+
+def _close_open() -> None:
+    for user in list(_open):
+        user.close()
+
+
+threading._register_atexit(_close_open)  # type: ignore[attr-defined]  # atexit's own come after that wait
 
 
 def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:

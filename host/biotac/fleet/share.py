@@ -55,7 +55,9 @@ class Share:
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
         self._new_epoch()
+        network.close_at_exit(self)
         hand._reader.add(self)
+        hand._reading.stop_buffering()  # nobody reads there, and a simulated board would wait for that
         hand.stream()
 
     def _new_epoch(self) -> None:

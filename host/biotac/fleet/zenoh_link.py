@@ -56,6 +56,7 @@ class ZenohLink(Link):
         self._absent_since_s = math.inf  # since when, by time.monotonic
         self._declared: list[Any] = []
         self.reopen(port)
+        network.close_at_exit(self)
 
     def ports(self) -> list[str]:
         return [self.port]

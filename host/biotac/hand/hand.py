@@ -232,14 +232,14 @@ class Hand(Commands, Subscriptions):
         self._stream.stop()
         self._latest.report()
 
-    def batches(self) -> Iterator[Batch]:
-        """Yield batches as they arrive, starting the stream if need be.
+    def batches(self, every_s: float | None = None) -> Iterator[Batch]:
+        """Yield batches as they arrive, starting the stream if need be; after ``every_s`` without any, an empty one.
 
         Ends when a simulated source ends, and when ``stop`` is called. All iterations of ``batches`` and ``frames``,
         and ``read``, share one queue, which only one thread at a time may use; another gets InputError. It begins with
         the stream, or, where a callback or a view was used before, with this call, and holds 16 384 rows, 10 to 20 s.
         """
-        yield from self._reading.batches()  # in a generator of the hand's, so that it is not collected meanwhile
+        yield from self._reading.batches(every_s)  # in a generator of the hand's, so that it is not collected meanwhile
 
     def frames(self) -> Iterator[Frame]:
         """Yield typed frames as they arrive; starts and ends like ``batches``."""

@@ -47,7 +47,7 @@ class Reading:
         self._latest.report()
         self._stream.ensure_started()
 
-    def batches(self) -> Iterator[Batch]:
+    def batches(self, every_s: float | None = None) -> Iterator[Batch]:
         """See Hand.batches, which keeps the hand open meanwhile."""
         stream, closing = self._stream, self._reader.closing
         with self._by_one_thread():
@@ -56,13 +56,15 @@ class Reading:
             while True:
                 self._latest.report()
                 over = not stream.on  # before the queue is emptied, so that nothing is left in it
-                batch = self._queue.get(wait=not (over or closing.is_set()))
+                batch = self._queue.get(wait=not (over or closing.is_set()), timeout_s=every_s)
                 if batch is not None:
                     yield batch
                 elif closing.is_set():
                     self._reader.raise_closed()
                 elif over:
                     return
+                elif every_s is not None:
+                    yield join([])
 
     def _begin(self) -> None:
         if self._queue not in self._reader.consumers:

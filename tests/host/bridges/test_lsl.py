@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import types
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,25 @@ def test_the_description_names_channels_units_and_rate(inlet) -> None:
     assert info.type() == "Tactile"
     assert "tip" in info.desc().child_value("axes")
     assert info.desc().child_value("finger") == "0"
+
+
+def test_a_finger_has_streams_when_it_comes_and_is_nan_once_when_it_goes(inlet) -> None:
+    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
+        both, alone = hand.read_batch(2.5), hand.read_batch(0.2)
+    rows = alone.wire["finger"] == 0
+    alone = replace(alone, wire=alone.wire[rows], seq=alone.seq[rows], t_us=alone.t_us[rows])
+    with biotac.open("sim:press.toml?seconds=0.5") as hand, Outlet(hand) as outlet:
+        outlet.push(both)
+        late = outlet.infos[3]
+        assert late.name() == "BioTac finger1"
+        stream = inlet(late)
+        outlet.push(both)
+        outlet.push(alone)
+        outlet.push(alone)
+        values, stamps_s = pull(stream, 251)
+        assert stream.pull_sample(timeout=0.0)[0] is None
+    assert not np.isnan(values[249]).any() and np.isnan(values[250, :13]).all()
+    assert (values[250, 14], values[250, 15]) == (biotac.Trust.NONE, 65535) and (np.diff(stamps_s) > 0).all()
 
 
 def test_columns_are_the_rows() -> None:

@@ -8,6 +8,7 @@ import math
 import sys
 import types
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import fake_ros
@@ -17,6 +18,7 @@ import pytest
 import biotac
 from biotac.clock import DeviceClock
 from biotac.export import export
+from biotac.wire.batches import join
 
 PACKAGE = Path(__file__).parents[3] / "host/ros2/biotac_ros2"
 
@@ -39,6 +41,7 @@ def unpaced(monkeypatch) -> None:
     """The node asks for real time; a test does not wait for it."""
     true_open = biotac.open
     monkeypatch.setattr(biotac, "open", lambda port, pace: true_open(port))
+    monkeypatch.setattr("biotac.bridges.silence.time", types.SimpleNamespace(monotonic=lambda: 70.0))
 
 
 def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch, tmp_path) -> None:
@@ -136,6 +139,35 @@ def test_invalid_is_nan_and_never_the_last_good_value(ros, monkeypatch) -> None:
     assert any(invalid)
     assert not all(invalid)
     assert [math.isnan(p.x) for p in points] == invalid
+
+
+def test_a_finger_is_published_when_it_comes_and_is_nan_once_when_it_goes(ros, monkeypatch) -> None:
+    unpaced(monkeypatch)
+    ros.up = True
+    ros.parameters["port"] = "sim:press.toml?seconds=0.5"
+    with biotac.open("sim:press.toml?fingers=2&seconds=3", None) as hand:
+        both, first = hand.read_batch(2.5), hand.read_batch(0.2)
+    alone = first.wire["finger"] == 0
+    first = replace(first, wire=first.wire[alone], seq=first.seq[alone], t_us=first.t_us[alone])
+    fingers = node().Fingers()  # of one finger, when it started
+    last_s = 70.0
+    monkeypatch.setattr("biotac.bridges.silence.time", types.SimpleNamespace(monotonic=lambda: last_s))
+    with fingers.hand:
+        fingers.publish(both)
+        assert not math.isnan(last_of(ros, 1)[0])
+        for batch, ended in ((first, [1]), (join([]), []), (join([]), [0])):
+            ros.published.clear()
+            fingers.publish(batch)
+            told = [topic for topic, message in ros.published if topic.endswith("trust") and message.data == 0]
+            assert told == [f"biotac/finger{finger}/trust" for finger in ended]
+            assert all(np.isnan(last_of(ros, finger)).all() for finger in ended)
+            last_s += 0.08
+
+
+def last_of(ros: fake_ros.Ros, finger: int) -> list[float]:
+    """Force, torque, point and grip of the last messages."""
+    last = {topic.removeprefix(f"biotac/finger{finger}/"): message for topic, message in ros.published}
+    return [number for name in ("wrench", "poc", "grip") for number in values(last[name])]
 
 
 def test_tare_says_which_finger_refused(ros, monkeypatch) -> None:

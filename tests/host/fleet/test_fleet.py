@@ -373,3 +373,21 @@ def test_a_gateway_that_is_killed_leaves_a_gap(tmp_path: Path) -> None:
     serving.wait()
     gap = recorded_gap(tmp_path / "a.mcap", 200)
     assert killed_ns < gap.lost_at_ns < gap.back_at_ns > back_ns  # by this computer's clock
+
+
+def test_sharing_ends_with_its_source(capsys) -> None:
+    source = "sim:press.toml?seconds=0.3&pace=fast"
+    assert main(["share", source, "--zenoh", "short", "--listen", f"tcp/127.0.0.1:{free_port()}"]) == 0
+    assert "is shared as zenoh:short" in capsys.readouterr().out
+
+
+ENDS = """
+import biotac
+hand = biotac.open("{port}")
+print(len(hand.read(seconds=0.1)))
+"""
+
+
+def test_a_program_that_does_not_close_its_hand_ends(shared: Any) -> None:
+    ended = subprocess.run([sys.executable, "-c", ENDS.format(port=shared.port())], capture_output=True, timeout=300)
+    assert ended.stdout.split() and ended.returncode == 0, ended.stderr

@@ -15,7 +15,7 @@ from ..outputs import note, report
 from .stream import batches, report_lost
 
 EXAMPLE = "biotac share /dev/ttyACM0 --zenoh left"
-LOOK_S = 0.5
+SHARED_LOOK_S = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,16 +58,18 @@ def serve(args: argparse.Namespace) -> int:
         facts = {"port": f"zenoh:{name}", "board": hand.port, "fingers": hand.fingers}
         report(args, facts, f"{hand.port} is shared as zenoh:{name}; Ctrl-C stops")
         try:
-            while True:
-                hand.check()  # the bridge reads and publishes on its own
-                time.sleep(LOOK_S)
+            while not hand.ended:  # the bridge reads and publishes on its own
+                hand.check()
+                time.sleep(SHARED_LOOK_S)
         except KeyboardInterrupt:
-            return 0
+            pass
+    return 0
 
 
 def publish(args: argparse.Namespace) -> int:
     """Publish streams on LSL until the time is over or the source ends."""
     from ...bridges.lsl import Outlet  # here, because Zenoh needs no liblsl
+    from ...bridges.silence import LOOK_S
 
     with biotac.open(args.port, pace=1.0) as hand, Outlet(hand) as outlet:
         hand.stream("results", "events")
@@ -76,7 +78,7 @@ def publish(args: argparse.Namespace) -> int:
         lines = [f"{s['name']}, {rate}" for s, rate in zip(streams, rates, strict=True)]
         report(args, {"streams": streams}, "\n".join([*lines, *(["Ctrl-C stops"] if args.seconds is None else [])]))
         with suppress(KeyboardInterrupt):
-            for batch, _ in batches(hand, args.seconds):
+            for batch, _ in batches(hand, args.seconds, LOOK_S):
                 outlet.push(batch)
         if outlet.by_arrival:
             note(f"{outlet.by_arrival} sample(s) stamped by arrival time: board clock unknown")

@@ -47,11 +47,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def batches(hand: biotac.Hand, seconds: float | None) -> Iterator[tuple[biotac.Batch, float]]:
+def batches(
+    hand: biotac.Hand, seconds: float | None, every_s: float | None = None
+) -> Iterator[tuple[biotac.Batch, float]]:
     """Batches, each with the device time of rows, each with its 10 ms, until it is ``seconds``."""
     first_us: int | None = None
     passed_s = 0.0
-    for batch in hand.batches():
+    for batch in hand.batches(every_s):
         last_us = batch.last_t_us()
         if last_us is not None:
             first_us = batch.first_t_us() if first_us is None else first_us

@@ -16,6 +16,7 @@ from std_msgs.msg import Float64MultiArray, String, UInt8, UInt32
 from std_srvs.srv import Trigger
 
 import biotac
+from biotac.bridges.silence import LOOK_S, Silence
 from biotac.clock.stamps import Stamps
 from biotac.recording.layout import frame_id
 
@@ -35,8 +36,9 @@ class Fingers(Node):
     ``biotac/finger0/trust`` UInt8 (enum trust);
     ``biotac/finger0/slip`` UInt8, its slip_level: 0 where it does not slip, 255 where that is not known;
     ``biotac/finger0/event`` String, an event's kind (EventKind: SLIP, ...) as soon as it is told. What is
-    invalid is NaN, never an old value: look at it before a controller does. Stamps are the begin of the round on this
-    node's clock. Service ``biotac/tare``, a Trigger: tares every finger now.
+    invalid is NaN, never an old value: look at it before a controller does. A finger that had frames and has had none
+    for 0.1 s is NaN once, of trust NONE. Topics come when a finger first does. Stamps are the begin of the round on
+    this node's clock. Service ``biotac/tare``, a Trigger: tares every finger now.
     """
 
     def __init__(self) -> None:
@@ -46,13 +48,10 @@ class Fingers(Node):
         self.hand = hand = biotac.open(self.get_parameter("port").value or None, pace=1.0)
         hand.stream("results", "events")
         self._stamps = Stamps(hand, lambda: self.get_clock().now().nanoseconds / 1e9)
-        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "grip": Float64MultiArray, "event": String}
-        kinds |= {"flags": UInt32, "trust": UInt8, "slip": UInt8}
-        self._topics = {
-            (finger, name): self.create_publisher(kind, f"biotac/finger{finger}/{name}", DEPTH)
-            for finger in hand.fingers
-            for name, kind in kinds.items()
-        }
+        self._silence = Silence()
+        self._topics: dict[int, dict[str, Any]] = {}
+        for finger in hand.fingers:
+            self._of(finger)
         self.create_service(Trigger, "biotac/tare", self.tare)
 
     def publish(self, batch: Any) -> None:
@@ -61,21 +60,35 @@ class Fingers(Node):
         for message in batch.messages:
             if isinstance(message, biotac.Event) and message.kind in list(biotac.EventKind):
                 kind_text = String(data=biotac.EventKind(message.kind).name)
-                self._topics[message.finger, "event"].publish(kind_text)
-        if not len(batch.frames):
-            return
+                self._of(message.finger)["event"].publish(kind_text)
         first = self._stamps.by_arrival == 0
-        stamps_s = np.empty(len(batch.frames))
-        for finger in np.unique(batch.frames["finger"]).tolist():
-            rows = batch.frames["finger"] == finger
-            stamps_s[rows] = self._stamps.of(batch.frames["t_us"][rows].astype(np.float64), finger)
+        self._publish_all(batch.frames)
+        self._publish_all(self._silence.rows(batch))
         if first and self._stamps.by_arrival:
             self.get_logger().warning("the board's clock is not known yet: frames are stamped on arrival")
-        for row, stamp_s in zip(batch.frames, stamps_s.tolist(), strict=True):
+
+    def _of(self, finger: int) -> dict[str, Any]:
+        """The publishers of a finger, made when it first appears."""
+        if finger not in self._topics:
+            kinds = {"wrench": WrenchStamped, "poc": PointStamped, "grip": Float64MultiArray, "event": String}
+            kinds |= {"flags": UInt32, "trust": UInt8, "slip": UInt8}
+            self._topics[finger] = {
+                name: self.create_publisher(kind, f"biotac/finger{finger}/{name}", DEPTH)
+                for name, kind in kinds.items()
+            }
+        return self._topics[finger]
+
+    def _publish_all(self, frames: Any) -> None:
+        stamps_s = np.empty(len(frames))
+        for finger in np.unique(frames["finger"]).tolist():
+            rows = frames["finger"] == finger
+            stamps_s[rows] = self._stamps.of(frames["t_us"][rows].astype(np.float64), finger)
+        for row, stamp_s in zip(frames, stamps_s.tolist(), strict=True):
             self._publish(row, round(stamp_s * 1e9))
 
     def _publish(self, row: Any, stamp_ns: int) -> None:
         finger = int(row["finger"])
+        topics = self._of(finger)
         wrench, point = WrenchStamped(), PointStamped()
         for header in (wrench.header, point.header):
             header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, 10**9)
@@ -83,12 +96,12 @@ class Fingers(Node):
         fill(wrench.wrench.force, row["force_n"])
         fill(wrench.wrench.torque, row["torque_nmm"] / 1000.0)
         fill(point.point, row["poc_mm"] / 1000.0)
-        self._topics[finger, "wrench"].publish(wrench)
-        self._topics[finger, "poc"].publish(point)
-        self._topics[finger, "grip"].publish(Float64MultiArray(data=[float(row[name]) for name in GRIP]))
-        self._topics[finger, "flags"].publish(UInt32(data=int(row["flags"])))
-        self._topics[finger, "trust"].publish(UInt8(data=int(row["trust"])))
-        self._topics[finger, "slip"].publish(UInt8(data=int(row["slip_level"])))
+        topics["wrench"].publish(wrench)
+        topics["poc"].publish(point)
+        topics["grip"].publish(Float64MultiArray(data=[float(row[name]) for name in GRIP]))
+        topics["flags"].publish(UInt32(data=int(row["flags"])))
+        topics["trust"].publish(UInt8(data=int(row["trust"])))
+        topics["slip"].publish(UInt8(data=int(row["slip_level"])))
 
     def tare(self, request: Any, response: Any) -> Any:
         """Tare every finger; the message names those that could not be tared, and why."""
@@ -110,7 +123,7 @@ def fill(vector: Any, values: Any) -> None:
 
 def spin(node: Fingers) -> None:
     """Publish until the source ends or ROS shuts down. One thread has board and node: a Hand is for one."""
-    for batch in node.hand.batches():
+    for batch in node.hand.batches(LOOK_S):
         if not rclpy.ok():
             return
         node.publish(batch)
