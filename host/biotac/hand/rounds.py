@@ -29,7 +29,8 @@ class Round:
     """What a board made of 10 ms: ``now["index"].frame``, ``now.events``.
 
     ``seq`` and ``t_us`` are those of its frames, -1 when there is none. ``missed`` is how many rounds were passed over
-    since the one before: theirs are the events that are older than this round, so that none is lost.
+    since the one before: theirs are the events that are older than this round. ``events_lost`` is how many of them are
+    not here, as a program that stands still is given the newest 1024.
     """
 
     seq: int
@@ -37,6 +38,7 @@ class Round:
     missed: int
     fingers: Mapping[str, FingerRound]
     events: tuple[Event, ...]
+    events_lost: int = 0
 
     def __getitem__(self, finger: str) -> FingerRound:
         """A finger by name; one that sent nothing has no frame. Raises KeyError for an unknown name."""
@@ -54,6 +56,7 @@ class Rounds(Consumer):
         self._latest = latest
         self._rows: dict[int, dict[int, tuple[Batch, int]]] = {}  # by t_us, by finger
         self._events: list[tuple[int, Event]] = []
+        self._events_lost = 0  # since a round was given
         self._expected = set(FINGERS_IN[reader.present])  # fingers that have rows: with these a round is complete
         self._news = threading.Condition()
         self._given_us = -1  # the latest round that was given
@@ -77,6 +80,7 @@ class Rounds(Consumer):
             for old in sorted(self._rows)[:-2]:  # a program that is behind gets the newest
                 del self._rows[old]
             events = [(self._reader.unwrap_t_us(m.t_us), m) for m in batch.messages if type(m) is Event]
+            self._events_lost += max(0, len(self._events) + len(events) - MOST_EVENTS)
             self._events = [*self._events, *events][-MOST_EVENTS:]
             self._news.notify_all()
 
@@ -128,6 +132,7 @@ class Rounds(Consumer):
             end_us = None if t_us is None else t_us + ROUND_US
             due = [event for at_us, event in self._events if end_us is None or at_us < end_us]
             self._events = self._events[len(due) :]
+            lost, self._events_lost = self._events_lost, 0
             before_us = self._given_us
             if rows and newest is not None:
                 self._expected, self._given_us = set(rows), newest
@@ -139,6 +144,6 @@ class Rounds(Consumer):
             fingers[self._latest.name(finger)] = FingerRound(frames.get(finger), own)
         seq = next((frame.seq for frame in frames.values()), -1)
         if not frames or newest is None:
-            return Round(-1, -1, 0, fingers, tuple(due))
+            return Round(-1, -1, 0, fingers, tuple(due), lost)
         missed = round((newest - before_us) / ROUND_US) - 1 if before_us >= 0 else 0
-        return Round(seq, newest, missed, fingers, tuple(due))
+        return Round(seq, newest, missed, fingers, tuple(due), lost)

@@ -132,6 +132,7 @@ def noisy_line(a_bit: float) -> Fault:
     return fault
 
 
+EXCHANGED = "two fingers exchanged"
 FAULTS: dict[str, Fault] = {
     "electrode open": _of_electrode(lambda on, x, t: np.full_like(x, 4095)),
     "electrode shorted": _of_electrode(lambda on, x, t: np.zeros_like(x)),
@@ -152,7 +153,7 @@ FAULTS: dict[str, Fault] = {
     "the same words for ever": _freeze(range(SLOTS_PER_FRAME)),
     "electrodes frozen, pressure alive": _freeze(ELECTRODE_SLOT),
     "channels shifted by a slot": _shifted,
-    "two fingers exchanged": lambda on, words, other: other.copy(),
+    EXCHANGED: lambda on, words, other: other.copy(),
     "cross-talk of 30 % between fingers": _slot_fault(ELECTRODE_SLOT, lambda on, x, y: x + 0.3 * (y - on.other_rest)),
     "cross-talk of 100 % between fingers": _slot_fault(ELECTRODE_SLOT, lambda on, x, y: x + (y - on.other_rest)),
     "noisy line, 1e-3 a bit": noisy_line(1e-3),
@@ -162,6 +163,9 @@ FAULTS: dict[str, Fault] = {
     "PDC 0": _slot_fault(PDC_SLOT, lambda on, x, y: 0.0),
     "PDC 4095": _slot_fault(PDC_SLOT, lambda on, x, y: 4095.0),
 }
+
+#: These are between a finger and the one beside it.
+BETWEEN_FINGERS = (EXCHANGED, "cross-talk of 30 % between fingers", "cross-talk of 100 % between fingers")
 
 #: What a sensor or its lead does on the bus, in place of counts.
 BUS_FAULTS = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
+from itertools import chain
 
 import numpy as np
 
@@ -12,13 +13,16 @@ from ..link.serial_port import SerialLink
 from ..wire.messages_gen import EmuStatus
 from ..wire.sensor_gen import MAX_SENSORS
 from . import touch
-from .faults import begin
+from .faults import BETWEEN_FINGERS, EXCHANGED, begin
 from .physics import Finger
 from .process import SimBoard, SimLink
 from .sampling import Sampler, Words
 from .scenario import default_serial
 from .source import Source
 from .touch import Load
+
+#: A fault on a finger: its number, that of the finger beside it, and what is laid over its words, given both.
+Laid = tuple[int, int, Callable[[Words, Words], Words]]
 
 
 class LiveFingers:
@@ -27,11 +31,14 @@ class LiveFingers:
     def __init__(self, fingers: Mapping[str, Finger]) -> None:
         if not 1 <= len(fingers) <= MAX_SENSORS:
             raise InputError(f"{len(fingers)} fingers are given, expected 1 to {MAX_SENSORS}")
+        for name, finger in fingers.items():
+            if not isinstance(finger, Finger):
+                raise InputError(f"finger {name!r} is {finger!r}, expected a SimFinger")
         self.names = {name: number for number, name in enumerate(fingers)}
         self._fingers = tuple(fingers.values())
         self._samplers = [Sampler(finger) for finger in self._fingers]
         self._rest = [finger.rest_counts(np.zeros(1))[0] for finger in self._fingers]
-        self._faults: dict[tuple[int, str], Callable[[Words, Words], Words]] = {}
+        self._faults: dict[str, tuple[Laid, ...]] = {}
 
     def at_rest(self, rounds: int = 1) -> Source:
         """The next rounds, in which nothing touches."""
@@ -46,8 +53,8 @@ class LiveFingers:
         read = [sampler.steps(rounds, *state) for sampler, state in zip(self._samplers, states, strict=True)]
         words = np.stack(read, axis=1)
         spoilt: Words = words.copy()
-        for (number, _), lay in self._faults.items():
-            spoilt[:, number] = lay(spoilt[:, number], words[:, (number + 1) % len(read)])
+        for number, beside, lay in chain(*self._faults.values()):
+            spoilt[:, number] = lay(spoilt[:, number], words[:, beside])
         return spoilt
 
     def number(self, name: str) -> int:
@@ -60,11 +67,17 @@ class LiveFingers:
         """Lay a fault on a finger from the next round on; None ends all of that finger's. See World.fault."""
         number = self.number(name)
         if kind is None:
-            self._faults = {key: laid for key, laid in self._faults.items() if key[0] != number}
+            self._faults = {
+                key: all_laid for key, all_laid in self._faults.items() if all(laid[0] != number for laid in all_laid)
+            }
             return
-        rest, other_rest = self._rest[number], self._rest[(number + 1) % len(self._rest)]
-        seed = [self._fingers[number].seed, 7]
-        self._faults[number, f"{kind} {channel}"] = begin(kind, channel, rest, other_rest, seed)
+        if kind in BETWEEN_FINGERS and len(self.names) == 1:
+            raise InputError(f"{kind!r} needs a second finger, and there is only {name!r}; add one")
+        beside, seed = (number + 1) % len(self.names), [self._fingers[number].seed, 7]
+        hit = [(number, beside), (beside, number)] if kind == EXCHANGED else [(number, beside)]
+        self._faults[f"{number} {kind} {channel}"] = tuple(
+            (one, other, begin(kind, channel, self._rest[one], self._rest[other], seed)) for one, other in hit
+        )
 
 
 class LiveLink(SimLink):

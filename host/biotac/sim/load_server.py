@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import json
 import socket
+from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
 from ..documents import parse_json
-from ..errors import BiotacError, DeviceLostError, InputError
+from ..errors import BiotacError, DeviceLostError, InputError, said
 from .live import LiveFingers
 from .process import SimBoard
 from .touch import Course, Load, Touch
 
 LINE_BYTES = 65536
 _KEYS = [field.name for field in fields(Touch)]
+_FAULT_KEYS = ("finger", "kind", "channel")
 
 
 class LoadServer:
@@ -39,34 +41,47 @@ class LoadServer:
         with self._listening:
             while True:
                 program, _ = self._listening.accept()
-                with program, program.makefile("rwb") as lines:
-                    try:
-                        self._serve(lines)
-                    except (BrokenPipeError, ConnectionResetError):
-                        continue  # the program has gone in the middle of a round
+                # The program may go in the middle of a round; what was not sent then fails again as the file is closed.
+                with suppress(BrokenPipeError, ConnectionResetError), program, program.makefile("rwb") as lines:
+                    self._serve(lines)
 
     def _serve(self, lines: Any) -> None:
         while line := lines.readline(LINE_BYTES):
+            rest = line if len(line) == LINE_BYTES else b"\n"
+            while rest and not rest.endswith(b"\n"):
+                rest = lines.readline(LINE_BYTES)
             lines.write(json.dumps(self._answer(line)).encode() + b"\n")
             lines.flush()
 
     def _answer(self, line: bytes) -> dict[str, Any]:
         try:
+            if len(line) == LINE_BYTES and not line.endswith(b"\n"):
+                raise InputError(f"the line is longer than {LINE_BYTES} bytes; send a course of fewer parts")
             request = parse_json(line)
             if not isinstance(request, dict):
                 raise InputError("expected an object with a load for each finger")
             if "fault" in request:
-                self._fingers.fault(*(request["fault"].get(key) for key in ("finger", "kind", "channel")))
+                self._fingers.fault(*_fault(request))
                 return {"round": self._rounds}
             words = self._fingers.read({name: _load(value) for name, value in request.items()})
         except DeviceLostError:
             raise
-        except (BiotacError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            return {"error": str(error.args[0] if error.args else error)}
+        except (BiotacError, LookupError, TypeError, ValueError, OverflowError) as error:
+            return {"error": said(error)}
         self._sensors.put(words)
         self._sensors.wait_still()
         self._rounds += 1
         return {"round": self._rounds}
+
+
+def _fault(request: dict[str, Any]) -> tuple[str, str | None, str | None]:
+    """Finger, kind and channel of a line that lays a fault, or ends them: only null does, no missing kind."""
+    given = request["fault"]
+    if len(request) > 1 or not isinstance(given, dict) or not {"finger", "kind"} <= {*given} <= {*_FAULT_KEYS}:
+        raise InputError(f"a fault is {json.dumps(request)}, expected it alone, with finger, kind and maybe channel")
+    if not all(value is None or isinstance(value, str) for value in given.values()):
+        raise InputError(f"a fault is {json.dumps(given)}, expected texts, and null for the kind to end faults")
+    return given["finger"], given["kind"], given.get("channel")
 
 
 def _load(value: Any) -> Load:
@@ -75,7 +90,7 @@ def _load(value: Any) -> Load:
         return None
     if isinstance(value, list):
         return [_touch(touch) for touch in value]
-    if isinstance(value, dict) and "course" in value:
+    if isinstance(value, dict) and value.keys() == {"course"} and isinstance(value["course"], list):
         return Course(_load(part) or () for part in value["course"])  # type: ignore[misc]
     return _touch(value)
 

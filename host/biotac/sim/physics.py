@@ -23,10 +23,12 @@ import numpy.typing as npt
 
 from ..core import geometry as surface
 from ..core.geometry import Floats
+from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")
+SEED_MAX = 2**31 - 1
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 REST_CELSIUS = 30.0  # the model's reference temperature
@@ -252,6 +254,10 @@ class Finger:
     """
 
     def __init__(self, seed: int, profile: Profile = "new") -> None:
+        if profile not in PROFILES:
+            raise InputError(f"a finger's profile is {profile!r}, expected one of: {', '.join(PROFILES)}")
+        if not isinstance(seed, (int, np.integer)) or not 0 <= seed <= SEED_MAX:
+            raise InputError(f"a finger's seed is {seed!r}, expected a whole number from 0 to {SEED_MAX}")
         worn = profile == "worn"
         rng = np.random.default_rng([seed, 0])
         self.seed = seed

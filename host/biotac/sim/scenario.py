@@ -31,8 +31,8 @@ from dataclasses import dataclass, replace
 from ..core import geometry as surface
 from ..errors import ScenarioError
 from ..wire import sensor_gen as _sensor
-from .faults import EVERY_FAULT
-from .physics import PROFILES, Profile
+from .faults import BETWEEN_FINGERS, EVERY_FAULT
+from .physics import PROFILES, SEED_MAX, Profile
 from .source import MAX_SECONDS
 from .tables import Table, parse_toml
 from .timeline import Pose, Track
@@ -44,7 +44,6 @@ FORCE_MAX_N = 50.0
 SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0
 SLIP_MAX_MM_S = 200.0
-SEED_MAX = 2**31 - 1
 # Repeated for an hour on five fingers, the worst scenario takes about 8 s on a busy processor (half of it for any hour)
 # and 350 MB.
 FINGER_SECONDS_MAX = 900.0  # all fingers together
@@ -238,6 +237,9 @@ def _point_mm(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
 
 def _fault(table: Table, fingers: int, scenario_s: float) -> Fault:
     table.only(("at_s", "seconds", "finger", "kind", "channel"))
+    kind = table.choice("kind", EVERY_FAULT)
+    if kind in BETWEEN_FINGERS and fingers == 1:
+        raise table.error("kind", f"is '{kind}' with one finger", "a second finger", "add one")
     channel = table.choice("channel", tuple(dict.fromkeys(_sensor.SLOTS))) if "channel" in table else None
     at_s = table.number("at_s", 0.0, scenario_s - 0.01 if scenario_s > 0.01 else 0.0, "s")
     return Fault(
@@ -245,6 +247,6 @@ def _fault(table: Table, fingers: int, scenario_s: float) -> Fault:
         # a fault may not end after the scenario: the source would not play that part
         seconds=table.number("seconds", 0.001, round(scenario_s - at_s, 9), "s"),
         finger=table.integer("finger", 0, fingers - 1),
-        kind=table.choice("kind", EVERY_FAULT),
+        kind=kind,
         channel=channel,
     )

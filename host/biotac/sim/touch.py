@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeAlias
+from numbers import Real
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -38,20 +39,28 @@ class Touch:
     celsius: float = REST_CELSIUS
 
     def __post_init__(self) -> None:
-        if len(self.shear_n) != 2:
+        if np.ndim(self.shear_n) != 1 or len(self.shear_n) != 2:
             raise InputError(f"Touch: shear_n is {self.shear_n}, expected two numbers, to the tip and to E11's side")
         limits = (
             ("normal_n", self.normal_n, 0.0, FORCE_MAX_N),
-            ("shear_n", max(map(abs, self.shear_n)), 0.0, SHEAR_MAX_N),
+            *(("shear_n", value, -SHEAR_MAX_N, SHEAR_MAX_N) for value in self.shear_n),
             ("torsion_nmm", self.torsion_nmm, -TORSION_MAX_NMM, TORSION_MAX_NMM),
             ("tip_mm", self.tip_mm, 0.5, 10.0),
             ("slip_mm_s", self.slip_mm_s, 0.0, SLIP_MAX_MM_S),
             ("celsius", self.celsius, 5.0, 60.0),
         )
         for name, value, low, high in limits:
-            if not low <= value <= high:  # NaN too
-                raise InputError(f"Touch: {name} is {value:g}, expected {low:g} to {high:g}; correct what computes it")
+            if not _is_number(value) or not low <= value <= high:  # NaN too
+                raise InputError(f"Touch: {name} is {value!r}, expected {low:g} to {high:g}; correct what computes it")
+        if not isinstance(self.at, str) and not (
+            isinstance(self.at, tuple) and len(self.at) == 2 and all(map(_is_number, self.at))
+        ):
+            raise InputError(f"Touch: at is {self.at!r}, expected an electrode, E1 to E19, or (x_mm, y_mm)")
         _place_mm(self.at)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 class Course(tuple["Touch | Sequence[Touch]", ...]):
@@ -88,8 +97,13 @@ def states(load: Load) -> tuple[States, ...]:
     return tuple(states_of(np.array([_pose(touch) for touch in column], float)) for column in columns)
 
 
-def _contacts(load: Touch | Sequence[Touch] | None) -> tuple[Touch, ...]:
-    return (Touch(),) if not load else (load,) if isinstance(load, Touch) else tuple(load)
+def _contacts(load: Any) -> tuple[Touch, ...]:
+    contacts = () if load is None else tuple(load) if type(load) in (list, tuple) else (load,)
+    if not all(isinstance(contact, Touch) for contact in contacts):
+        raise InputError(f"a load is {load!r}, expected a Touch, a list of them, a Course of either, or None")
+    if len({contact.celsius for contact in contacts}) > 1:
+        raise InputError(f"a load is {load!r}, expected one celsius for all contacts: it is the finger's own")
+    return contacts or (Touch(),)
 
 
 def _pose(touch: Touch) -> tuple[float, ...]:

@@ -13,6 +13,8 @@ steps so many rounds before each of its own.
 
 from __future__ import annotations
 
+import math
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -93,12 +95,11 @@ class World:
         return self._last
 
     def run(self, seconds: float, **loads: Load) -> Round:
-        """Step with the same loads for so long, without any they rest; the last round, with the events of all."""
-        events: tuple[Any, ...] = ()
-        for _ in range(_rounds_of(seconds)):
-            now = self.step(**loads)
-            events += now.events
-        return replace(now, events=events)
+        """Step with the same loads for so long, without any they rest; the last round, with the events of all.
+
+        So are ``missed`` and ``events_lost``. Raises InputError unless seconds is above 0.
+        """
+        return _as_one([self.step(**loads) for _ in range(_rounds_of(seconds))])
 
     def fault(self, finger: str, kind: str | None, channel: str | None = None) -> None:
         """Lay a fault on a finger from the next round on; None ends all of that finger's.
@@ -120,6 +121,7 @@ class LockStep(World):
         self._board = board
         self._rounds = Rounds(hand._board.reader, hand._latest) if hand is not None else None
         self._dead = self._away = self._stalled = 0  # for so many more rounds
+        self._turn = threading.Lock()
 
     @property
     def _link(self) -> LiveLink | None:
@@ -130,15 +132,23 @@ class LockStep(World):
         return self._step(1, loads)
 
     def run(self, seconds: float, **loads: Load) -> Round:
-        left, events = _rounds_of(seconds), tuple[Any, ...]()
+        left, rounds = _rounds_of(seconds), list[Round]()
         while left:
             link, is_disturbed = self._link, self._dead or self._away or self._stalled
             count = 1 if is_disturbed or (link is not None and link.reopened) else min(left, AT_ONCE_ROUNDS)
             now, left = self._step(count, loads), left - count
-            events += now.events
-        return replace(now, missed=max(0, now.missed - count + 1), events=events)
+            rounds.append(replace(now, missed=max(0, now.missed - count + 1)))
+        return _as_one(rounds)
 
     def _step(self, rounds: int, loads: Mapping[str, Load]) -> Round:
+        if not self._turn.acquire(blocking=False):
+            raise InputError("another thread is stepping this world, expected one thread; give each a world of its own")
+        try:
+            return self._next(rounds, loads)
+        finally:
+            self._turn.release()
+
+    def _next(self, rounds: int, loads: Mapping[str, Load]) -> Round:
         words, link = self._fingers.read(loads, rounds), self._link
         if link is not None and link.reopened and not link.away:
             self._reconnect()  # the program itself restarted the board
@@ -165,40 +175,53 @@ class LockStep(World):
 
         The hand connects again by itself. Settings and maps are restored as on a board, tares are not.
         """
-        self._pull(is_process=True)
-        self._dead, self._away = _rounds_of(boot_s), max(_rounds_of(away_s), _rounds_of(boot_s) + 1)
+        dead, away = _rounds_of(boot_s), _rounds_of(away_s)
+        link = self._checked_link(is_process=True)
+        before = self._away if link.away else 0  # while it hung, its port was to go
+        self._pull()
+        self._dead, self._away = dead, max(before, away, dead + 1)
 
     def cut_power(self, seconds: float) -> None:
         """Take the board's power for so long; then it boots, and its port comes back."""
+        _rounds_of(seconds)
         self.restart(boot_s=seconds + BOOT_S, away_s=seconds + AWAY_S)
 
     def hang(self, seconds: float = WATCHDOG_S) -> None:
         """The board does nothing for so long, while its port stays; then its watchdog resets it."""
-        self._dead = _rounds_of(seconds)
-        self._away = self._dead + _rounds_of(AWAY_S)
+        dead = _rounds_of(seconds)
+        self._checked_link(is_process=True)
+        self._dead, self._away = dead, max(self._away, dead + _rounds_of(AWAY_S))
 
     def unplug(self, seconds: float) -> None:
         """Take the cable to the host out for so long. The board has its power from elsewhere, and goes on."""
-        if self.hand is not None:
+        away = _rounds_of(seconds)
+        if not self._checked_link().away:
             self.hand.ping()  # as the keep-alive of a stream in real time: a HOLD lapses no sooner here
         self._pull()
-        self._away = _rounds_of(seconds)
+        self._away = max(self._away, away)
 
     def stall_host(self, seconds: float) -> None:
         """Let the program stand still for so long: steps return nothing, then all events that came meanwhile."""
-        self._stalled = _rounds_of(seconds) + 1
+        stalled = _rounds_of(seconds) + 1
+        self._checked_link()
+        self._stalled = stalled
 
-    def _pull(self, is_process: bool = False) -> None:
+    def _checked_link(self, is_process: bool = False) -> LiveLink:
         if self._link is None or (is_process and type(self._board) is not SimBoard):
             raise InputError("this needs a hand, and a restart the board that is a process; leave both arguments out")
-        self._link.away = True
+        if self.hand._board.closed:
+            raise InputError("the world was closed, expected one that runs; start another")
+        return self._link
+
+    def _pull(self) -> None:
+        self._checked_link().away = True
         reader = self.hand._board.reader
         if not reader.wait_for(lambda: reader.parked or reader.failure, PATIENCE_S):
             raise DeviceLostError("the simulated hand did not notice that its cable is out; start another world")
 
     def _reset(self) -> None:
         if self._link is not None and not self._link.away:  # it hung until now
-            self._pull(is_process=True)
+            self._pull()
         self._board.restart()
 
     def _reconnect(self) -> None:
@@ -246,6 +269,11 @@ def world(
     start, InputError or CommandRefusedError for a wrong setting or map.
     """
     feed = LiveFingers(fingers)
+    maps, settings = dict(maps or {}), {name.upper(): value for name, value in (settings or {}).items()}
+    if wrong := [*(settings.keys() - Setting.__members__.keys()), *(maps.keys() - feed.names.keys())]:
+        raise InputError(f"{wrong[0]!r} names no setting of link.toml, and no finger that has a map; correct it")
+    if not hand and (maps or settings):
+        raise InputError("maps and settings are given with hand=False, expected a hand that sends them; leave them out")
     with ExitStack() as closes:
         live = start_board(board, feed.at_rest(), pace=0.0, live=True, image=image)
         closes.callback(live.close)
@@ -256,9 +284,9 @@ def world(
         if opened is None:
             live.release()
         else:
-            for name, value in (settings or {}).items():
-                opened.board.set_setting(Setting[name.upper()], value)
-            for name, board_map in (maps or {}).items():
+            for name, value in settings.items():
+                opened.board.set_setting(Setting[name], value)
+            for name, board_map in maps.items():
                 opened.board.set_map(name, board_map, force=True)
             made._count()
             opened.stream(*streams)
@@ -293,5 +321,17 @@ def wired_world(
         return World(feed, sensors, hand, closes.pop_all())
 
 
+def _as_one(rounds: Sequence[Round]) -> Round:
+    """The last of these rounds, with the events of all."""
+    return replace(
+        rounds[-1],
+        missed=sum(now.missed for now in rounds),
+        events=tuple(event for now in rounds for event in now.events),
+        events_lost=sum(now.events_lost for now in rounds),
+    )
+
+
 def _rounds_of(seconds: float) -> int:
+    if not 0.0 < seconds < math.inf:  # NaN too
+        raise InputError(f"seconds is {seconds!r}, expected a number above 0")
     return max(1, round(seconds * FRAME_HZ))

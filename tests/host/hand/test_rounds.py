@@ -38,6 +38,14 @@ def test_the_next_round_after_a_reboot_comes_at_once_with_the_events_before(worl
     )
 
 
+def test_events_that_a_round_has_no_room_for_are_counted(world, quick, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.hand.rounds.MOST_EVENTS", 2)
+    live = world.opened(plugged := world.plug(boot_id=1, fingers_present=1))
+    plugged.firmware.after[wire.Start] = slip_at(9_990_000) * 5 + frame(1000) + frame(1001)
+    now = live.hand.next_round(timeout_s=20)
+    assert (len(now.events), now.events_lost) == (2, 3)
+
+
 def test_a_round_has_all_fingers_although_each_comes_in_a_read_of_its_own(live: Live) -> None:
     """From the second on, also if a loop was given the first before the other finger's frame had come."""
     with live.hand as hand:

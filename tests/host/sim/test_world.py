@@ -83,7 +83,20 @@ def test_several_contacts_add_as_in_the_model() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"normal_n": -1.0}, {"normal_n": np.nan}, {"at": "E20"}, {"at": (9, 9)}, {"shear_n": (30, 0)}, {"shear_n": (1,)}],
+    [
+        {"normal_n": -1.0},
+        {"normal_n": np.nan},
+        {"at": "E20"},
+        {"at": (9, 9)},
+        {"shear_n": (30, 0)},
+        {"shear_n": (1,)},
+        {"shear_n": (0.0, np.nan)},
+        {"shear_n": 1.0},
+        {"normal_n": "2"},
+        {"normal_n": True},
+        {"at": 5},
+        {"at": (1.0, "2")},
+    ],
 )
 def test_a_touch_that_cannot_be_is_refused_in_words(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"Touch: .*expected"):
@@ -152,9 +165,48 @@ def test_what_a_program_gets_wrong_costs_no_time(biotac_world: Callable[..., Any
         w.fault("index", "loose")
     with pytest.raises(InputError, match="channel is 'E77'"):
         w.fault("index", "unplugged", channel="E77")
-    assert w.step().seq == 1
+    for load in (2.0, ["E17"], Course([Course([Touch()])]), [Touch(celsius=20.0), Touch()]):
+        with pytest.raises(InputError, match=r"a load is .*expected"):
+            w.step(index=load)
+    for act in (w.run, w.unplug, w.hang, w.stall_host, w.cut_power, lambda s: w.restart(boot_s=s)):
+        for seconds in (0, -1.0, np.nan, np.inf):
+            with pytest.raises(InputError, match=r"seconds is .*expected a number above 0"):
+                act(seconds)
+    assert w.step().seq == 1 and w.hand.connected
     with pytest.raises(InputError, match="expected 1 to 5"):
         LiveFingers({str(k): SimFinger(k) for k in range(6)})
+
+
+@pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 1.5}, {"seed": 2**31}, {"seed": 1, "profile": "wron"}])
+def test_a_finger_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"a finger's .*expected"):
+        SimFinger(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"settings": {"nope": 1}}, {"maps": {"thumb": b""}}, {"settings": LIN, "hand": False}, {"fingers": {"index": 1}}],
+)
+def test_a_world_that_cannot_be_starts_no_board(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(sys.modules["biotac.sim.world"], "start_board")
+    with pytest.raises(InputError):
+        world(**{"fingers": {"index": SimFinger(1)}} | wrong)
+
+
+def test_what_needs_an_open_hand_is_refused_at_once_without_one() -> None:
+    without, closed = world({"index": SimFinger(1)}, hand=False), world({"index": SimFinger(1)})
+    for w in (without, closed):
+        w.close()
+        for act in (w.restart, w.hang, lambda w=w: w.unplug(1.0), lambda w=w: w.stall_host(1.0)):
+            with pytest.raises(InputError, match=r"needs a hand|was closed"):
+                act()
+
+
+def test_a_second_thread_that_steps_is_refused(biotac_world: Callable[..., Any]) -> None:
+    w = biotac_world(index=1)
+    with w._turn, pytest.raises(InputError, match="another thread"):
+        w.step()
+    assert w.step().seq == 1
 
 
 # ---- what goes wrong ---------------------------------------------------------------------------------
@@ -171,6 +223,38 @@ def test_faults_begin_and_end(biotac_world: Callable[..., Any]) -> None:
     w.fault("index", None)
     now = w.run(0.5)
     assert now["index"].frame.counts[2] < 4090 and now["thumb"].frame is not None
+
+
+def test_exchanged_fingers_have_each_others_words(biotac_world: Callable[..., Any]) -> None:
+    w, alone = biotac_world(index=1, thumb=2, little=3), biotac_world(index=1)
+    before = w.run(0.5)
+    w.fault("index", "two fingers exchanged")
+    now = w.run(0.5)
+    w.fault("thumb", None)
+    after = w.run(0.5)
+    for name, then in (("index", "thumb"), ("thumb", "index"), ("little", "little")):
+        is_of = [np.abs(now[name].frame.counts - before[k].frame.counts.astype(int)).mean() < 20 for k in (then, name)]
+        assert is_of == [True, name == then]
+        assert np.abs(after[name].frame.counts - before[name].frame.counts.astype(int)).mean() < 20
+    with pytest.raises(InputError, match=r"needs a second finger, and there is only 'index'"):
+        alone.fault("index", "cross-talk of 30 % between fingers")
+
+
+@pytest.mark.parametrize("first", ["hang", "restart"])
+def test_a_cable_that_comes_out_of_a_dead_board_comes_back(first: str, biotac_world: Callable[..., Any]) -> None:
+    w = biotac_world(index=1)
+    w.run(0.5)
+    getattr(w, first)()
+    w.unplug(1.0)
+    assert w.run(4.0)["index"].frame is not None
+
+
+def test_a_run_counts_all_rounds_that_were_missed(biotac_world: Callable[..., Any]) -> None:
+    steps, runs = biotac_world(index=1), biotac_world(index=1)
+    for w in (steps, runs):
+        w.run(1.0)
+        w.unplug(0.3)
+    assert runs.run(1.5).missed == sum(steps.step().missed for _ in range(150)) >= 29
 
 
 def test_a_board_that_restarts_hangs_or_loses_its_cable_comes_back(biotac_world: Callable[..., Any]) -> None:

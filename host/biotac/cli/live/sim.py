@@ -114,6 +114,8 @@ def run(args: argparse.Namespace) -> int:
 def serve_loads(args: argparse.Namespace) -> int:
     """Run a board whose fingers another program loads, until Ctrl-C."""
     names = [name for name in args.live.split(",") if name]
+    if len({*names, "fault"}) <= len(names):
+        raise InputError(f"--live is {args.live}, expected different names, and none of them fault, a key of its lines")
     fingers = LiveFingers({name: Finger(1 + number) for number, name in enumerate(names)})
     board = start_board(args.board or "posix", fingers.at_rest(), pace=0.0, live=True, image=args.image)
     with until_ctrl_c(board, args.link):

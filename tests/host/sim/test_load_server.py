@@ -1,0 +1,93 @@
+"""Loads from a program in any language: lines of JSON, each answered once."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import pytest
+
+import biotac
+from biotac.cli.main import main
+from biotac.sim import SimFinger
+from biotac.sim.live import LiveFingers
+from biotac.sim.load_server import LINE_BYTES, LoadServer
+from biotac.sim.ports import start_board
+
+PRESS = {"normal_n": 1.0}
+
+
+@pytest.fixture
+def server() -> Iterator[LoadServer]:
+    fingers = LiveFingers({"index": SimFinger(1), "thumb": SimFinger(2)})
+    board = start_board("posix", fingers.at_rest(), pace=0.0, live=True)
+    server = LoadServer(fingers, board)
+
+    def serve() -> None:
+        with suppress(OSError):  # it stops listening at the end
+            server.serve()
+
+    serving = threading.Thread(target=serve)
+    serving.start()
+    with biotac.open(board.path) as hand:  # whose reader the board waits for
+        hand.stream("results")
+        hand.on_batch(lambda batch: None)
+        yield server
+        server._listening.shutdown(socket.SHUT_RDWR)
+        serving.join()
+    board.close()
+
+
+def answers(server: LoadServer, *lines: bytes) -> list[dict[str, Any]]:
+    with socket.create_connection(("127.0.0.1", server.port)) as program, program.makefile("rwb") as file:
+        file.write(b"".join(line + b"\n" for line in lines))
+        file.flush()
+        program.shutdown(socket.SHUT_WR)
+        return [json.loads(line) for line in file]
+
+
+def fault(**given: Any) -> dict[str, Any]:
+    return {"fault": {"finger": "index", **given}}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (fault(), "with finger, kind"),
+        (fault(knd="electrode open"), "with finger, kind"),
+        (fault(kind="electrode open", at=3), "with finger, kind"),
+        (fault(kind="electrode open") | {"thumb": PRESS}, "expected it alone"),
+        ({"fault": None}, "with finger, kind"),
+        (fault(kind=["x"]), "expected texts"),
+        (fault(kind="nope"), "no fault 'nope'"),
+        ({"index": {"course": [PRESS], "normal_n": 3}}, "a touch is"),
+        ({"index": {"course": [{"course": [PRESS]}]}}, "a load is"),
+        ({"index": [{"celsius": 10}, {"celsius": 50}]}, "one celsius"),
+        ({"ring": PRESS}, "no finger 'ring', expected one of index, thumb"),
+        ({"index": {"at": "E" * LINE_BYTES}}, "longer than"),
+    ],
+)
+def test_a_line_that_is_no_load_is_answered_once_in_words(server: LoadServer, wrong: Any, words: str) -> None:
+    first, *others = answers(server, json.dumps(wrong).encode(), b"\xff\xfe", b"{}")
+    assert words in first["error"] and "decode" in others[0]["error"] and others[1:] == [{"round": 1}]
+
+
+def test_a_program_that_vanishes_makes_room_for_the_next(server: LoadServer) -> None:
+    for _ in range(5):
+        program = socket.create_connection(("127.0.0.1", server.port))
+        program.sendall(b"{}\n" * 50)
+        program.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        program.close()
+    (answer,) = answers(server, b"{}")
+    assert answer["round"] >= 1
+
+
+@pytest.mark.parametrize("names", ["index,index", "index,fault"])
+def test_names_that_a_line_could_not_tell_apart_are_refused(names: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sim", "--live", names]) == 2
+    assert "expected different names" in capsys.readouterr().err
