@@ -99,10 +99,13 @@ def states(load: Load) -> tuple[States, ...]:
 
 def _contacts(load: Any) -> tuple[Touch, ...]:
     contacts = () if load is None else tuple(load) if type(load) in (list, tuple) else (load,)
-    if not all(isinstance(contact, Touch) for contact in contacts):
-        raise InputError(f"a load is {load!r}, expected a Touch, a list of them, a Course of either, or None")
-    if len({contact.celsius for contact in contacts}) > 1:
-        raise InputError(f"a load is {load!r}, expected one celsius for all contacts: it is the finger's own")
+    for contact in contacts:
+        if not isinstance(contact, Touch):
+            seen = type(contact).__name__
+            raise InputError(f"a load has a {seen}, expected a Touch, a list of them, a Course of either, or None")
+    celsius = sorted({contact.celsius for contact in contacts})
+    if len(celsius) > 1:
+        raise InputError(f"a load has contacts of celsius {celsius}, expected one for all: it is the finger's own")
     return contacts or (Touch(),)
 
 

@@ -166,7 +166,7 @@ def test_what_a_program_gets_wrong_costs_no_time(biotac_world: Callable[..., Any
     with pytest.raises(InputError, match="channel is 'E77'"):
         w.fault("index", "unplugged", channel="E77")
     for load in (2.0, ["E17"], Course([Course([Touch()])]), [Touch(celsius=20.0), Touch()]):
-        with pytest.raises(InputError, match=r"a load is .*expected"):
+        with pytest.raises(InputError, match=r"a load has .*expected"):
             w.step(index=load)
     for act in (w.run, w.unplug, w.hang, w.stall_host, w.cut_power, lambda s: w.restart(boot_s=s)):
         for seconds in (0, -1.0, np.nan, np.inf):
