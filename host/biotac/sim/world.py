@@ -183,7 +183,7 @@ class LockStep(World):
 
     def cut_power(self, seconds: float) -> None:
         """Take the board's power for so long; then it boots, and its port comes back."""
-        _rounds_of(seconds)
+        _rounds_of(seconds)  # also refuses what BOOT_S would make a number above 0
         self.restart(boot_s=seconds + BOOT_S, away_s=seconds + AWAY_S)
 
     def hang(self, seconds: float = WATCHDOG_S) -> None:
@@ -271,7 +271,7 @@ def world(
     feed = LiveFingers(fingers)
     maps, settings = dict(maps or {}), {name.upper(): value for name, value in (settings or {}).items()}
     if wrong := [*(settings.keys() - Setting.__members__.keys()), *(maps.keys() - feed.names.keys())]:
-        raise InputError(f"{wrong[0]!r} names no setting of link.toml, and no finger that has a map; correct it")
+        raise InputError(f"{wrong[0]!r} is none of them, expected a setting of link.toml, or a finger for a map")
     if not hand and (maps or settings):
         raise InputError("maps and settings are given with hand=False, expected a hand that sends them; leave them out")
     with ExitStack() as closes:

@@ -12,6 +12,7 @@ import { Stream } from "./stream.js";
 import { Timeline, savePicture } from "./timeline.js";
 
 const READ_MS = 100; // numbers that change faster cannot be read
+const LATE_MS = 1000;
 
 class Page {
   constructor() {
@@ -131,7 +132,7 @@ class Page {
     if (!health) return;
     const isThere = this.model.fingers.has(this.shown);
     if (this.frozen && health.link === "live") showLink("paused", "Paused: the picture is frozen; the board and any recording keep running.");
-    else if (this.model.isLate) showLink(health.link, `What is shown is ${number(lateMs / 1000, 0)} s old: the line from the viewer program is slow.`, true);
+    else if (lateMs > LATE_MS) showLink(health.link, `What is shown is ${number(lateMs / 1000, 0)} s old: the line from the viewer program is slow.`, true);
     else if (health.link === "live" && this.model.isSilent(this.shown)) showLink("live", isThere ? "No new frames come from this finger: what is shown is old." : "No frames come from this finger.", true);
     else showLink(health.link, health.words);
     this.showButtons();
@@ -207,7 +208,7 @@ class Page {
     showTare(about, facts);
     showFaults(about, facts);
     const latest = fingers.get(this.shown)?.latest;
-    const frame = latest ?? this.model.blank;
+    const frame = latest ?? this.model.inUnits([]);
     this.results.show(frame);
     this.flags.show(frame.flags);
     this.hand.read(this.model, this.masks.UNTARED);

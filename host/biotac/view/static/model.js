@@ -6,7 +6,6 @@ export const HISTORY_S = 10;
 export const zoom = { s: HISTORY_S }; // that the charts show of it
 export const SPECTRUM_SAMPLES = 1024;
 const STALE_MS = 500; // the slowest news of a healthy board are some 100 ms apart on a busy computer
-const LATE_MS = 1000;
 const HISTORY_ROWS = 1100; // a little more than HISTORY_S of frames
 const TRAIL_POINTS = 40;
 const COLUMN_SAMPLES = 128; // of the spectrogram: 58 ms
@@ -25,19 +24,10 @@ export class Model {
     this.lateMs = 0; // how much slower the latest news were: behind a slow line they are old
   }
 
-  get isLate() {
-    return this.lateMs > LATE_MS;
-  }
-
   // Whether a finger stands still, by now or, as a recording may be paused, beside the others. Its force is an old one.
   isSilent(index) {
     const nowMs = this.health?.live ? performance.now() : this.newestMs;
     return nowMs - (this.fingers.get(index)?.addedMs ?? this.beganMs) > STALE_MS;
-  }
-
-  // The numbers of a finger that has sent nothing.
-  get blank() {
-    return this.inUnits([]);
   }
 
   finger(index) {
@@ -67,6 +57,7 @@ export class Model {
     this.dropped = news.dropped;
   }
 
+  // A frame of a row; without values, of an empty one.
   inUnits(row) {
     const { column, about } = this;
     const scaled = (name, scale = name) => {
