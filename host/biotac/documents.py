@@ -50,6 +50,8 @@ EDITED = "edited"  # in place of the CRC-32
 #: How something was made, for people to read: any keys, any JSON values. Nothing is computed from it.
 Provenance = dict[str, Any]
 
+DOUBT = "not_worth_using"  # its member that says why not, of what was written by force
+
 Read = TypeVar("Read")
 
 

@@ -93,7 +93,18 @@ def test_a_hand_is_driven_in_the_paper_s_order_and_taken_back_when_it_fails() ->
         three = [(name, deg) for name in ("thumb", "index") for deg in (18, 20, 22)]
         assert targets == [*three, ("thumb", 21), ("index", 21)]
         assert hand.moves[-1] == ("index", None)
+        own = w.hand.board.calibration(1)
         hand.moves.clear()
+        # a plate in kilogram-force's tenths, and one that is knocked at the last touch
+        for times, words in ((9.0, "expected 0.003 to 0.05"), (1.0, "off on the verification press")):
+
+            def plate_n(times: float = times) -> float:
+                return hand.plate_n() * (times if len(hand.moves) < 7 else 3.0)
+
+            with pytest.raises(InputError, match=words):
+                drive(w.hand, hand.to_deg, plate_n, (18, 20, 22, 21), next_round=hand.step, fingers=["thumb"])
+            assert w.hand.board.calibration(1) == own
+            hand.moves.clear()
         with pytest.raises(InputError, match="never came: pressure rose by at most"):  # 14 degrees touch nothing
             drive(w.hand, hand.to_deg, hand.plate_n, (14, 14, 14, 14), next_round=hand.step)
         assert hand.moves[-1] == ("index", None)

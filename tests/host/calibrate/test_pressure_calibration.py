@@ -118,6 +118,20 @@ def test_a_board_whose_time_passes_is_calibrated_to_a_scale_in_one_session(tmp_p
     assert found.fit.press_forces_n == CALIBRATION_FORCES_N
 
 
+class Wrong(Scale):
+    """Another number is typed at the verification press."""
+
+    def force_n(self, step: Step) -> float:
+        return step.force_n * (3 if step.presses == 1 else 1)
+
+
+def test_a_k_that_its_verification_refutes_is_not_put_into_force(tmp_path: Path) -> None:
+    with biotac.open(f"sim:{write_patient_scenario(tmp_path)}?pace={PACE}") as hand:
+        hand.link.source = None
+        (found,) = calibrate(hand, Wrong(), fingers=(0,), made_s=77)
+        assert "67% off on the verification press" in found.why_not and hand.board.calibration(0) is None
+
+
 def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Path, capsys, monkeypatch) -> None:
     def refuse(self: object) -> None:
         raise biotac.CommandRefusedError("SaveSettings: NOT_STORED", 10)
@@ -201,6 +215,17 @@ def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
     assert run(pressed, "--readings", typed) == 0
     table = capsys.readouterr().out.splitlines()
     assert len(table) == 3 and "BTSIM00000000011" in table[1]
+
+
+def test_readings_in_kilograms_are_refused_and_written_only_by_force(pressed: Path, tmp_path: Path, capsys) -> None:
+    kilograms = ",".join(f"{force / 9.80665:.3f}" for force in FORCES)
+    argv = ["--finger", "1", "--out", str(tmp_path / "out"), "--readings"]
+    assert run(pressed, *argv, kilograms) == 1
+    assert "--unit kg" in capsys.readouterr().out and not (tmp_path / "out").exists()
+    assert run(pressed, *argv, kilograms, "--unit", "kg") == 0
+    assert run(pressed, *argv, "2,3.5,5,16", "--force") == 0
+    provenance = json.loads((tmp_path / "out" / "two-finger1.json").read_text())["provenance"]
+    assert "75% off on the verification press" in provenance["not_worth_using"]
 
 
 @pytest.mark.parametrize("head", ["t_s,force_n", "time [s],Fx [N],Fy [N],Fz [N],Tx [Nm],Ty [Nm],Tz [Nm]"])

@@ -12,7 +12,7 @@ import pytest
 from biotac.calibrate import population as population_map
 from biotac.calibrate.population import Population
 from biotac.calibrate.press import few_shot
-from biotac.calibrate.press.few_shot import SCALE
+from biotac.calibrate.press.few_shot import SCALE, Way
 from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
 from biotac.core.geometry import RADIUS_MM
@@ -45,10 +45,10 @@ def firm() -> Population:
 
 
 def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
-    presses, tilted = held(firm, 1.3, 0.08)
+    presses, tilted = held(firm, 1.1, 0.08)
     judged = found(tilted, presses, SCALE)
     x, _, z = judged.own.coefficients[:38].T
-    assert z == pytest.approx(np.full(38, 1.3 * -5.0), rel=0.02)
+    assert z == pytest.approx(np.full(38, 1.1 * -5.0), rel=0.02)
     assert x == pytest.approx(np.zeros(38), abs=0.005 * 5.0)
     assert (judged.held_out_n[[0, 2]] < 0.1 * judged.before_n[[0, 2]]).all()
     assert judged.why_not(np.full(3, 100.0)) == ""
@@ -66,6 +66,29 @@ def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
     presses, tilted = held(firm, 1.0, 0.0)
     presses.force_n[2] *= 5.0
     assert "no better than" in found(tilted, presses, SCALE).why_not(np.full(3, 100.0))
+
+
+@pytest.mark.parametrize(
+    ("gain", "way", "words"),
+    [
+        (1 / 9.80665, SCALE, "0.10 times what the map felt, expected 0.6 to 1.6; check the scale's unit (--unit kg"),
+        (0.8, SCALE, "the gain of z is 0.80, expected 0.88 to 1.12"),
+        (1.5, few_shot.WEIGHTS, "expected 0.70 to 1.30, as fingers have it; check the masses"),
+    ],
+)
+def test_a_size_that_no_finger_explains_names_its_unit(firm: Population, gain: float, way: Way, words: str) -> None:
+    presses, prior = held(firm, gain, 0.0)
+    why_not = found(prior, presses, way).why_not(np.full(3, 1e3))
+    assert words in why_not and "finger is unlike" not in why_not
+
+
+def test_a_scale_that_holds_its_value_is_no_scale(firm: Population) -> None:
+    presses, prior = held(firm, 1.0, 0.1)  # an x that gets better is no excuse
+    growing = replace(presses, counts=TARE + np.linspace(0.9, 1.4, 6)[:, None] * (presses.counts[:1] - TARE))
+    steady = np.tile([0.0, 0.0, firm.force(growing.counts, TARE)[:, 2].mean()], (6, 1))
+    assert "is the scale's hold on?" in found(prior, replace(growing, force_n=steady), SCALE).why_not(np.full(3, 1e3))
+    judged = replace(found(prior, presses, SCALE), before_n=np.array([9.0, 0, 1]), held_out_n=np.array([1.0, 0, 1.2]))
+    assert "held out, z is off by 1.20 N, more than the 1.00 N" in judged.why_not(np.full(3, 1e3))
 
 
 @pytest.mark.parametrize(
@@ -120,13 +143,18 @@ def test_presses_that_the_map_does_not_know_are_refused(tmp_path: Path, capsys: 
         "--finger",
         "index",
     ]
-    argv += ["--presses", "3", "--json"]
-    assert main(argv) == 1
+    out = tmp_path / "poked.wrench.json"
+    argv += ["--presses", "3", "--json", "--out", str(out)]
+    assert main(argv) == 1 and not out.exists()
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0] and "board" not in facts
-    assert "no better than" in facts["why_not"] or "unlike" in facts["why_not"]
+    assert facts["why_not"] and facts["refused"]
     assert main([*argv, "--force"]) == 0
     assert json.loads(capsys.readouterr().out)["board"]["frames_bit_for_bit"] > 0
+    assert json.loads(out.read_text())["provenance"]["not_worth_using"] == facts["why_not"]
+    put = ["calibration", "put", "sim:press.toml?seconds=2400", str(out), "--finger", "0"]
+    assert main(put) == 2 and "is not worth using: " in capsys.readouterr().err
+    assert main([*put, "--force"]) == 0
 
 
 def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -141,8 +169,13 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == pytest.approx([2.0, 3.5, 5.0, 4.0], abs=1e-4)
     assert facts["serial"] == "BTSIM00000000001"
-    assert main([*argv[:-1], "510,300"]) != 0
-    assert "expected 3 or more" in capsys.readouterr().err
+    for readings, words in (
+        ("510,300", "expected 3 or more"),
+        ("204,357,510", "the recording has 4 presses, 3 readings"),
+        ("204,357,510,20000", "up to 20000 g: expected less than 100 N; name the scale's unit"),
+    ):
+        assert main([*argv[:-1], readings]) == 2
+        assert words in capsys.readouterr().err
     assert main(argv[:-2]) != 0
     assert "--readings" in capsys.readouterr().err
 

@@ -82,7 +82,7 @@ def test_a_plate_corrects_directions_from_all_sides_alone(tmp_path: Path, capsys
     recording = tmp_path / "plate.mcap"
     assert main(["record", f"sim:{tmp_path / 'plate.toml'}", str(recording)]) == 0
     capsys.readouterr()
-    argv = ["calibrate", "press", str(recording), "--plate", "--finger", "index", "--json", "--presses"]
+    argv = ["calibrate", "press", str(recording), "--plate", "--finger", "index", "--json", "--force", "--presses"]
     assert main([*argv, "10"]) == 0
     facts = json.loads(capsys.readouterr().out)
     # population.md: 8 and 10 degrees on the halves of a real finger's recording

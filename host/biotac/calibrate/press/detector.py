@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -336,7 +337,24 @@ class Procedure:
     def find(self, rows: StructArray, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
         """The presses in all rows of a recording, by finger, with forces as finish() gives them.
 
-        Raises InputError unless every press was seen.
+        Raises InputError unless every press was seen, and for more presses than forces: which of them has none?
         """
         self.feed(rows)
-        return self.finish(forces_n)
+        found = self.finish(forces_n)
+        for finger, presses in found.items() if forces_n else ():
+            seen = _count(finger, rows[rows["finger"] == finger])
+            if seen > len(presses):
+                raise InputError(
+                    f"finger {finger}: the recording has {seen} presses, {len(presses)} readings or weights: "
+                    "expected one for each; give all of them, or record again"
+                )
+        return found
+
+
+def _count(finger: int, rows: StructArray) -> int:
+    """How many presses of a finger its rows hold."""
+    machine = Presses(finger, len(rows), needs_force=False)
+    with suppress(InputError):  # of a minute of rest behind the last
+        for row in rows:
+            machine.add(row)
+    return len(machine.presses)

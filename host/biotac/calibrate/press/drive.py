@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...hand.rounds import Round
+from ...keep import Calibration
 from ...recording.pressure_check import usable
 from ...wire.frames import StructArray
 from ...wire.messages_gen import INVALID_COUNT, FrameFlags
@@ -42,7 +43,7 @@ def drive(
     with growing force, and the one that verifies. ``plate_n`` is asked after each round for the size of the force on
     the plate in N (Eq 2), NaN where unknown. ``next_round`` lets 10 ms pass: hand.next_round by default, a step of a
     simulated world. A finger is taken back whatever happens. Raises InputError for touches that are not four, an
-    unknown finger, and presses that do not give K.
+    unknown finger, and presses that do not give K; a K that the fourth touch refutes is taken from the board again.
     """
     series = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N  # only how many they are matters: ``touches`` say how hard
     if len(touches) != sum(map(len, series)):
@@ -73,16 +74,26 @@ def drive(
 
     first = through(Procedure(list(names), series[0]), touches[:-1])
     fits = [fit(first.rests[finger], presses) for finger, presses in first.presses.items()]
+    for why_not in filter(None, (fitted.why_not for fitted in fits)):
+        raise InputError(why_not)
     hand.stop()  # a board takes no calibration while it streams
+    unset = Calibration().changed(hand.board.settings())
+    before = {fitted.finger: hand.board.calibration(fitted.finger) or unset for fitted in fits}
     own = {fitted.finger: with_gain(hand, fitted, int(time.time())) for fitted in fits}
     for finger, calibration in own.items():
         put(hand, finger, calibration)
     hand.stream("results", "events")
     held = through(Procedure(list(names), series[1]), touches[-1:]).presses
     source = {"from": hand.port, "touches": list(touches)}
-    return {
-        names[fit.finger]: Calibrated(fit, verify(fit, held[fit.finger][0]), own[fit.finger], source) for fit in fits
-    }
+    found = [Calibrated(fit, verify(fit, held[fit.finger][0]), own[fit.finger], source) for fit in fits]
+    wrong = [calibrated for calibrated in found if calibrated.why_not]
+    if wrong:
+        hand.stop()
+        for calibrated in wrong:
+            put(hand, calibrated.fit.finger, before[calibrated.fit.finger])
+        hand.stream("results", "events")
+        raise InputError("; ".join(calibrated.why_not for calibrated in wrong))
+    return {names[calibrated.fit.finger]: calibrated for calibrated in found}
 
 
 def _rows(now: Round, plate_n: Callable[[], float]) -> StructArray:

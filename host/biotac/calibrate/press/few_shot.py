@@ -25,20 +25,26 @@ PULL = 1000.0  # weight of the population map against the finger's own data, in 
 
 @dataclass(frozen=True)
 class Way:
-    """How a finger was pressed, by ``name``, and what is fitted to that.
+    """How a finger was pressed, by ``name``, and what is fitted to that; ``size`` is what says how hard.
 
     First it is how the map's axes (rows) mix into the finger's (columns), each number within ``spread`` (3, 3); where
     that is None, the gain of the electrodes' normals. With ``columns``, the coefficients of all columns follow.
     """
 
     name: str
+    size: str
     spread: Floats | None
     columns: bool
 
 
-SCALE = Way("presses on a scale", np.array([[0, 0, 0], [0, 0, 0], [BALANCE_SPREAD, 0, GAIN_SPREAD]]), columns=False)
-WEIGHTS = Way("weights on tilted blocks", np.full((3, 3), 0.1), columns=True)
-PLATE = Way("presses of a plate", None, columns=True)
+SCALE = Way(
+    "presses on a scale",
+    "the scale's unit (--unit kg, g or N; 1 lbf is 4.45 N)",
+    np.array([[0, 0, 0], [0, 0, 0], [BALANCE_SPREAD, 0, GAIN_SPREAD]]),
+    columns=False,
+)
+WEIGHTS = Way("weights on tilted blocks", "the masses (--masses, in grams)", np.full((3, 3), 0.1), columns=True)
+PLATE = Way("presses of a plate", "", None, columns=True)
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,18 @@ from ...wire import messages_gen as wire
 from ..population import Population, columns
 from ..wrench.figures import angles_deg, rmse
 from .detector import Press, Procedure
-from .few_shot import Way, fit
+from .few_shot import SCALE, Scale, Way, fit, scale_of
 from .force_source import ForceSource, rows_of
 from .guide import Face, guide
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
+UNIT_SHARE = (0.6, 1.6)  # of the readings in what the map felt: beyond, they are likelier in another unit
+WORSE = 1.1  # held out, z may be off by this much more: chance with few presses
+EQUAL, UNEQUAL = 0.01, 0.3  # ranges, as shares of the mean: of readings that are the same, of presses that are not
 STRAIGHT_DOWN = (0.0, 0.0, 1.0)
 ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # on a scale: light and firm in turn; starts again after the last
+CURE = "tare, and load the pad flat, firmly and steadily"
 SIDE = 0.3  # component of a plate's normal, on each side
 
 
@@ -52,11 +56,16 @@ class Held:
 class Found:
     """The finger's ``own`` map, fitted to all presses, and RMS errors (3,) in N over the presses.
 
+    ``scale`` is the correction, None for a plate. ``shown_n`` and ``felt_n`` (k,) are z as given and as felt.
     ``held_out_n`` is with each press predicted by a map fitted to the others, ``before_n`` that of the map as it was;
     ``before_deg`` and ``held_out_deg`` are the median errors of the direction.
     """
 
     own: Population
+    way: Way
+    scale: Scale | None
+    shown_n: Floats
+    felt_n: Floats
     before_n: Floats
     held_out_n: Floats
     before_deg: float
@@ -65,17 +74,51 @@ class Found:
     def why_not(self, sigma_n: Floats) -> str:
         """Why the own map should not be used; empty if it should.
 
-        It should if it is better than the map as it was, and the finger is like those that the map knows: each axis's
-        held-out error is below FAR_SIGMAS times the map's one sigma ``sigma_n`` (3,).
+        It should if the forces are believable, if it is better than the map as it was, and if the finger is like those
+        that the map knows: each axis's held-out error is below FAR_SIGMAS times the map's one sigma ``sigma_n`` (3,).
         """
+        return self._why_not_forces() or self._why_not_errors(sigma_n)
+
+    def _why_not_forces(self) -> str:
+        if self.scale is None:
+            return ""
+        share, (low, high) = float(np.median(self.shown_n / self.felt_n)), UNIT_SHARE
+        if not low <= share <= high:
+            return (
+                f"{self.way.name} say {share:.2f} times what the map felt, expected {low:g} to {high:g}; check "
+                f"{self.way.size}"
+            )
+        even, felt = (float(np.ptp(z) / z.mean()) for z in (self.shown_n, self.felt_n))
+        if self.way is SCALE and even < EQUAL and felt > UNEQUAL:
+            return (
+                f"every reading is {self.shown_n.mean():.3g} N, but the map felt {self.felt_n.min():.2g} to "
+                f"{self.felt_n.max():.2g} N, expected readings that follow; is the scale's hold on?"
+            )
+        return ""
+
+    def _why_not_errors(self, sigma_n: Floats) -> str:
         before, held_out = np.linalg.norm(self.before_n), np.linalg.norm(self.held_out_n)
         if not held_out < before:
-            return f"held out, it is off by {held_out:.2f} N, no better than the {before:.2f} N of the population map"
+            return (
+                f"held out, it is off by {held_out:.2f} N, no better than the {before:.2f} N of the population map; "
+                f"{CURE}"
+            )
+        if self.scale is not None and self.held_out_n[2] > WORSE * self.before_n[2]:
+            return (
+                f"held out, z is off by {self.held_out_n[2]:.2f} N, more than the {self.before_n[2]:.2f} N of the "
+                f"population map; {CURE}"
+            )
+        far = 0.0 if self.way.spread is None else FAR_SIGMAS * self.way.spread[2, 2]
+        if self.scale is not None and abs(self.scale.gain - 1.0) > far:
+            return (
+                f"the gain of z is {self.scale.gain:.2f}, expected {1 - far:.2f} to {1 + far:.2f}, as fingers have it; "
+                f"check {self.way.size}"
+            )
         for axis, error_n, limit_n in zip("xyz", self.held_out_n, FAR_SIGMAS * sigma_n, strict=True):
             if not error_n < limit_n:
                 return (
                     f"held out, {axis} is off by {error_n:.2f} N, not below {FAR_SIGMAS:g} sigma ({limit_n:.2f} N): "
-                    "the finger is unlike those of the population map"
+                    f"the finger is unlike those of the population map; {CURE}"
                 )
         return ""
 
@@ -88,7 +131,8 @@ def found(population: Population, held: Held, way: Way) -> Found:
     out = [columns[k] @ fit(population, columns[every != k], force_n[every != k], way).coefficients for k in every]
     before, held_out = columns @ population.coefficients, np.array(out)
     deg = [float(np.median(angles_deg(felt_n, force_n))) for felt_n in (before, held_out)]
-    return Found(own, rmse(before, force_n), rmse(held_out, force_n), *deg)
+    scale = None if way.spread is None else scale_of(before, force_n, way)
+    return Found(own, way, scale, force_n[:, 2], before[:, 2], rmse(before, force_n), rmse(held_out, force_n), *deg)
 
 
 def of_plate(held: Held, population: Population) -> Held:
@@ -131,13 +175,22 @@ def guided(
 
 
 def recorded(
-    recording: Recording, finger: int, forces_n: Sequence[float], toward: Sequence[Sequence[float]] | None = None
+    recording: Recording,
+    finger: int,
+    forces_n: Sequence[float],
+    toward: Sequence[Sequence[float]] | None = None,
+    *,
+    shown: bool = True,
 ) -> Held:
-    """Presses in a recording, one for each of ``forces_n`` (k,). Raises InputError when it has fewer."""
+    """Presses in a recording, one for each of ``forces_n`` (k,). Raises InputError when it has fewer.
+
+    With more it raises too, except where the forces are only what was asked for, and nothing has ``shown`` them.
+    """
     _check_enough(len(forces_n))
     own = recording.wire["finger"] == finger
     rows = rows_of(recording.wire[own], recording.frames["t_us"][own])
-    return _held(Procedure([finger], forces_n, needs_force=False).find(rows, forces_n)[finger], toward)
+    procedure = Procedure([finger], forces_n, needs_force=False)
+    return _held(procedure.find(rows, forces_n if shown else ())[finger], toward)
 
 
 def _check_enough(presses: int) -> None:

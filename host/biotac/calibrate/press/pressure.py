@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.compiled import NN_PER_N, pressure_force_100un
 from ...core.geometry import Floats
-from ...documents import Provenance
+from ...documents import DOUBT, Provenance
 from ...errors import InputError
 from ...keep import Calibration
 from ...recording.alignment import Alignment
@@ -28,8 +28,10 @@ CALIBRATION_FORCES_N = (2.0, 3.5, 5.0)
 VERIFICATION_FORCES_N = (4.0,)
 MIN_PRESSES = 3
 PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
-# The paper found 0.009 to 0.016 N per count. The limits are a tenth of the smallest, and what a board accepts, six
-# times the largest: beyond these something else is wrong.
+WRONG_ERROR = 0.25  # K at another place is off by 24 % at most; with more, something was typed or pressed wrongly
+# The paper found 0.009 to 0.016 N per count. A third of the smallest and three times the largest are likelier another
+# unit; a tenth of the smallest, and what a board accepts, six times the largest, cannot be right at all.
+USUAL_GAIN_N = (0.003, 0.05)
 GAIN_MIN_N = 0.0009
 GAIN_MAX_N = wire.SETTINGS[wire.Setting.PRESSURE_GAIN_NN].high / NN_PER_N
 #: The gains of single presses may be this far apart, as a share of K, before the fit is refused. A press at another
@@ -56,6 +58,17 @@ class Fit:
     def gain_nn(self) -> int:
         """K as the board keeps it, in whole nN per count."""
         return round(self.gain_n * NN_PER_N)
+
+    @property
+    def why_not(self) -> str:
+        """Why K should not be used; empty if it should."""
+        low, high = USUAL_GAIN_N
+        if low <= self.gain_n <= high:
+            return ""
+        return (
+            f"finger {self.finger}: K is {self.gain_n:.3g} N/count, expected {low:g} to {high:g}; name the unit that "
+            "the force was in (--unit kg or g), or convert it to newtons"
+        )
 
 
 @dataclass(frozen=True)
@@ -172,10 +185,21 @@ class Calibrated:
     alignment: Alignment | None = None
 
     @property
+    def why_not(self) -> str:
+        """Why it should not be put into force; empty if it should."""
+        if self.fit.why_not or self.verified.board_error <= WRONG_ERROR:
+            return self.fit.why_not
+        return (
+            f"finger {self.fit.finger}: {self.verified.board_error:.0%} off on the verification press, expected "
+            f"at most {WRONG_ERROR:.0%}; check what the scale showed at each press, and press at one place"
+        )
+
+    @property
     def provenance(self) -> Provenance:
         """How the calibration was made."""
         made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
-        return made | self.source | _numbers(self.fit)
+        doubt = {DOUBT: self.why_not} if self.why_not else {}
+        return made | self.source | _numbers(self.fit) | doubt
 
 
 def fit_and_verify(rest: Rest, presses: Sequence[Press]) -> tuple[Fit, Verification]:
@@ -206,6 +230,7 @@ def facts(fingers: Sequence[Calibrated]) -> list[dict[str, Any]]:
             "serial": finger.calibration.serial,
             "pressure_gain_nn": finger.fit.gain_nn,
             "notes": list(finger.fit.notes),
+            "why_not": finger.why_not,
             "verification": {key: round(getattr(finger.verified, key), n) for key, n in digits.items()},
         }
         | ({} if finger.alignment is None else {"alignment": asdict(finger.alignment)})
@@ -225,7 +250,9 @@ def lines(fingers: Sequence[Calibrated]) -> list[str]:
             f"  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
         )
         notes += fitted.notes
-        if seen.board_error > PAPER_ERROR:
+        if finger.why_not:
+            notes.append(finger.why_not)
+        elif seen.board_error > PAPER_ERROR:
             notes.append(
                 f"finger {fitted.finger}: {seen.board_error:.1%} off on the verification press (the paper's: "
                 f"{PAPER_ERROR:.2%}): was it at another place, or pressed in another way?"

@@ -27,11 +27,14 @@ from .guide import Face, guide
 from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, Fit, fit_and_verify
 
 
-def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int) -> list[Calibrated]:
+def calibrate(
+    hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int, force: bool = False
+) -> list[Calibrated]:
     """K of each of ``fingers`` (none: all) on a board, from the paper's presses; in force until the next reboot.
 
-    The force is the board's scenario's, or what ``face`` gives. Raises InputError for presses that cannot be used, for
-    a finger without a sensor, and for a sensor that was changed meanwhile.
+    One with a reason ``why_not`` is not put into force, except with ``force``. The force is the board's scenario's, or
+    what ``face`` gives. Raises InputError for presses that cannot be used, for a finger without a sensor, and for a
+    sensor that was changed meanwhile.
     """
     absent = sorted(set(fingers) - set(hand.fingers))
     if absent or not hand.fingers:
@@ -54,7 +57,8 @@ def calibrate(hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: in
             )
         fitted, verified = fit_and_verify(procedure.rests[finger], presses)
         calibrated.append(Calibrated(fitted, verified, with_gain(hand, fitted, made_s), source))
-        put(hand, finger, calibrated[-1].calibration)
+        if force or not calibrated[-1].why_not:
+            put(hand, finger, calibrated[-1].calibration)
     return calibrated
 
 

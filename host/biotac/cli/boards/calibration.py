@@ -14,7 +14,7 @@ from typing import Any
 import biotac
 from biotac import Calibration, Hand
 
-from ...documents import JSON_BYTES, made_text, parse_json, read_text, write_new
+from ...documents import DOUBT, JSON_BYTES, made_text, parse_json, read_text, write_new
 from ...errors import InputError
 from ...hand.configuration import Configuration
 from ...keep import calibration_file, eeprom
@@ -90,7 +90,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     put = add("put", _put, "From a file to a board or an EEPROM.", "/dev/ttyACM0 index.json --finger index --save")
     put.add_argument("where", metavar=f"PORT|{IN_EEPROM}", help=which)
     put.add_argument("file", metavar="FILE", type=Path, help="- is standard input")
-    put.add_argument("--force", action="store_true", help="accept a sensor other than the file's")
+    put.add_argument(
+        "--force", action="store_true", help="accept a sensor other than the file's, and what is not worth using"
+    )
 
     clear = add("clear", _clear, "Back to the board's settings.", "/dev/ttyACM0 --finger index --save")
     clear.add_argument("where", metavar="PORT")
@@ -105,7 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _show(args: argparse.Namespace) -> int:
     is_file = args.where.endswith(".json") or (Path(args.where).is_file() and _port(args.where) == args.where)
     if is_file or args.where.startswith(EEPROM):
-        kind, content = _load(Path(args.where)) if is_file else (KINDS["calibration"], _in_eeprom(args.where))
+        kind, content = _load(Path(args.where))[:2] if is_file else (KINDS["calibration"], _in_eeprom(args.where))
         lines = [f"{args.where}: {kind.title(content)}", *kind.lines(content)]
         report(args, kind.file.to_dict(content), "\n".join(lines))
         return 0
@@ -150,7 +152,11 @@ def _get(args: argparse.Namespace) -> int:
 
 
 def _put(args: argparse.Namespace) -> int:
-    kind, content = _load(args.file)
+    kind, content, doubt = _load(args.file)
+    if doubt and not args.force:
+        raise InputError(
+            f"{args.file} is not worth using: {doubt}; calibrate again, or put it all the same with --force"
+        )
     if args.where.startswith(EEPROM):
         if kind is not KINDS["calibration"]:
             raise InputError(f"{args.file} is a {kind.name}, which no EEPROM holds; expected a calibration")
@@ -203,8 +209,8 @@ def _port(where: str) -> str:
     return f"replay:{where}" if is_named_as_recording(where) else where
 
 
-def _load(path: Path) -> tuple[Kind, Any]:
-    """What a file holds, and of which kind it is: its format tells."""
+def _load(path: Path) -> tuple[Kind, Any, str]:
+    """Of which kind a file is, as its format tells, what it holds, and why that is not worth using."""
     piped = str(path) == "-"
     try:
         text = sys.stdin.read() if piped else read_text(path, JSON_BYTES)
@@ -216,7 +222,9 @@ def _load(path: Path) -> tuple[Kind, Any]:
     seen = tree.get("format") if isinstance(tree, dict) else None
     for kind in KINDS.values():
         if seen == kind.file.FORMAT:
-            return kind, kind.file.loads(text, "standard input" if piped else str(path))
+            content = kind.file.loads(text, "standard input" if piped else str(path))
+            made = tree.get("provenance")
+            return kind, content, str(made.get(DOUBT, "")) if isinstance(made, dict) else ""
     formats = " or ".join(f'"{kind.file.FORMAT}"' for kind in KINDS.values())
     raise InputError(
         f'{path} is not usable: it has "format": {json.dumps(seen)}, expected {formats}, as `biotac calibration get` '

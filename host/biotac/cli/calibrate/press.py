@@ -20,7 +20,7 @@ from ...calibrate.reference.mounting import LIN
 from ...calibrate.reference.scale import UNITS_N, SerialScale
 from ...calibrate.wrench.sources import read_reference
 from ...calibrate.wrench.upload import upload
-from ...documents import write_new
+from ...documents import DOUBT, write_new
 from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
 from ...keep import calibration_file
@@ -142,6 +142,17 @@ def _typed_n(step: Step, unit: str = "N") -> float:
             raise InputError(f"no reading was typed in; expected a number in {unit}") from error
         if 0 < value_n < MAX_N:
             return value_n
+        print(f"expected above 0 and below {MAX_N:g} N; for grams start again with --unit g", file=sys.stderr)
+
+
+def _readings_n(args: argparse.Namespace) -> list[float]:
+    readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
+    if any(abs(value_n) >= MAX_N for value_n in readings_n):
+        raise InputError(
+            f"--readings up to {max(args.readings):g} {args.unit}: expected less than {MAX_N:g} N; name the scale's "
+            "unit, such as --unit g"
+        )
+    return readings_n
 
 
 def _check_terminal(hand: Hand, where: str) -> None:
@@ -198,62 +209,60 @@ def _asked_n(args: argparse.Namespace) -> list[float]:
 
 def _recorded(args: argparse.Namespace, recording: Recording, loads: Sequence[weights.Load]) -> known_force.Held:
     if args.plate:
-        return known_force.recorded(recording, args.finger[0], _asked_n(args))
+        return known_force.recorded(recording, args.finger[0], _asked_n(args), shown=False)
     if not loads and args.readings is None:
         raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
-    forces_n = [load.size_n for load in loads] or [value * UNITS_N[args.unit] for value in args.readings]
+    forces_n = [load.size_n for load in loads] or _readings_n(args)
     return known_force.recorded(recording, args.finger[0], forces_n, [load.toward for load in loads] or None)
 
 
 def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand: Hand | None) -> int:
-    """Fit the map, upload it only if it helps or --force is given. Return 1 if it was to go to a board and did not."""
+    """Fit the map; write and upload it only if it helps or --force is given. Return 1 if it does not and is not."""
     trained = population.load(args.population)
     way = few_shot.WEIGHTS if args.weights else few_shot.PLATE if args.plate else few_shot.SCALE
-    scale = None
     if args.plate:
         held = known_force.of_plate(held, trained.population)
-    else:
-        scale = few_shot.scale_of(held.columns @ trained.population.coefficients, held.force_n, way)
     found = known_force.found(trained.population, held, way)
     own = found.own.wrench_map(held.tare)
     (finger,), made_s = args.finger, int(time.time())
+    why_not = found.why_not(trained.sigma_scale5_n)
+    refused = bool(why_not) and not args.force
     facts: dict[str, Any] = {
         "finger": finger,
         "serial": serial,
         "presses": len(held.force_n),
         **({"shown_n": held.force_n[:, 2].tolist()} if args.scale is not None else {"force_n": held.force_n.tolist()}),
-        **(asdict(scale) if scale else {}),
+        **(asdict(found.scale) if found.scale else {}),
         "before_n": found.before_n.tolist(),
         "held_out_n": found.held_out_n.tolist(),
         "before_deg": found.before_deg,
         "held_out_deg": found.held_out_deg,
-        "why_not": found.why_not(trained.sigma_scale5_n),
+        "why_not": why_not,
+        "refused": refused,
         "sigma_n": trained.sigma_scale5_n.tolist(),
         "fixed_point": summary(own, held.counts),
     }
-    if args.out is not None:
+    if args.out is not None and not refused:
         software = trained.provenance.get("software", "")
         origin = {"serial": serial, "made_s": made_s, "software": software, "files": [args.where]}
         origin["reference"] = f"{len(held.force_n)} {way.name}; population map from {trained.fingers}"
+        origin |= {DOUBT: why_not} if why_not else {}
         text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=origin)
         with whole(args.out, overwrite=args.force) as path:
             path.write_text(text, encoding="utf-8")
         facts["written"] = str(args.out)
-    wanted = hand is not None and not args.no_upload
-    facts["refused"] = wanted and bool(facts["why_not"]) and not args.force
-    if hand is not None and wanted and not facts["refused"]:
+    if hand is not None and not args.no_upload and not refused:
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
         if args.save:
             hand.board.save_settings()
     outputs.report(args, facts, "\n".join(_map_lines(facts, way.name)))
-    return int(facts["refused"])
+    return int(refused)
 
 
 def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
     def numbers(axes: Sequence[float]) -> str:
         return "  ".join(f"{value:5.2f}" for value in axes)
 
-    cure = "tare, and load the pad flat, firmly and steadily, or upload it anyway with --force"
     gain = (
         "  z gain {gain:.3f} (one sigma {gain_sigma:.3f}), balance {balance:+.3f} N/N (one sigma {balance_sigma:.3f})"
     )
@@ -263,7 +272,8 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N, {facts['before_deg']:.1f} deg",
         f"  each press held out:          {numbers(facts['held_out_n'])} N, {facts['held_out_deg']:.1f} deg",
         f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
-        *([f"  not worth using: {facts['why_not']}; {cure}"] if facts["why_not"] else []),
+        *([f"  not worth using: {facts['why_not']}"] if facts["why_not"] else []),
+        *(["  neither written nor uploaded; --force does so all the same"] if facts["refused"] else []),
         *([f"  written: {facts['written']}"] if "written" in facts else []),
         "  on the board; without --save, only until it restarts" if "board" in facts else "  no board was changed",
     ]
@@ -280,7 +290,7 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
         outputs.check(args.out, every, overwrite=args.force)
     if recorded:
         reference = read_reference(args.pressure, LIN, size=True) if args.pressure else None
-        readings_n = [value * UNITS_N[args.unit] for value in args.readings or ()]
+        readings_n = _readings_n(args)
         calibrated = pressure_procedure.calibrate_recording(
             load(Path(args.where)), reference, fingers=args.finger, forces_n=readings_n, made_s=made_s
         )
@@ -292,18 +302,22 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
     else:
         calibrated, not_saved = _on_board(args, made_s)
     written = []
-    for fitted in calibrated if args.out is not None else ():
+    usable = [fitted for fitted in calibrated if args.force or not fitted.why_not]
+    for fitted in usable if args.out is not None else ():
         outputs.make_folder(args.out)
         path = args.out / f"{stem}finger{fitted.fit.finger}.json"
         write_new(path, calibration_file.dumps(fitted.calibration, fitted.provenance), overwrite=args.force)
         written.append(str(path))
     lines = [*pressure.lines(calibrated), *(f"  written: {path}" for path in written)]
-    if not recorded and (not args.save or not_saved is not None):
+    if usable and not recorded and (not args.save or not_saved is not None):
         lines.append("in force until the next reboot (--save keeps it)")
+    if len(usable) < len(calibrated):
+        refused = ", ".join(str(fitted.fit.finger) for fitted in calibrated if fitted not in usable)
+        lines.append(f"finger {refused}: neither put into force nor written; --force does so all the same")
     outputs.report(args, {"fingers": pressure.facts(calibrated), "written": written}, "\n".join(lines))
     if not_saved is not None:
         raise not_saved  # only now: the presses are not lost for this
-    return 0
+    return int(len(usable) < len(calibrated))
 
 
 def _on_board(args: argparse.Namespace, made_s: int) -> tuple[list[pressure.Calibrated], CommandRefusedError | None]:
@@ -314,9 +328,9 @@ def _on_board(args: argparse.Namespace, made_s: int) -> tuple[list[pressure.Cali
     )
     with biotac.open(args.where, pace=1.0) as hand:  # prompts that a person can follow
         _check_terminal(hand, args.where)
-        calibrated = pressure_procedure.calibrate(hand, face, fingers=args.finger, made_s=made_s)
+        calibrated = pressure_procedure.calibrate(hand, face, fingers=args.finger, made_s=made_s, force=args.force)
         try:
-            if args.save:
+            if args.save and (args.force or not all(fitted.why_not for fitted in calibrated)):
                 hand.board.save_settings()
         except CommandRefusedError as error:
             return calibrated, error
