@@ -22,7 +22,7 @@ STEP_S = 0.01  # a board's round
 # Times after a frame's t_us at which its electrodes, on average, and its pressure are read.
 ELECTRODES_S = float(np.mean([_sensor.SLOTS.index(name) for name in _sensor.ELECTRODE_NAMES])) / _sensor.SLOT_HZ
 PDC_S = _sensor.SLOTS.index("PDC") / _sensor.SLOT_HZ
-MAX_GAP_S = 0.05  # between two samples of the reference: in a longer gap its value is unknown
+MAX_GAP_S = 0.05  # between two samples of the reference, or 1.5 of its steps: in a longer gap its value is unknown
 MIN_OVERLAP_S = 10.0
 MIN_OVERLAP_SHARE = 0.3  # of the shorter stream
 MIN_PEAK = 0.4  # correlation; unrelated streams of two minutes have 0.2 to 0.3
@@ -35,6 +35,7 @@ PIECE_SEARCH_S = 0.3
 MIN_PIECES = 4  # for a drift
 MAX_DRIFT_PPM = 1000.0
 MAX_SCATTER_S = 0.02  # of the pieces about their line; with more, one of the clocks jumped
+MIN_KEPT = 0.8  # of the pieces in which something happens; where more match nowhere near, one of the clocks jumped
 
 
 @dataclass(frozen=True)
@@ -114,12 +115,18 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
             f"{not_aligned}: their best agreement ({peak:.2f}) is not clear: another shift has {runner_up:.2f}, "
             f"{clear:.1f} standard errors lower, expected {MIN_CLEAR:g}; press less regularly, or record longer"
         )
-    drift_ppm, middle_s, offset, scatter, pieces = _drift(a, b, a_start, b_start, int(lags[best]), offset)
+    drift_ppm, middle_s, offset, scatter, pieces, busy, lost_s = _drift(a, b, a_start, b_start, int(lags[best]), offset)
     if abs(drift_ppm) > MAX_DRIFT_PPM or scatter > MAX_SCATTER_S:
         raise RecordingError(
             f"{not_aligned}: the clocks drift by {drift_ppm:.0f} ppm over the run, and parts of it lie "
             f"{scatter * 1e3:.0f} ms off that: expected at most {MAX_DRIFT_PPM:g} ppm and {MAX_SCATTER_S * 1e3:g} ms; "
             "did a clock jump?"
+        )
+    if pieces >= MIN_PIECES and len(lost_s) > (1.0 - MIN_KEPT) * busy:
+        raise RecordingError(
+            f"{not_aligned}: {len(lost_s)} of {busy} pieces, {min(lost_s) - board_s[0]:.0f} to "
+            f"{max(lost_s) - board_s[0]:.0f} s after the start, match at no shift near that of the others: expected at "
+            f"most {1.0 - MIN_KEPT:.0%}; did a clock jump there?"
         )
     return Alignment(
         float(offset), drift_ppm, middle_s, peak, runner_up, clear, width_s, scatter_s=scatter, pieces=pieces,
@@ -157,7 +164,8 @@ def means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
     share = (at_s - t_s[after - 1]) / (t_s[after] - t_s[after - 1])
     line = values[after - 1] + share[:, None] * (values[after] - values[after - 1])
     result = np.where((many >= 2)[:, None], result, line)
-    gap = (t_s[after] - t_s[after - 1] > MAX_GAP_S) & (many == 0)
+    longest_s = max(MAX_GAP_S, 1.5 * float(np.median(np.diff(t_s))))
+    gap = (t_s[after] - t_s[after - 1] > longest_s) & (many == 0)
     result[gap | (at_s < t_s[0]) | (at_s > t_s[-1])] = np.nan
     return result
 
@@ -221,12 +229,16 @@ def _width(correlation: Floats, best: int) -> float:
 
 def _drift(
     a: Floats, b: Floats, a_start: float, b_start: float, lag: int, offset_s: float
-) -> tuple[float, float, float, float, int]:
-    """A line through the offsets of pieces: ppm, the board's middle time, offset there, scatter, number of pieces."""
+) -> tuple[float, float, float, float, int, int, list[float]]:
+    """A line through the offsets of pieces: ppm, the board's middle time, offset there, scatter, pieces on it.
+
+    Then come the number of pieces in which something happens, and the times of those that match nowhere near the line.
+    """
     size, reach = round(PIECE_S / STEP_S), round(PIECE_SEARCH_S / STEP_S)
     busy = 0.2 * float((a**2).mean())
     at: list[float] = []
     offsets: list[float] = []
+    lost: list[float] = []
     for begin in range(max(0, -lag + reach), min(len(a), len(b) - lag - reach) - size + 1, size):
         piece = a[begin : begin + size]
         if float((piece**2).mean()) < busy:
@@ -238,12 +250,15 @@ def _drift(
         )
         best = int(np.argmax(found))
         height, shift = _peak(found, best)
-        if 0 < best < 2 * reach and height >= MIN_PEAK:
-            at.append(a_start + (begin + size / 2) * STEP_S)
+        piece_s = a_start + (begin + size / 2) * STEP_S
+        if not (0 < best < 2 * reach and height >= MIN_PEAK):
+            lost.append(piece_s)
+        else:
+            at.append(piece_s)
             offsets.append(b_start - a_start + (lag + best - reach + shift) * STEP_S)
     middle = a_start + len(a) * STEP_S / 2
     if len(at) < MIN_PIECES:
-        return 0.0, middle, offset_s, 0.0, len(at)
+        return 0.0, middle, offset_s, 0.0, len(at), len(at) + len(lost), lost
     slope, value, keep = 0.0, float(np.median(offsets)), np.ones(len(at), dtype=np.bool_)
     times, found = np.array(at) - middle, np.array(offsets)
     for _ in range(3):  # a piece that locked onto another press must not bend the line
@@ -254,4 +269,6 @@ def _drift(
             break
         keep = near
     scatter = float(np.sqrt(((found - value - slope * times)[keep] ** 2).mean()))
-    return 1e6 * slope, middle, value, scatter, int(keep.sum())
+    far = np.abs(found - value - slope * times) > MAX_SCATTER_S
+    busy, lost = len(at) + len(lost), [*lost, *(times[far] + middle).tolist()]
+    return 1e6 * slope, middle, value, scatter, int(keep.sum()), busy, lost

@@ -44,11 +44,17 @@ def test_the_firmwares_own_map_comes_back_into_force(port: str, capsys: pytest.C
         hand.board.set_setting(Setting.FORCE_MODEL, ForceModel.LIN)
         for setting, value in defaults.items():
             hand.board.set_setting(setting, value)
+        hand.board.set_map(1, population_map.load(None).population.wrench_map(np.zeros(19)).on_board())
         hand.board.set_calibration(1, biotac.Calibration(force_gain_nn=(1, 2, 3)))
-    assert main(["calibrate", "population", port, "--finger", "0"]) == 0
+    argv = ["calibrate", "population", port, "--finger"]
+    assert main([*argv, "0"]) == 2
+    assert "finger 0 has a wrench map of its own (force, " in capsys.readouterr().err
+    with biotac.open(port) as hand:
+        assert hand.board.get_map(0) is not None and hand.board.setting(Setting.FORCE_MODEL) == ForceModel.LIN
+    assert main([*argv, "0", "--force"]) == 0
     assert "map of F1.npz, F2.npz, in force, until the next reboot" in capsys.readouterr().out
-    assert main(["calibrate", "population", port, "--finger", "1"]) == 2
+    assert main([*argv, "1", "--force"]) == 2
     assert "force gains of its own, which go before the map" in capsys.readouterr().err
     with biotac.open(port) as hand:
-        assert hand.board.get_map(0) is None
+        assert hand.board.get_map(0) is None and hand.board.get_map(1) is not None
         assert hand.board.setting(Setting.FORCE_MODEL) == ForceModel.POPULATION

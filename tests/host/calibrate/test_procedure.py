@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.coverage import REGIONS, Coverage
 from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
+from biotac.cli.main import main
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording.reader import Recording
 from biotac.sim.nano17 import Nano17, Nano17Reader
@@ -303,3 +305,28 @@ def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
     assert not Recording(tmp_path / "walk.mcap").problems
     with pytest.raises(InputError, match="already exists; choose another name"):
         walked(tmp_path, SHORT)
+
+
+# ---- the verb ----------------------------------------------------------------------------------
+
+
+def test_outputs_are_checked_before_minutes_of_loading(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "BTSIM00000000006.md").write_text("mine")
+    argv = ["calibrate", "wrench", "--live", "sim:calibrate.toml", "--finger", "index", "--reference", "nano17"]
+    assert main([*argv, "--out", str(tmp_path)]) == 2
+    assert "BTSIM00000000006.md already exists" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["BTSIM00000000006.md"]
+
+
+def test_a_full_disk_says_where_the_data_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(hand: object, reader: object, procedure: object, path: Path, **options: object) -> None:
+        path.touch()
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("biotac.cli.calibrate.wrench.walk", full)
+    argv = ["calibrate", "wrench", "--live", "sim:calibrate.toml", "--finger", "index", "--reference", "nano17"]
+    with suppress(OSError):  # of capsys, whose stdout cannot be turned off
+        main([*argv, "--out", str(tmp_path)])
+    assert f"the recorded data is in {tmp_path / 'BTSIM00000000006.mcap'} and" in capsys.readouterr().err

@@ -72,7 +72,8 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[..., Flo
     for match in re.finditer(r"[^\n]*\n?", text):
         line = match[0].strip()
         if line and not line.startswith("#"):
-            head, body = line, text[match.end() :]
+            # a last row without its end was cut by a full disk or a kill: its last number may lack digits
+            head, body = line, text[match.end() : text.rfind("\n") + 1]
             break
         key, colon, value = line.lstrip("# ").partition(":")
         if colon:

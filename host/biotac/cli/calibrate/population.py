@@ -12,6 +12,7 @@ import biotac
 
 from ...calibrate import population
 from ...errors import InputError
+from ...map import file as map_file
 from ...map.columns import ELECTRODES
 from ...map.population import in_force
 from ...wire import messages_gen as wire
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--population", metavar="FILE", type=Path, help="a map of other fingers (default: the firmware's own)"
     )
     values.add_save(parser)
+    parser.add_argument("--force", action="store_true", help="replace a map that the finger has of its own")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -37,16 +39,23 @@ def run(args: argparse.Namespace) -> int:
     trained = population.load(args.population)
     with biotac.open(args.port) as hand:
         values.check_answers(hand, args.finger)
+        own = hand.board.get_map(args.finger)
+        if own is not None and not args.force:
+            raise InputError(
+                f"finger {args.finger} has a wrench map of its own ({map_file.title(own)}): expected none; keep it by "
+                "`biotac calibration get`, and replace it with --force"
+            )
         if args.population is None:
-            if hand.board.get_map(args.finger) is not None:
-                hand.board.clear_map(args.finger)
-            hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
-            if not in_force(hand.board.finger_settings().get(args.finger, hand.board.settings())):
+            modelled = {wire.Setting.FORCE_MODEL: wire.ForceModel.POPULATION}
+            if not in_force({**hand.board.finger_settings().get(args.finger, hand.board.settings()), **modelled}):
                 raise InputError(
                     f"finger {args.finger} has force gains of its own, which go before the map: expected the default "
                     "ones; `biotac calibration clear` removes a finger's, and the board's are the settings "
                     "force_gain_x_nn to _z_nn"
                 )
+            if own is not None:
+                hand.board.clear_map(args.finger)
+            hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.POPULATION)
         else:
             # the board takes counts above its own tare: any will do here
             fitted = trained.population.wrench_map(np.zeros(ELECTRODES))

@@ -119,8 +119,6 @@ def _live(args: argparse.Namespace) -> int:
         path, missing = _record(args, hand, args.finger)
         for line in missing:
             outputs.note(f"not covered: {line}")
-        if not args.force:
-            _check_out(args.out, [path], overwrite=False)
         beside = path.with_suffix(".csv")
         loaded = load(path, (beside, read_reference(str(beside))), finger=args.finger)
         facts = _calibrate(args, loaded, None if args.no_upload else hand)
@@ -176,6 +174,7 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
     serial = ascii_text(hand.sensor_info(finger).serial)
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
     path = args.out / f"{serial or f'finger{finger}'}.mcap"
+    _check_out(args.out, [path], overwrite=args.force)
     recorded = f"the recorded data is in {path} and {path.with_suffix('.csv')}"
     with _reader(args, hand, finger) as (reader, mounting), Progress() as progress:
 
@@ -183,11 +182,10 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
             progress.done()
             outputs.note(event)
 
-        outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
             walk(hand, reader, procedure, path, overwrite=args.force, show=show, progress=progress.show)
-        except BiotacError:
+        except (BiotacError, OSError):
             if path.exists():
                 outputs.note(recorded)
             raise
