@@ -1,6 +1,7 @@
 """The command ``biotac``, and ``python -m biotac``."""
 
 import sys
+import warnings
 
 from .cli import ending
 
@@ -9,6 +10,10 @@ def program() -> int:
     """Run the command line; return its exit code. A signal ends it from here on, with no traceback."""
     ending.by_leaving()
     from .cli.main import main
+    from .cli.outputs import note
+
+    # the library's warnings are for the user too, without a line of code in front
+    warnings.showwarning = lambda message, *where, **more: note(str(message))
 
     code = ending.INTERRUPTED
     try:

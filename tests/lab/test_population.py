@@ -114,6 +114,12 @@ def test_presses_that_say_nothing_are_refused(said_z: list[float], shown: list[f
         scale_of(felt_n, np.multiply.outer(shown, [0.0, 0.0, 1.0]))
 
 
+def test_a_run_against_the_others_is_named_and_not_a_scale(prior: Population, runs: list[Run]) -> None:
+    flipped = replace(prior, coefficients=-prior.coefficients)
+    with pytest.raises(InputError, match=r"^3\.npz: the map of the others feels -\d.* along z"):
+        held_out_error.worth_of_force(flipped, runs[2])
+
+
 def test_a_minute_moves_the_map_and_no_time_does_not(prior: Population, runs: list[Run]) -> None:
     new = runs[2]
     sums = training.sums(new)

@@ -12,9 +12,9 @@ from mcap.writer import Writer
 
 from biotac.calibrate.reference.csv_file import CsvWriter, GrowingCsv
 from biotac.calibrate.reference.mounting import LIN, Mounting, read_mounting
-from biotac.calibrate.reference.samples import Samples
+from biotac.calibrate.reference.samples import Samples, checked
 from biotac.calibrate.wrench.sources import read_reference
-from biotac.errors import DeviceLostError, InputError, RecordingError
+from biotac.errors import DeviceLostError, InputError, RecordingError, RecordingWarning
 from biotac.sim.nano17 import MOUNTING
 
 N = 2000
@@ -108,6 +108,23 @@ def test_a_csv_may_have_three_axes_semicolons_and_other_columns(tmp_path: Path) 
     found = read_reference(str(path), LIN).samples
     np.testing.assert_allclose(found.wrench[:, :3], loads[:-1, :3])  # the last line has no end
     assert found.wrench.shape[1] == 3
+
+
+@pytest.mark.parametrize("noise_n", [0.0, 0.01])
+def test_a_reference_that_repeats_its_last_reading_is_told_or_refused(noise_n: float) -> None:
+    """Presses that are held still are none, not even without noise."""
+    t_s = np.arange(30_000) * 0.002
+    size_n = np.interp(t_s % 4.0, [1.0, 1.5, 3.0, 3.5], [0.0, 3.0, 3.0, 0.0])
+    force = size_n[:, None] * [0.6, 0.0, 0.8] + np.random.default_rng(3).normal(0.0, noise_n, (len(t_s), 3))
+    np.testing.assert_array_equal(checked("x", Samples(t_s, force)).wrench, force)
+    force[2600:3400] = force[2600]  # 1.6 s, from the press's hold into the next rest
+    with pytest.warns(RecordingWarning, match=r"x: 2\.7% of the readings repeat the last one .* left out"):
+        lost = np.isnan(checked("x", Samples(t_s, force)).wrench[:, 0])
+    assert not lost[:2600].any() and lost[2601:3400].all() and not lost[3400:].any()
+    for begin in range(4600, 20_000, 2000):
+        force[begin : begin + 800] = force[begin]
+    with pytest.raises(RecordingError, match=r"x: 2\d\.\d% of the readings .*: expected at most 10%"):
+        checked("x", Samples(t_s, force))
 
 
 @pytest.mark.parametrize("cut", [3, 20])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from biotac import InputError
 from biotac.calibrate.population import Population
 from biotac.calibrate.press import Scale, scale_of, shrink_to
 from biotac.calibrate.wrench import Run, rmse
@@ -51,7 +52,7 @@ def worth(population: Population, run: Run) -> Worth:
     """The errors of a map on an aligned run whose finger is new to it."""
     truth = run.truth
     published, by_map = population.published(run.counts, run.tare), population.force(run.counts, run.tare)
-    scales, scale5 = _scaled(by_map, truth)
+    scales, scale5 = _scaled(run.name, by_map, truth)
     return Worth(rmse(published, truth), scale5, _minute(population, run), published, by_map, truth, scales)
 
 
@@ -77,7 +78,7 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
 def worth_of_force(population: Population, run: Run) -> tuple[Floats, Floats]:
     """RMSE (3,) in N as the map is and after five presses; the former twice where the run has no such presses."""
     raw = rmse(population.published(run.counts, run.tare), run.truth)
-    _, scale5 = _scaled(population.force(run.counts, run.tare), run.truth)
+    _, scale5 = _scaled(run.name, population.force(run.counts, run.tare), run.truth)
     return raw, raw if scale5 is None else scale5
 
 
@@ -116,13 +117,18 @@ def facts(found: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
     return result
 
 
-def _scaled(felt_n: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | None]:
+def _scaled(name: str, felt_n: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | None]:
     """Scales from draws of five presses, each a firm and straight stretch of the run, and the RMSE with them."""
     ends = np.arange(PRESS_ROWS, len(truth) + 1)
     total = np.concatenate([np.zeros((1, 6)), np.cumsum(np.column_stack([felt_n, truth]), axis=0)])
     mean = (total[ends] - total[ends - PRESS_ROWS]) / PRESS_ROWS
     shear = np.hypot(mean[:, 3], mean[:, 4])
     good = np.flatnonzero((mean[:, 5] > FIRM_N) & (shear < STRAIGHT * mean[:, 5]))
+    if (mean[good, 2] <= 0.0).any():
+        raise InputError(
+            f"{name}: the map of the others feels {mean[good, 2].min():.2f} N along z where it is pressed with over "
+            f"{FIRM_N:g} N: expected above 0; check the sign and axes of F in its file and in theirs"
+        )
     rng = np.random.default_rng(0)
     result = []
     for _ in range(DRAWS):

@@ -24,7 +24,7 @@ import numpy as np
 from ...core.geometry import Floats
 from ...errors import DeviceLostError, InputError, RecordingError, exists_error
 from .mounting import Mounting, from_json
-from .samples import Reference, Samples, check
+from .samples import Reference, Samples, checked
 
 COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
 # in the order of the result; torque may be named M or T
@@ -42,8 +42,7 @@ def read_csv(path: Path, mounting: Mounting | None = None, *, size: bool = False
     chosen = mounting or _mounting_in(path, own)
     use, scale = _columns(path, head, size=size)
     table = read(use)
-    samples = Samples(table[:, 0], table[:, 1:] * scale)
-    check(str(path), samples)
+    samples = checked(str(path), Samples(table[:, 0], table[:, 1:] * scale))
     return Reference(path.name, samples, chosen, own.get("sensor", ""))
 
 

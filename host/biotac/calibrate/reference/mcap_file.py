@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from ...documents import parse_json
 from ...errors import BiotacError, RecordingError, imported
 from .mounting import Mounting
-from .samples import Reference, Samples, check
+from .samples import Reference, Samples, checked
 
 SCHEMAS = ("geometry_msgs/msg/WrenchStamped", "geometry_msgs/WrenchStamped")
 NMM_PER_NM = 1000.0
@@ -54,8 +54,7 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
     ((name, stamped),) = rows.items()
     stamped.sort(key=lambda row: row[0])  # a bag is in order of arrival, not of the sensor's stamps
     samples = Samples(np.array([t for t, _ in stamped]), np.array([w for _, w in stamped]))
-    check(f"{path} {name}", samples)
-    return Reference(path.name, samples, mounting, name)
+    return Reference(path.name, checked(f"{path} {name}", samples), mounting, name)
 
 
 def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.geometry import Floats
-from ...errors import RecordingError
+from ...errors import RecordingError, RecordingWarning, printable
 from .mounting import Mounting
 
 RATE_HZ = (20.0, 20_000.0)  # below 20 Hz a press has only a few points; ATI's fastest boxes give 7 to 8 kHz
 FORCE_N = (0.3, 200.0)  # of the 99th percentile: from the least useful for calibrating to what would break a finger
+FROZEN_S = 0.2  # of readings that repeat exactly, and then leap: the sensor's program repeated the last
+LEAP = 3.0  # times the step that 99 % of the others stay below
+NOISY = 0.01  # of the steps of a sensor that never repeats itself, at most, are 0
+MAX_FROZEN = 0.1
 
 
 @dataclass(frozen=True)
@@ -45,8 +50,11 @@ class Reference:
     sensor: str = ""
 
 
-def check(where: str, samples: Samples) -> None:
-    """Refuse samples that cannot be a finger's reference. Raises RecordingError with the number that shows why."""
+def checked(where: str, samples: Samples) -> Samples:
+    """The samples, NaN where they are frozen, which is warned of.
+
+    Raises RecordingError, with the number that shows why, for samples that cannot be a finger's reference.
+    """
     if len(samples) < 2:
         raise RecordingError(f"{where}: {len(samples)} samples: expected a recording of several minutes; record again")
     step = np.diff(samples.t_s)
@@ -77,6 +85,29 @@ def check(where: str, samples: Samples) -> None:
             f"{where}: force changes by {size_n:.4g} N (99th percentile): expected {FORCE_N[0]:g} to {FORCE_N[1]:g} N "
             f"on a finger; {guess}"
         )
+    frozen = _frozen(samples)
+    if frozen.any():
+        seen = f"{where}: {frozen.mean():.1%} of the readings repeat the last one for over {FROZEN_S:g} s and then leap"
+        if frozen.mean() > MAX_FROZEN:
+            raise RecordingError(f"{seen}: expected at most {MAX_FROZEN:.0%}; does the sensor's program drop data?")
+        warnings.warn(printable(f"{seen}: they are left out"), RecordingWarning, stacklevel=2)
+    return replace(samples, wrench=np.where(frozen[:, None], np.nan, samples.wrench))
+
+
+def _frozen(samples: Samples) -> npt.NDArray[np.bool_]:
+    """Which samples (n,) only repeat the one before: a held force, which repeats too, ends in no leap."""
+    change = np.linalg.norm(np.diff(samples.wrench[:, :3], axis=0), axis=1)
+    same = (np.diff(samples.wrench, axis=0) == 0.0).all(axis=1)
+    begin, end = np.flatnonzero(np.diff(np.r_[False, same, False])).reshape(-1, 2).T
+    long = samples.t_s[end] - samples.t_s[begin] > FROZEN_S
+    after = np.append(change, 0.0)[end]
+    leaps = long & (after > LEAP * np.nanpercentile(change[~same], 99))
+    if leaps.any() and same.mean() < 0.5 and same.sum() - (end - begin)[long].sum() < NOISY * len(same):
+        leaps = long  # also those after which the force is what it was
+    frozen = np.zeros(len(samples), dtype=np.bool_)
+    for first, last in zip(begin[leaps], end[leaps], strict=True):
+        frozen[first + 1 : last + 1] = True
+    return frozen
 
 
 class Reader(Protocol):
