@@ -111,3 +111,12 @@ def test_a_calibration_reads_the_scale_at_every_press(capsys: pytest.CaptureFixt
     facts = json.loads(capsys.readouterr().out)
     assert facts["serial"] == "BTSIM00000000001" and not facts["refused"]
     assert facts["shown_n"] == pytest.approx([0.204 * G, 0.357 * G, 0.510 * G])
+
+
+def test_what_was_shown_is_kept_when_the_scale_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["calibrate", "press", "sim:fingers.toml?fingers=1&pace=fast", "--finger", "index", "--presses", "3"]
+    with printing([b"S S     204.0 g\r\n", b"S S     357.0 g\r\n", b"S +\r\n"]) as port:
+        assert main([*argv, "--scale", port]) == 2
+    error = capsys.readouterr().err
+    assert "the scale is out of range" in error
+    assert "biotac calibrate press REC --scale --finger 0 --readings 2.001,3.501`, and those that are missing" in error

@@ -90,6 +90,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    args.shown_n, code = {}, 1
+    try:
+        code = _run(args)
+        return code
+    finally:
+        way = "--scale" if args.pressure is None else "--pressure"
+        for finger, readings_n in args.shown_n.items() if code else ():
+            readings = ",".join(f"{value_n:.4g}" for value_n in readings_n)
+            outputs.note(
+                f"what finger {finger} was pressed with is not lost: a recording of that goes on by `biotac calibrate "
+                f"press REC {way} --finger {finger} --readings {readings}`, and those that are missing"
+            )
+
+
+def _run(args: argparse.Namespace) -> int:
     recorded = is_recording(args.where)
     if recorded and args.save:
         raise InputError("--save needs a board, not a recording: drop --save, or name a PORT")
@@ -128,8 +143,14 @@ class _Guide:
         print(text, file=sys.stderr)
 
 
-def _typed_n(step: Step, unit: str = "N") -> float:
-    """Ask on stderr until a force between 0 and MAX_N is typed in, in ``unit``; in N."""
+def _kept_n(args: argparse.Namespace, step: Step, value_n: float) -> float:
+    args.shown_n.setdefault(step.finger, []).append(value_n)
+    return value_n
+
+
+def _typed_n(step: Step, args: argparse.Namespace) -> float:
+    """Ask on stderr until a force between 0 and MAX_N is typed in, in the unit of ``args``; in N."""
+    unit = args.unit
     while True:
         print(
             f"finger {step.finger}, press {step.press}: the scale shows [{unit}] ", end="", file=sys.stderr, flush=True
@@ -141,7 +162,7 @@ def _typed_n(step: Step, unit: str = "N") -> float:
         except EOFError as error:
             raise InputError(f"no reading was typed in; expected a number in {unit}") from error
         if 0 < value_n < MAX_N:
-            return value_n
+            return _kept_n(args, step, value_n)
         print(f"expected above 0 and below {MAX_N:g} N; for grams start again with --unit g", file=sys.stderr)
 
 
@@ -195,9 +216,10 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
         return known_force.guided(hand, finger, asked_n, face)
     if args.scale:
         with SerialScale(args.scale) as scale:
-            return known_force.guided(hand, finger, asked_n, _Guide(press, lambda step: scale.force_n(), "let go"))
+            face = _Guide(press, lambda step: _kept_n(args, step, scale.force_n()), "let go")
+            return known_force.guided(hand, finger, asked_n, face)
     _check_terminal(hand, args.where)
-    face = _Guide(press, lambda step: _typed_n(step, args.unit), "let go")
+    face = _Guide(press, lambda step: _typed_n(step, args), "let go")
     reference = None if hand.link.source is None else Truth(hand)
     return known_force.guided(hand, finger, asked_n, face, reference=reference)
 
@@ -323,7 +345,7 @@ def _pressure(args: argparse.Namespace, *, recorded: bool) -> int:
 def _on_board(args: argparse.Namespace, made_s: int) -> tuple[list[pressure.Calibrated], CommandRefusedError | None]:
     face = _Guide(
         lambda step: f"press finger {step.finger} with about {step.force_n:g} N, and hold still",
-        lambda step: _typed_n(step, args.unit),
+        lambda step: _typed_n(step, args),
         "let go of finger {finger}",
     )
     with biotac.open(args.where, pace=1.0) as hand:  # prompts that a person can follow
