@@ -89,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
     outputs.check_file(args.share, overwrite=args.force)
     if args.out is not None:
         _check_out(args.out, args.files, overwrite=args.force)
+        outputs.make_folder(args.out)
     recordings = [path for path in args.files if path.suffix.lower() == ".mcap"]
     if args.reference and len(args.reference) != len(recordings):
         raise InputError(
@@ -182,6 +183,7 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
             progress.done()
             outputs.note(event)
 
+        outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
             walk(hand, reader, procedure, path, overwrite=args.force, show=show, progress=progress.show)
@@ -220,7 +222,6 @@ def _outputs(folder: Path, path: Path) -> tuple[Path, Path, Path]:
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     check_drawable()
     outputs.check(folder, [out for path in files for out in _outputs(folder, path)], overwrite=overwrite)
-    outputs.make_folder(folder)
 
 
 def _write(
