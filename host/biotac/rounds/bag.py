@@ -11,7 +11,7 @@ from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import Reader as Reader2
 
 from ..errors import BiotacError, InputError
-from .message import Message, RefusedError
+from .message import ALTERNATE_NS, Message, RefusedError
 from .ros import Decode, decoder, is_known
 
 
@@ -19,12 +19,21 @@ from .ros import Decode, decoder, is_known
 def opened(path: Path) -> Iterator[Any]:
     """rosbags' reader of a bag, of ROS 1 by its suffix. Raises InputError for one that cannot be read."""
     try:
-        with Reader1(path) if path.suffix == ".bag" else Reader2(path) as bag:
+        with Reader1(path) if is_ros1(path) else Reader2(path) as bag:
             yield bag
     except BiotacError:
         raise
     except Exception as error:  # rosbags raises what it finds
-        raise InputError(f"{path} cannot be read as a ROS bag ({error}); copy it again") from error
+        cure = "`rosbag reindex`" if is_ros1(path) else "`mcap recover`, then `ros2 bag reindex`"
+        cure = f"a recorder that was killed leaves it so: {cure} mends it, else copy it again"
+        raise InputError(
+            f"{path} cannot be read as a ROS bag ({str(error) or type(error).__name__}); {cure}"
+        ) from error
+
+
+def is_ros1(path: Path) -> bool:
+    """By its suffix, also while it was being written: .bag.active."""
+    return ".bag" in [suffix.lower() for suffix in path.suffixes[-2:]]
 
 
 class Bag:
@@ -36,7 +45,7 @@ class Bag:
         if not path.exists():
             raise InputError(f"{path} does not exist; expected a ROS 1 .bag, or the folder of a ROS 2 bag")
         self._path = path
-        self._ros1 = path.suffix == ".bag"
+        self._ros1 = is_ros1(path)
         with opened(self._path) as bag:
             found = [c for c in bag.connections if is_known(c.msgtype) and topic in ("", c.topic)]
             topics = sorted({c.topic for c in found})
@@ -49,6 +58,7 @@ class Bag:
                 self._decode: dict[Any, Decode] = {c.id: self._decoder(c) for c in found}
             except RefusedError as error:
                 raise InputError(f"{path}: {error}") from error
+            self._topic = topics[0]
             self._ids = set(self._decode)
 
     def _decoder(self, connection: Any) -> Decode:
@@ -60,8 +70,22 @@ class Bag:
     def __iter__(self) -> Iterator[Message | RefusedError]:
         with opened(self._path) as bag:
             chosen = [c for c in bag.connections if c.id in self._ids]
+            seen_ns: dict[Any, int] = {}  # by connection
+            last = None
             for connection, logged_ns, raw in bag.messages(connections=chosen):
+                if connection.id != last:
+                    self._refuse_two(logged_ns - seen_ns.get(connection.id, -(10**18)))
+                last = connection.id
+                seen_ns[last] = logged_ns
                 try:
                     yield self._decode[connection.id](bytes(raw), logged_ns)
                 except RefusedError as error:
                     yield error
+
+    def _refuse_two(self, since_ns: int) -> None:
+        """A publisher that comes back after another within a second is one of two, of two hands."""
+        if since_ns < ALTERNATE_NS:
+            raise InputError(
+                f"{self._path}: two publishers take turns on {self._topic}, expected one hand a topic; record each "
+                "hand on a topic of its own"
+            )

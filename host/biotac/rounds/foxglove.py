@@ -30,13 +30,14 @@ class Foxglove:
 
     def __init__(self, port: str, host: str, topic: str) -> None:
         self._port, self._host, self._topic = port, host, topic
+        self._is_named = bool(topic)
         self._seen: dict[int, str] = {}  # other channels
         self._channel: int | None = None
         self._subscriptions = 0
         self._decode: Decode | None = None
         self._received_s = 0.0
 
-    def __iter__(self) -> Iterator[Message | RefusedError | None]:
+    def __iter__(self) -> Iterator[Message | RefusedError | str | None]:
         try:
             bridge = websocket.create_connection(f"ws://{self._host}", subprotocols=PROTOCOLS, timeout=CONNECT_S)
         except Exception as error:  # of sockets, of HTTP, of names
@@ -67,11 +68,15 @@ class Foxglove:
             self._channel = self._decode = None
             bridge.close()
 
-    def _receive(self, bridge: Any, data: bytes) -> RefusedError | None:
+    def _receive(self, bridge: Any, data: bytes) -> RefusedError | str | None:
         """Subscribe to the topic whenever it is advertised, as after a change of its definition."""
         try:
             advert = json.loads(data)
             channels = advert["channels"] if advert.get("op") == "advertise" else []
+            known = sorted({own["topic"] for own in channels if is_known(own["schemaName"])})
+            if not self._topic and len(known) > 1:
+                cure = f"name one: foxglove://{self._host}{known[0]}"
+                raise PortError(f"{self._port}: expected one topic with BioTacs, it has {' and '.join(known)}; {cure}")
             for own in channels:
                 topic, kind = own["topic"], own["schemaName"]
                 if is_known(kind) and self._topic in ("", topic):
@@ -82,6 +87,9 @@ class Foxglove:
             return error
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             return RefusedError(f"what is no advertisement ({error})")
+        others = "" if self._is_named else " and ".join(topic for topic in known if topic != self._topic)
+        if channels and others:
+            return f"{others} came after {self._topic}, and is not read"
         if channels and self._channel is None:
             return RefusedError(
                 f"no topic {self._topic or 'of BiotacAll or BioTacHand'}, but {', '.join(self._seen.values())}"

@@ -6,6 +6,8 @@ of real fingers (host/docs/guides/owners.md).
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +22,8 @@ STALE_ROUNDS, STALE_MOVED_ROUNDS, MOVED_COUNTS = 100, 30, 8
 LEAST_REST_COUNTS = 1000  # real ones rest at 1870 to 3600
 DEAD = 3
 DEAD_ROUNDS = 30
-BEYOND_ROUNDS = 10  # with a count that no BioTac has
+REST_ROUNDS = 30  # that show at what a finger rests
+BEYOND_ROUNDS, BEYOND_OF = 10, 100  # with a count that no BioTac has, among the latest
 
 
 class Judge:
@@ -31,28 +34,40 @@ class Judge:
 
     def __init__(self, first: list[Counts]) -> None:
         self.foreign = ""
+        self._rest: list[NDArray[np.int64]] | None = None  # of a finger of which too little is known
         self.stale = 0
-        counts = np.array([own.electrodes[:ELECTRODES] for own in first])
-        self._rest = np.median(counts, axis=0)
-        self._last, self._recent = counts[0], counts[:1]
-        self._same = np.zeros(ELECTRODES, int)
-        self._dead = self._beyond = 0
+        self._same, self._ever_moved = np.zeros(ELECTRODES, int), np.zeros(ELECTRODES, bool)
+        self._last = np.full(ELECTRODES, -1)
+        self.begin()
         for own in first:
             self.words(own)
-        if not self.foreign and np.median(self._rest) < LEAST_REST_COUNTS:
-            self._condemn(f"they rest at {np.median(self._rest):.0f} counts, a BioTac's at 1900 to 3600")
+        self._rest = [own.electrodes[:ELECTRODES] for own in first]
+        self._look_at_rest()
+
+    def begin(self) -> None:
+        """From the first round once more; ``foreign`` stays, and so do electrodes that say one count throughout."""
+        frozen = np.array([bool(self.stale >> k & 1) for k in range(ELECTRODES)]) & ~self._ever_moved
+        self._same = np.where(frozen, STALE_ROUNDS, 0)
+        self._last = np.where(frozen, self._last, -1)
+        self._recent = np.empty((0, ELECTRODES), int)
+        self._round = self._dead = 0
+        self._beyond: deque[int] = deque(maxlen=BEYOND_ROUNDS)
 
     def words(self, own: Counts) -> NDArray[np.uint16]:
         """The round's electrodes (19,), INVALID_COUNT where stale or out of range."""
         counts = own.electrodes[:ELECTRODES]
         beyond = _beyond(counts)
-        self._same = np.where(counts == self._last, self._same + 1, 0)
+        self._ever_moved |= (counts != self._last) & (self._last >= 0)
+        self._same = np.where((counts == self._last) & (counts != wire.INVALID_COUNT), self._same + 1, 0)
         self._last = counts
         self._recent = np.vstack([self._recent[1 - STALE_MOVED_ROUNDS :], counts])
         stale = self._find_stale()
         self.stale = int((1 << np.flatnonzero(stale)).sum())
         if not self.foreign:
             self._look(own, counts, beyond)
+        if self._rest is not None:
+            self._rest.append(counts)
+            self._look_at_rest()
         return np.where(beyond | stale, wire.INVALID_COUNT, counts).astype(np.uint16)
 
     def _find_stale(self) -> NDArray[np.bool_]:
@@ -70,11 +85,21 @@ class Judge:
             self.foreign = SP
             return
         self._dead = self._dead + 1 if zeros >= DEAD else 0
-        self._beyond += bool(beyond.any())
+        self._round += 1
+        if beyond.any():
+            self._beyond.append(self._round)
         if self._dead >= DEAD_ROUNDS:
             self._condemn(f"{zeros} electrodes say 0")
-        elif self._beyond >= BEYOND_ROUNDS:
+        elif len(self._beyond) == BEYOND_ROUNDS and self._beyond[0] > self._round - BEYOND_OF:
             self._condemn(f"counts of up to {counts.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}")
+
+    def _look_at_rest(self) -> None:
+        if self._rest is None or len(self._rest) < REST_ROUNDS:
+            return
+        rest = float(np.median(np.median(self._rest, axis=0)))
+        self._rest = None
+        if not self.foreign and rest < LEAST_REST_COUNTS:
+            self._condemn(f"they rest at {rest:.0f} counts, a BioTac's at 1900 to 3600")
 
     def _condemn(self, why: str) -> None:
         self.foreign = f"these are not a BioTac's counts: {why}; no force"

@@ -19,11 +19,11 @@ from ..link.in_process import OUTBOX_BYTES, InProcessLink
 from ..wire.identity import SENSOR_SERIAL_BYTES
 from ..wire.native import ffi, lib
 from .message import Message, RefusedError
-from .words import EMPTY, ROUND_US, SILENCE_US, Round, Rounds
+from .rate import ROUND_US, SILENCE_US
+from .stamps import Stamps, by_header, timed
+from .words import EMPTY, Round, Rounds
 
 LIVE_SILENCE_US = 250_000  # on a network, messages may also be late
-AHEAD_US = 3600 * 10**6  # a stamp that is so much later is none
-ANCHOR_AGAIN = 50  # messages with wrong stamps in a row: the clock was set
 POLL_S = 0.01
 STOOD_S = 0.3  # without a look at the bridge, which is polled every few ms
 # Messages that show a source's rate and fingers: what has come of a topic, or the begin of a file.
@@ -33,12 +33,13 @@ PREVIEW, FILE_PREVIEW, PREVIEW_S = 50, 400, 10.0
 class Source(Protocol):
     """Where messages come from: iterating yields each, or the RefusedError of one that is none of a BioTac's.
 
-    A live one yields None while nothing has come, raises when it ends, and begins anew when it is iterated again.
+    A live one yields None while nothing has come, a str that a user should know, raises when it ends, and begins anew
+    when it is iterated again.
     """
 
     live: bool
 
-    def __iter__(self) -> Iterator[Message | RefusedError | None]: ...
+    def __iter__(self) -> Iterator[Message | RefusedError | str | None]: ...
 
 
 class MessagesLink(InProcessLink):
@@ -50,38 +51,42 @@ class MessagesLink(InProcessLink):
         self.pace, self.keeps_time = float(source.live), source.live
         self._held = True
         first = self._preview()
+        self._is_header = by_header(first)
+        first = [m for m in (timed(m, self._is_header) for m in first) if m.stamp_ns or m.logged_ns is None]
         self._rounds = Rounds(port, first)
-        if not source.live:  # of a file, all is known before the first round
-            self._rounds.look_at(source)
-            self._messages = iter(source)
+        self._seen = self._stamps = self._new_stamps(first[0].stamp_ns if source.live else None)
+        if not source.live:
+            self._look_at(first)
         self._gaps: list[tuple[int, int]] = []  # how long, and when, by the stamps
-        self._zero_ns = self._begin_ns = first[0].stamp_ns
         self._now_us, self._last_us, self._last_s = 0, -ROUND_US, time.monotonic()
-        self._wrong = 0  # stamps in a row
         self._announced: dict[int, tuple[bytes, bool]] = {}  # to the board, of each finger's sensor
         self.begin(lib.bt_sbc_new(self._handle, 0, self._rounds.timed, secrets.randbits(32)))
 
     @property
     def zero_ns(self) -> int:
         """See Link; of this wrap of the wire's 32 bits."""
-        return self._begin_ns + (self._now_us >> 32 << 32) * 1000
+        return (self._stamps.begin_ns or 0) + (self._now_us >> 32 << 32) * 1000
 
     @property
     def notes(self) -> list[str]:
+        notes = [*self._rounds.notes, *self._early, *self._seen.notes, *self._seen.tally.lines()]
         if not self._gaps:
-            return list(self._rounds.notes)
+            return notes
         long_us, at_us = max(self._gaps)
         longest = f"the longest {long_us / 1e6:.2f} s, {at_us / 1e6:.2f} s after the first message"
-        return [*self._rounds.notes, f"{len(self._gaps)} gap(s) of more than {SILENCE_US / 1e6:.2f} s, {longest}"]
+        return [*notes, f"{len(self._gaps)} gap(s) of more than {SILENCE_US / 1e6:.2f} s, {longest}"]
 
     def _preview(self) -> list[Message]:
         first: list[Message] = []
+        self._early: list[str] = []
         enough, refused, why = PREVIEW if self._source.live else FILE_PREVIEW, 0, "none came"
         deadline_s = time.monotonic() + PREVIEW_S
-        self._messages = iter(self._source)
+        self._messages: Iterator[Message | RefusedError | str | None] = iter(self._source)
         for message in self._messages:
             if isinstance(message, Message):
                 first.append(message)
+            elif isinstance(message, str):
+                self._early.append(message)
             elif message is not None:
                 refused, why = refused + 1, str(message)
             if len(first) >= enough or refused > enough or time.monotonic() > deadline_s:
@@ -89,6 +94,19 @@ class MessagesLink(InProcessLink):
         if len(first) < 2:
             raise PortError(f"{self.port}: no messages of a BioTac: {why}; expected some within {PREVIEW_S:.0f} s")
         return first
+
+    def _new_stamps(self, begin_ns: int | None) -> Stamps:
+        return Stamps(self.port, self._rounds.rate, self._is_header, begin_ns, self._source.live)
+
+    def _look_at(self, first: list[Message]) -> None:
+        """Of a file, all is known before the first round."""
+        self._rounds.look_at(self._seen.all(self._source))
+        known = self._rounds.positions.order
+        if known != sorted(known):  # one came late that is another finger than the next
+            self._rounds, self._seen = Rounds(self.port, first, known), self._new_stamps(None)
+            self._rounds.look_at(self._seen.all(self._source))
+        self._stamps = self._new_stamps(self._seen.begin_ns)
+        self._messages = self._stamps.all(self._source)
 
     def release(self) -> None:
         self._held = False
@@ -103,7 +121,7 @@ class MessagesLink(InProcessLink):
     def reopen(self, port: str) -> None:
         self._thread.join()
         self._messages = iter(self._source)
-        self._add(next(self._messages))  # raises when it is not there
+        self._take(next(self._messages))  # raises when it is not there
         self._failure = None
         self._start()
 
@@ -127,7 +145,8 @@ class MessagesLink(InProcessLink):
                 else:
                     message = next(self._messages, None)
                     self.ended = message is None
-                    self._add(message)
+                    if isinstance(message, Message):
+                        self._add(message)
         except Exception as error:  # as of a network, or unforeseen: the host gets it
             self._fail(error)
 
@@ -139,25 +158,16 @@ class MessagesLink(InProcessLink):
         self._polled_s = time.monotonic()
         since_us = int((time.monotonic() - self._last_s) * 1e6)
         self._now_us = max(self._now_us, self._last_us + since_us)
-        self._add(message)
+        self._take(message)
         if message is None and since_us > LIVE_SILENCE_US:
             self._fall_silent()
 
-    def _add(self, message: Message | RefusedError | None) -> None:
-        if not isinstance(message, Message):
-            if message is not None:
-                self._rounds.note(f"a message was refused: {message}")
-            return
-        t_us = (message.stamp_ns - self._zero_ns) // 1000
-        if not 0 < t_us - self._last_us < AHEAD_US:
-            self._rounds.note("a message was refused: its stamp is not after the one before, or more than an hour")
-            self._wrong += 1
-            if self._wrong < ANCHOR_AGAIN:
-                return
-            self._rounds.note("the stamps' clock was set: device time goes on, and stamps from here are off by that")
-            t_us = self._last_us + ROUND_US
-            self._zero_ns = message.stamp_ns - t_us * 1000
-        self._wrong = 0
+    def _take(self, message: Message | RefusedError | str | None) -> None:
+        for own in self._stamps.take(message):
+            self._add(own)
+
+    def _add(self, message: Message) -> None:
+        t_us = message.stamp_ns // 1000
         round_ = self._rounds.add(message)
         if round_ is None:
             return

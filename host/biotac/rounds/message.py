@@ -12,6 +12,7 @@ from ..wire import sensor_gen as sensor
 
 KINDS = (len(sensor.ELECTRODE_NAMES), sensor.FOREIGN_ELECTRODES)
 SLOT_US = (np.arange(len(sensor.SLOTS)) * 1e6 / sensor.SLOT_HZ).astype(np.uint32)
+ALTERNATE_NS = 10**9  # two senders, or two sensors, that take turns within that are two hands
 MAX_PAC = 4096  # in one message: two seconds
 
 
@@ -33,16 +34,46 @@ class Counts:
 
 @dataclass(frozen=True)
 class Message:
-    """``fingers``: five, None where there is no sensor. ``slot_us`` (44,): when each slot was sampled after the stamp,
-    None where unknown."""
+    """``fingers``: five, or those at ``positions`` of the hand; None where there is no sensor. ``slot_us`` (44,): when
+    each slot was sampled after the stamp, None where unknown.
+
+    ``logged_ns`` is for a source whose stamps are 0, None where a stamp may be 0. ``refused``: why single fingers are
+    left out.
+    """
 
     stamp_ns: int
     fingers: tuple[Counts | None, ...]
     slot_us: NDArray[np.uint32] | None = None
+    logged_ns: int | None = None
+    positions: tuple[int, ...] = ()
+    refused: tuple[str, ...] = ()
+
+
+class Found:
+    """A message's fingers, of which one that is wrong is left out alone."""
+
+    def __init__(self) -> None:
+        self.fingers: list[Counts | None] = []
+        self.refused: list[str] = []
+
+    def add(self, *words: Any) -> None:
+        """Of ``counts_of``'s."""
+        try:
+            self.fingers.append(counts_of(*words))
+        except RefusedError as error:
+            self.fingers.append(None)
+            self.refused.append(str(error))
+
+    def message(self, stamp_ns: int, *, places: int, **more: Any) -> Message:
+        """Raises RefusedError when no finger is left."""
+        if self.refused and not any(own is not None for own in self.fingers):
+            raise RefusedError(self.refused[0])
+        fingers = tuple([*self.fingers, *[None] * places][:places])
+        return Message(stamp_ns, fingers, refused=tuple(self.refused), **more)
 
 
 def counts_of(
-    finger: int, electrodes: Any, pdc: Any, tac: Any, tdc: Any, pac: Any = (), serial: bytes = b""
+    finger: int | str, electrodes: Any, pdc: Any, tac: Any, tdc: Any, pac: Any = (), serial: bytes = b""
 ) -> Counts | None:
     """Counts as a message has them; None when all is zero: no sensor.
 

@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from ..wire import sensor_gen as sensor
 from ..wire import slots
 from ..wire.identity import SENSOR_SERIAL_BYTES
-from .message import SLOT_US, Message, RefusedError, counts_of
+from .message import SLOT_US, Found, Message, RefusedError
 
 #: By the type's last word: Shadow's sr_robot_msgs/BiotacAll, and biotac_sensors/BioTacHand of Penn and KTH.
 TYPES = ("BiotacAll", "BioTacHand")
@@ -37,14 +37,15 @@ def decoder(kind: str, definition: str, *, ros1: bool, idl: bool = False) -> Dec
     except Exception as error:  # it is another program's text
         raise RefusedError(f"the definition of {kind} cannot be read ({error})") from error
     deserialize = store.deserialize_ros1 if ros1 else store.deserialize_cdr
-    read = _all if kind.endswith("BiotacAll") else _Hand()
+    read = _all if kind.endswith("BiotacAll") else _hand
 
     def decode(raw: bytes, logged_ns: int) -> Message:
         if len(raw) > MAX_BYTES:
             raise RefusedError(f"a message of {len(raw)} bytes, expected at most {MAX_BYTES}")
         try:
             message: Any = deserialize(raw, name)
-            return read(message, _stamp_ns(message.header.stamp) or logged_ns)
+            header = getattr(message, "header", None)
+            return read(message, 0 if header is None else _stamp_ns(header.stamp), logged_ns)
         except RefusedError:
             raise
         except Exception as error:  # a hostile message can fail anywhere in rosbags
@@ -61,35 +62,30 @@ def _stamp_ns(stamp: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-def _all(message: Any, stamp_ns: int) -> Message:
+def _all(message: Any, stamp_ns: int, logged_ns: int) -> Message:
     """sr_robot_msgs/BiotacAll: first, middle, ring, little finger, thumb, which are our default names."""
     tactiles = message.tactiles
     if len(tactiles) > sensor.MAX_SENSORS:
         raise RefusedError(f"tactiles has {len(tactiles)} entries, expected at most {sensor.MAX_SENSORS}")
-    found = []
+    found = Found()
     for f, own in enumerate(tactiles):
         pac = getattr(own, "pac", ())  # all since the message before; without it, the last two
-        pac = pac if len(pac) else (own.pac0, own.pac1)
-        found.append(counts_of(f, own.electrodes, own.pdc, own.tac, own.tdc, pac))
-    return Message(stamp_ns, tuple([*found, *[None] * sensor.MAX_SENSORS][: sensor.MAX_SENSORS]))
+        pac = pac if len(pac) else [getattr(own, name) for name in ("pac0", "pac1") if hasattr(own, name)]
+        found.add(f, own.electrodes, own.pdc, getattr(own, "tac", None), getattr(own, "tdc", None), pac)
+    return found.message(stamp_ns, places=sensor.MAX_SENSORS, logged_ns=logged_ns)
 
 
-class _Hand:
-    """biotac_sensors/BioTacHand: sensors in order of their positions, all slots with their times."""
-
-    def __init__(self) -> None:
-        self._finger_at: dict[int, int] = {}
-
-    def __call__(self, message: Any, stamp_ns: int) -> Message:
-        found: list[Any] = [None] * sensor.MAX_SENSORS
-        for own in sorted(message.bt_data, key=lambda own: int(own.bt_position)):
-            f = self._finger_at.setdefault(int(own.bt_position), len(self._finger_at))
-            if f >= sensor.MAX_SENSORS or found[f] is not None:
-                raise RefusedError(f"sensor position {own.bt_position} is one too many, or comes twice")
-            serial = own.bt_serial.encode("ascii", "replace")[:SENSOR_SERIAL_BYTES]
-            channels = own.electrode_data, own.pdc_data, own.tac_data, own.tdc_data, own.pac_data
-            found[f] = counts_of(f, *channels, serial)
-        return Message(stamp_ns, tuple(found), _slot_us(message.bt_time))
+def _hand(message: Any, stamp_ns: int, logged_ns: int) -> Message:
+    """biotac_sensors/BioTacHand: sensors by their positions, all slots with their times."""
+    found, positions = Found(), tuple(int(own.bt_position) for own in message.bt_data)
+    if len(set(positions)) != len(positions):
+        raise RefusedError(f"sensors at positions {', '.join(map(str, positions))}, expected each once")
+    for own in message.bt_data:
+        serial = own.bt_serial.encode("ascii", "replace")[:SENSOR_SERIAL_BYTES]
+        channels = own.electrode_data, own.pdc_data, own.tac_data, own.tdc_data, own.pac_data
+        found.add(f"at position {own.bt_position}", *channels, serial)
+    more = {"logged_ns": logged_ns, "positions": positions, "slot_us": _slot_us(message.bt_time)}
+    return found.message(stamp_ns, places=len(positions), **more)
 
 
 def _slot_us(times: Any) -> Any:

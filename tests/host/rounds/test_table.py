@@ -33,7 +33,8 @@ def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
     with biotac.open(write(tmp_path, f'time = "t"\n{ONE}', t_s=times_s)) as hand:
         assert bytes(hand.sensor_info(0).serial) == b"BT2P00000000000A"
         batch = hand.read_batch(100.0)
-        assert list(hand.link.notes) == ["a message was refused: row 101: its time is nan s"]
+        why = "a message was refused, after 0.98 s: row 101: its time is nan s"
+        assert list(hand.link.notes) == [why, "a message was missing, after 0.99 s"]
     good = ~np.isnan(times_s)
     np.testing.assert_array_equal(batch.frames["counts"], ROWS[good][:, slots.ELECTRODE_SLOT])
     np.testing.assert_array_equal(batch.pac["pac"], ROWS[good][:, slots.PAC_SLOT])
