@@ -107,7 +107,7 @@ class Gaps:
         ``lost_after`` has (finger, seq, frames missing).
         """
         seen_us, fingers = self._seen_us, FINGERS_IN[batch.fingers]
-        gap: Gap | None = None
+        gaps: list[Gap] = []
         if self._begun is not None:
             now, later = split(batch, batch.first_t_us() or 0)
             self._held_back.append(later)
@@ -117,22 +117,21 @@ class Gaps:
                 now.fingers = 0
                 return now  # the messages, which do not wait
             batch.messages = now.messages
-            gap = self._loss(*self._begun, batch.first_t_us() or last_us, flags)
+            gaps = [self._loss(*self._begun, batch.first_t_us() or last_us, flags)]
             self._begun, self._held_back, fingers = None, [], tuple(flags)
             batch.fingers = sum(1 << finger for finger in fingers)
         is_long = last_us - (batch.first_t_us() or last_us) > LONG_US
-        jumps = gap is None and any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers)
+        jumps = not gaps and any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers)
         rows = _rows(batch) if is_long or jumps else {}
-        if gap is None and rows:
-            gap = self._jump(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
+        if not gaps and rows:
+            gaps = self._jumps(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
         for finger in fingers:
             seen_us[finger] = last_us
         if is_long:
             seen_us |= {finger: own[-1][0] for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
-        if gap is not None:
-            self.count += 1
-            batch.messages.insert(0, replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id))
+        self.count += len(gaps)
+        batch.messages[:0] = [replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id) for gap in gaps]
         return batch
 
     def _loss(self, reason: Reason, last_us: int | None, lost_at_ns: int, next_us: int, flags: dict[int, int]) -> Gap:
@@ -144,20 +143,26 @@ class Gaps:
         known = None if reason == "rebooted" else missed
         return Gap(reason, last_us, next_us, lost_at_ns, 0, 0, fingers, known, lapsed)
 
-    def _jump(self, rows: dict[int, list[tuple[int, int, int, int]]], losses: set[tuple[int, int]]) -> Gap | None:
-        """A gap of single fingers, while the stream went on; None where heartbeats cover the time."""
-        gap: Gap | None = None
+    def _jumps(self, rows: dict[int, list[tuple[int, int, int, int]]], losses: set[tuple[int, int]]) -> list[Gap]:
+        """Gaps of single fingers, while the stream went on; none where heartbeats cover the time."""
+        gaps: list[Gap] = []
         for finger in rows:
             last_us = self._seen_us.get(finger, rows[finger][0][0])
             for t_us, seq, covered_us, _ in rows[finger]:
                 if t_us - last_us - covered_us > JUMP_US:
                     reason: Reason = "lost" if (finger, seq) in losses else "finger"
                     lost_at_ns = time.time_ns() - 1000 * (t_us - last_us)
-                    gap = gap or Gap(reason, last_us, t_us, lost_at_ns, 0, 0, frames_missed=0)
+                    at = next((k for k, gap in enumerate(gaps) if _is_same(gap, last_us, t_us)), len(gaps))
+                    gap = [*gaps, Gap(reason, last_us, t_us, lost_at_ns, 0, 0, frames_missed=0)][at]
                     missed = (gap.frames_missed or 0) + _rounds_between(last_us, t_us)
-                    gap = replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)
+                    gaps[at : at + 1] = [replace(gap, fingers=gap.fingers | 1 << finger, frames_missed=missed)]
                 last_us = t_us
-        return gap
+        return sorted(gaps, key=lambda gap: gap.next_t_us or 0)
+
+
+def _is_same(gap: Gap, last_us: int, next_us: int) -> bool:
+    """Whether another finger's gap is of the same time, to within what a batch tells of it."""
+    return max(abs((gap.last_t_us or 0) - last_us), abs((gap.next_t_us or 0) - next_us)) < JUMP_US
 
 
 def _rows(batch: Batch) -> dict[int, list[tuple[int, int, int, int]]]:

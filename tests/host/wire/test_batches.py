@@ -134,6 +134,14 @@ def test_losses_longer_than_the_numbers_are_counted_by_device_time() -> None:
     assert decoder.lost_pac == rounds[-1] + 1 - len(rounds)
 
 
+def test_numbers_that_follow_directly_do_so_after_any_silence() -> None:
+    t_us = [10_000, 20_000, 1_000_020_000, 1_000_040_000]
+    rows = [wire.Pac(seq, t, 0, (2000,) * 22).pack() for seq, t in zip((65_535, 0, 1, 3), t_us, strict=True)]
+    decoder = StreamDecoder()
+    batch = decoder.feed(b"".join(encode(wire.Pac.ID, row) for row in rows))
+    assert np.diff(batch.pac["seq"]).tolist() == [1, 1, 2] and decoder.lost_pac == 1
+
+
 def test_device_time_goes_on_over_its_wraps() -> None:
     truth = 2**32 - 10**6 + np.cumsum(np.random.default_rng(2).integers(-(10**6), 2**32 - 10**8, 1000))
     clock = ffi.new("bt_unwrapper *")
