@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import biotac
 from biotac.errors import InputError
 from biotac.sim.loading import load_source
+from biotac.wire import messages_gen as wire
 from biotac.wire import slots
 
 HEAD = ["t", "label", *(f"E{k}" for k in range(1, 20)), "P", *(f"pac{k}" for k in range(1, 23))]
@@ -33,7 +35,7 @@ def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
     with biotac.open(write(tmp_path, f'time = "t"\n{ONE}', t_s=times_s)) as hand:
         assert bytes(hand.sensor_info(0).serial) == b"BT2P00000000000A"
         batch = hand.read_batch(100.0)
-        why = "a message was refused, after 0.98 s: row 101: its time is nan s"
+        why = "a message was refused, after 0.98 s: line 102: its time is nan s"
         assert list(hand.link.notes) == [why, "a message was missing, after 0.99 s"]
     good = ~np.isnan(times_s)
     np.testing.assert_array_equal(batch.frames["counts"], ROWS[good][:, slots.ELECTRODE_SLOT])
@@ -63,3 +65,55 @@ def test_one_row_a_grasp_has_no_rest(tmp_path: Path) -> None:
         biotac.open(write(tmp_path, f"rate_hz = 100\n{ONE}", rows))
     with pytest.raises(InputError, match=r"what are its columns\? expected csv:"):
         biotac.open(f"csv:{tmp_path / 'a.csv'}")
+
+
+def changed(port: str, change: Callable[[list[str]], list[str]]) -> biotac.Hand:
+    path = Path(port[4:].partition("?")[0])
+    path.write_text("\n".join(change(path.read_text().split("\n"))))
+    return biotac.open(port)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda lines: [line.replace(",", ";") for line in lines],
+        lambda lines: [line.replace(",", "\t") for line in lines],
+        lambda lines: ["# of a press", "", *lines[:50], "# here it slipped", *lines[50:]],
+        lambda lines: [lines[0].replace("E19", "E0"), *lines[1:]],
+    ],
+)
+def test_a_table_of_another_form_says_the_same(tmp_path: Path, change: Callable[[list[str]], list[str]]) -> None:
+    with changed(write(tmp_path, f'time = "t"\n{ONE}'), change) as hand:
+        counts, notes = hand.read(100.0)["counts"], hand.link.notes
+    order = [18, *range(18)] if (tmp_path / "a.csv").read_text().count("E0") else range(19)
+    np.testing.assert_array_equal(counts, ROWS[:, slots.ELECTRODE_SLOT][:, order])
+    assert list(notes) == []
+
+
+def test_times_begin_anywhere_and_a_missing_word_is_only_that(tmp_path: Path) -> None:
+    port = write(tmp_path, f'time = "t"\n{ONE}', t_s=np.arange(len(ROWS)) * 0.01 - 3.0)
+    first = ROWS[100, slots.ELECTRODE_SLOT[0]]
+    with changed(
+        port, lambda lines: [*lines[:101], lines[101].replace(f",{first},", ",NaN,", 1), *lines[102:]]
+    ) as hand:
+        frames = hand.read(100.0)
+    assert len(frames) == len(ROWS) and frames["t_us"][0] == 0
+    assert np.argwhere(frames["counts"] == wire.INVALID_COUNT).tolist() == [[100, 0]]
+
+
+@pytest.mark.parametrize(
+    ("columns", "change", "words"),
+    [
+        (ONE, lambda lines: [lines[0].replace("E7,", "X,"), *lines[1:]], "no column E7, but E19; expected all"),
+        (ONE.replace("pdc", "pcd"), list, "unknown key 'pcd'; expected electrodes, pdc"),
+        (f"unit = 1\n{ONE}", list, "unknown key 'unit'; expected rate_hz, time, finger"),
+        (ONE, lambda lines: lines[:1], "has no rows"),
+        (ONE, lambda lines: ["", *lines[:9], lines[9].replace(",2", ",x", 1), *lines[10:]], "at line 11, column"),
+        (ONE, lambda lines: ["", *lines[:9], lines[9][:60], *lines[10:]], "at line 11 with"),
+    ],
+)
+def test_a_table_that_is_wrong_is_refused_by_name_or_line(
+    tmp_path: Path, columns: str, change: Callable[[list[str]], list[str]], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        changed(write(tmp_path, f'time = "t"\n{columns}'), change)
