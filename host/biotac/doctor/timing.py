@@ -45,11 +45,7 @@ def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
         yield Finding("bytes_damaged", seen)
     for finger in board.present:
         rate = slots_per_s(board, finger)
-        if (
-            rate is not None
-            and board.hello.board != wire.Board.MESSAGES
-            and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE
-        ):
+        if rate is not None and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE:
             yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} slots per second, expected {board.hello.slot_hz}")
     if board.clock is None:
         return
@@ -62,7 +58,7 @@ def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
 
 
 def slots_per_s(board: BoardFacts, finger: int) -> float | None:
-    """Slots per second of a finger by the board's own clock; None with less than two rounds.
+    """Slots per second of a finger by the board's own clock; None with less than two rounds, or without a bus.
 
     The median over consecutive frames and heartbeats: rounds without a good word are not numbered and leave holes.
     """
@@ -71,6 +67,6 @@ def slots_per_s(board: BoardFacts, finger: int) -> float | None:
     order = np.argsort(t_us)
     steps, times_us = np.diff(seq[order]), np.diff(t_us[order])
     good = (steps > 0) & (times_us > 0)
-    if not good.any():
+    if not good.any() or board.hello.board == wire.Board.MESSAGES:
         return None
     return float(np.median(steps[good] * len(sensor.SLOTS) / (times_us[good] / 1e6)))

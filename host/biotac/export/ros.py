@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from ..errors import InputError
 from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
-from ..rounds.bag import opened
+from ..rounds.bag import is_ros1, opened
 from .columns import Show, Table
 
 KINDS_APART = False
@@ -82,9 +83,11 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
 
 def _copy(source: Path, bag: Any, ros1: bool) -> None:
     """All messages of the bag ``source``. Raises InputError for one that cannot be read, or of the other ROS."""
-    if (source.suffix == ".bag") != ros1:
+    if is_ros1(source) != ros1:
         raise InputError(f"{source} is no bag of ROS {1 if ros1 else 2}: name the output {'.ros2' if ros1 else '.bag'}")
     with opened(source) as reader:
+        if results := [c.topic for c in reader.connections if re.match("/biotac/(finger|log)", c.topic)]:
+            raise InputError(f"{source} has results already ({results[0]}); expected the bag that the robot recorded")
         digest = "md5sum" if ros1 else "rihs01"
         to = {
             c.id: bag.add_connection(c.topic, c.msgtype, msgdef=c.msgdef.data, **{digest: c.digest})

@@ -39,6 +39,14 @@ def file_and_query(text: str) -> tuple[str, str]:
     return head, query
 
 
+def how_to_record(path: object) -> str:
+    """How a bag or a table of another driver's messages becomes a recording; empty for any other file."""
+    stem, suffix = os.path.splitext(os.path.normpath(str(path)))
+    scheme = {".bag": "bag", ".csv": "csv"}.get(suffix.lower())
+    more = "?columns=COLUMNS.toml" if scheme == "csv" else ""
+    return f"`biotac record '{scheme}:{path}{more}' {stem}.mcap` makes a recording of it" if scheme else ""
+
+
 def parse_pace(text: str) -> float:
     """Device seconds per second: ``real`` is 1, ``fast`` is 0, else a number. Raises ValueError for anything else."""
     named = {"real": 1.0, "fast": 0.0}

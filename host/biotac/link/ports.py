@@ -44,7 +44,7 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
             "replay:REC, bag:FILE, csv:FILE, foxglove://HOST:PORT/TOPIC or zenoh:NAME"
         )
     players = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim", ".bag": "bag", ".csv": "csv"}
-    cure = players.get(os.path.splitext(port)[1].lower())
+    cure = players.get(os.path.splitext(port.lower().removesuffix(".gz"))[1])
     if cure and not known:
         raise PortError(f"{port} is a file, not a port; play it with {cure}:{port}")
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")

@@ -27,6 +27,7 @@ from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
+from ..link.port_text import how_to_record
 from . import layout
 
 # A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to, or less with fingers at rest. In
@@ -188,10 +189,8 @@ class Scan:
                 yield from self._by_index(stream, self._index)
                 return
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                raise RecordingError(
-                    f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); expected a file "
-                    "written by `biotac record`"
-                )
+                cure = how_to_record(self.path) or "expected a file written by `biotac record`"
+                raise RecordingError(f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); {cure}")
             good_until = len(MCAP0_MAGIC)
             held: tuple[int, int] | None = None  # position and length of a chunk whose message indexes are being read
             channels: set[int] = set()

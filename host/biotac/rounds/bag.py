@@ -18,6 +18,8 @@ from .ros import Decode, decoder, is_known
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
     """rosbags' reader of a bag, of ROS 1 by its suffix. Raises InputError for one that cannot be read."""
+    if not path.exists():
+        raise InputError(f"{path} does not exist; expected a ROS 1 .bag, or the folder of a ROS 2 bag")
     try:
         with Reader1(path) if is_ros1(path) else Reader2(path) as bag:
             yield bag
@@ -42,8 +44,6 @@ class Bag:
     live = False
 
     def __init__(self, path: Path, topic: str) -> None:
-        if not path.exists():
-            raise InputError(f"{path} does not exist; expected a ROS 1 .bag, or the folder of a ROS 2 bag")
         self._path = path
         self._ros1 = is_ros1(path)
         with opened(self._path) as bag:

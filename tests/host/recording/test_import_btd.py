@@ -100,3 +100,14 @@ def test_a_real_file_with_gaps(tmp_path) -> None:
         assert np.array_equal(recording.pac["pac"], truth["PAC"])
     gaps_s = np.diff(recording.frames["t_us"]) / 1e6
     assert np.count_nonzero(gaps_s > 0.2) == 154
+
+
+@pytest.mark.parametrize("cut", [3, 30])
+def test_a_file_that_is_cut_within_its_last_line_lacks_one_frame(tmp_path: Path, capsys, cut: int) -> None:
+    path = tmp_path / "a.btd"
+    write_btd(path, load_source("press.toml", fingers=1, seconds=3.0).samples)
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert main(["export", str(path), str(tmp_path / "a.mcap")]) == 0
+    captured = capsys.readouterr()
+    assert "299 frames of 1 finger(s), 1 incomplete skipped" in captured.out
+    assert "1 gap(s) of more than 0.09 s" in captured.err

@@ -17,6 +17,8 @@ from .stream import batches
 
 EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30 --fact subject=S03 --fact trial=7"
 
+FILES = ("bag:", "csv:", "replay:")  # ports that end by themselves
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
@@ -40,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
         earlier = latched_faults(hand)
         recorder = hand.record(args.out, overwrite=args.force, note=args.note, **values.facts(args.fact))
         hand.stream("results", "events")
+        stopped = True
         with suppress(KeyboardInterrupt):  # the usual way to stop a recording
             for batch, recorded_s in batches(hand, args.seconds):
                 applied_n = hand.applied_n(batch.wire["finger"], batch.t_us)
@@ -50,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
                 progress.show(
                     f"{recorded_s:.1f} s, {recorder.frames} frames, {lost} lost, {size_mb:.1f} MB, Ctrl-C stops"
                 )
+            stopped = False
         with ending.held():
             progress.done()
             recorder.close()
@@ -71,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
     lines = [f"{held}; `biotac check {args.out}` verifies them", *(f"fault during the recording: {f}" for f in faults)]
     lines += [f"felt (mean ± RMS error) along what was applied: {felt}"] if str(felt) else []
     report(args, facts, "\n".join(lines))
+    if stopped and args.port.startswith(FILES):
+        note(f"{args.port} was stopped at {recorded_s:.1f} s of it: the recording has not the rest")
     if args.seconds is not None and recorded_s < args.seconds:
         note(f"{recorded_s:.1f} s were recorded, {args.seconds:g} s asked for: it ended before")
         return 1

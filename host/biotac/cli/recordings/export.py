@@ -14,6 +14,7 @@ from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
 from ...hand.opening import shake_hands
+from ...link.port_text import how_to_record
 from ...partial_file import whole
 from ...recording.layout import finger_of
 from ...recording.reader import Recording
@@ -78,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
     imports = source.name.lower().endswith((".btd", ".btd.gz"))
     if out.suffix.lower() != RECORDING:
         writer_for(out)
+    elif not recomputes and (cure := how_to_record(source)):
+        raise InputError(f"{source} is no recording; {cure}")
     elif not (imports or recomputes):
         raise InputError(
             f"{out}: {source} is an .mcap file already; add --recompute, name another format, or take `biotac file cut`"
@@ -95,6 +98,8 @@ def run(args: argparse.Namespace) -> int:
         if imports:
             with _recording_at(out, source, args.force, written) as target:
                 made: dict[str, Any] = import_btd(source, target)
+            for note in made["notes"]:
+                outputs.note(printable(note))
                 text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
             changes = read_settings(args.settings) if args.settings else {}
@@ -144,7 +149,8 @@ def import_btd(path: Path, out: Path) -> dict[str, Any]:
         for _ in hand.batches():
             pass
         recorder.close()
-        return {"fingers": len(hand.fingers), "frames": recorder.frames, "skipped": source.read.skipped}
+        counts = {"fingers": len(hand.fingers), "frames": recorder.frames, "skipped": source.read.skipped}
+        return counts | {"notes": list(hand.link.notes)}
 
 
 def frames_of(given: list[str], names: Mapping[str, int]) -> dict[int, str]:

@@ -138,14 +138,23 @@ def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64
     # drop the rest of the 'Begin File' line, so that row 0 is the line after it
     body = body.partition(b"\n")[2]
     try:
-        table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None, encoding="latin-1")
+        table = _table(body)
     except ValueError:
-        table = np.empty((0, 0))
+        try:  # without its last line, if the file is cut within that
+            table = _table(body[: body.rfind(b"\n") + 1])
+        except ValueError:
+            table = np.empty((0, 0))
     columns, parity = table.shape[1], table[:, _FIRST_PAIR + 1 :: 2]
     paired = columns >= _FIRST_PAIR + 2 and columns % 2 == 0
     if not paired or not np.isfinite(table).all() or not np.isin(parity, (0, 1)).all():
         raise RecordingError(f"{path}: {_first_fault(body, first_line)}")
     return table
+
+
+def _table(body: bytes) -> npt.NDArray[np.float64]:
+    if not body.strip():
+        raise ValueError("no lines")
+    return np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None, encoding="latin-1")
 
 
 def _first_fault(body: bytes, first_line: int) -> str:
