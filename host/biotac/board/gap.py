@@ -120,7 +120,8 @@ class Gaps:
             gaps = [self._loss(*self._begun, batch.first_t_us() or last_us, flags)]
             self._begun, self._held_back, fingers = None, [], tuple(flags)
             batch.fingers = sum(1 << finger for finger in fingers)
-        is_long = last_us - (batch.first_t_us() or last_us) > LONG_US
+        first_us = batch.first_t_us()
+        is_long = first_us is not None and last_us - first_us > LONG_US
         jumps = not gaps and any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers)
         rows = _rows(batch) if is_long or jumps else {}
         if not gaps and rows:

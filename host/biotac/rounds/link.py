@@ -26,6 +26,7 @@ from .words import EMPTY, Round, Rounds
 LIVE_SILENCE_US = 250_000  # on a network, messages may also be late
 POLL_S = 0.01
 STOOD_S = 0.3  # without a look at the bridge, which is polled every few ms
+SPEAKS_S = 5.0  # at most, on a computer that is busy: a host that streams speaks every third of a second
 # Messages that show a source's rate and fingers: what has come of a topic, or the begin of a file.
 PREVIEW, FILE_PREVIEW, PREVIEW_S = 50, 400, 10.0
 
@@ -152,11 +153,13 @@ class MessagesLink(InProcessLink):
 
     def _live(self) -> None:
         message = next(self._messages)
-        if time.monotonic() - self._polled_s > STOOD_S:  # so did the host: let it speak before its time goes on
+        now_s = time.monotonic()
+        if now_s - self._polled_s > STOOD_S:  # so did the host: let it speak before its time goes on
             with self._changed:
-                self._changed.wait_for(lambda: self._inbox or self._closing, STOOD_S)
+                self._changed.wait_for(lambda: self._inbox or self._closing, SPEAKS_S)
         self._polled_s = time.monotonic()
-        since_us = int((time.monotonic() - self._last_s) * 1e6)
+        # Until then, not until now: a stop in between is seen by the next look.
+        since_us = int((now_s - self._last_s) * 1e6)
         self._now_us = max(self._now_us, self._last_us + since_us)
         self._take(message)
         if message is None and since_us > LIVE_SILENCE_US:

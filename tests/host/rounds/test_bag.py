@@ -118,12 +118,12 @@ def test_own_stamps_are_kept_and_gaps_told(tmp_path: Path) -> None:
 
 def test_each_pause_is_a_gap_and_a_long_one_loses_no_number(tmp_path: Path) -> None:
     ns = START_NS + 10_000_000 * np.arange(400)
-    for at, pause_s in ((300, 0.5), (320, 0.4), (340, 1000)):
+    for at, pause_s in ((3, 0.3), (300, 0.5), (320, 0.4), (340, 1000)):
         ns[at:] += round(pause_s * 1e9)
     with biotac.open(Robot(HAND).write(tmp_path / "a.bag", samples(1)[:400], stamps_ns=ns)) as hand:
         gaps = [m for m in hand.read_batch(2000.0).messages if isinstance(m, biotac.Gap)]
-        assert hand.stats.frames_lost == 0 and hand.stats.gaps == 3
-    assert [(gap.fingers, gap.seconds) for gap in gaps] == [(1, 0.51), (1, 0.41), (1, 1000.01)]
+        assert hand.stats.frames_lost == 0 and hand.stats.gaps == 4
+    assert [(gap.fingers, gap.seconds) for gap in gaps] == [(1, 0.31), (1, 0.51), (1, 0.41), (1, 1000.01)]
 
 
 @pytest.mark.parametrize(("step_ms", "words"), [(25, "40 a second, expected 50 to 125"), (1000, "1 a second")])
