@@ -189,8 +189,11 @@ class Scan:
                 yield from self._by_index(stream, self._index)
                 return
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                cure = how_to_record(self.path) or "expected a file written by `biotac record`"
-                raise RecordingError(f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); {cure}")
+                how = how_to_record(self.path)
+                raise RecordingError(
+                    f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); expected a file "
+                    f"written by `biotac record`{how and '; '}{how}"
+                )
             good_until = len(MCAP0_MAGIC)
             held: tuple[int, int] | None = None  # position and length of a chunk whose message indexes are being read
             channels: set[int] = set()
