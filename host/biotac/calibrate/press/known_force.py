@@ -103,7 +103,7 @@ class Found:
                 f"held out, it is off by {held_out:.2f} N, no better than the {before:.2f} N of the population map; "
                 f"{CURE}"
             )
-        if self.scale is not None and self.held_out_n[2] > WORSE * self.before_n[2]:
+        if self.scale is not None and self.held_out_n[2] > max(WORSE * self.before_n[2], sigma_n[2]):
             return (
                 f"held out, z is off by {self.held_out_n[2]:.2f} N, more than the {self.before_n[2]:.2f} N of the "
                 f"population map; {CURE}"
