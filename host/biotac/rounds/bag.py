@@ -35,7 +35,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 def is_ros1(path: Path) -> bool:
     """By its suffix, also while it was being written: .bag.active."""
-    return ".bag" in [suffix.lower() for suffix in path.suffixes[-2:]]
+    return path.name.lower().removesuffix(".active").endswith(".bag")
 
 
 class Bag:

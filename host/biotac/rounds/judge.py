@@ -37,7 +37,6 @@ class Judge:
         self._rest: list[NDArray[np.int64]] | None = None  # of a finger of which too little is known
         self.stale = 0
         self._same, self._ever_moved = np.zeros(ELECTRODES, int), np.zeros(ELECTRODES, bool)
-        self._last = np.full(ELECTRODES, -1)
         self.begin()
         for own in first:
             self.words(own)
@@ -47,8 +46,8 @@ class Judge:
     def begin(self) -> None:
         """From the first round once more; ``foreign`` stays, and so do electrodes that say one count throughout."""
         frozen = np.array([bool(self.stale >> k & 1) for k in range(ELECTRODES)]) & ~self._ever_moved
-        self._same = np.where(frozen, STALE_ROUNDS, 0)
-        self._last = np.where(frozen, self._last, -1)
+        self._same = np.where(frozen, STALE_ROUNDS, -1)
+        self._last: NDArray[np.int64] | None = None
         self._recent = np.empty((0, ELECTRODES), int)
         self._round = self._dead = 0
         self._beyond: deque[int] = deque(maxlen=BEYOND_ROUNDS)
@@ -57,12 +56,13 @@ class Judge:
         """The round's electrodes (19,), INVALID_COUNT where stale or out of range."""
         counts = own.electrodes[:ELECTRODES]
         beyond = _beyond(counts)
-        self._ever_moved |= (counts != self._last) & (self._last >= 0)
-        self._same = np.where((counts == self._last) & (counts != wire.INVALID_COUNT), self._same + 1, 0)
+        same = counts == (counts if self._last is None else self._last)
+        self._ever_moved |= ~same
+        self._same = np.where(same, self._same + 1, 0)
         self._last = counts
         self._recent = np.vstack([self._recent[1 - STALE_MOVED_ROUNDS :], counts])
         stale = self._find_stale()
-        self.stale = int((1 << np.flatnonzero(stale)).sum())
+        self.stale = int((1 << np.flatnonzero(stale & (counts != wire.INVALID_COUNT))).sum()) if stale.any() else 0
         if not self.foreign:
             self._look(own, counts, beyond)
         if self._rest is not None:

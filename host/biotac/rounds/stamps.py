@@ -37,7 +37,7 @@ class Stamps:
         self.notes: list[str] = []
         self.begin_ns = self._zero_ns = begin_ns
         self._port, self._rate, self._is_header, self._live = port, rate, is_header, live
-        self._watch = rate.watch()
+        self._watch, self._is_changed = rate.watch(), False
         self._last_us, self._last_ns = -int(rate.step_us), -1
         self._wrong, self._wrong_ns = 0, 0
         self._held: Message | None = None
@@ -98,5 +98,6 @@ class Stamps:
         if not self._live:
             at_s = self.tally.s - ago_s
             raise InputError(f"{self._port}: {text} from {at_s:.1f} s on; expected one rate: split the file there")
-        if not any(text[:20] in note for note in self.notes):
+        if not self._is_changed:
+            self._is_changed = True
             self.notes.append(f"{text} later: what counts rounds takes longer or shorter; open it again")
