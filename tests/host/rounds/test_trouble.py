@@ -15,6 +15,9 @@ from rosbags.rosbag1 import Writer
 import biotac
 from biotac.errors import InputError, PortError
 from biotac.rounds.foxglove import Foxglove
+from biotac.rounds.message import Counts, Message
+from biotac.rounds.stamps import Stamps
+from biotac.rounds.words import Rounds
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots
@@ -191,3 +194,13 @@ def test_a_late_finger_is_judged_by_what_follows_and_a_silent_channel_may_begin(
     own = batch.frames[batch.frames["finger"] == 1]
     assert notes == [] and len(own) == 600 and not (own["flags"] & wire.FrameFlags.SENSOR_FAULT).any()
     np.testing.assert_array_equal(own["pdc"], [*[wire.INVALID_COUNT] * 10, *ROWS[610:, 1, slots.PDC_SLOT]])
+
+
+def test_a_live_rate_that_changes_is_told_once_and_makes_no_more_rounds_than_half_a_period_apart() -> None:
+    ns = np.cumsum([10_000_000] * 300 + [1_000_000] * 1000)
+    messages = [Message(int(t), (Counts(ROWS[0, 0, E]), None, None, None, None)) for t in ns]
+    rounds = Rounds("live", messages[:50])
+    stamps = Stamps("live", rounds.rate, True, int(ns[0]), live=True)
+    made = [own.stamp_ns for m in messages for own in stamps.take(m) if rounds.add(own) is not None]
+    assert len(made) >= 300 + 100 and min(np.diff(made)[310:]) >= 5_000_000
+    assert [note[:50] for note in stamps.notes] == ["100 messages a second at first, 1000 later: what c"]
