@@ -103,7 +103,7 @@ def _mixing(felt_n: Floats, force_n: Floats, way: Way) -> tuple[Floats, Floats]:
         felt, read = (np.array2string(values, precision=1) for values in pressed.T)
         raise InputError(
             f"presses of {felt} N by the map, {read} N on the scale: expected all above 0; tare the finger, and "
-            "press its pad straight down"
+            "press its pad straight down, about E17: at E18 and E19 the map does not reach"
         )
     return _regress(np.eye(3), way.spread, PRESS_ERROR_N, felt_n.T @ felt_n, felt_n.T @ force_n)
 
