@@ -10,13 +10,13 @@ void close_at(float mm_s);                   // the hand's own: both fingers; ne
 #define MARGIN(half_mn) ((half_mn) == 65535 ? 0 : (float)(half_mn) / 1e3f)
 struct grip {
     float least_n, most_n, slip_n, slip_shear_n, power, stiffness, speed_mm_s, normal_n, shear_n, margin_n,
-        way_mm, first_n, wanted_n;
-    int round, blind, reflex_until, pending_until, holds, settled, slips, opens;
+        way_mm, first_n, wanted_n, blind_n;
+    int round, blind, blind_slips, reflex_until, pending_until, holds, settled, slips, opens;
 } grip;
 static struct felt {
     float normal_n, shear_n, margin_n, half_n; // sums
     float most_n;
-    int frames, strong, lifted, unheld;
+    int frames, strong, lifted, unheld, slipped;
     int touched; // 1: a finger is, 2: one is not, 3: both
 } felt;          // since the last grip_round
 
@@ -44,7 +44,7 @@ void act_on(const bt_msg_frame *frame)
 void act_on_event(const bt_msg_event *event)
 {
     if (event->kind == BT_EVENT_KIND_SLIP && FINGERS >> event->finger & 1)
-        grip.pending_until = grip.round + 4; // the next round, and two
+        felt.slipped = 1;
 }
 
 void grip_begin(float least_n, float most_n) // grip.py: 0.8, 12
@@ -90,28 +90,43 @@ static float step(float shear_n)
     return (before + (reflex ? 1 : 0.3f) * (wanted - before)) / grip.stiffness;
 }
 
+// In N/s: from three rounds on harder by two fifths, as it may get heavier, by the interval's width, and at
+// once by two fifths more for each of two slips.
+static float press_blindly(void)
+{
+    const float pressed_n = fminf(grip.normal_n, grip.wanted_n);
+    grip.blind_slips += felt.slipped && grip.blind_slips < 2;
+    const float enough_n =
+        pressed_n * powf(1.4f, 1.0f + (float)grip.blind_slips) + fminf(4 * grip.margin_n, pressed_n);
+    const float rate = grip.blind_slips ? 40 : 5;
+    if (grip.blind < 3 || grip.normal_n + grip.blind_n >= fminf(enough_n, grip.most_n))
+        return 0;
+    grip.blind_n += rate * 0.01f;
+    return rate;
+}
+
 void grip_round(void)
 {
     const float frames = (float)felt.frames;
     grip.round++;
+    if (grip.holds && (!felt.frames || grip.blind)) // also what it does blindly makes the force
+        grip.way_mm += grip.speed_mm_s * 0.01f;
     if (grip.opens) { // RELEASE once nothing is touched: what is left over then is residue
         grip.speed_mm_s = -20;
         if (grip.opens == 1 && felt.touched == 2)
             hand_send(BT_RELEASE_ID, &(bt_msg_release){4, FINGERS}), grip.opens = 2;
     } else if (felt.frames) {
         grip.speed_mm_s = grip.blind ? 0 : grip.speed_mm_s; // what it did blindly is no rate to go on from
-        grip.blind = 0;
+        if (felt.slipped || grip.blind_slips)               // it may slip still
+            grip.pending_until = grip.round + 3;
+        grip.blind = grip.blind_slips = 0, grip.blind_n = 0;
         grip.margin_n += 0.1f * (felt.margin_n / frames - grip.margin_n);
         grip.normal_n = felt.normal_n / frames + grip.margin_n;
         const float closing_mm_s = felt.most_n < grip.most_n ? 10 : 0;
         grip.speed_mm_s = grip.holds || !felt.lifted ? step(felt.shear_n / frames) : closing_mm_s;
-    } else { // after three rounds harder by two fifths, as it may get heavier, and by the interval's width
-        const float pressed_n = fminf(grip.normal_n, grip.wanted_n);
-        const float enough_n = 1.4f * pressed_n + fminf(4 * grip.margin_n, pressed_n);
-        const float more_n = fminf(enough_n, grip.most_n) - grip.normal_n;
+    } else {
         grip.blind++;
-        const int harder = grip.holds && grip.blind >= 3 && 0.05f * (float)(grip.blind - 3) < more_n;
-        grip.speed_mm_s = harder ? 5 / grip.stiffness : 0;
+        grip.speed_mm_s = grip.holds ? press_blindly() / grip.stiffness : 0;
     }
     if (grip.holds && !grip.opens && felt.unheld) // again if it was lost, or lapsed with a restart
         hand_send(BT_HOLD_ID, &(bt_msg_hold){3, FINGERS});

@@ -13,7 +13,8 @@ REFLEX, REFLEX_ROUNDS = (40.0, 40.0, 1.0), 8  # the same after a slip, and for h
 SLIPS_FROM, PENDING_ROUNDS = 22, 3  # the level of a slip, which a squeeze hardly has, and for how long it is awaited
 LATE = 0.9  # of what is needed: pressed when a slip is felt
 DOUBT, DOUBT_RESERVE = 0.45, 0.65  # of shear's half width; of what pressed, on top where shear says nothing
-BLIND_ROUNDS, BLIND_SHARE, BLIND_MARGINS = 3, 0.4, 4  # who feels nothing for so long presses harder: see _blind_n
+BLIND_ROUNDS, BLIND_SHARE = 3, 0.4  # who feels nothing for so long presses harder by that, as it may get heavier,
+BLIND_MARGINS, BLIND_SLIPS = 4, 2  # by so many of its margins, and by that share again for each of so many slips
 
 
 class Grip:
@@ -30,6 +31,7 @@ class Grip:
         self.slip_n, self.slip_shear_n, self.power = LATE, FRICTION, 1.0  # of the latest slip: see needed_n
         self.speed_mm_s, self.normal_n, self.shear_n, self.margin_n = CLOSING_MM_S, 0.0, 0.0, 0.0
         self.holds, self.settled, self.slips = False, 0, 0  # rounds near the wanted force; slips acted on
+        self._blind_slips, self._blind_n = 0, 0.0  # while nothing is felt, and how much harder it pressed since
         self._round = self._blind = self._reflex_until = self._pending_until = self._way_mm = self._first_n = 0
 
     def step(self, frames, slipped: bool) -> float:
@@ -40,14 +42,15 @@ class Grip:
         self._round, self._blind = self._round + 1, self._blind + 1
         sides = zip(frames, self.towards, self.shares, strict=True)
         known = [(f, to, w) for f, to, w in sides if f and f.trust >= Trust.INTERVAL and np.isfinite(f.force_n).all()]
+        if self.holds and (not known or self._blind > 1):
+            self._way_mm += self.speed_mm_s * ROUND_S  # also what it did blindly makes the force
         if not known:
-            more_n = self.holds * (self._blind_n() - self.normal_n)
-            harder = 0 <= self._blind - BLIND_ROUNDS < more_n / (CALM[1] * ROUND_S)
-            self.speed_mm_s = CALM[1] / self.stiffness if harder else 0.0
+            self.speed_mm_s = self._press_blindly(slipped) / self.stiffness if self.holds else 0.0
             return self.speed_mm_s
         if self._blind > 1:
             self.speed_mm_s = 0.0  # what it did blindly is no rate to go on from
-        self._blind = 0
+        slipped = slipped or self._blind_slips > 0  # it may slip still
+        self._blind, self._blind_slips, self._blind_n = 0, 0, 0.0
         if not self.holds and not all(f.flags & FrameFlags.CONTACT for f, *_ in known):
             most_n = max(f.force_n @ to / share for f, to, share in known)
             self.speed_mm_s = CLOSING_MM_S if most_n < self.most_n else 0.0
@@ -71,11 +74,17 @@ class Grip:
         margin_n = 0.0 if frame.trust == Trust.ACT else frame.normal_half_n / 2
         return np.array([normal_n, np.linalg.norm(frame.force_n - normal_n * to), margin_n, frame.shear_half_n]) / share
 
-    def _blind_n(self) -> float:
-        """What it presses with at most where it feels nothing: more by a share, as things may get heavier, and by
-        the interval that it was felt with, at most by as much again. Once, in many gaps, too."""
+    def _press_blindly(self, slipped: bool) -> float:
+        """How fast to press, in N/s, where nothing is felt; in many gaps, too, once from what was felt."""
+        self._blind_slips = min(self._blind_slips + slipped, BLIND_SLIPS)
         pressed_n = min(self.normal_n, self.wanted_n)
-        return min((1 + BLIND_SHARE) * pressed_n + min(BLIND_MARGINS * self.margin_n, pressed_n), self.most_n)
+        enough_n = pressed_n * (1 + BLIND_SHARE) ** (1 + self._blind_slips)
+        enough_n += min(BLIND_MARGINS * self.margin_n, pressed_n)
+        if self._blind < BLIND_ROUNDS or self.normal_n + self._blind_n >= min(enough_n, self.most_n):
+            return 0.0
+        rate_n_s = (REFLEX if self._blind_slips else CALM)[1]
+        self._blind_n += rate_n_s * ROUND_S
+        return rate_n_s
 
     def needed_n(self, shear_n: float) -> float:
         """What each side has to press with at this shear, by the latest slip; where shear says nothing, as then."""
