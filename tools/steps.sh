@@ -86,7 +86,7 @@ m4f_tests() { # arguments go to ctest
 }
 
 python_tests() { # arguments go to pytest; processes with whole files each, for what tests of a file share
-    # Four on two cores: almost half of the time a test waits for a board whose time is real. Skipped tests say why,
+    # Three on two cores: almost half of the time a test waits for a board whose time is real. Skipped tests say why,
     # once a reason. What hangs is named with where it stands, after longer than any test takes on a busy computer.
-    pytest -rsfE -n 4 --dist loadfile --no-loadscope-reorder --timeout 900 "$@"
+    pytest -rsfE -n 3 --dist loadfile --no-loadscope-reorder --timeout 900 "$@"
 }

@@ -15,6 +15,7 @@ import pytest
 import serial
 from deframer import Deframer
 from fake_flash_board import FakeBoard
+from live_board import until
 
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError
@@ -183,6 +184,7 @@ def test_the_image_is_written_the_settings_stay_and_where_to_begin_comes_last(ro
     assert rom.flash[:8] == data[:8]
     assert bytes(rom.flash[SECTORS[1] : SECTORS[3]]) == settings
     assert [sector for kind, sector in rom.events if kind == "erase"] == [0, 3, 4]  # 16 and 64 KiB from 0xC000 on
+    until(lambda: ("go", 0) in rom.events)  # which it acknowledges first
     assert rom.events[-2:] == [("write", 0), ("go", 0)]
     assert shown[-1][0] == shown[-1][1] == -(-len(data) // 256)
 
