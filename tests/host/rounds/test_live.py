@@ -138,16 +138,21 @@ with biotac.open(sys.argv[1]) as hand:
     begun_s = time.monotonic()
     stop = f"sleep 2; kill -STOP {os.getpid()}; sleep 2; kill -CONT {os.getpid()}"
     subprocess.Popen(["sh", "-c", stop], start_new_session=True)
+    longest_us, last_us = 0, {}
     for batch in hand.batches():
+        for finger, t_us in zip(batch.wire["finger"].tolist(), batch.t_us.tolist()):
+            longest_us = max(longest_us, t_us - last_us.get(finger, t_us))
+            last_us[finger] = t_us
         if time.monotonic() > begun_s + 7.0:
             break
-    print(hand.stats.gaps)
+    print(hand.stats.frames_lost, longest_us < 1_000_000)
 """
 
 
 def test_a_program_that_stands_still_loses_no_message(bridge) -> None:
+    """No hole as long as it stood still; on a busy computer the robot itself may pause for a quarter of a second."""
     done = subprocess.run([sys.executable, "-c", STANDS_STILL, bridge().port], capture_output=True, text=True)
-    assert (done.stdout, done.stderr) == ("0\n", "")
+    assert (done.stdout, done.stderr) == ("0 True\n", "")
 
 
 def test_a_bridge_that_is_killed_is_lost_or_found_again(bridge) -> None:
