@@ -20,10 +20,10 @@ CHANNEL = {name: (sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in sensor.S
 SECOND_S = 0.5  # a gap of the logger's, behind the first half
 
 
-def write_btd(path: Path, samples: np.ndarray) -> np.ndarray:
+def write_btd(path: Path, samples: np.ndarray, gap_s: float = SECOND_S) -> np.ndarray:
     """Samples (frames, sensors, 44) as text, a bad word in one of them; returns each frame's time, s."""
     frames = len(samples)
-    times = np.arange(frames) * 0.01 + np.where(np.arange(frames) >= frames // 2, SECOND_S, 0.0)
+    times = np.arange(frames) * 0.01 + np.where(np.arange(frames) >= frames // 2, gap_s, 0.0)
     lines = ["a header", "Begin File"]
     for k in range(frames):
         for slot, name in enumerate(sensor.SLOTS):
@@ -61,6 +61,13 @@ def test_every_count_is_there_at_its_time(imported) -> None:
         assert np.array_equal(pac["pac"], samples[:, finger, np.array(sensor.SLOTS) == "PAC"])
         assert np.array_equal(rows["t_us"], np.rint(times * 1e6))
         assert np.array_equal(pac["seq"], rows["seq"])
+
+
+def test_a_file_of_which_nothing_is_missing_is_reported_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_btd(tmp_path / "a.btd", load_source("press.toml", fingers=1, seconds=1.0).samples, gap_s=0.0)
+    assert main(["export", str(tmp_path / "a.btd"), str(tmp_path / "a.mcap")]) == 0
+    out, notes = capsys.readouterr()
+    assert out.startswith("100 frames of 1 finger(s), 0 incomplete skipped") and notes == ""
 
 
 def test_results_are_those_of_the_boards_own_code(imported) -> None:

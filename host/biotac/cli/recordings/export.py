@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
                 made: dict[str, Any] = import_btd(source, target)
             for note in made["notes"]:
                 outputs.note(printable(note))
-                text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
+            text = f"{made['frames']} frames of {made['fingers']} finger(s), {made['skipped']} incomplete skipped"
         elif recomputes:
             changes = read_settings(args.settings) if args.settings else {}
             if args.poc_weights:
