@@ -27,8 +27,8 @@ class InputError(BiotacError):
     exit_code = 2
 
 
-def said(error: Exception) -> str:
-    """What an error says: a KeyError would quote its text."""
+def error_text(error: Exception) -> str:
+    """The text of an error, or its type where it has none; a KeyError would quote its text."""
     return str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error) or type(error).__name__
 
 

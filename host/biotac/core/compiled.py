@@ -47,10 +47,8 @@ def on_board_q4(
     poc_um, force_100un, torque_mnmm, each (n, 3), torsion_mnmm, which only a map gives, and the kernel's flags (n,).
     Raises ValueError for other shapes or ranges.
     """
-    n = len(counts)
-    if pdc_above_rest_q4 is None:
-        pdc_above_rest_q4 = np.full(n, wire.INVALID_I32, np.int32)
     raw, tare_q4, pdc = _checked(counts, tare_q4, pdc_above_rest_q4)
+    n = len(raw)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
     kernel.map = own_map
     poc_um, torsion_mnmm, flags = np.empty((n, 3), np.int16), np.empty(n, np.int32), np.empty(n, np.uint32)
@@ -75,6 +73,8 @@ def map_results_q4(
 def _checked(counts: Any, tare_q4: Any, pdc_above_rest_q4: Any) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
+    if pdc_above_rest_q4 is None:
+        pdc_above_rest_q4 = np.full(len(raw), wire.INVALID_I32, np.int32)
     return raw, tare_q4, integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, len(raw))
 
 

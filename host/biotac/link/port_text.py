@@ -9,6 +9,8 @@ from urllib.parse import parse_qsl
 
 from ..errors import PortError
 
+_PLAYERS = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim", ".bag": "bag", ".csv": "csv"}
+
 
 def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
     """WHAT, and the options by key. Raises PortError, with the expected ``form``, for an option not in ``known``."""
@@ -39,12 +41,17 @@ def file_and_query(text: str) -> tuple[str, str]:
     return head, query
 
 
+def player(path: object) -> str:
+    """The kind of port that plays such a file, by its suffix; empty for any other."""
+    name = os.path.normpath(str(path)).lower()
+    return _PLAYERS.get(os.path.splitext(name.removesuffix(".gz") if name.endswith(".btd.gz") else name)[1], "")
+
+
 def how_to_record(path: object) -> str:
     """How a bag or a table of another driver's messages becomes a recording; empty for any other file."""
-    stem, suffix = os.path.splitext(os.path.normpath(str(path)))
-    scheme = {".bag": "bag", ".csv": "csv"}.get(suffix.lower())
-    more = "?columns=COLUMNS.toml" if scheme == "csv" else ""
-    return f"`biotac record '{scheme}:{path}{more}' {stem}.mcap` makes a recording of it" if scheme else ""
+    more = {"bag": "", "csv": "?columns=COLUMNS.toml"}.get(scheme := player(path))
+    out = os.path.splitext(os.path.normpath(str(path)))[0]
+    return "" if more is None else f"`biotac record '{scheme}:{path}{more}' {out}.mcap` makes a recording of it"
 
 
 def parse_pace(text: str) -> float:

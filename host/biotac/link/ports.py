@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from ..errors import PortError
 from .base import Link
+from .port_text import player
 
 #: What opens each kind of port, as MODULE:FUNCTION. These are names, imported only when such a port is opened: this
 #: folder does not depend on those above it, and the user of a real board does not wait for the simulator to load.
@@ -43,8 +44,7 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
             "uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, "
             "replay:REC, bag:FILE, csv:FILE, foxglove://HOST:PORT/TOPIC or zenoh:NAME"
         )
-    players = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim", ".bag": "bag", ".csv": "csv"}
-    cure = players.get(os.path.splitext(port.lower().removesuffix(".gz"))[1])
+    cure = player(port)
     if cure and not known:
         raise PortError(f"{port} is a file, not a port; play it with {cure}:{port}")
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")

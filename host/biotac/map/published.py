@@ -35,8 +35,8 @@ def published(
 def by_map(results: StructArray, board_map: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
     """Replace in ``results`` of biotac.compute, MAPPED_RESULT_DTYPE, what the map has; returns the same array.
 
-    Shapes are as there. ``pdc_above_rest``, in counts, is (n,), one number, or None: missing. Raises ValueError for a
-    pressure of another shape.
+    Arguments have that function's shapes. ``pdc_above_rest``, in counts, is (n,), one number, or None: missing. Raises
+    ValueError for a pressure of another shape.
     """
     rows = results.reshape(-1)
     raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)

@@ -9,6 +9,7 @@ that does not stand out is refused: two files that do not belong together also h
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -115,22 +116,22 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
             f"{not_aligned}: their best agreement ({peak:.2f}) is not clear: another shift has {runner_up:.2f}, "
             f"{clear:.1f} standard errors lower, expected {MIN_CLEAR:g}; press less regularly, or record longer"
         )
-    drift_ppm, middle_s, offset, scatter, pieces, busy, lost_s = _drift(a, b, a_start, b_start, int(lags[best]), offset)
-    if abs(drift_ppm) > MAX_DRIFT_PPM or scatter > MAX_SCATTER_S:
+    drift = _drift(a, b, a_start, b_start, int(lags[best]), offset)
+    if abs(drift.ppm) > MAX_DRIFT_PPM or drift.scatter_s > MAX_SCATTER_S:
         raise RecordingError(
-            f"{not_aligned}: the clocks drift by {drift_ppm:.0f} ppm over the run, and parts of it lie "
-            f"{scatter * 1e3:.0f} ms off that: expected at most {MAX_DRIFT_PPM:g} ppm and {MAX_SCATTER_S * 1e3:g} ms; "
-            "did a clock jump?"
+            f"{not_aligned}: the clocks drift by {drift.ppm:.0f} ppm over the run, and parts of it lie "
+            f"{drift.scatter_s * 1e3:.0f} ms off that: expected at most {MAX_DRIFT_PPM:g} ppm and "
+            f"{MAX_SCATTER_S * 1e3:g} ms; did a clock jump?"
         )
-    if pieces >= MIN_PIECES and len(lost_s) > (1.0 - MIN_KEPT) * busy:
+    if drift.pieces >= MIN_PIECES and len(drift.lost_s) > (1.0 - MIN_KEPT) * drift.busy:
         raise RecordingError(
-            f"{not_aligned}: {len(lost_s)} of {busy} pieces, {min(lost_s) - board_s[0]:.0f} to "
-            f"{max(lost_s) - board_s[0]:.0f} s after the start, match at no shift near that of the others: expected at "
-            f"most {1.0 - MIN_KEPT:.0%}; did a clock jump there?"
+            f"{not_aligned}: {len(drift.lost_s)} of {drift.busy} pieces, {min(drift.lost_s) - board_s[0]:.0f} to "
+            f"{max(drift.lost_s) - board_s[0]:.0f} s after the start, match at no shift near that of the others: "
+            f"expected at most {1.0 - MIN_KEPT:.0%}; did a clock jump there?"
         )
     return Alignment(
-        float(offset), drift_ppm, middle_s, peak, runner_up, clear, width_s, scatter_s=scatter, pieces=pieces,
-        overlap_s=overlap_s,
+        float(drift.offset_s), drift.ppm, drift.middle_s, peak, runner_up, clear, width_s, scatter_s=drift.scatter_s,
+        pieces=drift.pieces, overlap_s=overlap_s,
     )  # fmt: skip
 
 
@@ -227,13 +228,22 @@ def _width(correlation: Floats, best: int) -> float:
     return float((right - left) * STEP_S)
 
 
-def _drift(
-    a: Floats, b: Floats, a_start: float, b_start: float, lag: int, offset_s: float
-) -> tuple[float, float, float, float, int, int, list[float]]:
-    """A line through the offsets of pieces: ppm, the board's middle time, offset there, scatter, pieces on it.
+class _Drift(NamedTuple):
+    """A line through the offsets of pieces, of which ``pieces`` lie on it: ``offset_s`` is at the board's ``middle_s``.
 
-    Then come the number of pieces in which something happens, and the times of those that match nowhere near the line.
+    Something happens in ``busy`` pieces; those at ``lost_s`` match nowhere near the line.
     """
+
+    ppm: float
+    middle_s: float
+    offset_s: float
+    scatter_s: float
+    pieces: int
+    busy: int
+    lost_s: list[float]
+
+
+def _drift(a: Floats, b: Floats, a_start: float, b_start: float, lag: int, offset_s: float) -> _Drift:
     size, reach = round(PIECE_S / STEP_S), round(PIECE_SEARCH_S / STEP_S)
     busy = 0.2 * float((a**2).mean())
     at: list[float] = []
@@ -258,7 +268,7 @@ def _drift(
             offsets.append(b_start - a_start + (lag + best - reach + shift) * STEP_S)
     middle = a_start + len(a) * STEP_S / 2
     if len(at) < MIN_PIECES:
-        return 0.0, middle, offset_s, 0.0, len(at), len(at) + len(lost), lost
+        return _Drift(0.0, middle, offset_s, 0.0, len(at), len(at) + len(lost), lost)
     slope, value, keep = 0.0, float(np.median(offsets)), np.ones(len(at), dtype=np.bool_)
     times, found = np.array(at) - middle, np.array(offsets)
     for _ in range(3):  # a piece that locked onto another press must not bend the line
@@ -270,5 +280,5 @@ def _drift(
         keep = near
     scatter = float(np.sqrt(((found - value - slope * times)[keep] ** 2).mean()))
     far = np.abs(found - value - slope * times) > MAX_SCATTER_S
-    busy, lost = len(at) + len(lost), [*lost, *(times[far] + middle).tolist()]
-    return 1e6 * slope, middle, value, scatter, int(keep.sum()), busy, lost
+    lost_s = [*lost, *(times[far] + middle).tolist()]
+    return _Drift(1e6 * slope, middle, value, scatter, int(keep.sum()), len(at) + len(lost), lost_s)

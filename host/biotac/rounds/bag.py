@@ -10,7 +10,7 @@ from typing import Any
 from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import Reader as Reader2
 
-from ..errors import BiotacError, InputError
+from ..errors import BiotacError, InputError, error_text
 from .message import ALTERNATE_NS, Message, RefusedError
 from .ros import Decode, decoder, is_known
 
@@ -28,9 +28,7 @@ def opened(path: Path) -> Iterator[Any]:
     except Exception as error:  # rosbags raises what it finds
         cure = "`rosbag reindex`" if is_ros1(path) else "`mcap recover`, then `ros2 bag reindex`"
         cure = f"a recorder that was killed leaves it so: {cure} mends it, else copy it again"
-        raise InputError(
-            f"{path} cannot be read as a ROS bag ({str(error) or type(error).__name__}); {cure}"
-        ) from error
+        raise InputError(f"{path} cannot be read as a ROS bag ({error_text(error)}); {cure}") from error
 
 
 def is_ros1(path: Path) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from ..errors import error_text
 from ..wire import sensor_gen as sensor
 from ..wire import slots
 from ..wire.identity import SENSOR_SERIAL_BYTES
@@ -49,9 +50,7 @@ def decoder(kind: str, definition: str, *, ros1: bool, idl: bool = False) -> Dec
         except RefusedError:
             raise
         except Exception as error:  # a hostile message can fail anywhere in rosbags
-            raise RefusedError(
-                f"{kind} of {len(raw)} bytes is no such message ({error or type(error).__name__})"
-            ) from None
+            raise RefusedError(f"{kind} of {len(raw)} bytes is no such message ({error_text(error)})") from None
 
     return decode
 

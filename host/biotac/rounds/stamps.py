@@ -88,7 +88,7 @@ class Stamps:
         step_us, self._last_us, self._last_ns = t_us - self._last_us, t_us, ns
         if missing := self._rate.missing(step_us):
             self.tally.add("missing", count=missing)
-        self.tally.s = t_us / 1e6
+        self.tally.time_s = t_us / 1e6
         if change := self._watch.changed(step_us):
             self._refuse_change(*change)
         yield replace(message, stamp_ns=t_us * 1000)
@@ -96,7 +96,7 @@ class Stamps:
     def _refuse_change(self, hz: float, ago_s: float) -> None:
         text = f"{1e6 / self._rate.step_us:.0f} messages a second at first, {hz:.0f}"
         if not self._live:
-            at_s = self.tally.s - ago_s
+            at_s = self.tally.time_s - ago_s
             raise InputError(f"{self._port}: {text} from {at_s:.1f} s on; expected one rate: split the file there")
         if not self._is_changed:
             self._is_changed = True

@@ -11,14 +11,14 @@ class Tally:
     """Counts by reason; numbers in a reason do not make it another one."""
 
     def __init__(self) -> None:
-        self.s = 0.0  # of the latest good message
+        self.time_s = 0.0  # of the latest good message
         self._found: dict[tuple[str, str], list[int | float | str]] = {}
 
     def add(self, what: str, why: str = "", count: int = 1) -> None:
         """``what`` happened to ``count`` messages: "refused", "missing"."""
         key = what, re.sub(r"\d+", "0", why)
         if key in self._found or len(self._found) < MOST:
-            own = self._found.setdefault(key, [0, self.s, f": {why}" if why else ""])
+            own = self._found.setdefault(key, [0, self.time_s, f": {why}" if why else ""])
             own[0] = int(own[0]) + count
 
     def lines(self) -> list[str]:

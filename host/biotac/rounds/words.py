@@ -57,7 +57,7 @@ class Rounds:
         self.serials: dict[int, bytes] = {}
         self._serial_before: dict[int, tuple[bytes, int, int]] = {}  # when it was left, and turns so far
         self.judges: dict[int, Judge] = {}
-        self._stale_told: dict[int, int] = {}
+        self._stale_reported: dict[int, int] = {}
         self._channels: dict[int, set[str]] = {}  # in use, by finger
         self._whole: dict[int, bool] = {}  # each message of the finger has a round's PAC
         self._kept_ns: int | None = None
@@ -118,7 +118,7 @@ class Rounds:
         for message in messages:
             for f, own in enumerate(self.positions.fingers(message)):
                 if own is not None and f in self.judges:
-                    self._hear(f, own, message.stamp_ns)
+                    self._judged(f, own, message.stamp_ns)
                 elif own is not None:
                     late.setdefault(f, []).append(own)
                     if len(late[f]) == LATE_FIRST:
@@ -134,7 +134,7 @@ class Rounds:
             judge.begin()
             self._channels[f] = set()
 
-    def _hear(self, f: int, own: Counts, ns: int) -> NDArray[np.uint16]:
+    def _judged(self, f: int, own: Counts, ns: int) -> NDArray[np.uint16]:
         """A finger's electrodes as words, and whatever else its counts say."""
         if f not in self.judges:
             self._begin(f, [own])
@@ -155,8 +155,8 @@ class Rounds:
                 self._unused.pop((f, name), None)
         if judge.foreign:
             self.note(f"finger {f}: {judge.foreign}")
-        if new := judge.stale & ~self._stale_told.get(f, 0):
-            self._stale_told[f] = self._stale_told.get(f, 0) | new
+        if new := judge.stale & ~self._stale_reported.get(f, 0):
+            self._stale_reported[f] = self._stale_reported.get(f, 0) | new
             names = [name for k, name in enumerate(sensor.ELECTRODE_NAMES) if new >> k & 1]
             self.note(f"finger {f}: {', '.join(names)} repeat one count while others do not, and count as missing")
         return words
@@ -172,7 +172,7 @@ class Rounds:
         for f, own in enumerate(fingers):
             if own is None:
                 continue
-            words[slots.ELECTRODE_SLOT, f] = self._hear(f, own, message.stamp_ns)
+            words[slots.ELECTRODE_SLOT, f] = self._judged(f, own, message.stamp_ns)
             for name, slot in SLOW.items():
                 word = getattr(own, name) if name in self._channels[f] else None
                 words[slot, f] = wire.INVALID_COUNT if word is None else word

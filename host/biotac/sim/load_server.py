@@ -13,7 +13,7 @@ from dataclasses import fields
 from typing import Any
 
 from ..documents import parse_json
-from ..errors import BiotacError, DeviceLostError, InputError, said
+from ..errors import BiotacError, DeviceLostError, InputError, error_text
 from .live import LiveFingers
 from .process import SimBoard
 from .touch import Course, Load, Touch
@@ -67,7 +67,7 @@ class LoadServer:
         except DeviceLostError:
             raise
         except (BiotacError, LookupError, TypeError, ValueError, OverflowError) as error:
-            return {"error": said(error)}
+            return {"error": error_text(error)}
         self._sensors.put(words)
         self._sensors.wait_still()
         self._rounds += 1

@@ -20,7 +20,7 @@ from importlib import resources
 from typing import Any
 
 from ..documents import parse_json
-from ..errors import BiotacError, PortError, said
+from ..errors import BiotacError, PortError, error_text
 from .reader import Reader
 from .rows import compact, facts
 from .state import State
@@ -131,7 +131,7 @@ class Handler(BaseHTTPRequestHandler):
             self._words(404, f"nothing at /{name}")
 
     def do_HEAD(self) -> None:
-        """Whether something is served there."""
+        """Answer 200 for a name that is served, 404 for any other."""
         if self._known_name():
             is_there = self._file_name() in ("events", *self.server.files)
             self._head(200 if is_there else 404, "text/html; charset=utf-8", {})
@@ -153,7 +153,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             self._words(200, self.server.reader.ask(*parse_command(self._body())))
         except (ValueError, KeyError) as error:  # of a finger that there is not
-            self._words(400, said(error))
+            self._words(400, error_text(error))
         except (BiotacError, OSError) as error:
             self._words(409, str(error))
 

@@ -158,8 +158,8 @@ def test_a_finger_is_published_when_it_comes_and_is_nan_once_when_it_goes(ros, m
         for batch, ended in ((first, [1]), (join([]), []), (join([]), [0])):
             ros.published.clear()
             fingers.publish(batch)
-            told = [topic for topic, message in ros.published if topic.endswith("trust") and message.data == 0]
-            assert told == [f"biotac/finger{finger}/trust" for finger in ended]
+            reported = [topic for topic, message in ros.published if topic.endswith("trust") and message.data == 0]
+            assert reported == [f"biotac/finger{finger}/trust" for finger in ended]
             assert all(np.isnan(last_of(ros, finger)).all() for finger in ended)
             last_s += 0.08
 

@@ -10,7 +10,7 @@ from biotac.recording.alignment import align, means
 
 
 def loads() -> tuple[np.ndarray, np.ndarray]:
-    """Four minutes of irregular presses at 100 Hz: times, and the load there."""
+    """Four minutes of irregular presses at 100 Hz: times, and the load at each."""
     rng = np.random.default_rng(4)
     t_s = np.arange(0.0, 240.0, 0.01)
     return t_s, np.interp(t_s, np.cumsum(rng.uniform(0.2, 0.8, 600)), rng.uniform(0.0, 5.0, 600))

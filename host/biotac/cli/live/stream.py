@@ -39,13 +39,13 @@ def run(args: argparse.Namespace) -> int:
     """Print until the time is over, the source ends or Ctrl-C."""
     # For people watching, simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
-        said = hand.warnings
-        for warning in said:
+        earlier = hand.warnings
+        for warning in earlier:
             note(warning.text)
         hand.stream("results", *(["events"] if args.events else []), rest=not args.touched)
         show(hand, rate=args.rate, seconds=args.seconds, events=args.events, as_json=args.json)
         for warning in hand.warnings:
-            if warning not in said:
+            if warning not in earlier:
                 note(warning.text)
         report_lost(hand)
     return 0
