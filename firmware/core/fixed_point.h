@@ -72,6 +72,12 @@ static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
     return ((int32_t)magnitude ^ mask) - mask;
 }
 
+// The next count, or the last one that its type holds.
+static inline uint8_t bt_counted(uint8_t count)
+{
+    return (uint8_t)(count + (count < UINT8_MAX));
+}
+
 static inline int bt_bit_length(uint32_t value)
 {
     return value == 0 ? 0 : 32 - __builtin_clz(value);

@@ -41,11 +41,6 @@ static void condemn(bt_health *health, uint32_t electrodes, uint8_t fault)
     health->alone &= ~electrodes;
 }
 
-static uint8_t counted(uint8_t count)
-{
-    return (uint8_t)(count + (count < UINT8_MAX));
-}
-
 // ---- words that jump back and forth --------------------------------------------------------------
 
 // Shaken skin does so, too, with pressure: then it is only suspected.
@@ -80,7 +75,7 @@ static void judge_repeats(bt_health *health, uint32_t missing, bool noisy)
         health->travel_q4 = 0;
     }
     health->unchanged = unchanged;
-    health->unchanged_windows = unchanged == 0 ? 0 : counted(health->unchanged_windows);
+    health->unchanged_windows = unchanged == 0 ? 0 : bt_counted(health->unchanged_windows);
     bool alive = health->alive_windows == ALIVE_WINDOWS, dead = health->alive_windows == 0;
     if (!frozen && health->windows > CLEAN_WINDOWS) {
         health->alive_windows = (uint8_t)(health->alive_windows + !alive);
@@ -240,7 +235,7 @@ static BT_NOINLINE uint32_t judge(bt_health *health, const bt_round *round, cons
     } else if (health->windows == CLEAN_WINDOWS) {
         anchor_all(health, &health->sum[!health->filling]);
     }
-    health->windows = counted(health->windows);
+    health->windows = bt_counted(health->windows);
     if (health->out != 0) {
         watch_condemned(health, round, &trigger->rest);
     }
@@ -266,7 +261,7 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
     health->down = trigger->down;
-    health->still_rounds = trigger->far >> BT_LANE_PDC & 1 ? 0 : counted(health->still_rounds);
+    health->still_rounds = trigger->far >> BT_LANE_PDC & 1 ? 0 : bt_counted(health->still_rounds);
     if (flips != 0) {
         judge_flips(health, flips, health->still_rounds <= SHAKEN_ROUNDS);
     }
@@ -277,16 +272,16 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
         bt_mean_add(&health->mean, before, 0);
         break;
     case 2:
-        bt_window_add(sum, smooth);
+        bt_lanes_add(sum, smooth);
         bt_mean_add(&health->mean, before, BT_LANES / 2);
         break;
     case 3:
-        bt_window_add(sum, smooth);
+        bt_lanes_add(sum, smooth);
         leave_out(health, without);
         health->moves = bt_moves_between(&health->mean, &health->anchor);
         break;
     default:
-        bt_window_add(sum, smooth);
+        bt_lanes_add(sum, smooth);
         lone = judge(health, round, trigger, noise);
         health->filling = !health->filling;
         health->rounds = 0;

@@ -17,14 +17,6 @@ uint32_t bt_window_begin(bt_lanes *sum, const bt_lanes *last, const bt_lanes *sm
     return same & BT_ALL_ELECTRODES;
 }
 
-void bt_window_add(bt_lanes *sum, const bt_lanes *smooth)
-{
-    BT_UNROLL
-    for (unsigned k = 0; k < BT_LANES / 2; k++) {
-        sum->pair[k] += smooth->pair[k];
-    }
-}
-
 void bt_mean_add(bt_lanes *mean_q4, const bt_lanes *sum_q2, unsigned first)
 {
     for (unsigned k = first / 2; k < first / 2 + BT_LANES / 4; k++) {

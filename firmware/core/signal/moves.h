@@ -13,7 +13,6 @@
 // Begin a window with this round's filtered counts, in the place of the one before the last. Returns a mask
 // of the electrodes that said one count in both, and say it now.
 uint32_t bt_window_begin(bt_lanes *sum, const bt_lanes *last, const bt_lanes *smooth);
-void bt_window_add(bt_lanes *sum, const bt_lanes *smooth);
 
 // Take the means of half of the lanes, from `first` on, a quarter of the way to a window's.
 void bt_mean_add(bt_lanes *mean_q4, const bt_lanes *sum_q2, unsigned first);

@@ -31,8 +31,6 @@ bool bt_silence_add(bt_silence *silence, uint32_t t_us, const bt_lanes *smooth)
     if (silence->sweeps == 0 || silence->rounds == BT_SILENCE_ROUNDS) {
         return false;
     }
-    for (unsigned k = 0; k < BT_LANES / 2; k++) {
-        silence->sum.pair[k] += smooth->pair[k];
-    }
+    bt_lanes_add(&silence->sum, smooth);
     return ++silence->rounds == BT_SILENCE_ROUNDS;
 }

@@ -38,10 +38,7 @@ void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth)
     if (!sweep->begun) {
         begin(sweep, smooth);
     }
-    BT_UNROLL
-    for (unsigned k = 0; k < BT_LANES / 2; k++) {
-        sweep->sum.pair[k] += smooth->pair[k];
-    }
+    bt_lanes_add(&sweep->sum, smooth);
 }
 
 void bt_sweep_start_over(bt_sweep *sweep)
@@ -50,8 +47,8 @@ void bt_sweep_start_over(bt_sweep *sweep)
     if (sweep->moved) {
         sweep->settled_q3 = sweep->mean_q3;
         sweep->still_sweeps = 0;
-    } else if (sweep->still_sweeps < UINT8_MAX) {
-        sweep->still_sweeps++;
+    } else {
+        sweep->still_sweeps = bt_counted(sweep->still_sweeps);
     }
     sweep->moved = false;
 }

@@ -18,14 +18,28 @@
 
 #include "signal/round.h"
 
+#ifndef BT_CDEF
+#include "fixed_point.h"
+#endif
+
 #define BT_LANES    (BT_ELECTRODES + 1) // what is filtered: the electrodes, then static pressure
 #define BT_LANE_PDC BT_ELECTRODES
 
-// One value per lane; pairs are for adding two at a time (sweep.c).
+// One value per lane; pairs are for adding two at a time, where no sum carries into its neighbour.
 typedef union {
     uint16_t lane[BT_LANES];
     uint32_t pair[BT_LANES / 2];
 } bt_lanes;
+
+#ifndef BT_CDEF
+static inline void bt_lanes_add(bt_lanes *sum, const bt_lanes *lanes)
+{
+    BT_UNROLL
+    for (unsigned k = 0; k < BT_LANES / 2; k++) {
+        sum->pair[k] += lanes->pair[k];
+    }
+}
+#endif
 
 // `smooth` and `rest` of a lane that never had a good word: it adds no energy, every first word is far from
 // it, and a sweep's sum has room for eight of it.

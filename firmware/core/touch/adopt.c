@@ -53,27 +53,18 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     tare->partial = true;
 }
 
-static uint32_t present_q16(const bt_tare *tare, unsigned lane)
-{
-    bool unknown = tare->trigger.unknown >> lane & 1;
-    return unknown ? BT_TARE_UNKNOWN : (uint32_t)tare->sweep.mean_q3.lane[lane] << 13;
-}
-
 void bt_adopt_present(bt_tare *tare, uint8_t reason)
 {
     bt_baseline base;
-    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        base.electrode_q16[i] = present_q16(tare, i);
-    }
-    base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
+    bt_baseline_present(&base, &tare->sweep, tare->trigger.unknown);
     bt_adopt(tare, &base, BT_TARE_STATE_REST, reason);
 }
 
 void bt_adopt_after_press(bt_tare *tare, uint8_t reason)
 {
     uint32_t rest_q16 = tare->base.pdc_q16;
-    uint32_t present = present_q16(tare, BT_LANE_PDC);
     bt_adopt_present(tare, reason);
+    uint32_t present = tare->base.pdc_q16;
     if (rest_q16 != BT_TARE_UNKNOWN && present < rest_q16
         && rest_q16 - present < UNDERSHOOT_PDC_COUNT_MAX << 16) {
         tare->base.pdc_q16 = rest_q16;
@@ -84,12 +75,12 @@ void bt_adopt_after_press(bt_tare *tare, uint8_t reason)
 
 void bt_adopt_shift(bt_tare *tare)
 {
-    bt_baseline base = tare->base;
+    bt_baseline base;
+    bt_baseline_present(&base, &tare->sweep, tare->trigger.unknown);
     int32_t shift_q16 = (int32_t)bt_div_round((int64_t)tare->sum_q4 * (1 << 12), BT_ELECTRODES);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        base.electrode_q16[i] = bt_baseline_moved(base.electrode_q16[i], shift_q16);
+        base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], shift_q16);
     }
-    base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
     bt_adopt(tare, &base, BT_TARE_STATE_REST, BT_TARE_REASON_SHIFT);
 }
 
@@ -114,19 +105,16 @@ static void adopt_first_word(bt_tare *tare, unsigned lane)
 {
     uint32_t first_q16 = (uint32_t)tare->trigger.smooth.lane[lane] << 16;
     bt_sweep_fill(&tare->sweep, lane, tare->trigger.smooth.lane[lane]);
-    if (lane < BT_ELECTRODES) {
-        if (tare->tared && tare->base.electrode_q16[lane] == BT_TARE_UNKNOWN) {
-            tare->base.electrode_q16[lane] = first_q16;
-            bt_rollback_fill(&tare->rollback, lane, first_q16);
-        }
-        bt_adopt_electrode(tare, lane);
-        return;
-    }
-    if (tare->state == BT_TARE_STATE_REST && tare->base.pdc_q16 == BT_TARE_UNKNOWN) {
-        tare->base.pdc_q16 = first_q16;
+    bool tared = lane == BT_LANE_PDC ? tare->state == BT_TARE_STATE_REST : tare->tared;
+    if (tared && tare->base.lane_q16[lane] == BT_TARE_UNKNOWN) {
+        tare->base.lane_q16[lane] = first_q16;
         bt_rollback_fill(&tare->rollback, lane, first_q16);
     }
-    bt_adopt_aim_pressure(tare);
+    if (lane == BT_LANE_PDC) {
+        bt_adopt_aim_pressure(tare);
+    } else {
+        bt_adopt_electrode(tare, lane);
+    }
 }
 
 BT_NOINLINE void bt_adopt_first_words(bt_tare *tare)

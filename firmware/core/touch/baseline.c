@@ -1,13 +1,18 @@
 #include "touch/baseline.h"
 
-#include "signal/sweep.h"
-
 #define SNAPSHOT_SWEEPS 3 // 240 ms
 #define ROLL_BACK       5 // snapshots
 
 _Static_assert(ROLL_BACK < BT_SNAPSHOTS, "the roll-back must be in the ring");
 _Static_assert(ROLL_BACK * SNAPSHOT_SWEEPS * BT_SWEEP_ROUNDS * BT_FRAME_MS >= 1000,
                "the roll-back must reach back a second");
+
+void bt_baseline_present(bt_baseline *base, const bt_sweep *sweep, uint32_t unknown)
+{
+    for (unsigned i = 0; i < BT_LANES; i++) {
+        base->lane_q16[i] = unknown >> i & 1 ? BT_TARE_UNKNOWN : (uint32_t)sweep->mean_q3.lane[i] << 13;
+    }
+}
 
 void bt_rollback_start(bt_rollback *rollback, const bt_baseline *base)
 {
@@ -25,19 +30,13 @@ void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base)
     rollback->countdown = SNAPSHOT_SWEEPS;
     rollback->head = (uint8_t)((rollback->head + 1) % BT_SNAPSHOTS);
     rollback->snapshot[rollback->head] = *base;
-    if (rollback->count < BT_SNAPSHOTS) {
-        rollback->count++;
-    }
+    rollback->count = (uint8_t)(rollback->count + (rollback->count < BT_SNAPSHOTS));
 }
 
 void bt_rollback_fill(bt_rollback *rollback, unsigned lane, uint32_t first_q16)
 {
     for (int k = 0; k < BT_SNAPSHOTS; k++) {
-        if (lane == BT_LANE_PDC) {
-            rollback->snapshot[k].pdc_q16 = first_q16;
-        } else {
-            rollback->snapshot[k].electrode_q16[lane] = first_q16;
-        }
+        rollback->snapshot[k].lane_q16[lane] = first_q16;
     }
 }
 

@@ -5,7 +5,7 @@
 #ifndef BIOTAC_BASELINE_H
 #define BIOTAC_BASELINE_H
 
-#include "signal/trigger.h"
+#include "signal/sweep.h"
 
 #define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
 #define BT_SNAPSHOTS    8
@@ -13,10 +13,16 @@
 // Per sweep; 0.5 count/s: drift is followed no faster, so that no load is.
 #define BT_SLEW_Q16 (8 * 328)
 
-typedef struct {
-    uint32_t electrode_q16[BT_ELECTRODES];
-    uint32_t pdc_q16;
+typedef union {
+    struct {
+        uint32_t electrode_q16[BT_ELECTRODES];
+        uint32_t pdc_q16;
+    };
+    uint32_t lane_q16[BT_LANES];
 } bt_baseline;
+
+// What the latest sweep read. Lanes in `unknown` have none.
+void bt_baseline_present(bt_baseline *base, const bt_sweep *sweep, uint32_t unknown);
 
 typedef struct {
     bt_baseline snapshot[BT_SNAPSHOTS];

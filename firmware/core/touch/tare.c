@@ -75,10 +75,9 @@ void bt_tare_reset(bt_tare *tare)
     bt_trigger_reset(&tare->trigger);
     bt_sweep_restart(&tare->sweep);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        tare->base.electrode_q16[i] = BT_TARE_UNKNOWN;
         tare->electrode_q4[i] = BT_INVALID_COUNT;
     }
-    tare->base.pdc_q16 = BT_TARE_UNKNOWN;
+    memset(&tare->base, 0xFF, sizeof tare->base); // BT_TARE_UNKNOWN
 }
 
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)

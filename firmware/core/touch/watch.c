@@ -56,14 +56,7 @@ void bt_watch_store(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
 {
     watch->wait_sweeps = 0;
     watch->early = false;
-    for (unsigned i = 0; i < BT_LANES; i++) {
-        uint32_t mean_q16 = unknown >> i & 1 ? BT_TARE_UNKNOWN : (uint32_t)sweep->mean_q3.lane[i] << 13;
-        if (i == BT_LANE_PDC) {
-            watch->base.pdc_q16 = mean_q16;
-        } else {
-            watch->base.electrode_q16[i] = mean_q16;
-        }
-    }
+    bt_baseline_present(&watch->base, sweep, unknown);
 }
 
 void bt_watch_wait(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
@@ -99,7 +92,7 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
 
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
 {
-    watch->creeps = (uint8_t)(watch->creeps + (watch->creeps < UINT8_MAX));
+    watch->creeps = bt_counted(watch->creeps);
     int change_q3 = pressure_mean_q3 == NULL ? LEVEL_Q3 + 1 : *pressure_mean_q3 - watch->level_q3;
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
         // Skin creeps: pressure that took so long to move by so little still counts as level.
@@ -109,8 +102,8 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
         if (!watch->slow) {
             bt_watch_begin(watch);
         }
-    } else if (watch->level_sweeps < UINT8_MAX) {
-        watch->level_sweeps++;
+    } else {
+        watch->level_sweeps = bt_counted(watch->level_sweeps);
     }
     watch->side_avg_q2 = (int16_t)(watch->side_avg_q2 + watch->side - bt_shift_down(watch->side_avg_q2, 2));
     watch->aligned = watch->side_avg_q2 >= SIDE_MIN_Q2 || watch->side_avg_q2 <= -SIDE_MIN_Q2;
