@@ -8,7 +8,7 @@ import numpy as np
 
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen
-from ..wire.identity import ascii_text
+from ..wire.identity import ascii_text, is_foreign
 from .catalogue import Finding
 from .facts import BoardFacts
 
@@ -19,8 +19,11 @@ def check(board: BoardFacts, expected: int | None) -> Iterator[Finding]:
     """Wrong type, none, fewer than ``expected``, lost or changed while listening, equal serials, damaged words."""
     for sensor in board.sensors:
         if not sensor.present and (serial := ascii_text(sensor.serial)):
-            reason = "which is not a BioTac with 19 electrodes"
-            yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, {reason}")
+            if is_foreign(sensor.serial):
+                reason = "which is not a BioTac with 19 electrodes"
+                yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, {reason}")
+            else:
+                yield Finding("sensor_lost", f"finger {sensor.finger}, {serial}, was unplugged")
     if not board.present:
         yield Finding("no_sensor", f"no sensor answers on any of {board.hello.fingers} chip selects")
         return

@@ -65,7 +65,7 @@ def pressed(pdc_per_n: float) -> Facts:
     """3 N on finger 1."""
 
     def press(rows: np.ndarray) -> None:
-        rows["force_n"][:, 2], rows["pdc_tare"] = 3.0, 2000
+        rows["normal_n"], rows["normal_half_n"], rows["pdc_tare"] = 3.0, 0.0, 2000
         rows["pdc"] += round(3 * pdc_per_n)
 
     return frames(press)
@@ -162,6 +162,11 @@ CASES: list[tuple[str, Facts, str]] = [
         board(sensors=[info(0, "BT00001"), dataclasses.replace(info(1, "BTSP050400018017"), present=0)]),
         "finger 1 is BTSP050400018017",
     ),
+    (
+        "sensor_lost",
+        board(sensors=[info(0, "BT00001"), dataclasses.replace(info(1, "BT00002"), present=0)]),
+        "finger 1, BT00002, was unplugged",
+    ),
     ("no_sensor", board(hello=hello(*RELEASE), sensors=[]), "no sensor answers"),
     ("sensor_missing", dataclasses.replace(board(), expected_fingers=3), "2 of 3 sensors answer: finger 0, 1"),
     ("sensor_lost", board(frames=rounds((0,))), "finger 1 sent no frame"),
@@ -256,6 +261,13 @@ def test_skin_that_bulges_is_not_inverted(change: Callable[[np.ndarray], None]) 
 
 def test_pressure_of_a_healthy_finger_is_no_finding() -> None:
     assert not [f for f in judge(pressed(100)) if f.code == "pressure_flat"]
+
+
+def test_a_press_that_the_default_map_reads_too_large_is_not_flat() -> None:
+    with biotac.open("sim:press.toml") as hand:
+        rows = hand.read(seconds=6.5)
+    side = rows[rows["t_us"] > 4_000_000]  # the scenario's press of 4 N at E13
+    assert not [f for f in judge(board(frames=side)) if f.code == "pressure_flat"]
 
 
 @pytest.mark.parametrize(("code", "facts", "words"), CASES, ids=[f"{c[0]}-{k}" for k, c in enumerate(CASES)])
