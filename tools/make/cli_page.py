@@ -70,9 +70,9 @@ def row(action: argparse.Action) -> tuple[str, str]:
     if action.choices is not None and action.metavar is None:
         value = "{" + ",".join(map(str, action.choices)) + "}"
     if action.option_strings:
-        name = ", ".join(action.option_strings) + ("" if action.nargs == 0 else f" {value}")
+        name = ", ".join(action.option_strings) + ("" if action.nargs == 0 else f" {optional(action, value)}")
     else:
-        name = f"[{value}]" if action.nargs == "?" else str(value)
+        name = optional(action, value)
     text = (action.help or "") % {"default": action.default}
     listed = ", ".join(map(str, action.choices or ()))
     if action.metavar is not None and not all(str(choice) in text for choice in action.choices or ()):
@@ -80,6 +80,11 @@ def row(action: argparse.Action) -> tuple[str, str]:
     if action.option_strings and action.required:
         text += f"{' ' if text else ''}(required)"
     return f"`{in_cell(name)}`", in_cell(text)
+
+
+def optional(action: argparse.Action, value: str) -> str:
+    """The argument's value, in brackets where it may be left out."""
+    return f"[{value}]" if action.nargs == "?" else str(value)
 
 
 def in_cell(text: str) -> str:

@@ -694,7 +694,7 @@ typedef struct {
 void bt_msg_tare_now_pack(const bt_msg_tare_now *msg, uint8_t out[BT_TARE_NOW_BYTES]);
 void bt_msg_tare_now_unpack(bt_msg_tare_now *msg, const uint8_t in[BT_TARE_NOW_BYTES]);
 
-// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or it is older than ten minutes and of a press, it stays TARE_UNSURE.
+// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or the finger is pressed and the tare older than ten minutes, it stays TARE_UNSURE.
 #define BT_TARE_SET_ID 0x85
 #define BT_TARE_SET_BYTES 46
 typedef struct {

@@ -1693,7 +1693,7 @@ class TareNow:
 
 @dataclass(frozen=True, slots=True)
 class TareSet:
-    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or it is older than ten minutes and of a press, it stays TARE_UNSURE."""
+    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded. It is TARE_UNSURE until it has been compared with what the finger reads, and then TARE_LIKELY if the two agree; if they do not, or the finger is pressed and the tare older than ten minutes, it stays TARE_UNSURE."""
 
     req_id: int
     finger: int

@@ -29,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ENDPOINT",
         nargs="?",
         const="",
-        help="also list boards shared by other computers, through ENDPOINT (tcp/HOST:7447) or by searching the network",
+        help="also list shared boards: this computer's or, with ZENOH_CONFIG, those of others, searched for or through "
+        "ENDPOINT (tcp/HOST:7447)",
     )
     parser.add_argument("--all", action="store_true", help="query every port, not only those with our USB ids")
 
@@ -87,7 +88,7 @@ def _command_line(process: Path) -> list[str]:
 
 
 def _shared(endpoint: str | None) -> list[dict[str, Any]]:
-    """What other computers on the network report about the boards they share."""
+    """What those who share boards report about them."""
     from ...fleet import network  # here, because most calls list this computer only
 
     with closing(network.open_session("biotac list", connect=endpoint)) as session:
