@@ -1,7 +1,7 @@
 """Finds what is wrong with a board, its sensors, its link or this computer; every finding names its cure.
 
 Facts are collected first (``system``, ``listening``), then judged: a check is a pure function of ``Facts``. Every
-finding's code is listed in ``catalogue`` and, for people, in host/docs/reference/doctor.md.
+finding's code is in ``catalogue``, which is host/docs/reference/doctor.md.
 """
 
 from __future__ import annotations

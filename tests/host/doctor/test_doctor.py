@@ -282,16 +282,12 @@ def test_a_development_version_is_not_newer_than_its_release(version: str) -> No
     assert release(version) == (1, 12, 3)
 
 
-def test_every_code_has_a_case_and_a_page() -> None:
+def test_every_code_has_a_case_and_every_section_of_the_page_is_read() -> None:
     cases = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*.py"))
     assert set(re.findall(r'\(\s*"(\w+)",', cases)) >= set(CATALOGUE)
     page = (ROOT / "host/docs/reference/doctor.md").read_text()
-    for code, entry in CATALOGUE.items():
-        assert f"## {code}\n" in page
-        assert entry.meaning in page
-        assert entry.cure in page
-    checked = [sys.executable, str(ROOT / "tools/make/doctor_page.py"), "--check"]
-    assert subprocess.run(checked, capture_output=True, text=True).stderr == ""
+    assert re.findall("^## (.+)$", page, re.MULTILINE) == list(CATALOGUE)
+    assert all(entry.meaning in page and entry.cure in page for entry in CATALOGUE.values())
 
 
 def test_what_is_healthy_is_left_alone() -> None:
