@@ -99,15 +99,15 @@ def error_bound(
     tare_q4: npt.NDArray[np.uint16],
     pdc_q4: npt.NDArray[np.int32],
 ) -> Floats:
-    """Bound (n, axes) on the board's error in N and N mm: against ``wanted``, as WrenchMap.blocks(), or exact()."""
-    off = [bound_of(board_map, wanted, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
+    """Bound (n, axes) on the board's error in N and N mm against exact() with ``wanted``."""
+    off = [_bound_of(board_map, wanted, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
     return np.concatenate(off) / result_units(board_map.axes)
 
 
 # ---- in the units of the board's integers ------------------------------------------------------
 
 
-def bound_of(board_map: BoardMap, wanted: Unrounded | None, signals: Signals) -> Floats:
+def _bound_of(board_map: BoardMap, wanted: Unrounded | None, signals: Signals) -> Floats:
     """The bound (n, axes) in the results' units, against the coefficients ``wanted``, or None: the integers' own."""
     columns, gate_values = kinds(signals), gates(signals.e)
     factors = {kind: columns[kind] * FACTOR[_map.KINDS[kind].of] for kind in _LINES if kind in columns}

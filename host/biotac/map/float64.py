@@ -64,17 +64,22 @@ def derived_torque_x(poc_mm: Floats, force_n: Floats) -> Floats:
 
 
 def exact(
-    board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
+    board_map: BoardMap,
+    counts: npt.NDArray[np.uint16],
+    tare_q4: npt.NDArray[np.uint16],
+    pdc_q4: npt.NDArray[np.int32],
+    wanted: Unrounded | None = None,
 ) -> Floats:
-    """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results()."""
-    blocks = [
-        (
-            (block.kind, block.gate),
-            block.coefficients * (unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)),
-        )
-        for block in board_map.blocks
-    ]
-    parts = [summed(blocks, signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
+    """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results().
+
+    ``wanted`` are the coefficients before they were rounded for the board; None: those that it has.
+    """
+    if wanted is None:
+        wanted = {
+            (own.kind, own.gate): own.coefficients * (unit(own.kind, own.gate) / 2.0 ** np.array(own.exponent))
+            for own in board_map.blocks
+        }
+    parts = [summed(wanted.items(), signals) for signals in tared_chunks(board_map, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
     return np.clip(np.concatenate(parts), -limit, limit) / result_units(board_map.axes)
 

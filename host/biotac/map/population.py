@@ -26,9 +26,9 @@ from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
-from .columns import GATED, SIGNAL_COUNTS, split, summed, tared
+from .columns import GATED, SIGNAL_COUNTS, split
 from .fitted import quantise
-from .float64 import derived_torque_x
+from .float64 import Unrounded
 from .margin import UNKNOWN, Margin
 
 SHIPPED = "population.json"
@@ -43,7 +43,6 @@ _LEAST_Q4 = 64 * 16
 _LIGHT_Q4 = 1500 * 16
 _FAR_8, _OUTSIDE = 11, 2
 _GAIN_LEAST = 102
-_CHUNK_ROWS = 4096
 
 
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:
@@ -73,9 +72,14 @@ def margin() -> Margin:
     return Margin(*map(tuple, json.loads(shipped())["margin"]))
 
 
+def unrounded(newtons: Mapping[tuple[Kind, Gate], Floats]) -> Unrounded:
+    """Such blocks in the board's unit of force."""
+    return {block: values * FORCE_LSB_PER_N for block, values in newtons.items()}
+
+
 def board_map(newtons: Mapping[tuple[Kind, Gate], Floats], margin: Margin = UNKNOWN) -> BoardMap:
     """Such blocks as a board's map. Raises InputError when they do not fit the board's formats."""
-    return quantise({block: values * FORCE_LSB_PER_N for block, values in newtons.items()}, margin=margin)
+    return quantise(unrounded(newtons), margin=margin)
 
 
 @dataclass(frozen=True)
@@ -182,21 +186,6 @@ def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> In
     unit = (size << _UNIT_BITS) // np.maximum(length, 1)[:, None]
     force: Integers = np.sign(to) * (unit * strength_100un[:, None] >> _UNIT_BITS)
     return force
-
-
-def replace_force(
-    counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], poc_mm: Floats, force_n: Floats, torque_nmm: Floats
-) -> None:
-    """Replace Lin's ``force_n`` by the map's and what it is mixed with, and derive torque x from the result.
-
-    All arrays have n rows. NaN in ``poc_mm`` makes torque x NaN.
-    """
-    for start in range(0, len(counts), _CHUNK_ROWS):
-        rows = slice(start, start + _CHUNK_ROWS)
-        signals = tared(counts[rows], tare_q4[rows])
-        by_board = board_force_100un(counts[rows], tare_q4[rows])
-        force_n[rows] = likeness(signals.e, by_board).mixed(summed(blocks().items(), signals))
-    torque_nmm[:, 0] = derived_torque_x(poc_mm, force_n)
 
 
 @cache

@@ -16,16 +16,20 @@ from ..wire import messages_gen as wire
 from ..wire.frames import StructArray, tare_to_q4
 from .board_map import BoardMap
 from .columns import tared
-from .float64 import exact, replace_gains
+from .float64 import Unrounded, exact, replace_gains
 from .margin import published_parts
 from .population import Likeness, board_force_100un, likeness
 
 
 def published(
-    board_map: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
+    board_map: BoardMap,
+    counts: npt.NDArray[np.uint16],
+    tare_q4: npt.NDArray[np.uint16],
+    pdc_q4: npt.NDArray[np.int32],
+    wanted: Unrounded | None = None,
 ) -> tuple[Floats, Likeness | None]:
-    """The results (n, axes) in N and N mm, without the board's rounding, and how a map that is judged was found."""
-    wrench = exact(board_map, counts, tare_q4, pdc_q4)
+    """exact(), mixed as a board does where it judges the map, and then how the map was found."""
+    wrench = exact(board_map, counts, tare_q4, pdc_q4, wanted)
     if not board_map.is_population:
         return wrench, None
     judged = likeness(tared(counts, tare_q4).e, board_force_100un(counts, tare_q4, board_map))

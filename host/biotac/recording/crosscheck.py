@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, completed, reference_q4
 from ..map import population
 from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
-from ..map.bound import bound_of, error_bound
-from ..map.columns import tared
+from ..map.bound import error_bound
 from ..map.float64 import replace_gains
 from ..map.published import published
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
-from ..wire.frames import FORCE_LSB_PER_N, UM_PER_MM, StructArray, electrode_signals, to_units
+from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .pressure_check import FORCE_BOUND_N, PressureCheck
@@ -123,16 +122,14 @@ class CrossCheck:
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
         torsion, torsion_bound = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
-        if own_map is not None:
-            force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, own_map, truth, settings)
-            self.mapped += len(messages)
-            if own_map.is_population:
-                self._judge_model(messages, own_map)
-        elif population.in_force(settings):
-            force_bound, torque_bound = _by_population(messages, truth, settings)
-            self._judge_model(messages, population.on_board())
-        else:
+        used = population.on_board() if own_map is None and population.in_force(settings) else own_map
+        if used is None:
             torque_bound = torque_bound_nmm(messages, truth, settings)
+        else:
+            force_bound, torque_bound, torsion_bound, judged = _by_map(messages, used, truth, torsion, settings)
+            self.mapped += 0 if own_map is None else len(messages)
+            if judged is not None:
+                self._judge_model(messages, judged, used)
         if not isinstance(force_bound, float):
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
         for own_bound in (torque_bound, torsion_bound):
@@ -163,12 +160,11 @@ class CrossCheck:
             self._find(messages, row, finding)
         self.frames += len(messages)
 
-    def _judge_model(self, messages: StructArray, used: BoardMap) -> None:
+    def _judge_model(self, messages: StructArray, judged: population.Likeness, used: BoardMap) -> None:
         """With a force POPULATION or MAPPED must be set, and OUTSIDE where the signals are unlike the training."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
-        unlike = _likeness(messages, used).outside
         own = wire.FrameFlags.POPULATION if used is population.on_board() else wire.FrameFlags.MAPPED
-        wanted = own | np.where(unlike, wire.FrameFlags.OUTSIDE, 0)
+        wanted = own | np.where(judged.outside, wire.FrameFlags.OUTSIDE, 0)
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.MAPPED | wire.FrameFlags.OUTSIDE)
         self._find_all(messages, made & (seen != wanted), "POPULATION or OUTSIDE contradicts the signals")
 
@@ -198,50 +194,27 @@ class CrossCheck:
 
 
 def _by_map(
-    messages: StructArray, own_map: BoardMap, truth: Results, settings: Settings
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Replace force and torque in ``truth`` by what the map's integers mean.
+    messages: StructArray, used: BoardMap, truth: Results, torsion: NDArray[np.float64], settings: Settings
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], population.Likeness | None]:
+    """Replace force and torque in ``truth``, and ``torsion`` (n, 1), by what the integers of an own map mean.
 
-    Returns the bounds of force, mN, and torque, N*mm, both (n, 3); then torsion and its bound, N*mm, both (n, 1), NaN
-    and 0 for a map without torsion.
+    The package's map is taken as it was trained. Returns the bounds of force, mN, and torque, N*mm, both (n, 3), and
+    of torsion, N*mm, (n, 1); then how a map that is judged was found.
     """
+    wanted = population.unrounded(population.blocks()) if used is population.on_board() else None
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    (wrench, judged), off = published(own_map, *frames), error_bound(own_map, None, *frames)
+    (wrench, judged), off = published(used, *frames, wanted), error_bound(used, wanted, *frames)
     if judged is not None:
         off = judged.bound(off)
-    torsion = np.empty((len(messages), 1))
-    replace_gains(own_map, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
+    replace_gains(used, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
-    if own_map.axes < _map.AXES_TORSION:
+    if used.axes < _map.AXES_TORSION:
         torsion_off = np.zeros_like(torsion)
-    if own_map.axes == 3:
+    if used.axes == 3:
         # Mx is derived from this force, with a lever of at most the core's radius
         torque_off = torque_bound_nmm(messages, truth, settings)
         torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
-    return 1e3 * force_off, torque_off, torsion, torsion_off
-
-
-def _by_population(
-    messages: StructArray, truth: Results, settings: Settings
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Replace force and torque in ``truth`` by the population map's. Bounds of force, mN, and torque, N*mm, (n, 3)."""
-    off = _population_bound_n(messages)
-    population.replace_force(messages["counts"], messages["tare_q4"], truth.poc_mm, truth.force_n, truth.torque_nmm)
-    torque_off = torque_bound_nmm(messages, truth, settings)
-    torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * off[:, 1:].sum(axis=1)
-    return 1e3 * off, torque_off
-
-
-def _likeness(messages: StructArray, used: BoardMap) -> population.Likeness:
-    counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    return population.likeness(tared(counts, tare_q4).e, population.board_force_100un(counts, tare_q4, used))
-
-
-def _population_bound_n(messages: StructArray) -> NDArray[np.float64]:
-    """Bound (n, 3) of the population map's force in N from its formats."""
-    wanted = {block: values * FORCE_LSB_PER_N for block, values in population.blocks().items()}
-    off = bound_of(population.on_board(), wanted, tared(messages["counts"], messages["tare_q4"])) / FORCE_LSB_PER_N
-    return _likeness(messages, population.on_board()).bound(off)
+    return 1e3 * force_off, torque_off, torsion_off, judged
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

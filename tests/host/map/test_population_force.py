@@ -12,6 +12,8 @@ from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.map import population
 from biotac.map.board_map import BoardMap
+from biotac.map.float64 import replace_gains
+from biotac.map.published import published
 from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
@@ -177,7 +179,10 @@ def test_compute_is_the_float64_that_boards_are_held_against() -> None:
     tare_q4 = np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)
     lin = biotac.compute(counts, TARE, LIN)
     wanted = {name: lin[name].copy() for name in lin.dtype.names}
-    population.replace_force(counts, tare_q4, *(wanted[name] for name in ("poc_mm", "force_n", "torque_nmm")))
+    trained, no_pdc = population.unrounded(population.blocks()), np.zeros(len(counts), np.int32)
+    wrench, _ = published(population.on_board(), counts, tare_q4, no_pdc, trained)
+    gains = (wanted[name] for name in ("poc_mm", "force_n", "torque_nmm"))
+    replace_gains(population.on_board(), wrench, *gains, np.empty(len(counts)))
     got = biotac.compute(counts, TARE)
     for name in ("poc_mm", "force_n", "torque_nmm"):
         np.testing.assert_allclose(got[name], wanted[name], rtol=0, atol=1e-9)
