@@ -28,13 +28,13 @@ from biotac.calibrate.press import (
     Fit,
     Press,
     Procedure,
-    Truth,
     Verification,
     fit,
     guide,
     put,
     relative_error,
     rows_of,
+    truth_of,
     verify,
     with_board_force,
     with_gain,
@@ -151,13 +151,13 @@ def _error_percent(gain_nn: int, group: Sequence[Press]) -> float:
 
 
 @contextlib.contextmanager
-def _played(text: str, board: str) -> Iterator[tuple[biotac.Hand, Truth]]:
+def _played(text: str, board: str) -> Iterator[tuple[biotac.Hand, Any]]:
     """A board that plays a scenario, and the force in it."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "navarro.toml")
         path.write_text(text, encoding="utf-8")
         with biotac.open(f"sim:{path}" if board == "posix" else f"emu:{board}?source={path}") as hand:
-            yield hand, Truth(hand)
+            yield hand, truth_of(hand)
 
 
 # ---- what the emulated hand does ----------------------------------------------------------------

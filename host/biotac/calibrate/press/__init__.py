@@ -12,7 +12,7 @@ from __future__ import annotations
 from .detector import Press, Procedure
 from .drive import Move, drive
 from .few_shot import Scale, scale_of, shrink_to
-from .force_source import Truth, rows_of
+from .force_source import rows_of, truth_of
 from .guide import guide
 from .pressure import (
     CALIBRATION_FORCES_N,
@@ -29,6 +29,6 @@ from .pressure_procedure import put, with_gain
 
 __all__ = [
     "CALIBRATION_FORCES_N", "PAPER_ERROR", "VERIFICATION_FORCES_N", "Fit", "Move", "Press", "Procedure", "Scale",
-    "Truth", "Verification", "drive", "fit", "guide", "put", "relative_error", "rows_of", "scale_of", "shrink_to",
+    "Verification", "drive", "fit", "guide", "put", "relative_error", "rows_of", "scale_of", "shrink_to", "truth_of",
     "verify", "with_board_force", "with_gain",
 ]  # fmt: skip

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -42,7 +41,6 @@ class Phase(Enum):
     REST = "rest"
     PRESS = "press"
     RELEASE = "release"
-    DONE = "done"
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def noise(values: Any) -> float:
 
 
 class Presses:
-    """Follows one finger through ``count`` presses, row by row; they are its only clock.
+    """Follows one finger through ``count`` presses and those behind them, row by row; they are its only clock.
 
     With ``needs_force``, rows without a reference do not count as held, whatever the pressure does.
     """
@@ -112,21 +110,19 @@ class Presses:
 
     @property
     def done(self) -> bool:
-        """Whether every press was seen and released (after finish(), the last need not be)."""
-        return self.phase is Phase.DONE
+        """Whether every press was seen and released."""
+        return self.phase is Phase.PRESS and len(self.presses) >= self._count
 
     def add(self, row: Any) -> None:
-        """Take this finger's next row. Raises InputError that says why after a minute in one phase."""
+        """Take this finger's next row. Raises InputError that says why after a minute in one phase, until done."""
         self._waited += 1
         self._follow(row)
-        if self._waited >= GIVE_UP_ROWS:
+        if self._waited >= GIVE_UP_ROWS and not self.done:
             raise InputError(self.why())
 
     def finish(self) -> None:
-        """End: no more rows come. Raises InputError unless every press was seen."""
-        if self.phase is Phase.RELEASE and len(self.presses) == self._count:
-            self.phase = Phase.DONE
-        if self.phase is not Phase.DONE:
+        """End: no more rows come. Raises InputError unless every press was seen; the last may still be held."""
+        if len(self.presses) < self._count:
             raise InputError(self.why())
 
     def why(self) -> str:
@@ -185,7 +181,7 @@ class Presses:
         elif self.phase is Phase.PRESS:
             self._pressing(row, above)
         elif above < RELEASE_COUNTS:
-            self._enter(Phase.PRESS if len(self.presses) < self._count else Phase.DONE)
+            self._enter(Phase.PRESS)
 
     def _begin_again(self) -> None:
         self._window.clear()
@@ -237,6 +233,11 @@ class Presses:
 MAX_N = 100.0  # no finger bears more
 
 
+def _check_forces(forces_n: Sequence[float]) -> None:
+    if not forces_n or not all(0 < force < MAX_N for force in forces_n):
+        raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
+
+
 @dataclass(frozen=True)
 class Step:
     """What to do now: ``phase`` of press number ``press`` of ``presses``, with about ``force_n``."""
@@ -260,8 +261,7 @@ class Procedure:
         if not fingers or len(set(fingers)) != len(fingers):
             raise InputError(f"fingers are {list(fingers)}; expected one or more, each once")
         for forces_n in series_n:
-            if not forces_n or not all(0 < force < MAX_N for force in forces_n):
-                raise InputError(f"forces are {list(forces_n)}; expected newtons above 0 and below {MAX_N:g}")
+            _check_forces(forces_n)
         self._turns = [
             (Presses(finger, len(forces_n), needs_force=needs_force), tuple(map(float, forces_n)))
             for forces_n in series_n
@@ -334,27 +334,29 @@ class Procedure:
             found.setdefault(press.finger, []).append(press.with_column("force_n", force_n))
         return found
 
-    def find(self, rows: StructArray, forces_n: Sequence[float] = ()) -> dict[int, list[Press]]:
-        """The presses in all rows of a recording, by finger, with forces as finish() gives them.
 
-        Raises InputError unless every press was seen, and for more presses than forces: which of them has none?
-        """
-        self.feed(rows)
-        found = self.finish(forces_n)
-        for finger, presses in found.items() if forces_n else ():
-            seen = _count(finger, rows[rows["finger"] == finger])
-            if seen > len(presses):
-                raise InputError(
-                    f"finger {finger}: the recording has {seen} presses, {len(presses)} readings or weights: "
-                    "expected one for each; give all of them, or record again"
-                )
-        return found
+def find(
+    finger: int, rows: StructArray, count: int, *, needs_force: bool = False, shown_n: Sequence[float] = ()
+) -> tuple[Rest, list[Press]]:
+    """A finger's rest and first ``count`` presses in its rows of a recording, each with what a scale showed, if given.
 
-
-def _count(finger: int, rows: StructArray) -> int:
-    """How many presses of a finger its rows hold."""
-    machine = Presses(finger, len(rows), needs_force=False)
-    with suppress(InputError):  # of a minute of rest behind the last
-        for row in rows:
-            machine.add(row)
-    return len(machine.presses)
+    Raises InputError unless every press was seen, and for more presses than ``shown_n``: which of them has none?
+    """
+    if shown_n:
+        _check_forces(shown_n)
+    machine = Presses(finger, count, needs_force=needs_force)
+    for row in rows:
+        if machine.done and not shown_n:
+            break
+        machine.add(row)
+    machine.finish()
+    assert machine.rest is not None
+    if not shown_n:
+        return machine.rest, machine.presses
+    if len(machine.presses) > count:
+        raise InputError(
+            f"finger {finger}: the recording has {len(machine.presses)} presses, {count} readings or weights: "
+            "expected one for each; give all of them, or record again"
+        )
+    shown = zip(machine.presses, shown_n, strict=True)
+    return machine.rest, [press.with_column("force_n", force_n) for press, force_n in shown]

@@ -5,7 +5,7 @@ There is no driver for a force plate here; anything that gives newtons at device
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,9 @@ from ...recording.pressure_check import usable
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 
-
-class ForceSource(Protocol):
-    """What knows the force on the finger that is pressed."""
-
-    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        """Magnitude (n,) in N at device times (n,), NaN where it is not known."""
-
+#: What knows the force on the finger that is pressed: from fingers (n,) and device times (n,) in us to its magnitude
+#: (n,) in N, NaN where it is not known.
+ForceSource = Callable[[NDArray[np.uint8], NDArray[np.int64]], Floats]
 
 #: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.
 #: ``board_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``counts`` are the
@@ -48,20 +44,24 @@ def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: ForceSour
     out["rest"] = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
     out["board_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
     out["counts"], out["tare"] = messages["counts"], to_units(messages["tare_q4"], Q4_PER_COUNT)
-    out["force_n"] = np.nan if reference is None else reference.at(messages["finger"], t_us)
+    out["force_n"] = np.nan if reference is None else reference(messages["finger"], t_us)
     out["touched"] = (messages["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.FAULT)) != 0
     out["railed"] = ~usable(messages["pdc"]) & (messages["pdc"] != wire.INVALID_COUNT)
     return out
 
 
-class Truth:
-    """The size of the force that the simulated board of ``hand`` applies. Raises InputError if its source has none."""
+def truth_of(hand: Hand) -> ForceSource | None:
+    """The size of the force that a simulated board applies; None for a board behind which nothing knows it.
 
-    def __init__(self, hand: Hand) -> None:
-        self._hand = hand
+    It raises InputError where the board's source has no force.
+    """
+    if hand.link.source is None:
+        return None
 
-    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        applied_n = self._hand.applied_n(finger, t_us)
+    def truth(finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
+        applied_n = hand.applied_n(finger, t_us)
         if applied_n is None and len(t_us):
-            raise InputError(f"{self._hand.port} has no force; expected a scenario or a recording with one")
+            raise InputError(f"{hand.port} has no force; expected a scenario or a recording with one")
         return np.zeros(0) if applied_n is None else np.sqrt((applied_n**2).sum(axis=1))
+
+    return truth

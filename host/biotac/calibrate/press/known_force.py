@@ -17,7 +17,7 @@ from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ..population import Population, columns
 from ..wrench.figures import angles_deg, rmse
-from .detector import Press, Procedure
+from .detector import Press, Procedure, find
 from .few_shot import SCALE, Scale, Way, fit, scale_of
 from .force_source import ForceSource, rows_of
 from .guide import Face, guide
@@ -189,8 +189,7 @@ def recorded(
     _check_enough(len(forces_n))
     own = recording.wire["finger"] == finger
     rows = rows_of(recording.wire[own], recording.frames["t_us"][own])
-    procedure = Procedure([finger], forces_n, needs_force=False)
-    return _held(procedure.find(rows, forces_n if shown else ())[finger], toward)
+    return _held(find(finger, rows, len(forces_n), shown_n=forces_n if shown else ())[1], toward)
 
 
 def _check_enough(presses: int) -> None:

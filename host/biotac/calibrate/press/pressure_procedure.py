@@ -21,8 +21,8 @@ from ...wire import messages_gen as wire
 from ...wire.frames import StructArray
 from ...wire.identity import ascii_text, serial_text
 from ..reference.samples import Reference
-from .detector import Procedure
-from .force_source import Truth, rows_of
+from .detector import Procedure, find
+from .force_source import rows_of, truth_of
 from .guide import Face, guide
 from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, Fit, fit_and_verify
 
@@ -42,7 +42,7 @@ def calibrate(
         raise InputError(f"no sensor on finger {absent[0] if absent else '0 to 4'} ({present} there); check its cable")
     fingers = fingers or hand.fingers
     serials = {finger: _serial(hand, finger) for finger in fingers}
-    reference = None if hand.link.source is None else Truth(hand)
+    reference = truth_of(hand)
     procedure = Procedure(fingers, CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, needs_force=reference is not None)
     held = guide(hand, procedure, reference, face)
     hand.stop()
@@ -128,11 +128,9 @@ def calibrate_recording(
     alignment = None if reference is None else _add_force(str(recording.path), rows, reference)
     calibrated = []
     for finger in fingers or present:
-        own_rows = rows[rows["finger"] == finger]
-        # A procedure for each finger: a recording may have them in any order.
-        procedure = Procedure([finger], asked, needs_force=reference is not None)
-        presses = procedure.find(own_rows, forces_n if reference is None else ())[finger]
-        fitted, verified = fit_and_verify(procedure.rests[finger], presses)
+        by = {"needs_force": True} if reference is not None else {"shown_n": forces_n}
+        rest, presses = find(finger, rows[rows["finger"] == finger], len(asked), **by)
+        fitted, verified = fit_and_verify(rest, presses)
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
         own = replace(own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s)
         calibrated.append(Calibrated(fitted, verified, own, source, alignment))

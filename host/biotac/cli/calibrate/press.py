@@ -15,7 +15,7 @@ import biotac
 from ...calibrate import population
 from ...calibrate.press import few_shot, known_force, pressure, pressure_procedure, weights
 from ...calibrate.press.detector import MAX_N, Phase, Step
-from ...calibrate.press.force_source import Truth
+from ...calibrate.press.force_source import truth_of
 from ...calibrate.reference.mounting import LIN
 from ...calibrate.reference.scale import UNITS_N, SerialScale
 from ...calibrate.wrench.sources import read_reference
@@ -220,7 +220,7 @@ def _guided(args: argparse.Namespace, hand: Hand, loads: Sequence[weights.Load])
             return known_force.guided(hand, finger, asked_n, face)
     _check_terminal(hand, args.where)
     face = _Guide(press, lambda step: _typed_n(step, args), "let go")
-    reference = None if hand.link.source is None else Truth(hand)
+    reference = truth_of(hand)
     return known_force.guided(hand, finger, asked_n, face, reference=reference)
 
 
