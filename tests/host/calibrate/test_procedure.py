@@ -54,16 +54,15 @@ def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, s
 
 @pytest.mark.parametrize(("counts_per_min", "warm"), [(-19.0, True), (21.0, False)])
 def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> None:
-    procedure = Procedure(0, LIN)
+    lines: list[str] = []
+    procedure = Procedure(0, LIN, lines.append)
     procedure.frames(frames(0, 5900, counts_per_min))
     assert procedure.step is Step.WARM_UP  # a minute is a minute
     procedure.frames(frames(5900, 600, counts_per_min))
     assert (procedure.step is Step.TARE) == warm
     assert procedure.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
-    lines = procedure.pop_events()
     assert lines[0] == "warming up: leave the finger alone"
     assert (lines[1:] == [f"warm: {procedure.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
-    assert procedure.pop_events() == []
 
 
 def test_the_drift_is_the_last_minutes() -> None:
@@ -81,9 +80,10 @@ def test_the_drift_is_the_last_minutes() -> None:
 
 
 def test_other_fingers_and_touches_do_not_warm_it_up() -> None:
-    procedure = Procedure(0, LIN)
+    lines: list[str] = []
+    procedure = Procedure(0, LIN, lines.append)
     procedure.frames(frames(0, 12_000, finger=1))
-    assert procedure.pop_events() == []
+    assert lines == []
     procedure.frames(frames(0, 12_000, flags=FrameFlags.CONTACT))
     assert procedure.step is Step.WARM_UP
 
@@ -127,14 +127,15 @@ def test_the_board_is_asked_again_after_a_refusal_and_quiet() -> None:
 
 
 def test_a_reference_that_moves_is_not_zeroed() -> None:
-    procedure = Procedure(0, LIN)
+    lines: list[str] = []
+    procedure = Procedure(0, LIN, lines.append)
     at = tare(procedure, 0)
     moving = still(1.0, 3.0)
     procedure.samples(Samples(moving.t_s, moving.wrench + np.linspace(0.0, 1.0, 500)[:, None]))
     procedure.tared(accepted=True)
     procedure.frames(frames(at, TARE_FRAMES))
     assert procedure.step is Step.TARE and procedure.zero is None
-    assert "the reference moves by 0." in procedure.pop_events()[-1]
+    assert "the reference moves by 0." in lines[-1]
     procedure.samples(still(3.0, 5.0))
     procedure.frames(frames(at, TARE_FRAMES))
     assert procedure.step is Step.LOADS
@@ -216,8 +217,8 @@ def walked(
         reader = Interrupting(hand.link.source, 0)
         reader.source_s = len(hand.link.source.samples) / 100.0
         reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
-        procedure = Procedure(0, reader.nano17.mounting)
-        walk(hand, reader, procedure, path, show=lines.append)
+        procedure = Procedure(0, reader.nano17.mounting, lines.append)
+        walk(hand, reader, procedure, path)
         assert not hand.streaming
         hand.board.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
     return procedure, lines, path, reader

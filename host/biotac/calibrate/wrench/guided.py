@@ -1,8 +1,8 @@
 """A guided calibration on a board: warm up, tare, load everywhere, done.
 
 The procedure is fed with a board's frames and a reference's samples, each by its own clock; it keeps no time of its
-own, prints nothing and asks nobody. ``events`` has a line for whatever a person must do or may want to know. walk()
-reads both streams and records them. The files are complete up to the last second, so that whatever ends it, they can be
+own and asks nobody. ``show`` gets a line for whatever a person must do or may want to know. walk() reads both streams
+and records them. The files are complete up to the last second, so that whatever ends it, they can be
 fitted later.
 """
 
@@ -37,6 +37,9 @@ MAX_WARM_UP_S = 3600.0
 DRIFT_OVER_S = 60.0
 
 
+Show = Callable[[str], None]
+
+
 class Step(Enum):
     """Step of the procedure; the value is the text for the person."""
 
@@ -48,7 +51,7 @@ class Step(Enum):
 
 @dataclass
 class Procedure:
-    """Guides one finger's calibration. Feed ``frames`` and ``samples`` as they come; watch ``step`` and ``events``.
+    """Guides one finger's calibration. Feed ``frames`` and ``samples`` as they come; watch ``step``.
 
     When ``wants_tare`` is true, the caller tells the board to tare, and calls ``tared`` with whether it accepted. Drift
     is that of the mean over the electrodes, over the last DRIFT_OVER_S.
@@ -56,10 +59,10 @@ class Procedure:
 
     finger: int
     mounting: Mounting
+    show: Show = lambda event: None
     max_drift_counts_per_min: float = 20.0
     coverage: Coverage = field(default_factory=Coverage)
     step: Step = Step.WARM_UP
-    events: list[str] = field(default_factory=list)
     zero: Floats | None = None
     drift_counts_per_min: float = float("nan")
     last_step: Step = Step.WARM_UP  # the step before the current one
@@ -101,7 +104,7 @@ class Procedure:
                 self._enter(Step.DONE, f"covered: {self.coverage.summary()}")
             elif text != self._last_status:
                 self._last_status = text
-                self.events.append(text)
+                self.show(text)
 
     def tared(self, *, accepted: bool) -> None:
         """Take the board's answer; if it refused, it is asked again after TARE_FRAMES untouched frames."""
@@ -109,7 +112,7 @@ class Procedure:
         self._tared_frames = 0
         if not accepted:
             self._untouched = 0
-            self.events.append("the board refused to tare, as its signals are moving: leave the finger alone")
+            self.show("the board refused to tare, as its signals are moving: leave the finger alone")
 
     def finish(self, why: str) -> None:
         """End the procedure, complete or not: at the user's request, or because no more data comes."""
@@ -123,11 +126,6 @@ class Procedure:
         if self.step is Step.LOADS:
             return f"{self.coverage.summary()}; missing: {next(iter(self.coverage.missing()), 'nothing')}"
         return str(self.step.value)
-
-    def pop_events(self) -> list[str]:
-        """The events since the last call."""
-        events, self.events = self.events, []
-        return events
 
     @property
     def wants_tare(self) -> bool:
@@ -151,7 +149,7 @@ class Procedure:
     def _warm_up(self, at_s: float, row: np.void, disturbed: bool) -> None:
         if self._begin_s is None:
             self._begin_s = at_s
-            self.events.append(Step.WARM_UP.value)
+            self.show(Step.WARM_UP.value)
         if at_s - self._begin_s > MAX_WARM_UP_S:
             raise InputError(
                 f"after {MAX_WARM_UP_S / 60:.0f} minutes the finger still drifts by {self.drift_counts_per_min:+.0f} "
@@ -185,7 +183,7 @@ class Procedure:
         spread_n = float(np.ptp(np.percentile(wrench[:, :3], (10, 90), axis=0), axis=0).max())
         if spread_n > MAX_ZERO_SPREAD_N:
             self._tared_frames = 0
-            self.events.append(f"the reference moves by {spread_n:.2f} N: let go of everything")
+            self.show(f"the reference moves by {spread_n:.2f} N: let go of everything")
             return
         self.zero = np.median(wrench, axis=0)
         self._recent.clear()
@@ -193,10 +191,7 @@ class Procedure:
 
     def _enter(self, step: Step, event: str) -> None:
         self.last_step, self.step = self.step, step
-        self.events.append(event)
-
-
-Show = Callable[[str], None]
+        self.show(event)
 
 
 def walk(
@@ -206,7 +201,6 @@ def walk(
     path: Path,
     *,
     overwrite: bool = False,
-    show: Show = lambda event: None,
     progress: Show = lambda text: None,
 ) -> bool:
     """Run the procedure until it is done or the board's source ends (returns True), or a KeyboardInterrupt ends it.
@@ -235,8 +229,6 @@ def walk(
                         procedure.tared(accepted=True)
                     except CommandRefusedError:
                         procedure.tared(accepted=False)
-                for event in procedure.pop_events():
-                    show(event)
                 progress(procedure.status())
                 if procedure.step is Step.DONE:
                     break
@@ -244,8 +236,6 @@ def walk(
         except KeyboardInterrupt:
             interrupted = True
             procedure.finish("stopped by Ctrl-C")
-    for event in procedure.pop_events():
-        show(event)
     # needed even if the board's source has ended: it sends nothing more, but still refuses as busy
     hand.stop()
     return not interrupted

@@ -184,9 +184,9 @@ def _record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[P
             outputs.note(event)
 
         outputs.make_folder(args.out)
-        procedure = Procedure(finger, mounting)
+        procedure = Procedure(finger, mounting, show)
         try:
-            walk(hand, reader, procedure, path, overwrite=args.force, show=show, progress=progress.show)
+            walk(hand, reader, procedure, path, overwrite=args.force, progress=progress.show)
         except (BiotacError, OSError):
             if path.exists():
                 outputs.note(recorded)
