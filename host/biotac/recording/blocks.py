@@ -174,7 +174,6 @@ class Contents:
         self.damage = scanned.scan.problems
         self.cut_off = scanned.scan.cut_off
         self.damaged_chunks = scanned.scan.damaged_chunks
-        self.wrong_checksums = scanned.scan.wrong_checksums
         if scanned.metadata is None:
             raise RecordingError(self._without_metadata(scanned.damaged_metadata > 0))
         self.metadata = scanned.metadata

@@ -52,10 +52,9 @@ class Recording:
     finger's frames.
 
     ``problems`` lists in words what is missing or damaged; the rest is good. ``damage``: those of the file, not of the
-    link. ``cut_off``: the file ends without its index. ``damaged_chunks``: number of seconds left out.
-    ``wrong_checksums``: number of wrong checksums over the file's records and its index. ``gaps``: times when the board
-    was away. ``rejected``: what came damaged, for each block that had any: ``at_s``, when it began after the first one,
-    and how many by kind (``bad_crc``, ``bad_cobs``, ``bad_length``, ``too_long``).
+    link. ``cut_off``: the file ends without its index. ``damaged_chunks``: number of seconds left out. ``gaps``: times
+    when the board was away. ``rejected``: what came damaged, for each block that had any: ``at_s``, when it began after
+    the first one, and how many by kind (``bad_crc``, ``bad_cobs``, ``bad_length``, ``too_long``).
 
     It consists of blocks of about a second. ``arrived_ns`` is when each block began, ``all_here_ns`` when it was
     complete (None where unknown), both in ns on the host's clock (Unix).
@@ -69,7 +68,6 @@ class Recording:
     damage: list[str] = _of_contents("damage")
     cut_off: bool = _of_contents("cut_off")
     damaged_chunks: int = _of_contents("damaged_chunks")
-    wrong_checksums: int = _of_contents("wrong_checksums")
     arrived_ns: list[int] = _of_contents("arrived_ns")
     all_here_ns: list[int | None] = _of_contents("all_here_ns")
     messages: list[Any] = _of_contents("messages")

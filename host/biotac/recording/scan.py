@@ -145,10 +145,10 @@ class Scan:
     """Iterates over Metadata, and the messages of ``wanted`` topics as (topic, Message).
 
     ``schemas`` holds the schemas read so far, by topic. Complete afterwards: ``problems`` in words, ``cut_off`` (the
-    file ends without its index), ``damaged_chunks`` and ``wrong_checksums`` (over the file's records and its index).
-    Unwanted chunks, and those two checksums, are verified only with ``check``. With ``index``, only the metadata and
-    the chunks of the blocks ``only`` are read. Raises RecordingError if the file is not an MCAP file, unpacks to far
-    more than a recording would, or has changed since its index was read.
+    file ends without its index) and ``damaged_chunks``. Unwanted chunks, and the checksums of the file's records and
+    index, are verified only with ``check``. With ``index``, only the metadata and the chunks of the blocks ``only`` are
+    read. Raises RecordingError if the file is not an MCAP file, unpacks to far more than a recording would, or has
+    changed since its index was read.
     """
 
     def __init__(
@@ -164,7 +164,7 @@ class Scan:
         self.problems: list[str] = []
         self.cut_off = False
         self.share = 0.0  #: of the file that was read so far
-        self.damaged_chunks = self.wrong_checksums = 0
+        self.damaged_chunks = 0
         self.schemas: dict[str, bytes] = {}
         self._wanted = cache(wanted)
         self._check = check
@@ -260,7 +260,6 @@ class Scan:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return
         if self._check and expected and _crc32(stream, begin, end) != expected:
-            self.wrong_checksums += 1
             self.problems.append(f"{self.path.name} is damaged: the checksum of its {part} is wrong")
 
     def _read(self, opcode: int, content: ReadDataStream) -> Any:
