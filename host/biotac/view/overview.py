@@ -7,9 +7,6 @@ from typing import Any
 import numpy as np
 
 from ..recording.reader import Recording
-from ..recording.stamps import unwrapped_us
-from ..wire import messages_gen as wire
-from ..wire.events import kind_name
 
 BINS = 600
 EVENTS = 3000  # half an hour of touches each second
@@ -26,11 +23,9 @@ def overview(recording: Recording) -> dict[str, Any]:
         {"at_s": ((label.t_us or begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.line()}
         for label in recording.labels
     ]
-    events = [message for message in recording.messages if isinstance(message, wire.Event)]
-    times_us = unwrapped_us(begin_us, [event.t_us for event in events]).tolist()
     fingers: dict[tuple[int, str], list[int]] = {}  # one mark for what a whole hand feels within a tenth of a second
-    for event, t_us in zip(events, times_us, strict=True):
-        fingers.setdefault(((t_us - begin_us) // 100_000, kind_name(event).lower()), []).append(event.finger)
+    for finger, kind, t_us in recording.events()[["finger", "kind", "t_us"]].tolist():
+        fingers.setdefault(((t_us - begin_us) // 100_000, kind.lower()), []).append(finger)
     for (tenth, name), felt in list(fingers.items())[:EVENTS]:
         touched = " ".join(str(finger) for finger in sorted({*felt}))
         marks.append({"at_s": tenth / 10, "finger": None, "name": f"{name}, finger {touched}"})
