@@ -415,15 +415,15 @@ def test_the_spectrum_is_numpys_and_texts_of_marks_never_overprint(view, open_pa
       const { Finger } = await import('./model.js');
       const { TimePlot } = await import('./plots.js');
       const { readTheme } = await import('./colours.js');
-      const finger = new Finger(), marks = [];
+      const finger = new Finger(), marks = [], lines = [({ forceN }) => forceN[0]];
       const frame = { forceN: [0, 0, 0], appliedN: [], gripN: [], pdc: 0, mapMm: null };
-      for (let k = 0; k < 1000; k++) finger.add({ ...frame, tUs: 1e4 * k });
+      for (let k = 0; k < 1000; k++) finger.add({ ...frame, tS: k / 100 });
       for (const s of [1, 3, 3.1, 3.2, 5, 5.4, 9.5, 9.9]) marks.push({ t_us: 1e6 * s, name: 'a slip' });
       const places = [], fill = CanvasRenderingContext2D.prototype.fillText;
       CanvasRenderingContext2D.prototype.fillText = function (text, x) {
         if (text === 'a slip') places.push([x, x + this.measureText(text).width]);
       };
-      const force = new TimePlot(document.getElementById('force-plot'), ['x'], ['x'], { least: 1, digits: 1 });
+      const force = new TimePlot(document.getElementById('force-plot'), lines, ['x'], { least: 1, digits: 1 });
       force.draw(finger, readTheme(), marks);
       CanvasRenderingContext2D.prototype.fillText = fill;
       return [...places.sort(([a], [b]) => a - b), [force.canvas.clientWidth]];

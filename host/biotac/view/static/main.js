@@ -14,15 +14,18 @@ import { Timeline, savePicture } from "./timeline.js";
 const READ_MS = 100; // numbers that change faster cannot be read
 const LATE_MS = 1000;
 
+// Functions from a frame to these parts of one of its vectors.
+const parts = (name, ...indices) => indices.map((k) => (frame) => frame[name][k]);
+
 class Page {
   constructor() {
     this.shown = 0;
     this.frozen = false; // pause of a board: only the picture stands still
     this.limit = new Limit();
     this.plots = [
-      new TimePlot(byId("force-plot"), ["x", "y", "z"], ["x", "y", "z"], { least: 1, digits: 1, zero: true, wide: ["appliedX", "appliedY", "appliedZ"], trust: true }),
-      new TimePlot(byId("grip-plot"), ["normal", "shear"], ["z", "x"], { least: 1, digits: 1, zero: true, halves: ["normalHalf", "shearHalf"] }),
-      new TimePlot(byId("pdc-plot"), ["pdc"], ["text"], { least: 20, digits: 0, zero: false }),
+      new TimePlot(byId("force-plot"), parts("forceN", 0, 1, 2), ["x", "y", "z"], { least: 1, digits: 1, zero: true, wide: parts("appliedN", 0, 1, 2), trust: true }),
+      new TimePlot(byId("grip-plot"), parts("gripN", 0, 2), ["z", "x"], { least: 1, digits: 1, zero: true, halves: parts("gripN", 1, 3) }),
+      new TimePlot(byId("pdc-plot"), [({ pdc }) => pdc], ["text"], { least: 20, digits: 0, zero: false }),
     ];
     this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));
     this.link = new Link();

@@ -68,7 +68,7 @@ export class Model {
     return {
       finger: plain("finger"),
       seq: plain("seq"),
-      tUs: row[column.t_us],
+      tS: row[column.t_us] / 1e6,
       flags: row[column.flags] ?? 0,
       trust: row[column.trust] ?? 0,
       signal: scaled("signal_q4"),
@@ -90,9 +90,7 @@ export class Finger {
   constructor() {
     this.latest = null;
     this.addedMs = 0; // when the latest came, by the browser's clock
-    const ring = () => new Float64Array(HISTORY_ROWS).fill(NaN);
-    this.history = { t: ring(), x: ring(), y: ring(), z: ring(), pdc: ring(), appliedX: ring(), appliedY: ring(), appliedZ: ring(), normal: ring(), normalHalf: ring(), shear: ring(), shearHalf: ring(), trust: ring() };
-    this.rows = 0; // ever added
+    this.frames = []; // HISTORY_ROWS of them, oldest first
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
     this.pacSamples = 0;
     this.spectrogram = []; // { t, values }: amplitudes of counts, oldest first
@@ -102,13 +100,8 @@ export class Finger {
   add(frame) {
     this.latest = frame;
     this.addedMs = performance.now();
-    const at = this.rows++ % HISTORY_ROWS;
-    this.history.t[at] = frame.tUs / 1e6;
-    [this.history.x[at], this.history.y[at], this.history.z[at]] = frame.forceN;
-    [this.history.appliedX[at], this.history.appliedY[at], this.history.appliedZ[at]] = frame.appliedN;
-    [this.history.normal[at], this.history.normalHalf[at], this.history.shear[at], this.history.shearHalf[at]] = frame.gripN;
-    this.history.pdc[at] = frame.pdc;
-    this.history.trust[at] = frame.trust;
+    this.frames.push(frame);
+    if (this.frames.length > HISTORY_ROWS) this.frames.shift();
     this.trail.push(frame.mapMm);
     if (this.trail.length > TRAIL_POINTS) this.trail.shift();
   }
@@ -129,10 +122,5 @@ export class Finger {
 
   get pacIsFull() {
     return this.pacSamples >= SPECTRUM_SAMPLES;
-  }
-
-  // Indices of the history, oldest first.
-  *order() {
-    for (let k = Math.max(0, this.rows - HISTORY_ROWS); k < this.rows; k++) yield k % HISTORY_ROWS;
   }
 }

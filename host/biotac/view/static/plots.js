@@ -60,22 +60,21 @@ class Area {
 }
 
 export class TimePlot {
-  // names: columns of Finger.history; wide: those drawn behind them; colours: of both in the theme; least: the smallest span shown;
-  // halves: columns of half widths of the band about each name
-  constructor(canvas, names, colours, { least, digits, zero, wide = [], halves = [], trust = false }) {
-    Object.assign(this, { canvas, names, colours, least, digits, zero, wide, halves, trust });
+  // lines: functions from a frame to a value; wide: those drawn behind them; colours: of both in the theme; least: the smallest
+  // span shown; halves: to the half width of the band about each line
+  constructor(canvas, lines, colours, { least, digits, zero, wide = [], halves = [], trust = false }) {
+    Object.assign(this, { canvas, lines, colours, least, digits, zero, wide, halves, trust });
   }
 
   // marks: events of this finger, { t_us, name }
   draw(finger, theme, marks = []) {
     const area = new Area(this.canvas);
     const { c } = area;
-    const order = finger ? [...finger.order()] : [];
-    const endS = finger && order.length ? finger.history.t[order.at(-1)] : 0;
-    const shown = order.filter((k) => endS - finger.history.t[k] <= zoom.s);
-    const [low, high] = this.span(finger, shown);
+    const endS = finger?.latest?.tS ?? 0;
+    const shown = (finger?.frames ?? []).filter(({ tS }) => endS - tS <= zoom.s);
+    const [low, high] = this.span(shown);
     area.timeTicks(theme);
-    if (this.trust) this.band(area, theme, finger, shown, endS);
+    if (this.trust) this.band(area, theme, shown, endS);
     const step = niceStep((high - low) / 4);
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
       area.tick(theme, { y: area.y((v - low) / (high - low)), text: v.toFixed(step < 1 ? this.digits : 0).replace("-", "−") });
@@ -83,37 +82,36 @@ export class TimePlot {
     let free = area.right; // the newest comes first; a text that would reach into it is left out
     for (const mark of marks.toReversed()) free = this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / zoom.s, mark.name, free);
     c.lineJoin = "round";
-    this.halves.forEach((name, line) => {
+    this.halves.forEach((halfOf, line) => {
       [c.strokeStyle, c.lineWidth, c.globalAlpha] = [theme[this.colours[line]], 2, 0.15];
       c.beginPath();
-      for (const k of shown) {
-        const [v, half] = [finger.history[this.names[line]][k], finger.history[name][k]];
+      for (const frame of shown) {
+        const [v, half] = [this.lines[line](frame), halfOf(frame)];
         if (Number.isNaN(half)) continue;
-        const x = area.x(1 - (endS - finger.history.t[k]) / zoom.s);
+        const x = area.x(1 - (endS - frame.tS) / zoom.s);
         for (const end of [v - half, v + half]) c[end < v ? "moveTo" : "lineTo"](x, area.y(Math.min(Math.max((end - low) / (high - low), 0), 1)));
       }
       c.stroke();
     });
-    [...this.wide, ...this.names].forEach((name, k) => {
-      const line = k % this.names.length;
+    [...this.wide, ...this.lines].forEach((value, k) => {
+      const line = k % this.lines.length;
       const wide = k < this.wide.length;
       c.strokeStyle = theme[this.colours[line]];
       [c.lineWidth, c.globalAlpha] = wide ? [7, 0.3] : [1.75, 1];
       c.setLineDash((!wide && DASHES[this.colours[line]]) || []);
       c.beginPath();
       let before = -Infinity;
-      for (const k of shown) {
-        const t = finger.history.t[k];
-        const v = finger.history[name][k];
+      for (const frame of shown) {
+        const v = value(frame);
         if (Number.isNaN(v)) {
           before = -Infinity;
           continue;
         }
-        const x = area.x(1 - (endS - t) / zoom.s);
+        const x = area.x(1 - (endS - frame.tS) / zoom.s);
         const y = area.y((v - low) / (high - low));
-        if (t - before > GAP_S) c.moveTo(x, y);
+        if (frame.tS - before > GAP_S) c.moveTo(x, y);
         else c.lineTo(x, y);
-        before = t;
+        before = frame.tS;
       }
       c.stroke();
     });
@@ -121,12 +119,12 @@ export class TimePlot {
   }
 
   // Below the lines, which it leaves less room: where the force is not to be acted on as it is; NONE is the highest.
-  band(area, theme, finger, shown, endS) {
+  band(area, theme, shown, endS) {
     const { c } = area;
     c.fillStyle = theme.warn;
-    for (const k of shown) {
-      const height = TRUST_STEP * (3 - finger.history.trust[k]);
-      if (height > 0) c.fillRect(area.x(1 - (endS - finger.history.t[k]) / zoom.s), area.bottom - height, 1.5, height);
+    for (const { tS, trust } of shown) {
+      const height = TRUST_STEP * (3 - trust);
+      if (height > 0) c.fillRect(area.x(1 - (endS - tS) / zoom.s), area.bottom - height, 1.5, height);
     }
     area.bottom -= TRUST_HEIGHT;
   }
@@ -148,13 +146,13 @@ export class TimePlot {
     return x;
   }
 
-  span(finger, shown) {
+  span(shown) {
     let low = Infinity, high = -Infinity;
-    [...this.names, ...this.wide].forEach((name, line) => {
-      const halves = finger?.history[this.halves[line]];
-      for (const k of shown) {
-        const v = finger.history[name][k];
-        const top = v + (halves?.[k] || 0);
+    [...this.lines, ...this.wide].forEach((value, line) => {
+      const halfOf = this.halves[line];
+      for (const frame of shown) {
+        const v = value(frame);
+        const top = v + (halfOf?.(frame) || 0);
         if (v < low) low = v;
         if (top > high) high = top;
       }
