@@ -50,7 +50,6 @@ class Page {
         again: () => this.command("again"),
         theme: () => this.themes.next(),
       },
-      pick: (index) => this.pick(index),
       step: (by) => this.step(by),
     });
     byId("zoom").onchange = () => (zoom.s = Number(byId("zoom").value));
