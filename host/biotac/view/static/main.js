@@ -6,7 +6,7 @@ import { Fingertip } from "./fingertip.js";
 import { HandRow } from "./hand.js";
 import { Model, SPECTRUM_SAMPLES, zoom } from "./model.js";
 import { SpectrogramPlot, TimePlot, drawSpectrum } from "./plots.js";
-import { Flags, Link, Results, byId, number, showLink, showFaults, showTare, showReply } from "./readout.js";
+import { Flags, Results, byId, number, showFaults, showHealth, showLink, showReply, showTare } from "./readout.js";
 import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
 import { Timeline, savePicture } from "./timeline.js";
@@ -28,7 +28,6 @@ class Page {
       new TimePlot(byId("pdc-plot"), [({ pdc }) => pdc], ["text"], { least: 20, digits: 0, zero: false }),
     ];
     this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));
-    this.link = new Link();
     this.readMs = 0;
     this.lost = false;
     this.turn = false;
@@ -197,7 +196,7 @@ class Page {
     this.showState();
     const { fingers, about, health, dropped } = this.model;
     if (health) {
-      this.link.show(health, dropped);
+      showHealth(health, dropped);
       this.timeline.show(health.position_s);
       this.timeline.draw(this.theme);
       if (health.live) this.timeline.list(health.events.toReversed().map(({ t_us: tUs, finger, name }) => ({ at_s: tUs / 1e6, finger, name })));

@@ -34,32 +34,15 @@ export function make(tag, properties = {}, data = {}) {
   return element;
 }
 
-const VECTORS = [
-  { key: "forceN", name: "Force", unit: "N", digits: 2 },
-  { key: "appliedN", name: "Applied", unit: "N", digits: 2 },
-  { key: "torqueNmm", name: "Torque", unit: "N·mm", digits: 1 },
-  { key: "pocMm", name: "Contact", unit: "mm", digits: 2 },
-];
-const SCALARS = [
-  { key: "pdc", name: "Pressure, count" },
-  { key: "tac", name: "Flux, count" },
-  { key: "celsius", name: "Temperature, °C", digits: 1 },
-  { key: "slipLevel", name: "Slip, count" },
-];
+// Digits after the point, by data-key of the page.
+const VECTORS = { forceN: 2, appliedN: 2, torqueNmm: 1, pocMm: 2 };
+const SCALARS = { pdc: 0, tac: 0, celsius: 1, slipLevel: 0, seq: 0 };
+
+const cell = (key, axis) => document.querySelector(axis ? `[data-key=${key}][data-axis=${axis}]` : `[data-key=${key}]`);
 
 export class Results {
   constructor(about) {
     [this.trusts, this.thermistor] = [about.trust, about.thermistor];
-    const table = byId("results");
-    table.replaceChildren();
-    this.cells = VECTORS.map(({ key, name, unit }) => {
-      const row = make("tr");
-      const cells = ["x", "y", "z"].map((axis) => make("td", {}, { key, axis }));
-      row.append(make("th", { scope: "row", textContent: name }), ...cells, make("td", { textContent: unit }));
-      table.append(row);
-      return cells;
-    });
-    this.scalars = pairs(byId("scalars"), [...SCALARS, { key: "seq", name: "Frame" }]);
     const list = byId("electrodes");
     list.replaceChildren();
     this.electrodes = about.electrodes.map(({ name }) => {
@@ -76,17 +59,16 @@ export class Results {
     panel.dataset.seq = frame.seq;
     panel.dataset.finger = frame.finger;
     panel.dataset.flags = frame.flags;
-    VECTORS.forEach(({ key, digits }, row) => frame[key].forEach((v, k) => put(this.cells[row][k], v, digits)));
-    for (const element of [this.cells[1][0].parentNode, byId("applied-key")]) element.hidden = Number.isNaN(frame.appliedN[0]);
+    for (const [key, digits] of Object.entries(VECTORS)) frame[key].forEach((v, k) => put(cell(key, "xyz"[k]), v, digits));
+    for (const id of ["applied", "applied-key"]) byId(id).hidden = Number.isNaN(frame.appliedN[0]);
     const { a, b, beta_k, full_scale } = this.thermistor; // biotac.features.thermal has the formula's source
     const celsius = frame.tdc < 1 ? NaN : beta_k / Math.log((full_scale * a) / frame.tdc - b) - 273.15;
-    for (const { key, digits = 0 } of SCALARS) put(this.scalars[key], { ...frame, celsius }[key], digits);
-    this.scalars.slipLevel.dataset.kind = frame.slipLevel > 0 ? "warn" : "calm";
-    put(this.scalars.seq, frame.seq, 0);
+    for (const [key, digits] of Object.entries(SCALARS)) put(cell(key), { ...frame, celsius }[key], digits);
+    cell("slipLevel").dataset.kind = frame.slipLevel > 0 ? "warn" : "calm";
     this.showTrust(frame.trust);
     ["normalN", "shearN"].forEach((key, k) => {
       const [value, half] = frame.gripN.slice(2 * k);
-      const place = document.querySelector(`.grip[data-key=${key}]`);
+      const place = cell(key);
       write(place, `${number(value, 2)} ± ${number(half, 2)}`);
       [place.dataset.value, place.dataset.half] = [value, half];
     });
@@ -100,16 +82,6 @@ export class Results {
     chip.dataset.kind = { NONE: "warn", HOLD: "warn", ACT: "on" }[name] ?? "calm";
     write(byId("trust-words"), words);
   }
-}
-
-// A description list's values by their keys.
-function pairs(list, rows) {
-  list.replaceChildren();
-  return Object.fromEntries(rows.map(({ key, name }) => {
-    const value = make("dd", {}, { key });
-    list.append(make("dt", { textContent: name }), value);
-    return [key, value];
-  }));
 }
 
 export class Flags {
@@ -156,30 +128,25 @@ export function showTare(about, facts) {
   write(byId("tare-reason"), reason?.words ?? "");
 }
 
-const HEALTH = [
-  { key: "framesPerS", name: "Frames per second", of: (health) => health.frames_per_s },
-  { key: "lost", name: "Frames lost", warns: true, of: ({ stats }) => stats.frames_lost },
-  { key: "crc", name: "CRC errors", warns: true, of: ({ stats }) => stats.crc_errors },
-  { key: "other", name: "Other wire errors", warns: true, of: ({ stats }) => stats.other_errors },
-  { key: "late", name: "Late slots on the board", warns: true, of: ({ status }) => status.slots_late },
-  { key: "boardDropped", name: "Messages dropped by the board", warns: true, of: ({ status }) => status.messages_dropped },
-  { key: "dropped", name: "Frames not drawn by this page", of: (_, dropped) => dropped },
-];
+// By data-key; those with data-warns are to be 0.
+const HEALTH = {
+  framesPerS: (health) => health.frames_per_s,
+  lost: ({ stats }) => stats.frames_lost,
+  crc: ({ stats }) => stats.crc_errors,
+  other: ({ stats }) => stats.other_errors,
+  late: ({ status }) => status.slots_late,
+  boardDropped: ({ status }) => status.messages_dropped,
+  dropped: (_, dropped) => dropped,
+};
 
-export class Link {
-  constructor() {
-    this.values = pairs(byId("health"), HEALTH);
+export function showHealth(health, dropped) {
+  for (const [key, of] of Object.entries(HEALTH)) {
+    const value = of(health, dropped);
+    put(cell(key), value, 0);
+    cell(key).dataset.kind = cell(key).hasAttribute("data-warns") && value > 0 ? "warn" : "calm";
   }
-
-  show(health, dropped) {
-    for (const { key, warns, of } of HEALTH) {
-      const value = of(health, dropped);
-      put(this.values[key], value, 0);
-      this.values[key].dataset.kind = warns && value > 0 ? "warn" : "calm";
-    }
-    write(byId("board"), health.board);
-    write(byId("source"), health.source);
-  }
+  write(byId("board"), health.board);
+  write(byId("source"), health.source);
 }
 
 export function showLink(link, words, isSilent = false) {
