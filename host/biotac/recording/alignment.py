@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..errors import RecordingError
 from ..wire import sensor_gen as _sensor
@@ -253,11 +254,8 @@ def _drift(a: Floats, b: Floats, a_start: float, b_start: float, lag: int, offse
         piece = a[begin : begin + size]
         if float((piece**2).mean()) < busy:
             continue
-        others = [b[begin + lag + k : begin + lag + k + size] for k in range(-reach, reach + 1)]
-        size_of_piece = np.linalg.norm(piece)
-        found = np.array(
-            [piece @ other / max(float(size_of_piece * np.linalg.norm(other)), 1e-300) for other in others]
-        )
+        others = sliding_window_view(b[begin + lag - reach : begin + lag + reach + size], size)
+        found = others @ piece / np.maximum(np.linalg.norm(others, axis=1) * np.linalg.norm(piece), 1e-300)
         best = int(np.argmax(found))
         height, shift = _peak(found, best)
         piece_s = a_start + (begin + size / 2) * STEP_S
