@@ -125,14 +125,14 @@ def how_long(args: argparse.Namespace) -> str:
     return "saved" if args.save else "until the next reboot (--save keeps it)"
 
 
-def add_port(parser: argparse.ArgumentParser, more: str = "") -> None:
-    """Add PORT, which may be left out; ``more`` ends its help."""
+def add_port(parser: argparse.ArgumentParser, more: str = " (default: the only board on USB)") -> None:
+    """Add PORT, which may be left out if ``more``, the end of its help, says what is taken then."""
     parser.add_argument(
         "port",
         metavar="PORT",
-        nargs="?",
+        nargs="?" if more else None,
         help="device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE, emu:pico?source=SOURCE, replay:REC, "
-        f"bag:FILE, csv:FILE or foxglove://HOST:PORT/TOPIC (default: the only board on USB){more}",
+        f"bag:FILE, csv:FILE or foxglove://HOST:PORT/TOPIC{more}",
     )
 
 

@@ -26,7 +26,7 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    values.add_port(parser, "; or a recording, .mcap")
+    values.add_port(parser, " (default: the only board on USB); or a recording, .mcap")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -21,12 +21,7 @@ FILES = ("bag:", "csv:", "replay:")  # ports that end by themselves
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "port",
-        metavar="PORT",
-        help="device path, spidev:BUS.DEVICE, sim:SOURCE, emu:pico?source=SOURCE, bag:FILE, "
-        "csv:FILE or foxglove://HOST:PORT/TOPIC",
-    )
+    values.add_port(parser, "")
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
     parser.add_argument("--seconds", type=values.seconds, help="device time to record at least (default: until Ctrl-C)")
     parser.add_argument("--note", default="", metavar="TEXT", help="a label of the whole recording")
