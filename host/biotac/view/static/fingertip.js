@@ -4,7 +4,7 @@ import { shade } from "./colours.js";
 
 // The picture's edges in mm; the canvas has the shape of their ratio (style.css).
 const LEFT = -9.5, RIGHT = 9.5, TOP = 9.8, BOTTOM = -17.2;
-const HALF_WIDTH = 8.6, TIP = 9.0, FOOT = -16.4;
+const SKIN = new Path2D("M -8.6 0 A 8.6 9 0 0 0 8.6 0 V -14.4 Q 8.6 -16.4 6.6 -16.4 H -6.6 Q -8.6 -16.4 -8.6 -14.4 Z");
 const FIELD_W = 38, FIELD_H = 54;
 const REACH_MM = 2.3; // of an electrode's colour
 const REST_WEIGHT = 0.12; // far from every electrode the skin has the colour of rest
@@ -34,15 +34,13 @@ export class Fingertip {
     c.translate(-LEFT, -TOP);
     const frame = finger?.latest;
     const signal = frame?.signal ?? null;
-    outline(c);
     c.save();
-    c.clip();
+    c.clip(SKIN);
     this.drawField(signal, theme, limit);
     c.restore();
-    outline(c);
     c.lineWidth = (this.large ? 2 : 1.5) / scale * devicePixelRatio;
     c.strokeStyle = theme["skin-edge"];
-    c.stroke();
+    c.stroke(SKIN);
     this.drawElectrodes(signal, theme, limit, scale);
     if (frame?.mapMm && frame.touched) this.drawContact(finger, frame, theme, scale);
     if (this.large) this.drawNumbers(signal, theme, limit); // last: nothing hides them
@@ -173,17 +171,6 @@ export function fit(canvas, units = 1) {
     canvas.height = height;
   }
   return width / units;
-}
-
-function outline(c) {
-  c.beginPath();
-  c.moveTo(-HALF_WIDTH, 0);
-  c.ellipse(0, 0, HALF_WIDTH, TIP, 0, Math.PI, 0, true);
-  c.lineTo(HALF_WIDTH, FOOT + 2);
-  c.quadraticCurveTo(HALF_WIDTH, FOOT, HALF_WIDTH - 2, FOOT);
-  c.lineTo(-HALF_WIDTH + 2, FOOT);
-  c.quadraticCurveTo(-HALF_WIDTH, FOOT, -HALF_WIDTH, FOOT + 2);
-  c.closePath();
 }
 
 function disc(c, x, y, radius) {
