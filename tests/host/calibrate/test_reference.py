@@ -59,7 +59,7 @@ def test_a_mounting_turns_by_hand() -> None:
         ('rotation = [[1,0,0],[0,1,0]]\noffset_mm = [0,0,0]\nreads = "force on finger"', r"shape \(2, 3\)"),
         ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,9e9]\nreads = "force on finger"', "up to 500 mm"),
         ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,0]\nreads = "both"', "reads is 'both'"),
-        ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\nreads = "force on finger"', "offset_mm is missing"),
+        ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\nreads = "force on finger"', "key 'offset_mm' is missing"),
         ('rotation = [["a",0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,0]\nreads = "force on finger"', "is not numeric"),
         ("rotation = [", "expected TOML with rotation"),
     ],

@@ -10,7 +10,7 @@ offset hold for the whole run. In a TOML file:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,7 +71,7 @@ class Mounting:
         return self.sign * np.column_stack([force @ self.rotation, moment @ self.rotation])
 
     def facts(self) -> dict[str, Any]:
-        """The mounting as JSON types; mounting_of() reads them."""
+        """The mounting as JSON types; from_json() reads them."""
         reads = READS[0] if self.sign > 0 else READS[1]
         return {"rotation": self.rotation.tolist(), "offset_mm": self.offset_mm.tolist(), "reads": reads}
 
@@ -80,41 +80,32 @@ class Mounting:
 LIN = Mounting(np.eye(3), np.zeros(3))
 
 
-def mounting_of(facts: Mapping[str, Any], where: str) -> Mounting:
-    """The mounting from its three values. Raises InputError that begins with ``where``."""
-    missing, unknown = [key for key in KEYS if key not in facts], sorted(set(facts) - set(KEYS))
-    if missing or unknown:
-        seen = f"{missing[0]} is missing" if missing else f"key {unknown[0]!r} is unknown"
-        raise InputError(f"{where}: {seen}: expected {', '.join(KEYS)}")
-    if facts["reads"] not in READS:
-        raise InputError(f"{where}: reads is {facts['reads']!r}: expected {READS[0]!r} or {READS[1]!r}")
-    try:
-        rotation = np.array(facts["rotation"], dtype=np.float64)
-        offset = np.array(facts["offset_mm"], dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where}: rotation or offset_mm is not numeric: expected 3 by 3 numbers and 3") from None
-    try:
-        return Mounting(rotation, offset, 1.0 if facts["reads"] == READS[0] else -1.0)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-
-
 def read_mounting(text: str) -> Mounting:
     """The mounting in a TOML file, or LIN for the word ``lin``. Raises InputError that says what is wrong."""
-    if text == "lin":
-        return LIN
-    path = Path(text)
-    try:
-        facts = parse_toml(read_text(path, TOML_BYTES))
-    except (OSError, ValueError) as error:
-        seen = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(f"{path}: {seen}: expected TOML with {', '.join(KEYS)}, or the word lin") from None
-    return mounting_of(facts, str(path))
+    form = f"TOML with {', '.join(KEYS)}, or the word lin"
+    return LIN if text == "lin" else _read(lambda: parse_toml(read_text(Path(text), TOML_BYTES)), text, form)
 
 
 def from_json(text: str, where: str) -> Mounting:
     """The mounting in one line of JSON, as in a recorded reference. Raises InputError that begins with ``where``."""
+    return _read(lambda: parse_json(text), where, f"a JSON object with {', '.join(KEYS)}")
+
+
+def _read(load: Callable[[], Any], where: str, form: str) -> Mounting:
     try:
-        return mounting_of(dict(parse_json(text)), where)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{where}: {error}: expected a JSON object with {', '.join(KEYS)}") from None
+        facts = dict(load())
+        for key in [*KEYS, *sorted(facts)]:
+            if key not in facts or key not in KEYS:
+                raise ValueError(f"key {key!r} is {'unknown' if key in facts else 'missing'}")
+        if facts["reads"] not in READS:
+            raise InputError(f"reads is {facts['reads']!r}: expected {READS[0]!r} or {READS[1]!r}")
+        try:
+            rotation, offset = (np.array(facts[key], dtype=np.float64) for key in KEYS[:2])
+        except (TypeError, ValueError, OverflowError):
+            raise InputError("rotation or offset_mm is not numeric: expected 3 by 3 numbers and 3") from None
+        return Mounting(rotation, offset, 1.0 if facts["reads"] == READS[0] else -1.0)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except (OSError, TypeError, ValueError) as error:
+        seen = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{where}: {seen}: expected {form}") from None
