@@ -68,13 +68,8 @@ def usb_ids(root: Path) -> Iterable[tuple[str, tuple[int, int]]]:
 
 def owner(path: Path) -> str:
     """Who owns the port, in words."""
-    with suppress(OSError, KeyError, ImportError):
-        import grp
-        import pwd
-
-        facts = path.stat()
-        user, group = pwd.getpwuid(facts.st_uid).pw_name, grp.getgrgid(facts.st_gid).gr_name
-        return f"{user}, group {group}, mode {facts.st_mode & 0o777:o}"
+    with suppress(OSError, KeyError, NotImplementedError):  # Windows has none
+        return f"{path.owner()}, group {path.group()}, mode {path.stat().st_mode & 0o777:o}"
     return "another user"
 
 
