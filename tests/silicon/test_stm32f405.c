@@ -75,7 +75,7 @@ TEST(the_flash_by_the_rules_and_the_watchdog_is_fed_over_it)
 {
     uint8_t page[256], back[256];
     memset(page, 0x5A, sizeof page);
-    start(false);
+    start(true);
     for (int k = 0; k < 4; k++) {
         assert_true(port_flash_erase(ONLY_BOARD, 16384 * (k % 2)));
         assert_true(port_flash_program(ONLY_BOARD, 16384 * (k % 2), page));
@@ -108,6 +108,7 @@ TEST(each_rule_can_be_broken)
     BREAKS("flash written while locked", REG32(0x08004000u) = 0);
     BREAKS("not as one by 32 bits", FLASH_KEYR = FLASH_KEY_1, FLASH_KEYR = FLASH_KEY_2,
            FLASH_CR = FLASH_CR_SER | FLASH_CR_STRT);
+    BREAKS("while unlocked", FLASH_KEYR = FLASH_KEY_1);
     BREAKS("fed late", now_ns += 900000000, watchdog_feed()); // after an erase that took half a second
     BREAKS("RLR written while locked", IWDG_RLR = 1);
     BREAKS("halt by a debugger", DBGMCU_APB1_FZ = 0, IWDG_KR = IWDG_KR_START);

@@ -69,11 +69,12 @@ void chip_reset(bool by_loader)
     poke(PLLCFGR, 0x24003010);
     poke(FLASH_CR, LOCKED);
     // What AN2606's table of the F40x and stm32duino #1653 have the loader leave: the PLL, its USB's
-    // interrupt on.
+    // interrupt on, and the flash unlocked.
     if (by_loader) {
         poke(CR, 0x83 | PLL_ON | PLL_ON << 1);
         poke(PLLCFGR, 16 | 192 << 6 | 3 << 16 | 4u << 24);
         poke(CFGR, 2 | 2 << 2);
+        poke(FLASH_CR, 0);
         nvic_enabled[2] = 1u << (67 - 64);
     }
     enabled_at = 0;
@@ -179,7 +180,9 @@ static void spi(uint32_t at, uint32_t old, uint32_t value)
 static void flash(uint32_t at, uint32_t old, uint32_t value)
 {
     const uint32_t cr = peek(FLASH_CR);
-    if (at == KEYR) {
+    if (at == KEYR && !(cr & LOCKED)) {
+        break_rule("FLASH_KEYR written while unlocked: a bus fault (RM0090 3.6.1; qmk #13841)");
+    } else if (at == KEYR) {
         keys = keys == 0 && value == 0x45670123u ? 1 : keys == 1 && value == 0xCDEF89ABu ? 2 : 0;
         poke(FLASH_CR, keys == 2 ? cr & ~LOCKED : cr);
     } else if (at == FLASH_SR) {

@@ -15,8 +15,10 @@ uint32_t flash_erase_us;
 
 static bool begin(uint32_t how)
 {
-    FLASH_KEYR = FLASH_KEY_1;
-    FLASH_KEYR = FLASH_KEY_2;
+    if (FLASH_CR & FLASH_CR_LOCK) { // its loader leaves it unlocked, where a key is a bus fault (qmk #13841)
+        FLASH_KEYR = FLASH_KEY_1;
+        FLASH_KEYR = FLASH_KEY_2;
+    }
     if (!wait_for(&FLASH_SR, FLASH_SR_BSY, 0, WAIT_FLASH_TURNS)) {
         return false;
     }
