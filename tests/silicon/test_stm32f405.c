@@ -102,6 +102,7 @@ TEST(each_rule_can_be_broken)
     start(false);
     BREAKS("", SPI2_CR1 = SPI_CR1_MSTR, SPI2_CR1 = SPI_CR1_MSTR | SPI_CR1_SPE);
     BREAKS("format changed while enabled", SPI2_CR1 |= SPI_CR1_BR(3));
+    BREAKS("SCK without a pull-down", GPIO_PUPDR(PORT_SPI) &= 2u << 2 * PIN_MISO, SPI2_CR1 |= SPI_CR1_SPE);
     BREAKS("MISO floats", GPIO_PUPDR(PORT_SPI) = 0, SPI2_CR1 |= SPI_CR1_SPE);
     BREAKS("SCK is slow", GPIO_OSPEEDR(PORT_SPI) = 1u << 2 * PIN_SCK, SPI2_CR1 |= SPI_CR1_SPE);
     BREAKS("FLASH_CR written while locked", FLASH_CR = FLASH_CR_PG);

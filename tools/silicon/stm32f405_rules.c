@@ -171,6 +171,8 @@ static void spi(uint32_t at, uint32_t old, uint32_t value)
                        "feedback)");
         } else if ((peek(GPIOB + 12) >> 28 & 3) == 0) {
             break_rule("an input read without a pull: where no sensor is, MISO floats");
+        } else if ((peek(GPIOB + 12) >> 26 & 3) != 2) {
+            break_rule("SCK without a pull-down: it floats while SPE is 0 (RM0090 28.3.1; embassy #1094)");
         }
     } else if (at == SPI_DR) {
         poke(SPI_SR, 3);

@@ -21,7 +21,7 @@ void spi_start(void)
         GPIO_BSRR(PORT_SELECT) = 1u << select_pin[f]; // high before it becomes an output
         pin_output(PORT_SELECT, select_pin[f]);
     }
-    pin_function(PORT_SPI, PIN_SCK, SPI_FUNCTION, PULL_NONE);
+    pin_function(PORT_SPI, PIN_SCK, SPI_FUNCTION, PULL_DOWN); // it floats while the block is off (28.3.1)
     pin_function(PORT_SPI, PIN_MOSI, SPI_FUNCTION, PULL_NONE);
     // The receiver samples by SCK as its pad has it: on a slow one a word's last bit is old (ES0182 2.5.2).
     GPIO_OSPEEDR(PORT_SPI) |= 3u << 2 * PIN_SCK | 3u << 2 * PIN_MOSI;
