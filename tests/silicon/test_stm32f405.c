@@ -24,6 +24,18 @@ static void start(bool by_loader)
     port_link_uart(ONLY_BOARD, 0);
 }
 
+TEST(its_uart_has_the_rates_of_the_setting)
+{
+    static const uint32_t rates[] = {1200, 115200, 921600, 1500000, 2250000, 3000000};
+    start(false);
+    for (unsigned k = 0; k < sizeof rates / sizeof *rates; k++) {
+        port_link_uart(ONLY_BOARD, rates[k]);
+        const uint32_t brr = USART3_BRR, clocks = USART3_CR1 >> 15 & 1 ? (brr >> 4) * 8 + (brr & 7) : brr;
+        assert_in_range(hclk_hz() / 4 / clocks, rates[k] / 100 * 98, rates[k] / 100 * 102);
+    }
+    assert_true(broke(""));
+}
+
 TEST(it_starts_by_the_rules)
 {
     start(false);
@@ -109,6 +121,7 @@ TEST(each_rule_can_be_broken)
     BREAKS("flash written while locked", REG32(0x08004000u) = 0);
     BREAKS("not as one by 32 bits", FLASH_KEYR = FLASH_KEY_1, FLASH_KEYR = FLASH_KEY_2,
            FLASH_CR = FLASH_CR_SER | FLASH_CR_STRT);
+    BREAKS("less than one", USART3_BRR = 12);
     BREAKS("while unlocked", FLASH_KEYR = FLASH_KEY_1);
     BREAKS("fed late", now_ns += 900000000, watchdog_feed()); // after an erase that took half a second
     BREAKS("RLR written while locked", IWDG_RLR = 1);

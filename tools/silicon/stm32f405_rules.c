@@ -23,6 +23,7 @@
 #define SPI_DR     0x4000380Cu
 #define IWDG       0x40003000u
 #define TIM2_CNT   0x40000024u
+#define BRR        0x40004808u
 #define DBG_FZ     0xE0042008u
 #define AIRCR      0xE000ED0Cu
 #define PLL_ON     (1u << 24)
@@ -248,6 +249,8 @@ void on_write(uint32_t at, uint32_t old, uint32_t value)
         flash(at, old, value);
     } else if (at - IWDG < 0x400) {
         watchdog(at, value);
+    } else if (at == BRR && value < 16) {
+        break_rule("a USART divided by less than one (RM0090 30.3.4)");
     } else if (at - 0xE000E100u < 16) {
         nvic_enabled[(at - 0xE000E100u) / 4] |= value;
     } else if (at - 0xE000E180u < 16) {

@@ -137,6 +137,7 @@
 #define USART_CR1_RXNEIE (1u << 5)
 #define USART_CR1_TXEIE  (1u << 7)
 #define USART_CR1_UE     (1u << 13)
+#define USART_CR1_OVER8  (1u << 15) // BRR in eights
 
 // ---- 39.1, 38.6.1 the chip's own 96-bit number and its kind
 #define UNIQUE_ID        ((const volatile uint32_t *)0x1FFF7A10u)

@@ -59,8 +59,10 @@ void port_link_uart(bt_port *port, uint32_t bits_per_s)
     pin_function(PORT_UART, PIN_UART_TX, UART_FUNCTION, PULL_NONE);
     pin_function(PORT_UART, PIN_UART_RX, UART_FUNCTION, PULL_UP); // a line that nobody drives is idle
     USART3_CR1 = 0;
-    USART3_BRR = (APB1_HZ + bits_per_s / 2) / bits_per_s;
-    USART3_CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
+    const uint32_t clocks = (APB1_HZ + bits_per_s / 2) / bits_per_s; // of a bit; fewer than 16 need OVER8
+    USART3_BRR = clocks < 16 ? clocks / 8 << 4 | clocks % 8 : clocks;
+    USART3_CR1 =
+        (clocks < 16 ? USART_CR1_OVER8 : 0) | USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
     use_interrupt(USART3_IRQ, 0, uart_interrupt);
     started = true;
 }
