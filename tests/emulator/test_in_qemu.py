@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,16 @@ def test_the_hex_has_both_parts_of_an_f405s_image(board: dict[str, Any], tmp_pat
     subprocess.run([*command, made, whole], check=True)
     image = made.with_suffix(".bin").read_bytes()
     assert whole.read_bytes() == image[:8].ljust(0xC000, b"\xff") + image
+
+
+def test_an_f405_sleeps_at_an_address_of_eight(board: dict[str, Any]) -> None:
+    if board["board_id"] != wire.Board.STM32F405:
+        pytest.skip("ES0182 2.1.3 is of an STM32F405")
+    listed = subprocess.run(
+        ["arm-none-eabi-objdump", "-d", "build/f405/biotac-f405.elf"], capture_output=True, text=True, check=True
+    ).stdout
+    places = re.findall(r"^ *([0-9a-f]+):.*\twfi$", listed, re.MULTILINE)
+    assert places and not [place for place in places if int(place, 16) % 8]
 
 
 @pytest.mark.parametrize("seconds", [2, pytest.param(60, marks=pytest.mark.nightly)])

@@ -121,6 +121,7 @@ TEST(each_rule_can_be_broken)
     BREAKS("flash written while locked", REG32(0x08004000u) = 0);
     BREAKS("not as one by 32 bits", FLASH_KEYR = FLASH_KEY_1, FLASH_KEYR = FLASH_KEY_2,
            FLASH_CR = FLASH_CR_SER | FLASH_CR_STRT);
+    BREAKS("DBG_SLEEP", REG32(0xE0042004u) = 1);
     BREAKS("less than one", USART3_BRR = 12);
     BREAKS("while unlocked", FLASH_KEYR = FLASH_KEY_1);
     BREAKS("fed late", now_ns += 900000000, watchdog_feed()); // after an erase that took half a second

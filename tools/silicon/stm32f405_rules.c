@@ -24,6 +24,7 @@
 #define IWDG       0x40003000u
 #define TIM2_CNT   0x40000024u
 #define BRR        0x40004808u
+#define DBG_CR     0xE0042004u
 #define DBG_FZ     0xE0042008u
 #define AIRCR      0xE000ED0Cu
 #define PLL_ON     (1u << 24)
@@ -251,6 +252,8 @@ void on_write(uint32_t at, uint32_t old, uint32_t value)
         watchdog(at, value);
     } else if (at == BRR && value < 16) {
         break_rule("a USART divided by less than one (RM0090 30.3.4)");
+    } else if (at == DBG_CR && value & 1) {
+        break_rule("DBG_SLEEP, with which WFI may be followed by what is not there (ES0182 2.1.3)");
     } else if (at - 0xE000E100u < 16) {
         nvic_enabled[(at - 0xE000E100u) / 4] |= value;
     } else if (at - 0xE000E180u < 16) {

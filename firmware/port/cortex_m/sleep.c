@@ -7,7 +7,7 @@
 #ifdef BOARD_NEVER_SLEEPS
 #define REST "nop\n"
 #else
-#define REST "dsb\n wfi\n"
+#define REST "dsb\n .balign 8\n wfi\n" // elsewhere a probed F405 may run what is not there (ES0182 2.1.3)
 #endif
 
 static volatile bool woken;

@@ -83,9 +83,8 @@ uint32_t clock_us(void)
 
 void watchdog_start(void)
 {
-    // A debugger's halt stops time and watchdog with the core, and a core asleep still answers it.
+    // A debugger's halt stops time and watchdog with the core; DBG_SLEEP is its own to set (ES0182 2.1.3).
     DBGMCU_APB1_FZ |= DBGMCU_IWDG_STOP | DBGMCU_TIM2_STOP;
-    DBGMCU_CR |= DBGMCU_SLEEP;
     IWDG_KR = IWDG_KR_ACCESS;
     IWDG_PR = IWDG_PR_BY_64;
     IWDG_RLR = 1000; // 2 s, 1.4 at least: longer than a sector's erase

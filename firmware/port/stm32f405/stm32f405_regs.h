@@ -142,8 +142,6 @@
 // ---- 39.1, 38.6.1 the chip's own 96-bit number and its kind
 #define UNIQUE_ID        ((const volatile uint32_t *)0x1FFF7A10u)
 #define DBGMCU_IDCODE    REG32(0xE0042000u)
-#define DBGMCU_CR        REG32(0xE0042004u)
-#define DBGMCU_SLEEP     (1u << 0)
 #define DBGMCU_APB1_FZ   REG32(0xE0042008u)
 #define DBGMCU_TIM2_STOP (1u << 0)
 #define DBGMCU_IWDG_STOP (1u << 12)
