@@ -97,6 +97,30 @@ TEST(the_flash_by_the_rules_and_the_watchdog_is_fed_over_it)
     assert_true(broke(""));
 }
 
+// As on the Pico, but for who is heard: a byte of the UART.
+TEST(the_led_tells_four_states)
+{
+    assert_true(clocks_start());
+    registers_settle();
+    assert_false(gpio_c_out >> PIN_LED & 1);
+    (void)port_init(0, NULL);
+    registers_settle();
+    assert_true(gpio_c_out >> PIN_LED & 1);
+    for (int heard = 0; heard < 2; heard++) {
+        int changes = 0;
+        uart_received = heard;
+        port_idle(ONLY_BOARD);
+        for (int k = 0; k < 2000; k++) {
+            const uint32_t before = gpio_c_out;
+            port_idle(ONLY_BOARD);
+            registers_settle();
+            changes += (before ^ gpio_c_out) >> PIN_LED & 1;
+        }
+        assert_in_range(changes, heard ? 3 : 14, heard ? 4 : 16);
+    }
+    assert_true(broke(""));
+}
+
 #define BREAKS(part, ...) __VA_ARGS__, assert_true(broke(part))
 
 TEST(each_rule_can_be_broken)

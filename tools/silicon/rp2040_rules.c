@@ -60,6 +60,9 @@ void chip_reset(void)
 
 static void touch(uint32_t at)
 {
+    if (now_ns - fed_ns > 2000000000u) {
+        break_rule("watchdog fed late: boot2 sets it to two seconds");
+    }
     for (unsigned k = 0; k < sizeof block / sizeof *block; k++) {
         if (at - block[k].at < block[k].bytes && peek(RESETS) >> block[k].bit & 1) {
             break_rule("a block touched while in reset (2.14)");
@@ -136,8 +139,6 @@ static void rest(uint32_t at, uint32_t old, uint32_t value)
     } else if (at == WATCHDOG + 4) {
         if (value > 0xFFFFFFu) {
             break_rule("a watchdog's LOAD of more than 24 bits (4.7)");
-        } else if (now_ns - fed_ns > 2000000000u) {
-            break_rule("watchdog fed late: boot2 sets it to two seconds");
         }
         fed_ns = now_ns;
     } else if (at == SIO + 0x14) {

@@ -1,5 +1,6 @@
 // What the port's files call of the rest of an image.
 #include "cortex_m.h"
+#include "registers.h"
 #include "stm32f405_rules.h"
 
 #include <stdlib.h>
@@ -35,4 +36,5 @@ void wake(void)
 
 void sleep_until_woken(void)
 {
+    now_ns += 1000000;
 }

@@ -47,7 +47,7 @@ static uint32_t enabled_in, enabled_bits;
 static bool latency_is_read, iwdg_open, iwdg_runs;
 static int keys, busy_reads;
 static uint64_t fed_ns;
-uint32_t nvic_enabled[4];
+uint32_t nvic_enabled[4], gpio_c_out;
 
 void chip_reset(bool by_loader)
 {
@@ -82,6 +82,7 @@ void chip_reset(bool by_loader)
     enabled_at = 0;
     latency_is_read = iwdg_open = iwdg_runs = false;
     keys = busy_reads = 0;
+    gpio_c_out = 0;
     broken[0] = '\0';
 }
 
@@ -95,6 +96,9 @@ uint32_t hclk_hz(void)
 
 static void touch(uint32_t at)
 {
+    if (iwdg_runs && now_ns - fed_ns > IWDG_LEAST_NS) {
+        break_rule("watchdog fed late: LSI may be 47 kHz (data sheet, 5.3.9)");
+    }
     for (unsigned k = 0; k < sizeof block / sizeof *block; k++) {
         if (at - block[k].at < block[k].bytes) {
             if (!(peek(block[k].enable) >> block[k].bit & 1)) {
@@ -224,9 +228,6 @@ static void watchdog(uint32_t at, uint32_t value)
         return;
     }
     iwdg_open = value == 0x5555;
-    if (iwdg_runs && value == 0xAAAA && now_ns - fed_ns > IWDG_LEAST_NS) {
-        break_rule("watchdog fed late: LSI may be 47 kHz (data sheet, 5.3.9)");
-    }
     iwdg_runs = iwdg_runs || value == 0xCCCC;
     if (value == 0xCCCC && (peek(DBG_FZ) & (1u << 12 | 1)) != (1u << 12 | 1)) {
         break_rule(
@@ -252,6 +253,8 @@ void on_write(uint32_t at, uint32_t old, uint32_t value)
         watchdog(at, value);
     } else if (at == BRR && value < 16) {
         break_rule("a USART divided by less than one (RM0090 30.3.4)");
+    } else if (at == 0x40020818u) { // GPIOC_BSRR
+        gpio_c_out = (gpio_c_out & ~(value >> 16)) | (value & 0xFFFF);
     } else if (at == DBG_CR && value & 1) {
         break_rule("DBG_SLEEP, with which WFI may be followed by what is not there (ES0182 2.1.3)");
     } else if (at - 0xE000E100u < 16) {

@@ -8,5 +8,6 @@
 void chip_reset(bool by_loader);
 uint32_t hclk_hz(void);          // by the registers as they are
 extern uint32_t nvic_enabled[4]; // bit: interrupt
+extern uint32_t gpio_c_out;      // bit: pin
 
 #endif
