@@ -75,6 +75,47 @@ TEST(one_flipped_bit_anywhere_changes_nothing)
     }
 }
 
+// One round of a query: so many readings of a text. Whether it is sure.
+static bool answers(bt_serial_query *query, const char *text, int readings)
+{
+    uint8_t serial[BT_SERIAL_CHARS];
+    bt_serial_query_begin(query);
+    for (int k = 1; k <= readings; k++) {
+        memcpy(query->read[k].got, text, BT_SERIAL_CHARS);
+    }
+    query->whole = (uint8_t)(readings + 1);
+    return bt_serial_query_answer(query, serial);
+}
+
+TEST(a_serial_number_has_its_letters_and_digits_and_two_forms_or_three_readings)
+{
+    static const struct {
+        const char *text;
+        int words, bytes;
+        bool sure;
+    } round[] = {{"BTEMU00000000001", 3, 0, true},  {"BTEMU00000000001", 2, 0, false},
+                 {"BTEMU00000000001", 1, 1, true},  {"ATEMU00000000001", 3, 0, false},
+                 {"BTEMUA0000000001", 3, 0, false}, {"BTEMU00A00000001", 3, 0, false}};
+    for (unsigned k = 0; k < sizeof round / sizeof *round; k++) {
+        bt_serial_query query = {.form = BT_FORM_WORDS};
+        bool sure = answers(&query, round[k].text, round[k].words);
+        query.form = BT_FORM_BYTES;
+        sure = round[k].bytes == 0 ? sure : answers(&query, round[k].text, round[k].bytes);
+        assert_int_equal(sure, round[k].sure);
+    }
+}
+
+TEST(the_form_that_costs_the_others_their_rounds_is_given_up)
+{
+    bt_serial_query query = {0};
+    int held = 0;
+    for (int k = 0; k < 200; k++) {
+        held += query.form == BT_FORM_HELD;
+        assert_false(answers(&query, "no serial number", 1));
+    }
+    assert_int_equal(held, 6);
+}
+
 static uint16_t error_words(uint64_t n)
 {
     return n > 60 ? BT_EMU_FAULT_NO_CHANNEL : 0;
