@@ -27,6 +27,8 @@ DEFECTS = {
     "lose a start of frame in 5": ("usb_frames", "lost starts of frame"),
 }
 
+#: bring_up.md's
+ORDER = ["words at 1 MHz", "at 0.99 MHz", "serial numbers", "usual rate", "press each", "faster rates", "restart 1 "]
 
 pytestmark = pytest.mark.usefixtures("emulated_pico")
 
@@ -48,6 +50,7 @@ def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
     findings = [*judge(facts), *bringup.check(seen, facts)]
     bringup_report.write(folder / "bringup.md", seen, facts, findings)
     assert len(seen.restarts) == bringup.RESTARTS, (facts.error, steps)
+    assert [part for step in steps for part in ORDER if part in step] == ORDER, steps
     return {finding.code: finding.seen for finding in reversed(findings)}, (folder / "bringup.md").read_text()
 
 
