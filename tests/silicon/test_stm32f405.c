@@ -6,6 +6,7 @@
 #include "registers.h"
 #include "stm32f405.h"
 #include "stm32f405_rules.h"
+#include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
 static int new_chip(void **state)
@@ -50,6 +51,23 @@ TEST(it_starts_from_what_the_loader_left)
     for (int k = 0; k < 4; k++) {
         assert_int_equal(nvic_enabled[k] & ~(k == 1 ? 1u << (USART3_IRQ - 32) : 0), 0);
     }
+}
+
+TEST(it_tells_a_hang_and_a_crash_from_a_start)
+{
+    const uint32_t by_pin = 1u << 26;
+    start(false);
+    RCC_CSR = by_pin | RCC_CSR_IWDGRSTF;
+    assert_int_equal(started_by(), BT_FAULT_FLAG_HUNG);
+    RCC_CSR = by_pin | RCC_CSR_SFTRSTF;
+    assert_int_equal(started_by(), BT_FAULT_FLAG_CRASHED);
+    RCC_CSR = by_pin;
+    assert_int_equal(started_by(), BT_FAULT_FLAG_STARTED);
+    if (setjmp(registers_left) == 0) {
+        leave(false);
+    }
+    RCC_CSR = by_pin | RCC_CSR_SFTRSTF;
+    assert_int_equal(started_by(), BT_FAULT_FLAG_STARTED);
 }
 
 TEST(it_leaves_for_the_loader_as_out_of_reset)
