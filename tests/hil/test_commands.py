@@ -59,6 +59,7 @@ REFUSED = [
     (wire.TareSet, (0, (0xFFF1,) * 19, 0, 0), wire.Error.OUT_OF_RANGE),
     (wire.GetSetting, (0,), wire.Error.UNKNOWN_SETTING),
     (wire.SetSetting, (int(Setting.IDLE_PERIOD_MS), 1), wire.Error.OUT_OF_RANGE),
+    (wire.SetCalibration, (0, ANY_SENSOR, 0, (0,) * 7 + (-1,)), wire.Error.OUT_OF_RANGE),
     (wire.Start, (0x80, 1, 0), wire.Error.OUT_OF_RANGE),
     (wire.RebootBootloader, (1,), wire.Error.OUT_OF_RANGE),
     (wire.GetMap, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
