@@ -105,11 +105,11 @@ static void assert_followed(const emulated_finger *finger, const bt_baseline *fr
 
 TEST(the_tare_follows_the_temperature_in_contact)
 {
-    static const int gains[] = {500, 700, 970, -500, 1, 5000, -5000};
-    static const int steps[] = {1, 40, 90, -1, -40, -90};
-    for (int g = 0; g < 7; g++) {
+    static const int gains[] = {970, 1, -5000};
+    static const int steps[] = {1, 40, -90};
+    for (int g = 0; g < 3; g++) {
         emulated_finger held = held_finger(gains[g]);
-        for (int s = 0; s < 6; s++) {
+        for (int s = 0; s < 3; s++) {
             emulated_finger finger = held;
             bt_baseline before = finger.tare.base;
             tdc_now = (uint16_t)(T0 + steps[s]);
@@ -125,7 +125,7 @@ TEST(the_tare_follows_the_temperature_in_contact)
 TEST(the_ends_of_gain_and_temperature_are_bounded)
 {
     for (int up = 0; up < 2; up++) {
-        for (int gain = -5000; gain <= 5000; gain += 2500) {
+        for (int gain = -5000; gain <= 5000; gain += 5000) {
             emulated_finger finger;
             finger_init(&finger);
             finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(gain);
@@ -164,7 +164,9 @@ static bool flagged(const emulated_finger *finger, uint32_t warmed_max_q8)
 
 TEST(a_degree_is_flagged_in_contact_alone)
 {
-    for (int step = -100; step <= 100; step++) {
+    static const int steps[] = {-100, -34, -33, 33, 34, 100};
+    for (int s = 0; s < 6; s++) {
+        const int step = steps[s];
         emulated_finger finger = held_finger(0);
         tdc_now = (uint16_t)(T0 + step);
         for (int sweep = 1; sweep <= 60; sweep++) {
