@@ -60,7 +60,7 @@ def test_the_nearest_row_is_none_of_the_same_press() -> None:
     ("words", "message"),
     [
         (["newtons"], "no recording given"),
-        (["batch", "F1.npz"], "does not use a recording"),
+        (["batch", "F1.npz"], "bench batch uses neither a recording nor --picture"),
         (["newtons", "/nonexistent/F1.npz"], "F1.npz"),
     ],
 )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from biotac import InputError
 
 from ..report import Table
 
@@ -21,6 +24,15 @@ class Contestant:
     name: str
     count: int
     run: Callable[[], Any]
+
+
+def check_installed(*packages: str) -> None:
+    """Raises InputError where one of the packages of others, with whom a benchmark compares, is missing."""
+    for package in packages:
+        try:
+            importlib.import_module(package)
+        except ImportError as error:
+            raise InputError(f"{package} is not installed; pip install 'biotac-lab[bench]'") from error
 
 
 def timed(

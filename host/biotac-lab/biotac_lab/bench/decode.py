@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import biotac
-from biotac import InputError
 from biotac.wire import DTYPES, Decoder, StreamDecoder, encode, messages
 
 from ..report import Show, Table
-from .contest import Asked, Contestant, tables, timed
+from .contest import Asked, Contestant, check_installed, tables, timed
 
 FINGERS = 5
 FRAMES_PER_S = 100 * FINGERS
@@ -66,12 +65,10 @@ def measure(frames: int = 30_000, show: Show = lambda text: None, rounds: int = 
 
     Raises InputError without the extra `bench`, RuntimeError if two contestants differ.
     """
-    try:
-        from cobs import cobs
+    check_installed("cobs", "pymavlink")
+    from cobs import cobs
 
-        dialect = mavlink_dialect()
-    except ImportError as error:
-        raise InputError(f"{error.name} is not installed; pip install 'biotac-lab[bench]'") from None
+    dialect = mavlink_dialect()
     sent = recording(frames)
     unpacked = [
         (messages.MESSAGES[i].unpack(row.tobytes()), k) for i, rows in sent.items() for k, row in enumerate(rows)

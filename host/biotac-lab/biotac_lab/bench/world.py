@@ -9,11 +9,12 @@ from biotac.sim import SimFinger, Touch, world
 
 from ..report import Show, Table
 
+ROUNDS = 500
 ASKED_MS = {1: None, 2: 4.0, 5: 10.0}
 
 
-def measure(rounds: int, show: Show) -> list[Table]:
-    """Wall time of ``rounds`` hundreds of rounds in which every finger is pressed, moved and slides."""
+def measure(show: Show) -> list[Table]:
+    """Wall time of ROUNDS rounds in which every finger is pressed, moved and slides."""
     rows = []
     for fingers, asked in ASKED_MS.items():
         show(f"{fingers} fingers")
@@ -21,7 +22,7 @@ def measure(rounds: int, show: Show) -> list[Table]:
         with world({name: SimFinger(number + 1) for number, name in enumerate(names)}) as w:
             w.run(2.0)
             took_ms = []
-            for k in range(100 * rounds):
+            for k in range(ROUNDS):
                 begin_s = time.perf_counter()
                 w.step(**{name: Touch(2.0 + 0.01 * (k % 100), (0.1, 0.2), slip_mm_s=5.0) for name in names})
                 took_ms.append(1e3 * (time.perf_counter() - begin_s))
