@@ -1,20 +1,17 @@
 """A board that floods a pty with FRAMEs, in its own process: the producer of `biotac-lab bench live`.
 
-    python -m biotac_lab.bench.flood MASTER_FD RATE FRAMES TIMES_FILE
-
-It answers commands. START makes it send FRAMES frames of five fingers, RATE a second, through a ring of 16 KiB that
-drops whole frames when full, as on real boards. TIMES_FILE gets the time at which each burst entered the ring (int64
-ns, CLOCK_MONOTONIC); afterwards a line goes to stdout. It is Python because the simulator's executable is the
-firmware, which should not grow a flood mode. Frames are made beforehand: sending is a slice and a system call.
+It answers commands. START makes it send its frames through a ring of 16 KiB that drops whole frames when full, as on
+real boards. It is Python because the simulator's executable is the firmware, which should not grow a flood mode.
+Frames are made beforehand: sending is a slice and a system call.
 """
 
 from __future__ import annotations
 
-import mmap
 import os
+import pty
 import select
-import sys
 import time
+import tty
 from contextlib import suppress
 from typing import Any
 
@@ -111,17 +108,16 @@ def flood(board: Board, packets: list[bytes], rate: int, times: Any, ring: bytea
         board.send(ring)
 
 
-def main() -> None:
-    """Run the board; see the module's docstring."""
-    master, rate, count, path = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+def run(pipe: Any, rate: int, count: int, times: Any) -> None:
+    """Send the pty's path through the ``pipe``; then, after each START, ``count`` frames to the pty, ``rate`` a second.
+
+    ``times`` gets when each burst entered the ring (ns, CLOCK_MONOTONIC), and the pipe a None once all are sent.
+    """
     packets = frames(count)
-    bursts = -(-count // burst_frames(rate))
-    with open(path, "wb+") as file:
-        file.truncate(8 * bursts)
-        times = memoryview(mmap.mmap(file.fileno(), 8 * bursts)).cast("q")
-    board = Board(master)
-    ring = bytearray()
-    print("ready", flush=True)
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    board, ring = Board(master), bytearray()
+    pipe.send(os.ttyname(slave))
     while True:
         select.select([master], [], [])  # until something arrives
         try:
@@ -129,11 +125,7 @@ def main() -> None:
             board.send(ring)
             if started:
                 flood(board, packets, rate, times, ring)
-                print("sent", flush=True)
+                pipe.send(None)
         except OSError:  # nobody has the port open for a while, between two rounds
             ring.clear()
             time.sleep(0.001)
-
-
-if __name__ == "__main__":
-    main()

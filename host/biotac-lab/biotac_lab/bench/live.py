@@ -5,31 +5,26 @@ Both read the same board (flood.py, another process) through the same pty, in al
 
 from __future__ import annotations
 
-import os
-import pty
+import multiprocessing
 import statistics
-import subprocess
-import sys
-import tempfile
 import threading
 import time
-import tty
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import biotac
-from biotac import Batch, InputError
+from biotac import Batch
 from biotac.wire import DTYPES, encode
 from biotac.wire import messages as wire
 
 from ..report import Show, Table
 from . import flood
+from .contest import check_installed
 
 RATES = (5_000, 50_000)
 OURS, PYSERIAL = "biotac, on_batch", "pyserial thread, read(in_waiting or 1)"
@@ -54,29 +49,29 @@ class Round:
 class Producer:
     """flood.py in a process, and the pty to it."""
 
-    def __init__(self, rate: int, seconds: float, folder: Path) -> None:
-        self.rate = rate
-        self.seconds = seconds
-        self.frames = int(rate * seconds)
-        self._times = folder / f"times{rate}"
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        self.path = os.ttyname(self._slave)
-        options = [str(value) for value in (self._master, rate, self.frames, self._times)]
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "biotac_lab.bench.flood", *options], stdout=subprocess.PIPE, pass_fds=[self._master]
-        )
-        self.wait()
+    def __init__(self, rate: int, seconds: float) -> None:
+        self.rate, self.seconds, self.frames = rate, seconds, int(rate * seconds)
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe(duplex=False)
+        self._put_ns = context.RawArray("q", -(-self.frames // flood.burst_frames(rate)))
+        work = (theirs, rate, self.frames, self._put_ns)
+        self._process = context.Process(target=flood.run, args=work, daemon=True)
+        self._process.start()
+        theirs.close()
+        self.path = self.wait()
 
-    def wait(self) -> None:
-        """Wait for its next line: it writes one when ready, and one each time all frames are sent."""
-        assert self._process.stdout is not None
-        if not self._process.stdout.readline():
-            raise RuntimeError("the producer of `biotac-lab bench live` ended early; its own error is on stderr")
+    def wait(self) -> Any:
+        """Wait for its next word: the pty's path when it is ready, None each time all frames are sent."""
+        try:
+            return self._pipe.recv()
+        except EOFError:
+            raise RuntimeError(
+                "the producer of `biotac-lab bench live` ended early; its own error is on stderr"
+            ) from None
 
     def delays_us(self, arrivals: list[Arrival]) -> NDArray[np.float64]:
         """Delay of every frame that arrived, from the ring to the callback."""
-        put_ns = np.fromfile(self._times, np.int64)
+        put_ns = np.frombuffer(self._put_ns, np.int64)
         delays = [
             (when - put_ns[(seq.astype(np.int64) * flood.FINGERS + finger) // flood.burst_frames(self.rate)]) / 1e3
             for finger, seq, when in arrivals
@@ -86,11 +81,8 @@ class Producer:
     def close(self) -> None:
         """End the process."""
         self._process.kill()
-        self._process.wait()
-        assert self._process.stdout is not None
-        self._process.stdout.close()
-        os.close(self._master)
-        os.close(self._slave)
+        self._process.join()
+        self._pipe.close()
 
 
 def ours(path: str, arrivals: list[Arrival], until: Callable[[], None]) -> None:
@@ -163,26 +155,20 @@ def measure(
     show: Show = lambda text: None, *, rates: tuple[int, ...] = RATES, rounds: int = 5, seconds: float = 2.0
 ) -> list[Table]:
     """Time both readers at each rate in alternate rounds after an untimed one. Raises InputError if it cannot run."""
-    if os.name != "posix":
-        raise InputError("bench live needs a pty, which this system lacks; use Linux or macOS")
-    try:
-        import cobs  # noqa: F401
-    except ImportError:
-        raise InputError("bench live needs cobs for the pyserial reader; pip install 'biotac-lab[bench]'") from None
+    check_installed("cobs")
     contestants = {OURS: ours, PYSERIAL: pyserial_thread}
     done_rounds: dict[tuple[int, str], list[Round]] = {(rate, name): [] for rate in rates for name in contestants}
-    with tempfile.TemporaryDirectory(prefix="biotac-bench-") as folder:
-        for rate in rates:
-            show(f"{rate} frames a second")
-            producer = Producer(rate, seconds, Path(folder))
-            try:
-                for number in range(rounds + 1):
-                    for name, contestant in contestants.items():
-                        done = one_round(producer, contestant)
-                        if number:
-                            done_rounds[rate, name].append(done)
-            finally:
-                producer.close()
+    for rate in rates:
+        show(f"{rate} frames a second")
+        producer = Producer(rate, seconds)
+        try:
+            for number in range(rounds + 1):
+                for name, contestant in contestants.items():
+                    done = one_round(producer, contestant)
+                    if number:
+                        done_rounds[rate, name].append(done)
+        finally:
+            producer.close()
     return report(done_rounds, seconds)
 
 
