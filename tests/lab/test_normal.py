@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from biotac.calibrate.wrench import angles_deg
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac_lab.calibrate import normal
@@ -30,8 +31,8 @@ def looks(contacts: int = 12, frames: int = 20) -> normal.Looks:
 
 def test_what_the_electrodes_say_of_the_error_is_mended_on_contacts_that_were_not_trained_on() -> None:
     looked = looks()
-    before = np.median(normal.angles_deg(surface.normals_at(looked.points_mm), looked.normals))
-    after = np.median(normal.angles_deg(normal.held_out(looked), looked.normals))
+    before = np.median(angles_deg(surface.normals_at(looked.points_mm), looked.normals))
+    after = np.median(angles_deg(normal.held_out(looked), looked.normals))
     assert after < 0.25 * before
     turned = normal.fit(looked).point_mm(looked.points_mm, looked.e)
     truth = np.column_stack([looked.points_mm[:, 0], surface.RADIUS_MM * looked.normals[:, 1:]])

@@ -19,7 +19,6 @@ from biotac.core import to_frames
 from ..experiments import laboratory, plate_normal
 from ..report import Show, Table
 from . import training
-from .normal import angles_deg
 from .peer_net import PeerNet
 
 ABOUT = "Where the default force points, against a plate's normal, a measured force, or fingers that can only press."
@@ -131,7 +130,7 @@ def _judged(case: Case, force_n: Any, outside: Any | None = None) -> list[Any]:
         return [len(force_n), *[None] * 5, pulls, *[None] * 4]
     size_n = np.linalg.norm(force_n, axis=1, keepdims=True)
     unit, into = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9) for v in (force_n, case.truth))
-    off = angles_deg(unit, into)
+    off = wrench.angles_deg(unit, into)
     wrong = (off > WRONG_DEG) & (~np.array(case.in_n) | (np.linalg.norm(case.truth, axis=1) > FIRM_N))
     right = [_share((force_n * into)[np.abs(into[:, axis]) > SIDE, axis] > 0.0) for axis in (1, 0)]
     flags = [None if outside is None else _share(flagged[rows]) for rows in (wrong, ~wrong)]

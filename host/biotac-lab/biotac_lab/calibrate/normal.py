@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from biotac import InputError
+from biotac.calibrate.wrench import angles_deg
 from biotac.core import geometry as surface
 
 Floats = npt.NDArray[np.float64]
@@ -71,14 +72,6 @@ def held_out(looks: Looks) -> Floats:
     result = np.empty_like(looks.normals)
     for k, rows in enumerate(fitting.rows):
         result[rows] = fitting.predicted(rows, fitting.all_but(k))
-    return result
-
-
-def angles_deg(own: Floats, other: Floats) -> Floats:
-    """Angles (n,) in degrees between unit vectors (n, 3)."""
-    # atan2 is exact for small angles, which acos rounds to 0
-    cross = np.linalg.norm(np.cross(own, other), axis=1)
-    result: Floats = np.degrees(np.arctan2(cross, (own * other).sum(axis=1)))
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from biotac import Recording, RecordingError
-from biotac.calibrate.wrench import locate
+from biotac.calibrate.wrench import locate, numbers
 from biotac.recording import counts_field, read_npz, to_lin_frame
 from biotac.wire import messages, sensor
 
@@ -48,14 +48,14 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force:
         notes = [f"tare: median of {len(fields['E_base'])} rows of E_base, given to the board at the start"]
     time_s = np.arange(n, dtype=np.float64) * ROW_S
     if "t" in fields:
-        time_s = _numbers(path, "t", fields["t"], (n,), "s")
+        time_s = numbers(path, "t", fields["t"], (n,), "s")
         back = np.flatnonzero(np.diff(time_s) < 0.0)
         if len(back):
             raise RecordingError(
                 f"{path}: field t goes back in row {back[0] + 1}: expected times in order; sort the rows"
             )
     force, torque = (
-        to_lin_frame(_numbers(path, name, fields[name], (n, 3), unit)) if name in fields else None
+        to_lin_frame(numbers(path, name, fields[name], (n, 3), unit)) if name in fields else None
         for name, unit in (("F", "N"), ("M", "N mm"))
     )
     normal = _plate_normal(path, fields["z_dir"], n) if "z_dir" in fields else None
@@ -98,20 +98,8 @@ def _require(path: Path, needs: tuple[str, ...], seen: tuple[str, ...]) -> None:
         )
 
 
-def _numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ...], unit: str) -> Floats:
-    if array.shape != shape or array.dtype.kind not in "fiu":
-        raise RecordingError(f"{path}: field {name} is {array.dtype} {array.shape}: expected {shape} in {unit}")
-    wrong = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
-    if wrong.any():
-        raise RecordingError(
-            f"{path}: field {name} is not finite in {wrong.sum()} of {len(array)} rows, first in row {wrong.argmax()}: "
-            "expected numbers; drop those rows"
-        )
-    return array.astype(np.float64)
-
-
 def _plate_normal(path: Path, array: npt.NDArray[Any], rows: int) -> Floats:
-    z = _numbers(path, "z_dir", array, (rows, 3), "unit vectors")
+    z = numbers(path, "z_dir", array, (rows, 3), "unit vectors")
     length = np.linalg.norm(z, axis=1)
     if np.abs(length - 1.0).max() > 0.01:
         row = int(np.argmax(np.abs(length - 1.0)))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from biotac import InputError, PocWeights, RecordingError, Setting
+from biotac.calibrate import wrench
 from biotac.core import geometry as surface
 from biotac.sim import FLAT_MM, PROFILES, Pose, Profile
 
@@ -66,7 +67,7 @@ def angles_deg(points_mm: Floats, normals: Floats) -> Floats:
     """Angles between the core's outward normals at points (n, 3) and unit normals (n, 3); NaN without a point."""
     known = np.asarray(np.isfinite(points_mm).all(axis=1))
     outward = surface.normals_at(np.where(known[:, None], points_mm, [0.0, 0.0, -1.0]))
-    return np.where(known, normal.angles_deg(outward, normals), np.nan)
+    return np.where(known, wrench.angles_deg(outward, normals), np.nan)
 
 
 def emulated(seed: int, profile: Profile) -> Trial:
@@ -128,7 +129,7 @@ def looks(trial: Trial) -> normal.Looks:
 
 def _corrected(trial: Trial) -> Floats:
     seen = looks(trial)
-    return normal.angles_deg(normal.held_out(seen), seen.normals)
+    return wrench.angles_deg(normal.held_out(seen), seen.normals)
 
 
 def _case(profile: str, weights: PocWeights, trial: Trial) -> Angles:

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from .contact import MESH_STEP_MM, locate, locate_on_mesh, moment
 from .crossvalidation import Validation, validate
-from .figures import rmse
+from .figures import angles_deg, rmse
 from .lag import Lags
 from .moments import DRIFT_NODES
-from .run import Run, load_run, run_of
+from .run import Run, load_run, numbers, run_of
 from .sources import load
 from .splits import Blocks
 
 __all__ = [
-    "DRIFT_NODES", "MESH_STEP_MM", "Blocks", "Lags", "Run", "Validation", "load", "load_run", "locate",
-    "locate_on_mesh", "moment", "rmse", "run_of", "validate",
+    "DRIFT_NODES", "MESH_STEP_MM", "Blocks", "Lags", "Run", "Validation", "angles_deg", "load", "load_run", "locate",
+    "locate_on_mesh", "moment", "numbers", "rmse", "run_of", "validate",
 ]  # fmt: skip
