@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Sequence
@@ -41,11 +42,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         verb.add_argument("--json", action="store_true", help="print JSON for machines")
         verb.epilog = f"example: {module.EXAMPLE}"
         module.add_arguments(verb)
-        verb.set_defaults(run=module.run)
+        verb.set_defaults(run=module.run)  # returns an Outcome
     args = parser.parse_args(argv)
     progress = Progress()
     try:
-        return int(args.run(args, progress.show))
+        outcome = args.run(args, progress.show)
+        progress.clear()
+        print(json.dumps(outcome.facts) if args.json else outcome.page)
+        return int(vars(args).get("check", False) and not outcome.met)
     except BiotacError as error:
         progress.clear()
         print(f"biotac-lab: {' '.join(str(error).split())}", file=sys.stderr)

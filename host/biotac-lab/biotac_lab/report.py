@@ -74,6 +74,20 @@ def plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
+class Outcome:
+    """What a verb prints, as Markdown or as JSON types, and whether all limits are ``met`` that --check asks for."""
+
+    page: str
+    facts: Any
+    met: bool = True
+
+
+def of_tables(tables: Sequence[Table], facts: Any, *, met: bool = True) -> Outcome:
+    """The outcome of a verb whose page are tables."""
+    return Outcome("\n".join(line for table in tables for line in table.page()), facts, met)
+
+
+@dataclass(frozen=True)
 class Report:
     """``figures`` are JSON types beside the tables, for programs; ``draw`` draws the picture into a figure."""
 
@@ -97,6 +111,13 @@ class Report:
         for title, items in (("Checks", self.verdicts()), ("Notes", self.notes)):
             lines += [f"## {title}", "", *[f"* {item}" for item in items], ""] if items else []
         return "\n".join(lines)
+
+    def outcome(self, name: str, about: str, out: Path | None = None, *, overwrite: bool = False) -> Outcome:
+        """To be printed; and written into the folder ``out``, if there is one. Raises InputError."""
+        written = [] if out is None else [str(path) for path in write(self, out, name, about, overwrite=overwrite)]
+        page = self.page(name, about) + "".join(f"\nwritten: {path}" for path in written)
+        met = all(item["met"] for item in self.checks)
+        return Outcome(page, self.facts(name) | {"written": written}, met)
 
     def verdicts(self) -> list[str]:
         """The checks as lines of text."""
@@ -150,12 +171,17 @@ def write(report: Report, folder: Path, name: str, about: str, *, overwrite: boo
     return [page, drawn, facts]
 
 
+def check_file(path: Path | None, *, overwrite: bool) -> None:
+    """Raises InputError for a file that exists and may not be overwritten: before the work."""
+    if path is not None and path.exists() and not overwrite:
+        raise InputError(f"{path} exists; overwrite it (--force) or choose another name")
+
+
 def check_free(folder: Path, name: str, *, overwrite: bool) -> list[Path]:
-    """The files of write(). Raises InputError for one that exists and may not be overwritten: before the work."""
+    """The files of write(). Raises InputError for one that exists and may not be overwritten."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is not a folder; choose another name")
     files = [folder / f"{name}.{ending}" for ending in ("md", "png", "json")]
     for path in files:
-        if path.exists() and not overwrite:
-            raise InputError(f"{path} exists; overwrite it (--force) or choose another folder")
+        check_file(path, overwrite=overwrite)
     return files

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 from pathlib import Path
 from typing import Any
 
 from biotac import InputError
 
-from ..report import Show, Table
+from ..report import Outcome, Show, Table, of_tables
 
 ABOUT = "Measure batch maths, decoding, the live path, recordings, force against cycles, physics in the loop."
 EXAMPLE = "biotac-lab bench batch"
@@ -35,15 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--picture", metavar="FILE", type=Path, help="newtons: draw it here (.png)")
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Print the tables and return 0 whatever they are: judging them is up to people."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """The tables, without a limit: judging them is up to people."""
     given: dict[str, Any] = {"files": args.files, "picture": args.picture} if args.what == "newtons" else {}
     if not given and (args.files or args.picture):
         raise InputError(f"bench {args.what} uses neither a recording nor --picture; drop them")
     tables: list[Table] = importlib.import_module(f"{__package__}.{args.what}").measure(**given, show=show)
-    show("")
-    if args.json:
-        print(json.dumps({"bench": args.what, "tables": [table.facts() for table in tables]}))
-    else:
-        print("\n".join(line for table in tables for line in table.page()))
-    return 0
+    return of_tables(tables, {"bench": args.what, "tables": [table.facts() for table in tables]})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from biotac.calibrate import population, wrench
 from biotac.core import to_frames
 
 from ..experiments import laboratory, plate_normal
-from ..report import Show, Table
+from ..report import Outcome, Show, Table, of_tables
 from . import training
 from .peer_net import PeerNet
 
@@ -49,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--peer", metavar="FOLDER", type=Path, action="append", default=[], help=peer)
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Print a row for each recording and estimate."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """A row for each recording and estimate."""
     nets = {str(path): PeerNet(path / DATA) for path in args.peer}
     rows = []
     for path in args.files:
@@ -69,8 +68,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
         f"{WRONG_DEG:g} deg above {FIRM_N:g} N. The default was trained on what its map's provenance names."
     )
     table = Table("Direction of force", HEAD, rows, text, digits=3)
-    print(json.dumps(table.facts()) if args.json else "\n".join(table.page()))
-    return 0
+    return of_tables([table], table.facts())
 
 
 def _cases(path: Path) -> Iterator[Case]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from biotac import InputError
 from biotac.calibrate.population import Population
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.press import scale_of
@@ -21,7 +19,7 @@ from biotac.calibrate.wrench import Run, load, rmse, run_of, validate
 from biotac.core import geometry as surface
 from biotac.sim import Finger, States, plate_recording
 
-from ..report import Show, Table
+from ..report import Outcome, Show, Table, check_file, of_tables
 from . import training
 from .finger_fit import Fit, Floats, Half, completed, dumps, halves
 
@@ -72,10 +70,9 @@ class Touched:
         )
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
+def run(args: argparse.Namespace, show: Show) -> Outcome:
     """Fit, write, compare."""
-    if args.out is not None and args.out.exists() and not args.force:
-        raise InputError(f"{args.out} exists; overwrite it (--force) or name another")
+    check_file(args.out, overwrite=args.force)
     with threadpool_limits(limits=2, user_api="blas"):
         show("fitting")
         runs = [training.aligned(load(path).run) for path in args.files]
@@ -93,12 +90,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
         back = _back(touched, runs, [path.stem for path in args.files])
         own, exact = _calibrated(fit, list(seeds)[:CALIBRATED])
         tables += [default, own, back, _alike(fit.parts, touched, runs, [path.stem for path in args.files])]
-    print(
-        json.dumps([table.facts() for table in tables])
-        if args.json
-        else "\n\n".join("\n".join(t.page()) for t in tables)
-    )
-    return int(args.check and not (passed and exact))
+    return of_tables(tables, [table.facts() for table in tables], met=passed and exact)
 
 
 def _judged(population: Population, touched: Sequence[Touched]) -> tuple[Floats, float]:

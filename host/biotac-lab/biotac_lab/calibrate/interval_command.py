@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -11,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from biotac import InputError
 from biotac.calibrate.wrench import load
 
-from ..report import Show, Table
+from ..report import Outcome, Show, Table, of_tables
 from .interval import (
     Finger,
     Judged,
@@ -36,15 +35,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Judge the three sources on each finger, and print the table."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """Judge the three sources on each finger."""
     if len(args.files) < 2:
         raise InputError("one recording: expected at least two fingers, each to be left out of the others' map")
     with threadpool_limits(limits=1, user_api="blas"):
         tables = judge([Finger.of_run(load(path).run) for path in args.files], [path.name for path in args.files], show)
-    facts = {"tables": [table.facts() for table in tables]}
-    print(json.dumps(facts) if args.json else "\n".join(line for table in tables for line in table.page()))
-    return 0
+    return of_tables(tables, {"tables": [table.facts() for table in tables]})
 
 
 def judge(fingers: list[Finger], names: list[str], show: Show) -> list[Table]:

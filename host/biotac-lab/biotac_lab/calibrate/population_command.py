@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from biotac import InputError
 from biotac.calibrate.population import COLUMNS, Trained, dumps, provenance_of
 from biotac.calibrate.wrench import load
 
-from ..report import Show, Table
+from ..report import Outcome, Show, Table, check_file, of_tables
 from . import held_out_error, training
 from .direction_command import of_population
 from .held_out_error import Worth
@@ -42,12 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
+def run(args: argparse.Namespace, show: Show) -> Outcome:
     """Train the map, judge it, write it."""
     if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
         raise InputError(f"{args.test} is both a training file and --test: expected another finger; drop it from one")
-    if args.out is not None and args.out.exists() and not args.force:
-        raise InputError(f"{args.out} exists; overwrite it (--force) or name another")
+    check_file(args.out, overwrite=args.force)
     with threadpool_limits(limits=THREADS, user_api="blas"):
         fingers = [Finger.of_run(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
@@ -67,8 +65,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
     if args.out is not None:
         args.out.write_text(dumps(trained), encoding="utf-8")
         facts["written"] = str(args.out)
-    print(json.dumps(facts) if args.json else "\n".join(line for table in tables for line in table.page()))
-    return 0
+    return of_tables(tables, facts)
 
 
 def _calibrated(args: argparse.Namespace, fingers: list[Finger]) -> Trained:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any
 
 from biotac import InputError
 
-from ..report import Options, Show, check_free, write
+from ..report import Options, Outcome, Report, Show, check_free
 
 ABOUT = "Repeat a paper's experiment: figure, table against the paper, JSON."
 EXAMPLE = "biotac-lab experiment poke --out poked --check"
@@ -73,8 +72,8 @@ def _finger(text: str) -> int:
     return FINGERS[text] if text in FINGERS else int(text)
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Return 0, or 1 if --check finds a limit missed."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """Run it, and write it."""
     name, experiment = args.name, load(args.name)
     options = Options(
         finger=args.finger, maps=tuple(args.map), real=tuple(args.real), quick=args.quick, filter=args.filter,
@@ -84,17 +83,11 @@ def run(args: argparse.Namespace, show: Show) -> int:
     _check(name, hasattr(experiment, "RECORDING"), accepted, options, args.seed)
     if args.out is not None:
         check_free(args.out, name, overwrite=args.force)
-    report = experiment.run(replace(options, seed=1 if args.seed is None else args.seed))
-    show("")
+    report: Report = experiment.run(replace(options, seed=1 if args.seed is None else args.seed))
     if args.check and not report.checks:
         cure = "give --map FILE" if "maps" in accepted and args.recording is None else "drop --check"
         raise InputError(f"--check: {name} on {report.source} has no figure with a target; {cure}")
-    written = [] if args.out is None else write(report, args.out, name, NAMES[name], overwrite=args.force)
-    if args.json:
-        print(json.dumps(report.facts(name) | {"written": [str(path) for path in written]}))
-    else:
-        print(report.page(name, NAMES[name]) + "".join(f"\nwritten: {path}" for path in written))
-    return 1 if args.check and not all(item["met"] for item in report.checks) else 0
+    return report.outcome(name, NAMES[name], args.out, overwrite=args.force)
 
 
 def _check(name: str, has_recordings: bool, accepted: Collection[str], options: Options, seed: int | None) -> None:

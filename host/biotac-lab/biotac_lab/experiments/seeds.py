@@ -16,7 +16,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from ..report import Facts, Options, Show, Table, claim
+from ..report import Facts, Options, Outcome, Show, Table, claim, of_tables
 
 ABOUT = "Every method, equation, table and figure of the papers beside ours."
 EXAMPLE = "biotac-lab seeds --measure poke"
@@ -101,14 +101,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--measure", metavar="NAME", action="append", choices=known, default=[], help=text)
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Return 0."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """The table, with what was measured."""
     kept: dict[str, dict[str, float]] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     for experiment in args.measure:
         kept[experiment] = measured(experiment, show)
-    show("")
     if args.measure:
         KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     made = table(kept)
-    print(json.dumps(made.facts()) if args.json else "\n".join(made.page()))
-    return 0
+    return of_tables([made], made.facts())

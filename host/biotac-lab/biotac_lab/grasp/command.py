@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -15,7 +14,7 @@ import numpy as np
 from biotac import InputError
 from biotac.sim import PROFILES
 
-from ..report import Facts, Report, Show, Table, check, check_free, claim, write
+from ..report import Facts, Outcome, Report, Show, Table, check, check_free, claim
 from . import law, picture, runs
 from .felt import BOARD_FAULTS, SENSOR_FAULTS
 from .runs import CONTROLLERS, TRUE, Case
@@ -56,8 +55,8 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Return 0, or 1 if --check finds a limit missed."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """Grasp, and write it."""
     args.fault = list(FAULTS) if args.fault == ["all"] else args.fault
     electrodes = [f"E{k}" for k in range(1, 20)]
     for option, known in (("controllers", CONTROLLERS), ("fault", FAULTS), ("profile", PROFILES), ("at", electrodes)):
@@ -77,15 +76,9 @@ def run(args: argparse.Namespace, show: Show) -> int:
     ]
     kept = None if args.out is None else args.out / "grasps.jsonl"
     outcomes = runs.run(cases, args.objects, args.law, args.jobs, kept, show)
-    show("")
     report = _report({case: [outcomes[case, k] for k in range(args.objects)] for case in cases})
     report = replace(report, draw=partial(picture.draw, cases=cases, outcomes=outcomes, law_file=args.law))
-    written = [] if args.out is None else write(report, args.out, NAME, ABOUT, overwrite=args.force)
-    if args.json:
-        print(json.dumps(report.facts(NAME) | {"written": [str(path) for path in written]}))
-    else:
-        print(report.page(NAME, ABOUT) + "".join(f"\nwritten: {path}" for path in written))
-    return 1 if args.check and not all(item["met"] for item in report.checks) else 0
+    return report.outcome(NAME, ABOUT, args.out, overwrite=args.force)
 
 
 def _report(outcomes: dict[Case, list[Facts]]) -> Report:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from biotac.core import geometry as surface
 from biotac.sim import SimFinger, States, sample
 from biotac.wire import messages, slots
 
-from ..report import Report, Show, Table, check, claim
+from ..report import Outcome, Report, Show, Table, check, claim
 
 ABOUT = (
     "Squeeze, poke, hold and slide simulated fingers, play recordings of real ones, and count what is called a slip."
@@ -38,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses its limit")
 
 
-def run(args: argparse.Namespace, show: Show) -> int:
-    """Return 0, or 1 if --check finds a limit missed."""
+def run(args: argparse.Namespace, show: Show) -> Outcome:
+    """Squeeze, poke, hold and slide."""
     if args.fingers < 1:
         raise InputError(f"--fingers is {args.fingers}, expected 1 or more")
     found: Found = defaultdict(list)
@@ -49,7 +48,6 @@ def run(args: argparse.Namespace, show: Show) -> int:
             finger = SimFinger(seed)
             finger.rattle_per_n_s = rattle
             _press(found, finger, place)
-    show("")
     percent = {key: 100 * float(np.mean(hits)) for key, hits in found.items()}
     kinds = sorted({(case, n_s) for case, n_s, _ in found})
     rows = [(case, n_s, *[percent[case, n_s, rattle] for rattle in RATTLES]) for case, n_s in kinds]
@@ -67,9 +65,7 @@ def run(args: argparse.Namespace, show: Show) -> int:
         if path is not None:
             tables.append(Table(path.stem, ("real", ""), play(np.load(path)), digits=1))
     source = f"{args.fingers} simulated fingers from seed {args.seed}, on the pad and off it"
-    report = Report(source, tables, checks, [], lambda figure: None)
-    print(json.dumps(report.facts("slip")) if args.json else report.page("slip", ABOUT))
-    return 1 if args.check and not all(item["met"] for item in checks) else 0
+    return Report(source, tables, checks, [], lambda figure: None).outcome("slip", ABOUT)
 
 
 def _felt(finger: SimFinger, at: tuple[float, float], *legs: tuple[float, float], mm_s: float = 0.0) -> Any:
