@@ -6,6 +6,7 @@ force on the finger, up to 2 N. The trained nets are not part of this project: c
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -81,32 +82,15 @@ def _contact(e: Any) -> Any:
     return np.concatenate([np.where(tip, moved, centre)[:, :1], moved[:, 1:]], axis=1)
 
 
-def _layout(heads: int) -> dict[str, tuple[int, ...]]:
-    """Shapes by name, of a net with one head or with ten that share a layer."""
-    cells = [("", 1, 64), ("_1", 1, 64), ("_2", 128, 64), ("_3", 64, 64), ("_4", 64, 128)]
-    found = {f"Conv{name}/weights": (2,) * (3 - (name == "_4")) + (n, out) for name, n, out in cells}
-    found["fully_connected/weights"] = (128, 64)
-    found |= {"fully_connected_1/weights": (64, 32), "fully_connected_2/weights": (32, 3)} if heads == 1 else {}
-    found |= {"fcn32/weights": (64, 32), "fcn3/weights": (32, 3)} if heads > 1 else {}
-    found |= {name.replace("weights", "biases"): shape[-1:] for name, shape in found.items()}
-    for k, size in enumerate([64, 64, 64, 64, 128, 64] + [32] * heads):
-        found |= {f"LayerNorm{f'_{k}' if k else ''}/{kind}": (size,) for kind in ("beta", "gamma")}
-    return found
-
-
 def _arrays(data: bytes) -> dict[str, Any]:
-    """A checkpoint's arrays: in order of their names, each followed by its momentum. Raises ValueError for others."""
-    for heads in (1, 10):
-        scales = ["final_fc", *(f"final_fc/final_fc_dropout{k}" for k in range(heads - 1))]
-        shapes: dict[str, tuple[int, ...]] = {
-            f"{name}/Variable": (3,) for name in ["Validation", *(scales if heads > 1 else [])]
-        }
-        shapes |= {"Variable": (3,)} if heads == 1 else {}
-        for name, shape in _layout(heads).items():
-            shapes |= {name: shape, f"{name}/Momentum": shape}
-        names = sorted(shapes)
-        ends = np.cumsum([int(np.prod(shapes[name])) for name in names])
+    """A checkpoint's arrays by name. Raises ValueError for other data.
+
+    They follow each other in the order of their names, each before its momentum. Nets with one head and with ten
+    differ in size; peer_net.json has the shapes of both.
+    """
+    for shapes in json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8")):
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])
         if 4 * ends[-1] == len(data):
             parts = np.split(np.frombuffer(data, "<f4"), ends[:-1])
-            return {name: part.reshape(shapes[name]) for name, part in zip(names, parts, strict=True)}
+            return {name: part.reshape(shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)}
     raise ValueError(f"{len(data)} bytes")
