@@ -38,6 +38,11 @@ class Options:
     filter: bool = False
     show: Show = field(default=lambda text: None)
 
+    @property
+    def source(self) -> str:
+        """What it is run on, in words."""
+        return str(self.recording) if self.recording is not None else f"emulated finger, seed {self.seed}"
+
 
 @dataclass(frozen=True)
 class Table:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from biotac import Finger, FrameFlags, RecordingError, TareReason, TareState
-from biotac.sim import PROFILES
 from biotac.wire import messages
 
 from ..report import Options, Report, Table, check, claim
@@ -34,6 +33,7 @@ HOLD_ROWS = 200  # 2 s of rounds
 PRESSED_COUNTS, PRESSED_ROWS = 60, 8  # a press is this far above rest for this long
 REST_ROWS = (25, 8)  # rows before a press whose median is its rest
 
+EMULATED_NOTE = "emulated: the model's pressure creeps and undershoots"
 OUTCOMES = {"tared": "#b91c1c", "doubt": "#c2410c", "contact": "#1d4ed8"}  # with their colours
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT)
 
@@ -92,15 +92,6 @@ class Case:
         return [bool((state[p.first + 3 : p.peak + 1] == TareState.CONTACT).all()) for p in self.presses]
 
 
-@dataclass(frozen=True)
-class Result:
-    """One case per sensor."""
-
-    source: str
-    cases: list[Case]
-    notes: list[str]
-
-
 def presses_of(pdc: Words) -> list[Press]:
     """Where PDC exceeds its rest around there by PRESSED_COUNTS for at least PRESSED_ROWS."""
     known = np.where(pdc == messages.INVALID_COUNT, np.nan, pdc.astype(float))
@@ -149,31 +140,18 @@ def judge(name: str, counts: Words, pdc: Words) -> Case:
     return Case(name, pdc, Finger().feed(counts, pdc), presses, holds)
 
 
-def measure(options: Options) -> Result:
-    """Cases on a recording, or on an emulated finger, new and worn."""
-    if options.recording is not None:
-        trial = laboratory.load(options.recording, options.finger, needs=("PDC",))
-        case = judge("recorded", trial.counts, trial.pdc)
+def run(options: Options) -> Report:
+    """The outcomes of the holds by share, and the re-zeros; on a recording, or an emulated finger, new and worn."""
+    tables, checks, cases = [], [], []
+    trials = laboratory.trials(options, emulated, "presses on", ("PDC",))
+    for name, trial in trials.items():
+        case = judge(name, trial.counts, trial.pdc)
         if not case.presses:
             raise RecordingError(
                 f"{options.recording}: PDC is never {PRESSED_COUNTS} counts above rest for {PRESSED_ROWS} rows: "
                 "expected presses; check that PDC is in counts"
             )
-        return Result(str(options.recording), [case], list(trial.notes))
-    cases = []
-    for profile in PROFILES:
-        options.show(f"presses on the {profile} sensor")
-        trial = emulated(options.seed, profile)
-        cases.append(judge(profile, trial.counts, trial.pdc))
-    notes = ["emulated: the model's pressure creeps and undershoots"]
-    return Result(f"emulated finger, seed {options.seed}", cases, notes)
-
-
-def run(options: Options) -> Report:
-    """The outcomes of the holds by share, and the re-zeros; on a recording, or an emulated finger, new and worn."""
-    result = measure(options)
-    tables, checks = [], []
-    for case in result.cases:
+        cases.append(case)
         outcomes = {share: [hold.outcome for hold in case.holds if hold.share == share] for share in SHARES}
         rows = [
             [f"{share:.0%}", len(found), *[found.count(name) for name in OUTCOMES]] for share, found in outcomes.items()
@@ -199,19 +177,17 @@ def run(options: Options) -> Report:
             check(f"{case.name}: share of the lighter holds, above rest, that are tared",
                   tared / len(held) if held else float("nan"), LIGHT_LIMIT, f"of {len(held)}"),
         ]  # fmt: skip
-    notes = [
-        f"a hold is one row repeated for {HOLD_ROWS / 100:g} s; shares are of a press's peak PDC above its rest",
-        *result.notes,
-    ]
-    return Report(result.source, tables, checks, notes, lambda figure: _draw(result, figure))
+    notes = [f"a hold is one row repeated for {HOLD_ROWS / 100:g} s; shares are of a press's peak PDC above its rest"]
+    notes += trials["recorded"].notes if "recorded" in trials else [EMULATED_NOTE]
+    return Report(options.source, tables, checks, notes, lambda figure: _draw(options.source, cases, figure))
 
 
-def _draw(result: Result, figure: Any) -> None:
+def _draw(source: str, cases: list[Case], figure: Any) -> None:
     """Pressure with the board's states and re-zeros; outcomes of holds by share."""
-    figure.set_size_inches(13, 4.2 * len(result.cases))
-    axes = figure.subplots(len(result.cases), 2, squeeze=False)
-    figure.suptitle(f"Hold or residue: {result.source}")
-    for (left, right), case in zip(axes, result.cases, strict=True):
+    figure.set_size_inches(13, 4.2 * len(cases))
+    axes = figure.subplots(len(cases), 2, squeeze=False)
+    figure.suptitle(f"Hold or residue: {source}")
+    for (left, right), case in zip(axes, cases, strict=True):
         time_s: Floats = np.arange(len(case.pdc)) / 100.0
         left.plot(time_s, case.pdc, color="#111111", linewidth=0.6, label="PDC")
         left.plot(time_s, case.rows["pdc_tare_q4"] / 16.0, color="#15803d", linewidth=1, label="its tare")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,10 @@ import numpy.typing as npt
 from biotac import Recording, RecordingError
 from biotac.calibrate.wrench import locate, numbers
 from biotac.recording import counts_field, read_npz, to_lin_frame
+from biotac.sim import PROFILES, Profile
 from biotac.wire import messages, sensor
 
+from ..report import Options
 from .trial import Floats, Trial, on_board
 
 FIELDS = ("E", "PDC", "F", "M", "E_base", "t", "z_dir")
@@ -69,6 +72,19 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force:
     rows = on_board(counts, pdc, given=base)
     return Trial(path.name, time_s, (), counts, pdc, rows, force, torque, torsion, at_mm, normal, given=base,
                  notes=tuple(notes))  # fmt: skip
+
+
+def trials(
+    options: Options, emulate: Callable[[int, Profile], Trial], doing: str, needs: tuple[str, ...]
+) -> dict[str, Trial]:
+    """The trial "recorded" of the options' recording, as load() takes it; or of an emulated finger, new and worn."""
+    if options.recording is not None:
+        return {"recorded": load(options.recording, options.finger, needs)}
+    found: dict[str, Trial] = {}
+    for profile in PROFILES:
+        options.show(f"{doing} the {profile} sensor")
+        found[profile] = emulate(options.seed, profile)
+    return found
 
 
 def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bool) -> Trial:

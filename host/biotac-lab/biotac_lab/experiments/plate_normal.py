@@ -17,7 +17,7 @@ import numpy as np
 from biotac import InputError, PocWeights, RecordingError, Setting
 from biotac.calibrate import wrench
 from biotac.core import geometry as surface
-from biotac.sim import FLAT_MM, PROFILES, Pose, Profile
+from biotac.sim import FLAT_MM, Pose, Profile
 
 from ..calibrate import normal
 from ..report import Options, Report, Table, check
@@ -53,16 +53,6 @@ class Angles:
         return np.nan_to_num(self.angle_deg[rows], nan=180.0)
 
 
-@dataclass(frozen=True)
-class Result:
-    """A case per sensor and kind of weights; ``corrected_deg`` by sensor, each contact corrected by the others."""
-
-    source: str
-    cases: list[Angles]
-    corrected_deg: dict[str, Floats]
-    notes: list[str]
-
-
 def angles_deg(points_mm: Floats, normals: Floats) -> Floats:
     """Angles between the core's outward normals at points (n, 3) and unit normals (n, 3); NaN without a point."""
     known = np.asarray(np.isfinite(points_mm).all(axis=1))
@@ -87,36 +77,6 @@ def emulated(seed: int, profile: Profile) -> Trial:
     return replace(trial, plate_normal=surface.normals_at(contact))
 
 
-def measure(options: Options) -> Result:
-    """Angles on an emulated finger, new and worn, or on a recording."""
-    if options.recording is not None:
-        trial = laboratory.load(options.recording, options.finger, needs=("PDC", "z_dir"))
-        cases = [_case("recorded", weights, trial) for weights in WEIGHTS]
-        for case in cases:
-            if not len(case.over(CONTACT_COUNTS)):
-                raise RecordingError(
-                    f"{options.recording}: PDC is never {CONTACT_COUNTS:g} counts above rest in contact: expected "
-                    f"presses; check that PDC is in counts"
-                )
-        notes, corrected = list(trial.notes), {}
-        try:
-            corrected["recorded"] = _corrected(trial)
-        except InputError as error:
-            notes.append(f"no correction: {error}")
-        return Result(str(options.recording), cases, corrected, notes)
-    cases, corrected = [], {}
-    for profile in PROFILES:
-        options.show(f"pressing a plate on the {profile} sensor")
-        trial = emulated(options.seed, profile)
-        cases += [_case(profile, weights, trial) for weights in WEIGHTS]
-        corrected[profile] = _corrected(trial)
-    notes = [
-        f"emulated sensor, seed {options.seed}: {EMULATED_CONTACTS} presses of a {FLAT_MM:g} mm flat, 1 to 6 N, x -12 "
-        "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs, so a laboratory's angles are larger"
-    ]
-    return Result(f"emulated finger, seed {options.seed}", cases, corrected, notes)
-
-
 def looks(trial: Trial) -> normal.Looks:
     """Its frames in contact with a point, by CONTACT_COUNTS and the default weights, and the plate's normals there."""
     assert trial.plate_normal is not None
@@ -139,22 +99,44 @@ def _case(profile: str, weights: PocWeights, trial: Trial) -> Angles:
 
 
 def run(options: Options) -> Report:
-    """Angles at the threshold that counts, then at the others; on an emulated finger, new and worn, or a recording."""
-    result = measure(options)
-    shipped = next(case for case in result.cases if case.weights == SHIPPED)
+    """Angles at the threshold that counts, then at the others; on an emulated finger, new and worn, or a recording.
+
+    Each contact is corrected by the others, too.
+    """
+    trials = laboratory.trials(options, emulated, "pressing a plate on", ("PDC", "z_dir"))
+    notes = [
+        f"emulated sensor, seed {options.seed}: {EMULATED_CONTACTS} presses of a {FLAT_MM:g} mm flat, 1 to 6 N, x -12 "
+        "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs, so a laboratory's angles are larger"
+    ]
+    if "recorded" in trials:
+        notes = list(trials["recorded"].notes)
+    cases: list[Angles] = []
+    corrected: dict[str, Floats] = {}
+    for profile, trial in trials.items():
+        cases += [_case(profile, weights, trial) for weights in WEIGHTS]
+        if not len(cases[-1].over(CONTACT_COUNTS)):
+            raise RecordingError(
+                f"{options.recording}: PDC is never {CONTACT_COUNTS:g} counts above rest in contact: expected "
+                f"presses; check that PDC is in counts"
+            )
+        try:
+            corrected[profile] = _corrected(trial)
+        except InputError as error:
+            notes.append(f"no correction: {error}")
+    shipped = next(case for case in cases if case.weights == SHIPPED)
     angles = shipped.over(CONTACT_COUNTS)
     checks = [
         check(f"{name}, default weights, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
         for name, q, limit in (("median", 50, LIMIT_MEDIAN_DEG), ("90th percentile", 90, LIMIT_P90_DEG))
     ]
-    rows = [[case.profile, called(case.weights), *_summary(case.over(CONTACT_COUNTS))] for case in result.cases]
+    rows = [[case.profile, called(case.weights), *_summary(case.over(CONTACT_COUNTS))] for case in cases]
     rows += [
         [profile, "default, each contact corrected by the others", *_summary(angles)]
-        for profile, angles in result.corrected_deg.items()
+        for profile, angles in corrected.items()
     ]
     others: list[list[Any]] = [
         [case.profile, called(case.weights), name, *[_summary(case.over(counts))[k] for counts in THRESHOLDS_COUNTS]]
-        for case in result.cases
+        for case in cases
         for name, k in (("median", 1), ("90th percentile", 3))
     ]
     text = (
@@ -167,7 +149,7 @@ def run(options: Options) -> Report:
     head = ["sensor", "weights", "frames", "median", "mean", "90th percentile"]
     thresholds = ["sensor", "weights", "deg", *[f"> {counts:g} counts" for counts in THRESHOLDS_COUNTS]]
     tables = [Table("Angles", head, rows, text, digits=2), Table("Other thresholds", thresholds, others, digits=1)]
-    return Report(result.source, tables, checks, result.notes, lambda figure: _draw(result, figure))
+    return Report(options.source, tables, checks, notes, lambda figure: _draw(options.source, cases, figure))
 
 
 def _summary(angles: Floats) -> list[Any]:
@@ -178,13 +160,13 @@ def _summary(angles: Floats) -> list[Any]:
     return [len(angles), median, float(angles.mean()), p90]
 
 
-def _draw(result: Result, figure: Any) -> None:
+def _draw(source: str, cases: list[Angles], figure: Any) -> None:
     """Cumulative shares of frames by angle, and angles against pressure for the default weights."""
     figure.set_size_inches(13, 5.4)
     axes = figure.subplots(1, 2)
-    figure.suptitle(f"Normal at the point of contact against a flat plate's: {result.source}")
-    styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
-    for case in result.cases:
+    figure.suptitle(f"Normal at the point of contact against a flat plate's: {source}")
+    styles = dict(zip(dict.fromkeys(case.profile for case in cases), ("-", "--"), strict=False))
+    for case in cases:
         angles = np.sort(case.over(CONTACT_COUNTS))
         label = f"{case.profile}: {WORDS[case.weights]}: {np.median(angles):.1f} / {np.percentile(angles, 90):.1f} deg"
         axes[0].plot(angles, (np.arange(len(angles)) + 0.5) / len(angles), styles[case.profile],
@@ -194,14 +176,14 @@ def _draw(result: Result, figure: Any) -> None:
     axes[0].set(xlabel="angle [deg]", ylabel="share of frames within this angle", xlim=(0, 60), ylim=(0, 1))
     axes[0].set_title(f"frames with PDC > rest + {CONTACT_COUNTS:g} counts; median / 90th percentile", fontsize=10)
     axes[0].legend(fontsize=8, loc="lower right")
-    for case in result.cases:
-        if case.weights in (SHIPPED, PocWeights.ABS_N2) and case.profile == result.cases[0].profile:
+    for case in cases:
+        if case.weights in (SHIPPED, PocWeights.ABS_N2) and case.profile == cases[0].profile:
             rows = case.touched & (case.pressure > 0.0)
             axes[1].plot(case.pressure[rows], case.angle_deg[rows], ".", color=COLORS[case.weights], markersize=2,
                          alpha=0.35, label=WORDS[case.weights])  # fmt: skip
     axes[1].axvline(CONTACT_COUNTS, color="#111111", linewidth=1, linestyle=":")
     axes[1].set(xlabel="PDC above rest [counts]", ylabel="angle [deg]", xscale="log", xlim=(5, None), ylim=(0, 90))
-    axes[1].set_title(f"{result.cases[0].profile}, frames in contact", fontsize=10)
+    axes[1].set_title(f"{cases[0].profile}, frames in contact", fontsize=10)
     axes[1].legend(fontsize=8, markerscale=4)
     for axis in axes:
         axis.grid(alpha=0.25)

@@ -150,9 +150,7 @@ def measure(options: Options) -> Result:
     """Cases of an emulated finger, new and worn, twice each; or of a recording."""
     if options.recording is not None:
         trial = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
-        return Result(
-            str(options.recording), _cases("recorded", [trial], trial), list(trial.notes), {"recorded": trial}
-        )
+        return Result(options.source, _cases("recorded", [trial], trial), list(trial.notes), {"recorded": trial})
     cases: list[Case] = []
     first: dict[str, Trial] = {}
     for profile in PROFILES:
@@ -167,7 +165,7 @@ def measure(options: Options) -> Result:
         "probe placed exactly; by hand it is not, which adds to the paper's bias but not to its deviation",
         "new: noise 1.5 counts, 3 to 5 kOhm, as in the paper; worn: noise 5 counts, glitches, as in public recordings",
     ]
-    return Result(f"emulated finger, seed {options.seed}", cases, notes, first)
+    return Result(options.source, cases, notes, first)
 
 
 def _cases(profile: str, trials: list[Trial], slow: Trial) -> list[Case]:

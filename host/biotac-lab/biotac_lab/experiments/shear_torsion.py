@@ -100,8 +100,7 @@ def run(options: Options) -> Report:
         f"{CALIBRATED}: what `biotac calibrate wrench` chose; torsion is an axis of its own",
         f"figure 10's trial was not trained on: {result.replayed.notes[0]}",
     ]
-    source = f"emulated finger, seed {options.seed}"
-    return Report(source, tables, checks, notes, lambda figure: _draw(figure, result, source))
+    return Report(options.source, tables, checks, notes, lambda figure: _draw(figure, result, options.source))
 
 
 def _paper(validation: Validation) -> Floats:

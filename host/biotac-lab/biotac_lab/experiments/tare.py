@@ -141,9 +141,7 @@ def run(options: Options) -> Report:
         "true rest: the sensor model's, at each row's temperature, with its drift",
         "the board waits while pressure says that something may still be held (DOUBT), and then takes the residue",
     ]
-    return Report(
-        f"emulated finger, seed {options.seed}", [first, second], checks, notes, lambda figure: _draw(drawn, figure)
-    )
+    return Report(options.source, [first, second], checks, notes, lambda figure: _draw(drawn, figure))
 
 
 def _draw(drawn: list[tuple[str, Trial, Floats]], figure: Any) -> None:

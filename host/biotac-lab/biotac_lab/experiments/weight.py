@@ -88,11 +88,11 @@ def run(
     maps = load_maps(options.maps)
     earlier: list[Trial] = []
     if options.recording is not None:
-        source, trial = str(options.recording), _recorded(options.recording, options.finger, torque)
+        trial = _recorded(options.recording, options.finger, torque)
         notes = [*trial.notes, "a recording is not split into phases: its errors are over all loaded frames"]
     else:
         seed = options.seed
-        source, trial, earlier = f"emulated finger, seed {seed}", emulate(seed), [play(seed) for play in before]
+        trial, earlier = emulate(seed), [play(seed) for play in before]
         notes = [f"emulated sensor, new, seed {seed}: {WEIGHT_N:.1f} N over E17, {how}"]
     scales = {PAPER: paper_scales([trial])}
     notes.append(
@@ -111,7 +111,7 @@ def run(
         estimates.append(by_map(trial, fitted, name))
         more = "; torsion is an axis of its own" if "torsion" in fitted.axes else ""
         notes.append(f"{name}: {fitted.model}, {path}{more}")
-    return Result(source, trial, estimates, len(scales), notes)
+    return Result(options.source, trial, estimates, len(scales), notes)
 
 
 def _recorded(path: Path, finger: int, torque: bool) -> Trial:

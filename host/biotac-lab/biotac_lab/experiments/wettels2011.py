@@ -133,7 +133,7 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
     ]
     if options.quick:
         notes.append("--quick: far too few rows for the figures to mean anything")
-    return Result(f"emulated finger, seed {seed}", parts, notes, drawn, (rows.force_n, estimates[force.A_PRIORI]))
+    return Result(options.source, parts, notes, drawn, (rows.force_n, estimates[force.A_PRIORI]))
 
 
 def _checks(parts: Facts) -> list[Facts]:
