@@ -6,6 +6,7 @@ taken for held.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,23 +22,7 @@ except ImportError as error:
 
 STEPS, CREEP_MM_S = 20, 1.0
 HALF_MM, AIR_MM = 30.0, 0.05
-SIDE = """<body pos="{x} 0 0"><joint name="close{name}" type="slide" axis="{axis} 0 0"/>
- <geom size=".002" mass=".05" contype="0" conaffinity="0"/>
- <body name="pad{name}"><joint name="normal{name}" type="slide" axis="{axis} 0 0" stiffness="{normal}" damping="4"/>
-  <joint type="slide" axis="0 0 1" stiffness="{shear}" damping="4"/>
-  <joint type="slide" axis="0 1 0" stiffness="{shear}" damping="4"/>
-  <geom name="pad{name}" type="box" size=".002 .004 .004" mass=".01" condim="4" priority="1"
-   friction="{friction} .003 .0001"/></body></body>"""
-MODEL = """<mujoco>
-<option timestep="{dt}" cone="elliptic" impratio="20" integrator="implicitfast" noslip_iterations="4"/>
-<default><geom solref=".004 1" solimp=".95 .99 .0005"/></default><worldbody>
- <geom type="plane" size=".5 .5 .01" friction=".5"/>
- <body name="thing" pos="0 0 .03"><freejoint/><geom name="thing" type="box" size=".03 .02 .03" mass="{mass}"/></body>
- <body pos="0 0 .03"><joint name="up" type="slide" axis="0 0 1"/>
-  <geom size=".01" pos="0 0 .1" mass=".5" contype="0" conaffinity="0"/>{sides}</body>
-</worldbody><actuator><position joint="up" kp="20000" dampratio="1"/>
- <position joint="closeL" kp="20000" dampratio="1"/><position joint="closeR" kp="20000" dampratio="1"/>
-</actuator></mujoco>"""
+MODEL = Path(__file__).with_suffix(".xml")
 
 
 class MujocoPlant(Plant):
@@ -46,10 +31,10 @@ class MujocoPlant(Plant):
     def __init__(self, item: Item) -> None:
         super().__init__(item)
         self._spring = 1e3 / (1 / SKIN_N_PER_MM + 1 / (2 * item.stiffness)), 1e3 * SHEAR_N_PER_MM
-        values = dict(zip(("normal", "shear"), self._spring, strict=True), friction=item.friction)
-        off = (HALF_MM + CLOSED_MM + 2.0) / 1e3
-        both = (SIDE.format(x=-axis * off, name=name, axis=axis, **values) for name, axis in (("L", 1), ("R", -1)))
-        text = MODEL.format(dt=ROUND_S / STEPS, mass=item.mass_kg, sides="".join(both))
+        text = MODEL.read_text(encoding="utf-8").format(
+            dt=ROUND_S / STEPS, mass=item.mass_kg, off=(HALF_MM + CLOSED_MM + 2.0) / 1e3, normal=self._spring[0],
+            shear=self._spring[1], friction=item.friction,
+        )  # fmt: skip
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)

@@ -57,7 +57,8 @@ class Case:
 
 def digest(law_file: Path) -> str:
     """Of the law, this package and the gateway; what was compiled, by the hashes that its installer kept."""
-    python = [*Path(__file__).parent.glob("*.py"), *Path(str(files("biotac"))).rglob("*.py")]
+    own = [path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".xml")]
+    python = [*own, *Path(str(files("biotac"))).rglob("*.py")]
     compiled = (distribution("biotac-gateway").read_text("RECORD") or "").encode()
     return sha256(b"".join([compiled, *(path.read_bytes() for path in (law_file, *sorted(python)))])).hexdigest()[:16]
 
