@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from biotac import InputError
+from biotac.calibrate.population import load as load_population
+from biotac.calibrate.wrench import run_of, validate
 from biotac.core import geometry as surface
-from biotac.map import load_fitted
 from biotac.sim import SimFinger, Touch, fit_gains, world
 
 REST_S, PRESSES_S, PRESS_S, PAUSE_S, RAMP_S = 8.0, 120.0, 0.9, 0.3, 0.3
@@ -51,7 +48,7 @@ def hand_presses(seed: int) -> tuple[list[Touch], np.ndarray]:
 
 
 def calibrate(seeds: dict[str, int], profile: Any) -> dict[str, Any]:
-    """By finger ``maps`` as boards keep them, in hex, and ``gains`` for x, y, z in nN a count. Raises InputError."""
+    """By finger ``maps`` as boards keep them, in hex, and ``gains`` for x, y, z in nN a count."""
     plays = {name: hand_presses(seed) for name, seed in seeds.items()}
     rest, counts, found = round(REST_S * 100), dict[str, Any](), {"maps": dict[str, Any](), "gains": dict[str, Any]()}
     with world({name: SimFinger(seed, profile) for name, seed in seeds.items()}) as hand:
@@ -61,16 +58,12 @@ def calibrate(seeds: dict[str, int], profile: Any) -> dict[str, Any]:
         rounds = [hand.step(**load) for load in loads]
     for name in plays:
         counts[name] = np.array([now[name].frame.counts for now in rounds])  # type: ignore[union-attr]
-    with tempfile.TemporaryDirectory() as folder:
-        for name, (_, force_n) in plays.items():
-            file, idle, pressed = Path(folder) / f"{name}.npz", counts[name][rest - 500 : rest], counts[name][rest:]
-            plate = np.column_stack([force_n[:, 1], force_n[:, 0], -force_n[:, 2]])  # a recording's axes: wrench.md
-            np.savez(file, E=pressed, F=plate, E_base=idle)
-            command = [sys.executable, "-m", "biotac", "calibrate", "wrench", str(file), "--out", folder]
-            done = subprocess.run(command, capture_output=True, text=True)
-            if done.returncode:
-                raise InputError(f"the simulated {name} was not calibrated: {done.stderr.strip()}")
-            found["maps"][name] = load_fitted(Path(folder) / f"{name}.wrench.json").on_board().blob.hex()
-            gains = fit_gains(pressed - idle.mean(axis=0), force_n, np.zeros_like(force_n))
-            found["gains"][name] = [gains[f"force_gain_{axis}_nn"] for axis in "xyz"]
+    others, _ = load_population(None).others_than([])
+    for name, (_, force_n) in plays.items():
+        idle, pressed = counts[name][rest - 500 : rest], counts[name][rest:]
+        plate = np.column_stack([force_n[:, 1], force_n[:, 0], -force_n[:, 2]])  # a recording's axes: wrench.md
+        run = run_of(Path(name), {"E": pressed, "F": plate, "E_base": idle})
+        found["maps"][name] = validate(run, others=others).wrench_map.on_board().blob.hex()
+        gains = fit_gains(pressed - idle.mean(axis=0), force_n, np.zeros_like(force_n))
+        found["gains"][name] = [gains[f"force_gain_{axis}_nn"] for axis in "xyz"]
     return found
