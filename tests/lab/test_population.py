@@ -117,7 +117,7 @@ def test_presses_that_say_nothing_are_refused(said_z: list[float], shown: list[f
 def test_a_run_against_the_others_is_named_and_not_a_scale(prior: Population, runs: list[Run]) -> None:
     flipped = replace(prior, coefficients=-prior.coefficients)
     with pytest.raises(InputError, match=r"^3\.npz: the map of the others feels -\d.* along z"):
-        held_out_error.worth_of_force(flipped, runs[2])
+        held_out_error.worth(flipped, runs[2])
 
 
 def test_a_minute_moves_the_map_and_no_time_does_not(prior: Population, runs: list[Run]) -> None:
@@ -280,7 +280,8 @@ def test_real_fingers_each_by_the_other() -> None:
     fingers = [training.sums_of(run) for run in runs]
     within, after_presses = [], []
     for k, new in ((0, runs[1]), (1, runs[0])):
-        sigma = held_out_error.sigma_of([fingers[k]], [runs[k]])
+        image = held_out_error.worth(training.train([fingers[k]], mirror=False), training.mirrored(runs[k]))
+        sigma = held_out_error.sigma_of([image])
         facts = held_out_error.facts(held_out_error.worth(training.train([fingers[k]]), new), sigma)
         within.append(facts["coverage"])
         after_presses.append(facts["coverage_scale5"])

@@ -14,7 +14,7 @@ from biotac.calibrate.population import Population
 from biotac.calibrate.press import Scale, scale_of, shrink_to
 from biotac.calibrate.wrench import Run, rmse
 
-from .training import FingerSums, Floats, mirrored, sums, train
+from .training import Floats, sums
 
 ROWS_PER_S = 100  # taken for all recordings: they need not have times
 PRESSES = 5
@@ -56,30 +56,15 @@ def worth(population: Population, run: Run) -> Worth:
     return Worth(rmse(published, truth), scale5, _minute(population, run), published, by_map, truth, scales)
 
 
-def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
-    """One sigma (3,) in N of a new finger's force, by the map as it is and after five presses; ``runs`` are aligned.
+def sigma_of(left_out: Sequence[Worth]) -> tuple[Floats, Floats]:
+    """One sigma (3,) in N of a new finger's force, as the map is and after five presses: that of fingers left out.
 
-    With several fingers it is the error on each of the map of the others. With one it is the error of its map on its
-    own mirror image, the only other finger there is. Presses cannot correct a mirror image's F_x, but the second sigma
-    is never above the first: presses do not make a finger less known.
+    Where a run has no presses the former counts twice. The second sigma is never above the first: presses do not make
+    a finger less known.
     """
-    if len(fingers) == 1:
-        alone = train(fingers, mirror=False)
-        found = [worth_of_force(alone, mirrored(runs[0]))]
-    else:
-        found = []
-        for k, run in enumerate(runs):
-            others = [finger for j, finger in enumerate(fingers) if j != k]
-            found.append(worth_of_force(train(others, symmetric=symmetric), run))
-    raw, scaled = (np.sqrt(np.mean([errors[k] ** 2 for errors in found], axis=0)) for k in (0, 1))
-    return raw, np.minimum(raw, scaled)
-
-
-def worth_of_force(population: Population, run: Run) -> tuple[Floats, Floats]:
-    """RMSE (3,) in N as the map is and after five presses; the former twice where the run has no such presses."""
-    raw = rmse(population.published(run.counts, run.tare), run.truth)
-    _, scale5 = _scaled(run.name, population.force(run.counts, run.tare), run.truth)
-    return raw, raw if scale5 is None else scale5
+    scaled = [found.rmse_n if found.rmse_scale5_n is None else found.rmse_scale5_n for found in left_out]
+    raw, after = (np.sqrt(np.mean(np.square(each), axis=0)) for each in ([found.rmse_n for found in left_out], scaled))
+    return raw, np.minimum(raw, after)
 
 
 def by_band(found: Worth) -> list[list[Any]]:

@@ -49,8 +49,14 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
     with threadpool_limits(limits=THREADS, user_api="blas"):
         fingers = [Finger.of_run(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
-        trained = _calibrated(args, fingers)
-        judged = _left_out(args, fingers)
+        left_out = _left_out(fingers, symmetric=args.symmetric)
+        population = training.train([finger.sums for finger in fingers], symmetric=args.symmetric)
+        judged = {}
+        if len(fingers) > 1:
+            population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
+            judged = {f"{path.name} by the others": found for path, found in zip(args.files, left_out, strict=True)}
+        origin = provenance_of(args.files, args.source, symmetric=args.symmetric)
+        trained = Trained(population, *held_out_error.sigma_of(left_out), origin)
         facts = _facts(args, trained)
         if tested is not None:
             worth = held_out_error.worth(trained.population, tested)
@@ -68,22 +74,19 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
     return of_tables(tables, facts)
 
 
-def _calibrated(args: argparse.Namespace, fingers: list[Finger]) -> Trained:
-    sums, runs = [finger.sums for finger in fingers], [finger.aligned for finger in fingers]
-    population = training.train(sums, symmetric=args.symmetric)
-    if len(fingers) > 1:
-        population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
-    sigma = held_out_error.sigma_of(sums, runs, symmetric=args.symmetric)
-    return Trained(population, *sigma, provenance_of(args.files, args.source, symmetric=args.symmetric))
+def _left_out(fingers: list[Finger], *, symmetric: bool) -> list[Worth]:
+    """Each finger by the map of the others; of one alone, its mirror image by its map, the only other finger there is.
 
-
-def _left_out(args: argparse.Namespace, fingers: list[Finger]) -> dict[str, Worth]:
-    """Each finger by the map of the others, if there are others."""
-    found = {}
-    for k, path in enumerate(args.files if len(fingers) > 1 else []):
-        others = training.train([finger.sums for j, finger in enumerate(fingers) if j != k], symmetric=args.symmetric)
-        found[f"{path.name} by the others"] = held_out_error.worth(others, fingers[k].aligned)
-    return found
+    Presses cannot correct a mirror image's F_x.
+    """
+    if len(fingers) == 1:
+        alone = training.train([fingers[0].sums], mirror=False)
+        return [held_out_error.worth(alone, training.mirrored(fingers[0].aligned))]
+    maps = [
+        training.train([other.sums for other in fingers if other is not finger], symmetric=symmetric)
+        for finger in fingers
+    ]
+    return [held_out_error.worth(others, finger.aligned) for others, finger in zip(maps, fingers, strict=True)]
 
 
 def _facts(args: argparse.Namespace, trained: Trained) -> dict[str, Any]:
