@@ -85,9 +85,9 @@ def test_four_probes_are_told_apart_where_places_are_many() -> None:
     first = np.searchsorted(rows.stimulation, press)
     kind, contact = rows.probe[first], rows.contact[first]
     training, stopping, test = roc.split(contact, 1)
-    classifier = roc.train(columns[:, 34:], kind, training, stopping, steps=100)
-    alone = (classifier(columns[test][:, 34:]) == kind[test]).mean()
-    together = (classifier(columns[test][:, 34:], contact[test]) == kind[test]).mean()
+    net = roc.train(columns[:, 34:], kind, training, stopping, steps=100)
+    alone = (roc.decide(net(columns[test][:, 34:])) == kind[test]).mean()
+    together = (roc.decide(net(columns[test][:, 34:]), contact[test]) == kind[test]).mean()
     assert alone > 0.5 and together > alone
     outputs = roc.machine().fit(columns[~test], kind[~test]).decision_function(columns[test])
     assert (roc.decide(outputs) == kind[test]).mean() > 0.5
@@ -123,7 +123,7 @@ def test_directions_of_edges() -> None:
     seen = edge.columns(counts - tare, tare)
     assert seen.shape == (400, 57) and angle.min() >= 0.0 and angle.max() < np.pi
     net = edge.train(seen[:340], angle[:340], steps=50)
-    off = np.degrees(edge.turn(net(seen[340:]), angle[340:]))
+    off = np.degrees(edge.turn(edge.direction(net, seen[340:]), angle[340:]))
     assert np.median(np.abs(off)) < 22.5, "half of what guessing gives; the experiment trains on more"
 
 

@@ -7,29 +7,13 @@ a turn gives the same edge, and averaging the two averages directions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import numpy.typing as npt
 
 from . import inputs, nets
 from .nets import Floats
 from .roc import log_change
 
 COMPONENTS = 24
-
-
-@dataclass(frozen=True)
-class Orientation:
-    """A trained net and the reduction of its inputs."""
-
-    reduction: inputs.Reduction
-    net: nets.Net
-
-    def __call__(self, columns: npt.ArrayLike) -> Floats:
-        """The edge's direction (n,) in rad, 0 to pi: 0 is towards the tip, pi/2 towards E11's side."""
-        double = self.net(self.reduction(columns))
-        return np.mod(0.5 * np.arctan2(double[:, 1], double[:, 0]), np.pi)
 
 
 def columns(above: Floats, tare: Floats) -> Floats:
@@ -43,14 +27,22 @@ def columns(above: Floats, tare: Floats) -> Floats:
     return log_change(flat, np.broadcast_to(tare, above.shape).reshape(flat.shape)).reshape(n, levels * electrodes)
 
 
-def train(seen: Floats, angle_rad: Floats, *, seed: int = 0, steps: int = nets.STEPS) -> Orientation:
-    """Train on columns() (n, d) and the edge's direction (n,) in rad; the last 15 % of the rows decide when to stop."""
+def train(seen: Floats, angle_rad: Floats, *, seed: int = 0, steps: int = nets.STEPS) -> nets.Net:
+    """A net for direction(), from columns() (n, d) and the edge's direction (n,) in rad.
+
+    The last 15 % of the rows decide when to stop.
+    """
     double = np.column_stack([np.cos(2.0 * angle_rad), np.sin(2.0 * angle_rad)])
     stop = len(seen) - max(1, round(0.15 * len(seen)))
     reduction = inputs.principal(seen[:stop], 0.0, COMPONENTS)
     x = reduction(seen)
-    net = nets.train(x[:stop], double[:stop], (x[stop:], double[stop:]), seed=seed, steps=steps)
-    return Orientation(reduction, net)
+    return nets.train(x[:stop], double[:stop], (x[stop:], double[stop:]), seed=seed, steps=steps).after(reduction)
+
+
+def direction(net: nets.Net, seen: Floats) -> Floats:
+    """The edge's direction (n,) in rad, 0 to pi, from columns(): 0 is towards the tip, pi/2 towards E11's side."""
+    double = net(seen)
+    return np.mod(0.5 * np.arctan2(double[:, 1], double[:, 0]), np.pi)
 
 
 def turn(estimate_rad: Floats, truth_rad: Floats) -> Floats:

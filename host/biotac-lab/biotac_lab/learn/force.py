@@ -28,9 +28,9 @@ def classes(d_mm: Floats, large: Bools) -> Integers:
 
 @dataclass(frozen=True)
 class ForceNets:
-    """Nets and their reductions by class: ``by_class[c]`` holds one net for all axes, or one for each axis."""
+    """Nets by class: ``by_class[c]`` holds one net for all axes, or one for each axis."""
 
-    by_class: dict[int, list[tuple[inputs.Reduction, nets.Net]]]
+    by_class: dict[int, list[nets.Net]]
 
     def __call__(self, above: Floats, kind: Integers | None = None) -> Floats:
         """Force (n, 3) in N from signals (n, 19); ``kind`` (n,) is each row's class, 0 for all if not given.
@@ -47,7 +47,7 @@ class ForceNets:
         for c, parts in self.by_class.items():
             rows = labels == c
             if rows.any():
-                result[rows] = np.hstack([net(reduction(above[rows])) for reduction, net in parts])
+                result[rows] = np.hstack([net(above[rows]) for net in parts])
         return result
 
 
@@ -69,7 +69,7 @@ def train(
     electrodes that correlate with that axis.
     """
     labels = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
-    made: dict[int, list[tuple[inputs.Reduction, nets.Net]]] = {}
+    made: dict[int, list[nets.Net]] = {}
     for c in np.unique(labels).tolist():
         x, f, names = above[labels == c], force_n[labels == c], groups[labels == c]
         if by_spearman:
@@ -79,13 +79,16 @@ def train(
         else:
             parts = [(reduce(x), f)]
         stopping = _aside(names, seed)
-        made[c] = [(reduction, _net(reduction(x), target, stopping, seed, steps)) for reduction, target in parts]
+        made[c] = [_net(reduction, x, target, stopping, seed, steps) for reduction, target in parts]
     return ForceNets(made)
 
 
-def _net(x: Floats, target: Floats, stopping: Bools, seed: int, steps: int) -> nets.Net:
+def _net(
+    reduction: inputs.Reduction, above: Floats, target: Floats, stopping: Bools, seed: int, steps: int
+) -> nets.Net:
+    x = reduction(above)
     aside = (x[stopping], target[stopping]) if stopping.any() else None
-    return nets.train(x[~stopping], target[~stopping], aside, seed=seed, steps=steps)
+    return nets.train(x[~stopping], target[~stopping], aside, seed=seed, steps=steps).after(reduction)
 
 
 def _aside(groups: Integers, seed: int) -> Bools:

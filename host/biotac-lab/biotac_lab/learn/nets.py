@@ -6,7 +6,7 @@ takes longer. Here it is L-BFGS, with the weight decay that is best on such rows
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,8 @@ import numpy.typing as npt
 from sklearn.neural_network import MLPRegressor
 
 from biotac import InputError
+
+from .inputs import Reduction
 
 Floats = npt.NDArray[np.float64]
 
@@ -31,10 +33,15 @@ class Net:
     target_mean: Floats
     target_scale: float
     model: Any
+    reduction: Reduction | None = None
+
+    def after(self, reduction: Reduction) -> Net:
+        """The same net, whose inputs are the ``reduction`` of what it is given."""
+        return replace(self, reduction=reduction)
 
     def __call__(self, inputs: npt.ArrayLike) -> Floats:
         """Outputs (n, k) for inputs (n, d), in the target's unit; NaN rows stay NaN."""
-        x = np.asarray(inputs, dtype=np.float64)
+        x = np.asarray(inputs, dtype=np.float64) if self.reduction is None else self.reduction(inputs)
         if x.ndim != 2 or x.shape[1] != len(self.mean):
             raise InputError(f"inputs have shape {x.shape}: expected (n, {len(self.mean)}), as in training")
         result = np.full((len(x), len(self.target_mean)), np.nan)

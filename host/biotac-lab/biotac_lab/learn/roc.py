@@ -10,7 +10,6 @@ trajectories().
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -96,22 +95,6 @@ def split(groups: npt.NDArray[np.generic], seed: int = 0) -> tuple[Bools, Bools,
     return training, stopping, test
 
 
-@dataclass(frozen=True)
-class Classifier:
-    """A trained net and the reduction of its inputs; one output for each class."""
-
-    reduction: inputs.Reduction
-    net: nets.Net
-
-    def outputs(self, columns: Floats) -> Floats:
-        """Outputs (n, classes), about 1 for the right class and 0 for the others; not probabilities."""
-        return self.net(self.reduction(columns))
-
-    def __call__(self, columns: Floats, together: npt.NDArray[np.generic] | None = None) -> Integers:
-        """The class (n,) of each row; see decide()."""
-        return decide(self.outputs(columns), together)
-
-
 def decide(outputs: Floats, together: npt.NDArray[np.generic] | None = None) -> Integers:
     """The class (n,) with the largest output in each row of ``outputs`` (n, classes).
 
@@ -128,11 +111,12 @@ def decide(outputs: Floats, together: npt.NDArray[np.generic] | None = None) -> 
 
 def train(
     columns: Floats, kind: Integers, training: Bools, stopping: Bools, *, seed: int = 0, steps: int = nets.STEPS
-) -> Classifier:
+) -> nets.Net:
     """Train on ``columns`` (n, d) of frames or trajectories and the class ``kind`` (n,) of each, from 0.
 
-    ``training`` and ``stopping`` (n,) are masks of the rows. More than COMPONENTS columns are reduced to that many
-    principal components.
+    ``training`` and ``stopping`` (n,) are masks of the rows. More than COMPONENTS columns are
+    reduced to that many principal components. The net's outputs (n, classes) are about 1 for the right class and 0 for
+    the others: not probabilities. decide() takes them.
     """
     targets = np.eye(int(kind.max()) + 1)[kind]
     wide = columns.shape[1] > COMPONENTS
@@ -140,7 +124,7 @@ def train(
     reduction = inputs.principal(known, 0.0, COMPONENTS) if wide else inputs.every(known)
     x = reduction(columns)
     aside = (x[stopping], targets[stopping])
-    return Classifier(reduction, nets.train(x[training], targets[training], aside, seed=seed, steps=steps))
+    return nets.train(x[training], targets[training], aside, seed=seed, steps=steps).after(reduction)
 
 
 def machine(**options: Any) -> Pipeline:

@@ -27,7 +27,7 @@ def bars(finger: Finger, presses: int, seed: int, steps: int) -> Facts:
     seen = edge.columns(counts - tare, tare)
     known = round((1.0 - TEST_SHARE) * presses)
     net = edge.train(seen[:known], angle[:known], seed=seed, steps=steps)
-    off = np.degrees(edge.turn(net(seen[known:]), angle[known:]))
+    off = np.degrees(edge.turn(edge.direction(net, seen[known:]), angle[known:]))
     rmse, median = float(np.sqrt((off**2).mean())), float(np.median(np.abs(off)))
     return {"presses": presses, "test": len(off), "rmse_deg": plain(rmse), "median_deg": plain(median)}
 

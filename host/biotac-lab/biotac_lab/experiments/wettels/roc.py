@@ -72,8 +72,8 @@ def frames(finger: Finger, places: tuple[int, ...], seed: int, steps: int, most:
     columns, kind, rows = _firm(pressed, seed, most)
     training, stopping, test = roc.split(pressed.contact[rows], seed)
     net = roc.train(columns, kind, training, stopping, seed=seed, steps=steps)
-    right = float((net(columns[stopping]) == kind[stopping]).mean())
-    return _facts(QUICK, BY_CONTACT, right, net(columns[test]), kind[test], places)
+    right = float((roc.decide(net(columns[stopping])) == kind[stopping]).mean())
+    return _facts(QUICK, BY_CONTACT, right, roc.decide(net(columns[test])), kind[test], places)
 
 
 def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int) -> list[Facts]:
@@ -90,7 +90,7 @@ def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int)
     _, at = np.unique(contact[test], return_index=True)
     found = []
     for aside, outputs, by in (
-        (net.outputs(columns[stopping]), net.outputs(columns[test]), ""),
+        (net(columns[stopping]), net(columns[test]), ""),
         (before.decision_function(columns[stopping]), machine.decision_function(columns[test]), ", support vectors"),
     ):
         rights = [roc.decide(aside) == kind[stopping], roc.decide(aside, contact[stopping]) == kind[stopping]]
