@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from biotac_lab.calibrate import interval_command
+from biotac_lab.calibrate import interval
 from biotac_lab.cli import main
 
 
@@ -13,4 +13,4 @@ def test_help_shows_what_each_verb_does(verb, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
         main([*verb, "--help"])
     assert ended.value.code == 0
-    assert interval_command.ABOUT in " ".join(capsys.readouterr().out.split())
+    assert interval.ABOUT in " ".join(capsys.readouterr().out.split())

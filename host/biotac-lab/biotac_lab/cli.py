@@ -13,7 +13,7 @@ from biotac import BiotacError, InputError
 from .bench import command as bench
 from .calibrate import direction_command as direction
 from .calibrate import finger_command as finger
-from .calibrate import interval_command as interval
+from .calibrate import interval
 from .calibrate import population_command as population
 from .experiments import command as experiments
 from .experiments import seeds
