@@ -150,10 +150,9 @@ def _from_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popu
     """For each recording the map of the others; for a single one the package's map, if not trained on it."""
     if len(runs) > 1:
         fingers = [training.sums_of(training.aligned(run)) for run in runs]
-        return {
-            path.name: training.train([finger for j, finger in enumerate(fingers) if j != k], symmetric=True)
-            for k, path in enumerate(files)
-        }, ["population maps are trained on the other recordings, symmetric like the package's"]
+        maps = training.of_others(fingers, symmetric=True)
+        note = "population maps are trained on the other recordings, symmetric like the package's"
+        return {path.name: others for path, others in zip(files, maps, strict=True)}, [note]
     kept = load_population(None)
     path = files[0]
     if kept.made_of([path]):

@@ -19,13 +19,14 @@ from threadpoolctl import threadpool_limits
 
 from biotac import Finger as BoardFinger
 from biotac import ForceModel, InputError, Setting, compute
+from biotac.calibrate.population import Population
 from biotac.calibrate.wrench import Run, load, validate
 from biotac.core import to_frames
 from biotac.core.geometry import grip_parts
 from biotac.map import Margin, bands, fit_margin, published_parts
 
 from ..report import Outcome, Show, Table, of_tables
-from .training import FingerSums, Floats, aligned, sums_of, train
+from .training import FingerSums, Floats, aligned, of_others, sums_of
 
 ABOUT = "How often the 95 % intervals of normal and shear are right, on frames that the force's source had not seen."
 EXAMPLE = "biotac-lab interval F1.npz F2.npz"
@@ -90,23 +91,18 @@ class Finger:
         return cls(run, own, np.clip(np.rint(own.counts), 0, 4095).astype(np.uint16), sums_of(own))
 
 
-def population_rows(finger: Finger, others: Sequence[Finger], *, symmetric: bool = True) -> tuple[Judged, Floats]:
-    """A finger by the population map of the ``others``, with only the map's guess (n, 2) for a half width, which is
-    given again.
-    """
+def population_rows(finger: Finger, population: Population) -> tuple[Judged, Floats]:
+    """A finger by a population map, with only the map's guess (n, 2) for a half width, which is given again."""
     run = finger.aligned
-    population = train([other.sums for other in others], symmetric=symmetric)
     poc_mm = compute(finger.words, run.tare)["poc_mm"]
     felt = published_parts(population.published(run.counts, run.tare), poc_mm)
     guess = population.judged(run.counts, run.tare).guess_n
     return Judged(felt, guess, grip_parts(run.truth, poc_mm), run.truth), guess
 
 
-def population_margin(fingers: Sequence[Finger], *, symmetric: bool = True) -> tuple[Margin, list[Judged]]:
-    """The population map's margin, fitted to each finger by the map of the others, and these frames with it."""
-    each = [
-        population_rows(own, [other for other in fingers if other is not own], symmetric=symmetric) for own in fingers
-    ]
+def population_margin(fingers: Sequence[Finger], maps: Sequence[Population]) -> tuple[Margin, list[Judged]]:
+    """The population map's margin, fitted to each finger by its map of the others, and these frames with it."""
+    each = [population_rows(finger, population) for finger, population in zip(fingers, maps, strict=True)]
     rows, guess = together([judged for judged, _ in each]), np.concatenate([judged for _, judged in each])
     margin = fit_margin(rows.felt_n, rows.truth_n, rows.force_n, guess)
     return margin, [replace(judged, half_n=guess + margin.half_n(judged.felt_n)) for judged, guess in each]
@@ -208,7 +204,7 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
 
 def judge(fingers: list[Finger], names: list[str], show: Show) -> list[Table]:
     """The tables: the three sources by band, and with one electrode out."""
-    margin, by_population = population_margin(fingers)
+    margin, by_population = population_margin(fingers, of_others([finger.sums for finger in fingers], symmetric=True))
     rows, own, out = [], [], []
     for finger, name in zip(fingers, names, strict=True):
         show(f"{name}: its own map")

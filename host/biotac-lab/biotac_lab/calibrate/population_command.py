@@ -49,12 +49,15 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
     with threadpool_limits(limits=THREADS, user_api="blas"):
         fingers = [Finger.of_run(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
-        left_out = _left_out(fingers, symmetric=args.symmetric)
-        population = training.train([finger.sums for finger in fingers], symmetric=args.symmetric)
-        judged = {}
+        sums, runs, judged = [finger.sums for finger in fingers], [finger.aligned for finger in fingers], {}
+        population = training.train(sums, symmetric=args.symmetric)
         if len(fingers) > 1:
-            population = replace(population, margin=population_margin(fingers, symmetric=args.symmetric)[0])
+            maps = training.of_others(sums, symmetric=args.symmetric)
+            population = replace(population, margin=population_margin(fingers, maps)[0])
+            left_out = [held_out_error.worth(*each) for each in zip(maps, runs, strict=True)]
             judged = {f"{path.name} by the others": found for path, found in zip(args.files, left_out, strict=True)}
+        else:  # its own mirror image is the only other finger there is; presses cannot correct that one's F_x
+            left_out = [held_out_error.worth(training.train(sums, mirror=False), training.mirrored(runs[0]))]
         origin = provenance_of(args.files, args.source, symmetric=args.symmetric)
         trained = Trained(population, *held_out_error.sigma_of(left_out), origin)
         facts = _facts(args, trained)
@@ -72,21 +75,6 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
         args.out.write_text(dumps(trained), encoding="utf-8")
         facts["written"] = str(args.out)
     return of_tables(tables, facts)
-
-
-def _left_out(fingers: list[Finger], *, symmetric: bool) -> list[Worth]:
-    """Each finger by the map of the others; of one alone, its mirror image by its map, the only other finger there is.
-
-    Presses cannot correct a mirror image's F_x.
-    """
-    if len(fingers) == 1:
-        alone = training.train([fingers[0].sums], mirror=False)
-        return [held_out_error.worth(alone, training.mirrored(fingers[0].aligned))]
-    maps = [
-        training.train([other.sums for other in fingers if other is not finger], symmetric=symmetric)
-        for finger in fingers
-    ]
-    return [held_out_error.worth(others, finger.aligned) for others, finger in zip(maps, fingers, strict=True)]
 
 
 def _facts(args: argparse.Namespace, trained: Trained) -> dict[str, Any]:

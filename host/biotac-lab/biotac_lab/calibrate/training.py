@@ -112,6 +112,11 @@ def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: boo
     return Population(even, variance)
 
 
+def of_others(fingers: Sequence[FingerSums], *, symmetric: bool = False) -> list[Population]:
+    """For each finger the map of the others."""
+    return [train([other for other in fingers if other is not finger], symmetric=symmetric) for finger in fingers]
+
+
 def _solve(fingers: Sequence[Sums]) -> tuple[Floats, Floats]:
     gram, cross, mean = (np.mean([getattr(f, name) for f in fingers], axis=0) for name in ("gram", "cross", "mean"))
     known = normals()
