@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -12,29 +10,26 @@ import pytest
 from biotac_lab.bench import newtons
 from biotac_lab.cli import main
 
-PACKAGE = "biotac_lab.bench"
-
-
-def kept() -> dict:
-    return json.loads(resources.files(PACKAGE).joinpath(newtons.CYCLES).read_text(encoding="utf-8"))["data"]
-
 
 def outcome() -> newtons.Outcome:
     scenes = [scene for *_, scene in newtons.UNTRAINED] + [scene for _, scene, _ in newtons.OWN_MODELS]
     points = [
         newtons.Point(
-            scene, newtons.OWN, {core: found["cycles"][scene] for core, found in kept().items()}, {"a": [3, 0, 4]}
+            scene,
+            newtons.OWN,
+            {core: found["cycles"][scene] for core, found in newtons.CORES.items()},
+            {"a": [3, 0, 4]},
         )
         for scene in scenes
     ]
-    return newtons.Outcome(points, {"a": [0.1] * 3}, {"a": [0.2] * 3}, {}, [])
+    return newtons.Outcome(points, {"a": [0.1] * 3}, {"a": [0.2] * 3}, [])
 
 
 def test_every_point_has_cycles_on_every_core() -> None:
     """A scene with another name would be missing here; tests/docs/test_figures.py counts the cycles again."""
     found = outcome()
-    assert {"m0plus", "m4f"} == set(kept())
-    assert all(set(point.cycles) == set(kept()) for point in found.points)
+    assert {"m0plus", "m4f"} == set(newtons.CORES)
+    assert all(set(point.cycles) == set(newtons.CORES) for point in found.points)
     assert found.points[0].error_n == pytest.approx(5.0)
 
 

@@ -30,7 +30,7 @@ from .batch import LIN
 
 Floats = NDArray[np.float64]
 
-CYCLES = "cycles.json"
+CORES = json.loads(resources.files(__package__).joinpath("cycles.json").read_text(encoding="utf-8"))["data"]
 OWN = "its own force plate"
 #: Model of a finger's own map, what the board runs for it, and its label.
 OWN_MODELS = (
@@ -68,14 +68,12 @@ class Outcome:
     """All points, and two limits of the data, by recording for x y z.
 
     ``noise_n`` is the effect of one frame's electrode noise through the large map. ``repeatability_n`` is how much the
-    plate's force differs when the same counts recur, less what the large map explains. ``cores`` has titles and sources
-    of the cycles.
+    plate's force differs when the same counts recur, less what the large map explains.
     """
 
     points: list[Point]
     noise_n: dict[str, list[float]]
     repeatability_n: dict[str, list[float]]
-    cores: dict[str, dict[str, str]]
     notes: list[str]
 
 
@@ -84,14 +82,14 @@ def measure(files: Sequence[Path], picture: Path | None = None, show: Show = lam
     outcome = points_of(files, show)
     if picture is not None:
         draw(outcome, picture)
-    cores, names = outcome.cores, list(outcome.noise_n)
+    names = list(outcome.noise_n)
     rows = [
-        [p.name, p.knows, *[p.cycles[k] for k in cores], p.error_n, *[_three(p.rmse_n, k) for k in names]]
+        [p.name, p.knows, *[p.cycles[k] for k in CORES], p.error_n, *[_three(p.rmse_n, k) for k in names]]
         for p in outcome.points
     ]
     floors = [[text, *[_three(getattr(outcome, field), name) for name in names]] for field, text, _ in FLOORS]
-    titles = [f"cycles, {about['title']}" for about in cores.values()]
-    text = "; ".join([f"{about['title']}: {about['cycles_by']}" for about in cores.values()] + outcome.notes)
+    titles = [f"cycles, {about['title']}" for about in CORES.values()]
+    text = "; ".join([f"{about['title']}: {about['cycles_by']}" for about in CORES.values()] + outcome.notes)
     return [
         Table("Cycles against newtons", ["", "known about the finger", *titles, "error [N]", *names], rows,
               f"RMSE in x/y/z in N, held out. {text}."),
@@ -110,7 +108,6 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
     names = [path.name for path in files]
     if len(set(names)) < len(names):
         raise InputError(f"{', '.join(names)}: two have the same name; rename one")
-    kept = json.loads(resources.files(__package__).joinpath(CYCLES).read_text(encoding="utf-8"))["data"]
     runs = {path.name: load(path).run for path in files}
     with threadpool_limits(limits=1, user_api="blas"):
         others, notes = _from_others(files, list(runs.values()))
@@ -129,12 +126,11 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
         noise[name], repeats[name] = _noise(validation), _repeatability(validation)
     listed = [*UNTRAINED, *((model, OWN, called, scene) for model, scene, called in OWN_MODELS)]
     points = [
-        Point(called, knows, {core: about["cycles"][scene] for core, about in kept.items()}, found[key])
+        Point(called, knows, {core: about["cycles"][scene] for core, about in CORES.items()}, found[key])
         for key, knows, called, scene in listed
         if key in found
     ]
-    cores = {core: {key: about[key] for key in ("title", "cycles_by")} for core, about in kept.items()}
-    return Outcome(points, noise, repeats, cores, notes)
+    return Outcome(points, noise, repeats, notes)
 
 
 LINS, POPULATION, PRESSES, MINUTE = "default", "population", "presses", "minute"
