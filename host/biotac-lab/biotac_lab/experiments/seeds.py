@@ -26,6 +26,11 @@ FIGURE = re.compile(r"\{([^{}:]+(?:: [^{}:]+)*):([^{}]*)\}")
 NAMES = {"lin2013": "Lin 2013", "navarro2015": "Navarro 2015", "wettels2011": "Wettels 2011"}
 
 
+def rows_of(experiment: str) -> list[Facts]:
+    """The rows that this experiment shows."""
+    return [row for rows in ROWS.values() for row in rows if row.get("experiment") == experiment]
+
+
 def names(row: Facts) -> list[str]:
     """The figures that a row needs."""
     return [name for name, _ in FIGURE.findall(row["ours"])] + list(row.get("less", ()))
@@ -58,7 +63,7 @@ def _texts(cells: Any) -> str:
 def findings(experiment: str, facts: Facts) -> list[Facts]:
     """A check for each finding of an experiment that can turn round: it is right where that is said, or differs."""
     found = []
-    for row in (row for rows in ROWS.values() for row in rows if row.get("experiment") == experiment and "less" in row):
+    for row in (row for row in rows_of(experiment) if "less" in row):
         less, more = (figure(facts, name) for name in row["less"])
         ours = _filled(row, {name: figure(facts, name) for name in names(row)})
         text = f"{row['item']}. Theirs: {row['his']}; ours: {ours}; {row['verdict']}"
@@ -88,10 +93,7 @@ def measured(experiment: str, show: Show) -> dict[str, float]:
     from .command import load
 
     facts = load(experiment).run(Options(show=show)).facts(experiment)
-    wanted = [
-        name for rows in ROWS.values() for row in rows if row.get("experiment") == experiment for name in names(row)
-    ]
-    return {name: figure(facts, name) for name in dict.fromkeys(wanted)}
+    return {name: figure(facts, name) for row in rows_of(experiment) for name in names(row)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
