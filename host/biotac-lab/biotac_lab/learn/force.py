@@ -97,16 +97,14 @@ def _aside(groups: Integers, seed: int) -> Bools:
     return np.isin(groups, names[: int(len(names) * STOPPING_SHARE)])
 
 
-def cross_validated(
-    above: Floats, groups: Integers, folds: int, predict: Callable[[Bools, Bools], Floats], axes: int = 3
-) -> Floats:
-    """Held-out predictions (n, axes) by ``predict(training, test)``, masks (n,), in each of ``folds``.
+def cross_validated(above: Floats, groups: Integers, folds: int, predict: Callable[[Bools, Bools], Floats]) -> Floats:
+    """Held-out predictions (n, 3) by ``predict(training, test)``, masks (n,), in each of ``folds``.
 
     No group is both in training and in test.
     """
     from sklearn.model_selection import GroupKFold
 
-    estimates = np.full((len(above), axes), np.nan)
+    estimates = np.full((len(above), 3), np.nan)
     for training, test in GroupKFold(folds).split(above, groups=groups):
         masks = [np.isin(np.arange(len(above)), part) for part in (training, test)]
         estimates[masks[1]] = predict(*masks)

@@ -53,14 +53,14 @@ def principal(columns: Floats, least: float = LEAST_VARIANCE, most: int | None =
     return Reduction(plain.mean, plain.scale, kept.T)
 
 
-def independent(columns: Floats, least: float = LEAST_VARIANCE) -> Reduction:
-    """FastICA's components, as many as principal() keeps with ``least``.
+def independent(columns: Floats) -> Reduction:
+    """FastICA's components, as many as principal() keeps.
 
     Where it does not converge, they are those of its last iteration.
     """
     import warnings
 
-    plain = principal(columns, least)
+    plain = principal(columns)
     whitened = plain(columns)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "did not converge": the paper, too, finds that ICA does badly here
@@ -76,9 +76,9 @@ def correlations(columns: Floats, force_n: Floats) -> Floats:
     return result
 
 
-def correlated(columns: Floats, force_n: Floats, least: float = LEAST_CORRELATION) -> Bools:
-    """Mask (d, 3) of the columns whose correlations() with each axis of the force is above ``least``."""
-    return correlations(columns, force_n) > least
+def correlated(columns: Floats, force_n: Floats) -> Bools:
+    """Mask (d, 3) of the columns whose correlations() with each axis of the force is above LEAST_CORRELATION."""
+    return correlations(columns, force_n) > LEAST_CORRELATION
 
 
 def only(columns: Floats, kept: Bools) -> Reduction:

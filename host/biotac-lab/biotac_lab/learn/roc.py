@@ -10,8 +10,6 @@ trajectories().
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 from sklearn.pipeline import Pipeline, make_pipeline
@@ -127,10 +125,9 @@ def train(
     return nets.train(x[training], targets[training], aside, seed=seed, steps=steps).after(reduction)
 
 
-def machine(**options: Any) -> Pipeline:
+def machine() -> Pipeline:
     """An unfitted support vector machine with a radial kernel on scaled columns.
 
-    Fit it with ``fit(columns, kind)``; decide() takes its ``decision_function(columns)``. ``options`` are those of
-    sklearn's SVC.
+    Fit it with ``fit(columns, kind)``; decide() takes its ``decision_function(columns)``.
     """
-    return make_pipeline(StandardScaler(), SVC(**{"C": 10.0, **options}))
+    return make_pipeline(StandardScaler(), SVC(C=10.0))

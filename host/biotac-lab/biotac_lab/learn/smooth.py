@@ -18,13 +18,13 @@ SIGMA_PER_MAD = 1.4826
 LOW_PASS_HZ, LOW_PASS_POLES = 5.0, 3  # the paper, II.A
 
 
-def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
-    """Values (n,) or (n, k) smoothed by local lines over ``taps`` rows, without outliers.
+def lowess(values: npt.ArrayLike) -> Floats:
+    """Values (n,) or (n, k) smoothed by local lines over TAPS rows, without outliers.
 
     Cleveland's robust LOWESS (statsmodels', three robust steps) over the row number, each column by itself. Rows
     outside six standard deviations of those around them have no weight (outliers()): the robust steps alone would let
     one outlier of a thousand deviations bend all its neighbours, and reject these with it. NaN rows are skipped and
-    stay NaN. It needs the rows after a row, too; causal() does not. Raises InputError where fewer than ``taps`` rows
+    stay NaN. It needs the rows after a row, too; causal() does not. Raises InputError where fewer than TAPS rows
     are left.
     """
     from statsmodels.nonparametric.smoothers_lowess import lowess as theirs  # half a second to import
@@ -34,24 +34,24 @@ def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
     result = np.full(flat.shape, np.nan)
     for k, column in enumerate(flat.T):
         at = np.flatnonzero(np.isfinite(column))
-        good = at[~outliers(column[at], taps)]
-        if len(good) < taps:
-            raise InputError(f"{len(good)} rows have a value: expected at least {taps}; smooth a longer stretch")
-        smooth = theirs(column[good], good, frac=taps / len(good), it=ROBUST_STEPS, return_sorted=False)
+        good = at[~outliers(column[at])]
+        if len(good) < TAPS:
+            raise InputError(f"{len(good)} rows have a value: expected at least {TAPS}; smooth a longer stretch")
+        smooth = theirs(column[good], good, frac=TAPS / len(good), it=ROBUST_STEPS, return_sorted=False)
         result[at, k] = interp1d(good, smooth, fill_value="extrapolate")(at)
     return result.reshape(columns.shape)
 
 
-def outliers(values: Floats, taps: int = TAPS) -> npt.NDArray[np.bool_]:
-    """Mask (n,) of the values (n,) outside six deviations from the median of the ``taps`` around them (Hampel 1974).
+def outliers(values: Floats) -> npt.NDArray[np.bool_]:
+    """Mask (n,) of the values (n,) outside six deviations from the median of the TAPS around them (Hampel 1974).
 
     The deviation is the median one of the same rows, so that a slope widens it. Where half of them are equal it is 0,
     and any other value is outside.
     """
-    if len(values) < taps:
+    if len(values) < TAPS:
         return np.zeros(len(values), np.bool_)
-    begin = np.clip(np.arange(len(values)) - taps // 2, 0, len(values) - taps)
-    around = values[begin[:, None] + np.arange(taps)]
+    begin = np.clip(np.arange(len(values)) - TAPS // 2, 0, len(values) - TAPS)
+    around = values[begin[:, None] + np.arange(TAPS)]
     middle = np.median(around, axis=1)
     deviation = SIGMA_PER_MAD * np.median(np.abs(around - middle[:, None]), axis=1)
     return np.asarray(np.abs(values - middle) > OUTSIDE_SIGMAS * deviation)
@@ -73,27 +73,27 @@ def low_pass(values: npt.ArrayLike, rate_hz: float) -> Floats:
     return result
 
 
-def causal_taps(taps: int = TAPS) -> Floats:
-    """Weights (taps,), oldest first, that evaluate at the newest row a line fitted to the last ``taps`` rows.
+def causal_taps() -> Floats:
+    """Weights (TAPS,), oldest first, that evaluate at the newest row a line fitted to the last TAPS rows.
 
     The line is fitted with tricube weights that fall to zero one row before the oldest, as in LOWESS at the end of its
     data. The weights sum to 1, and a steady slope is followed without lag.
     """
-    age = np.arange(taps - 1, -1, -1.0)
-    weight = (1.0 - (age / taps) ** 3) ** 3
-    design = np.column_stack([np.ones(taps), -age])
+    age = np.arange(TAPS - 1, -1, -1.0)
+    weight = (1.0 - (age / TAPS) ** 3) ** 3
+    design = np.column_stack([np.ones(TAPS), -age])
     result: Floats = np.linalg.solve(design.T @ (design * weight[:, None]), (design * weight[:, None]).T)[0]
     return result
 
 
-def causal(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
-    """Values (n,) or (n, k) smoothed by causal_taps() over each row and those before; the first taps - 1 rows are NaN.
+def causal(values: npt.ArrayLike) -> Floats:
+    """Values (n,) or (n, k) smoothed by causal_taps() over each row and those before; the first TAPS - 1 rows are NaN.
 
     Linear, not robust: a single outlier passes with 0.4 of its size. A NaN makes every row NaN whose window holds it.
     """
     columns = np.asarray(values, dtype=np.float64)
     result = np.full(columns.shape, np.nan)
-    if len(columns) >= taps:
-        window = np.lib.stride_tricks.sliding_window_view(columns, taps, axis=0)
-        result[taps - 1 :] = window @ causal_taps(taps)
+    if len(columns) >= TAPS:
+        window = np.lib.stride_tricks.sliding_window_view(columns, TAPS, axis=0)
+        result[TAPS - 1 :] = window @ causal_taps()
     return result

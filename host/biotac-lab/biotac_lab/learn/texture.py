@@ -10,7 +10,6 @@ matter when the contact was or how long it lasted. BANDS messages give the same:
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -66,9 +65,6 @@ def describe_all(recordings: Iterable[npt.ArrayLike]) -> Floats:
     return np.array([describe(energies(pac)) for pac in recordings]).reshape(-1, len(QUANTILES) * len(BANDS_HZ))
 
 
-def classifier(**options: Any) -> Pipeline:
-    """An unfitted linear classifier of such rows: logistic regression on columns scaled to unit variance.
-
-    ``options`` are LogisticRegression's.
-    """
-    return make_pipeline(StandardScaler(), LogisticRegression(**{"C": 1.0, "max_iter": 3000, **options}))
+def classifier() -> Pipeline:
+    """An unfitted linear classifier of such rows: logistic regression on columns scaled to unit variance."""
+    return make_pipeline(StandardScaler(), LogisticRegression(C=1.0, max_iter=3000))
