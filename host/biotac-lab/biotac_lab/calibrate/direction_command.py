@@ -76,7 +76,6 @@ def _cases(path: Path) -> Iterator[Case]:
         fields = {name: archive[name] for name in set(archive.files) & {"z_dir", "F", "L", "R"}}
     if "z_dir" in fields:
         trial = laboratory.load(path, needs=("PDC", "z_dir"))
-        assert trial.plate_normal is not None
         rows = trial.touched & (trial.pressure > plate_normal.CONTACT_COUNTS) & np.isfinite(trial.signal).all(axis=1)
         yield Case(path.name, trial.signal[rows], -trial.plate_normal[rows])
     elif "F" in fields:

@@ -58,8 +58,7 @@ def paper_scales(trials: Sequence[Trial]) -> Settings:
     """The paper's scales as board settings: least squares over all frames of ``trials`` with a tare."""
     parts: list[tuple[Floats, Floats, Floats]] = []
     for trial in trials:
-        assert trial.force_n is not None
-        torque = np.zeros_like(trial.force_n) if trial.torque_nmm is None else trial.torque_nmm
+        torque = np.nan_to_num(trial.torque_nmm)  # zero where there is none
         known = np.asarray(np.isfinite(trial.signal).all(axis=1))
         parts.append((trial.signal[known], trial.force_n[known], torque[known]))
     signal, force, torque = (np.concatenate(column) for column in zip(*parts, strict=True))

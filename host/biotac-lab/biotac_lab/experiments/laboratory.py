@@ -57,13 +57,14 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force:
             raise RecordingError(
                 f"{path}: field t goes back in row {back[0] + 1}: expected times in order; sort the rows"
             )
+    unknown = np.full((n, 3), np.nan)
     force, torque = (
-        to_lin_frame(numbers(path, name, fields[name], (n, 3), unit)) if name in fields else None
+        to_lin_frame(numbers(path, name, fields[name], (n, 3), unit)) if name in fields else unknown
         for name, unit in (("F", "N"), ("M", "N mm"))
     )
-    normal = _plate_normal(path, fields["z_dir"], n) if "z_dir" in fields else None
-    torsion = at_mm = None
-    if force is not None and torque is not None:
+    normal = _plate_normal(path, fields["z_dir"], n) if "z_dir" in fields else unknown
+    torsion, at_mm = unknown[:, 0], unknown
+    if "F" in fields and "M" in fields:
         plate = locate(force, torque)
         # below that the plate's point of contact is noise divided by noise
         known = (np.linalg.norm(force, axis=1) > TOUCHED_N) & plate.on_skin
@@ -99,10 +100,12 @@ def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bo
     notes = ["tare: the board's own, from the recorded counts", *recording.problems]
     if own_force:
         notes.append("force: as the board published it, with its own scales; there was no force plate")
-    force = np.nan_to_num(own["force_n"]) if own_force else None
+    unknown = np.full((len(own), 3), np.nan)
+    force = np.nan_to_num(own["force_n"]) if own_force else unknown
     time_s = (own["t_us"] - own["t_us"][0]) / 1e6
     counts, pdc = own["counts"].copy(), own["pdc"].copy()
-    return Trial(path.name, time_s, (), counts, pdc, on_board(counts, pdc), force, None, notes=tuple(notes))
+    return Trial(path.name, time_s, (), counts, pdc, on_board(counts, pdc), force, unknown, unknown[:, 0], unknown,
+                 unknown, notes=tuple(notes))  # fmt: skip
 
 
 def _require(path: Path, needs: tuple[str, ...], seen: tuple[str, ...]) -> None:

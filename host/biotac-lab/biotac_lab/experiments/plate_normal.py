@@ -72,14 +72,12 @@ def emulated(seed: int, profile: Profile) -> Trial:
         script.phase(f"press {k + 1}", 0.5, 1.0, Pose(rest.x_mm, rest.y_mm, force_n, tip_mm=FLAT_MM))
         script.phase("release", 0.3, 0.2, rest)
     trial = play("plate-normal", script, seed=seed, profile=profile)
-    assert trial.at_mm is not None
     contact = np.where(np.isfinite(trial.at_mm), trial.at_mm, [0.0, 0.0, -surface.RADIUS_MM])
     return replace(trial, plate_normal=surface.normals_at(contact))
 
 
 def looks(trial: Trial) -> normal.Looks:
     """Its frames in contact with a point, by CONTACT_COUNTS and the default weights, and the plate's normals there."""
-    assert trial.plate_normal is not None
     points = trial.again({Setting.POC_WEIGHTS: int(SHIPPED)}).frames["poc_mm"]
     known = np.isfinite(points).all(axis=1) & np.isfinite(trial.signal).all(axis=1)
     rows = np.flatnonzero(trial.touched & (trial.pressure > CONTACT_COUNTS) & known)
@@ -93,7 +91,6 @@ def _corrected(trial: Trial) -> Floats:
 
 
 def _case(profile: str, weights: PocWeights, trial: Trial) -> Angles:
-    assert trial.plate_normal is not None
     points = trial.again({Setting.POC_WEIGHTS: int(weights)}).frames["poc_mm"]
     return Angles(profile, weights, angles_deg(points, trial.plate_normal), trial.touched, trial.pressure)
 

@@ -128,7 +128,6 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
 
     Raises RecordingError unless there are 19 contacts above FLOOR_N.
     """
-    assert trial.force_n is not None
     size = np.linalg.norm(trial.force_n, axis=1)
     firm = np.flatnonzero(size > FLOOR_N)
     breaks = np.flatnonzero(np.diff(trial.time_s[firm]) > GAP_S) + 1

@@ -22,11 +22,9 @@ NAMES = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [N mm]", "My [N mm]", "Mz [N mm]")
 
 def wrenches(trial: Trial) -> tuple[Floats, Floats]:
     """Force and torque (n, 6): the truth, NaN where the trial has no torque, and the board's."""
-    assert trial.force_n is not None
-    torque = np.full_like(trial.force_n, np.nan) if trial.torque_nmm is None else trial.torque_nmm
     by: Estimate = estimates.by_paper(trial, estimates.paper_scales([trial]))
     assert by.torque_nmm is not None
-    return np.hstack([trial.force_n, torque]), np.hstack([by.force_n, by.torque_nmm])
+    return np.hstack([trial.force_n, trial.torque_nmm]), np.hstack([by.force_n, by.torque_nmm])
 
 
 def rows(contacts: Sequence[Bools]) -> Bools:

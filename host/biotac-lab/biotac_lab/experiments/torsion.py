@@ -37,7 +37,6 @@ def run(options: Options) -> Report:
     result = weight.run(options, emulated, how, torque=True)
     trial, checks = result.trial, []
     if not trial.is_recorded:
-        assert trial.at_mm is not None
         held = {phase.name: trial.during(phase) for phase in trial.phases}
         for model in (result.estimates[0], *result.maps):
             turned = model.torsion_nmm(trial.at_mm)

@@ -56,7 +56,6 @@ def replay(
 
 def signs(trial: Trial, model: Estimate, at_mm: Floats) -> dict[str, bool]:
     """By region, whether the mean torsion at contacts (n, 3) has the true sign in both turns; {} without torque."""
-    assert trial.torsion_nmm is not None
     turned = model.torsion_nmm(at_mm)
     if turned is None:
         return {}
@@ -69,7 +68,6 @@ def signs(trial: Trial, model: Estimate, at_mm: Floats) -> dict[str, bool]:
 
 def leakage(trial: Trial, model: Estimate) -> float:
     """Size of Fy in N per N mm of pure torsion, between the two turns of region II, where the true Fy is 0."""
-    assert trial.torsion_nmm is not None
     clockwise, counter = (_rows(trial, f"II {turn}") for turn in ("clockwise", "counter"))
     lateral, torsion_nmm = model.force_n[:, 1], trial.torsion_nmm
     leaked = lateral[counter].mean() - lateral[clockwise].mean()
@@ -78,7 +76,7 @@ def leakage(trial: Trial, model: Estimate) -> float:
 
 def together(trial: Trial, model: Estimate) -> tuple[float, float]:
     """RMSE of Fy, N, and of the torsion at the true contact, N mm, while both act, all ramps included."""
-    assert trial.states is not None and trial.at_mm is not None
+    assert trial.states is not None
     pushed = np.linalg.norm(trial.states.shear_n, axis=1) > 0.0
     rows = np.asarray(pushed & (trial.states.torsion_nmm != 0.0))
     lateral = rmse(model.force_n, trial.force_n, rows)
@@ -100,7 +98,6 @@ def measure(options: Options) -> Result:
 def convolved(result: Result) -> Table:
     """Signs and leakage of each model."""
     trial, verdict = result.trial, {True: "right", False: "WRONG", None: "-"}
-    assert trial.at_mm is not None
     rows: list[list[Any]] = []
     for model in result.estimates:
         found = [signs(trial, model, at_mm) for at_mm in (trial.at_mm, trial.frames["poc_mm"])]
@@ -118,7 +115,6 @@ def convolved(result: Result) -> Table:
 def checks(result: Result) -> list[Facts]:
     """Of maps only: the paper's model is known to fail."""
     trial, found = result.trial, []
-    assert trial.at_mm is not None
     for model in result.maps:
         right = signs(trial, model, trial.at_mm)
         found += [

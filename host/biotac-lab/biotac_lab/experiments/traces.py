@@ -55,12 +55,12 @@ def _electrodes(axes: Any, trial: Trial, marked: Sequence[str]) -> None:
 def _quantity(panel: Any, trial: Trial, estimates: Sequence[Estimate], axis: str) -> None:
     step = max(1, len(trial) // MAX_POINTS)
     truth = _axis(axis, trial.force_n, trial.torque_nmm, trial.torsion_nmm)
-    if truth is not None:
+    if truth is not None and np.isfinite(truth).any():
         panel.plot(trial.time_s[::step], truth[::step], color="#111111", linewidth=3, alpha=0.3, label="applied")
     colors = iter(MAP_COLORS)
     papers = iter((PAPER_COLOR, OTHER_PAPER_COLOR))
     for trace in estimates:
-        at_contact = None if trial.at_mm is None or trace.torque_nmm is None else trace.torsion_nmm(trial.at_mm)
+        at_contact = None if trace.torque_nmm is None else trace.torsion_nmm(trial.at_mm)
         line = _axis(axis, trace.force_n, trace.torque_nmm, at_contact)
         if line is None:
             continue

@@ -44,7 +44,7 @@ class Trial:
     ``counts`` uint16 (n, 19) and ``pdc`` uint16 (n,) are 0xFFFF where missing; ``rows`` FINGER_DTYPE (n,) are the
     board's. The truth is ``force_n`` (n, 3) on the finger and ``torque_nmm`` (n, 3) about Lin's origin; ``torsion_nmm``
     (n,) about the contact's outward normal; ``at_mm`` (n, 3) the true contact, NaN without one; ``plate_normal`` (n, 3)
-    the unit normal of a plate that touches. What a recording does not hold is None. ``states`` are those of an emulated
+    the unit normal of a plate that touches. What a recording does not hold is NaN. ``states`` are those of an emulated
     trial; ``given`` (19,) is a tare that the board got at the start; ``notes`` say what was assumed about a recording.
     """
 
@@ -54,14 +54,19 @@ class Trial:
     counts: Words
     pdc: Words
     rows: Rows
-    force_n: Floats | None
-    torque_nmm: Floats | None
-    torsion_nmm: Floats | None = None
-    at_mm: Floats | None = None
-    plate_normal: Floats | None = None
+    force_n: Floats
+    torque_nmm: Floats
+    torsion_nmm: Floats
+    at_mm: Floats
+    plate_normal: Floats
     states: States | None = None
     given: Floats | None = None
     notes: tuple[str, ...] = ()
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether the true torque is known."""
+        return bool(np.isfinite(self.torque_nmm).any())
 
     @property
     def is_recorded(self) -> bool:
@@ -147,6 +152,7 @@ def play(name: str, script: Script, *, seed: int, profile: Profile = "new", repe
         torque_nmm=torque,
         torsion_nmm=states.torsion_nmm,
         at_mm=np.where(states.force_n[:, None] > 0.0, states.contact_mm, np.nan),
+        plate_normal=np.full_like(force, np.nan),
         states=states,
     )
 

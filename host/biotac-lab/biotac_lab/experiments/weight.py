@@ -99,7 +99,7 @@ def run(
         f"{PAPER}: one scale per axis, least squares on this same trial, so this is its best case; an axis without "
         "load keeps the board's default"
     )
-    if trial.torque_nmm is not None:
+    if trial.has_torque:
         notes.append("the board has no scale for Mx, which the electrodes hardly sense: it computes Mx from force and "
                      "point of contact")  # fmt: skip
     if earlier:
@@ -116,7 +116,6 @@ def run(
 
 def _recorded(path: Path, finger: int, torque: bool) -> Trial:
     trial = laboratory.load(path, finger, needs=("F", "M") if torque else ("F",))
-    assert trial.force_n is not None
     if not np.isfinite(trial.tare).any():
         raise RecordingError(
             f"{path}: the board finds no tare in it: expected a still, untouched finger at the start; add E_base"
@@ -131,7 +130,6 @@ def _recorded(path: Path, finger: int, torque: bool) -> Trial:
 
 def loaded(trial: Trial) -> Bools:
     """Frames (n,) with more than LOADED_N of true force and a tare."""
-    assert trial.force_n is not None
     tared = np.isfinite(trial.tare).all(axis=1)
     return np.asarray((np.linalg.norm(trial.force_n, axis=1) > LOADED_N) & tared)
 
@@ -139,7 +137,7 @@ def loaded(trial: Trial) -> Bools:
 def errors(result: Result) -> Table:
     """RMSE over the loaded frames, one row per model."""
     trial, rows = result.trial, loaded(result.trial)
-    torque = trial.torque_nmm is not None
+    torque = trial.has_torque
     head = ["model", *[f"{axis} [N]" for axis in FORCES]]
     text = [
         "The paper plots this trial without numbers, so the comparison is with its model on the same counts.",
@@ -153,7 +151,6 @@ def errors(result: Result) -> Table:
     for model in result.estimates:
         row: list[Any] = [model.name, *rmse(model.force_n, trial.force_n, rows)]
         if torque:
-            assert trial.at_mm is not None
             row += rmse(model.torque_nmm, trial.torque_nmm, rows).tolist()
             row += [
                 rmse(model.torsion_nmm(at_mm), trial.torsion_nmm, rows)[0]
@@ -168,7 +165,6 @@ def means(result: Result, axes: Sequence[str]) -> list[Table]:
     trial = result.trial
     if not trial.phases:
         return []
-    assert trial.at_mm is not None
     each: dict[str, dict[str, Floats]] = {"applied": _axes(trial.force_n, trial.torque_nmm, trial.torsion_nmm)}
     for model in result.estimates:
         each[model.name] = _axes(model.force_n, model.torque_nmm, model.torsion_nmm(trial.at_mm))

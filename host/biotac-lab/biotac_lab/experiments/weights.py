@@ -71,7 +71,6 @@ def run(options: Options) -> Report:
         plate = laboratory.load(options.recording, options.finger, needs=("PDC", "z_dir"))
     else:
         plate = plate_normal.emulated(options.seed, "new")
-    assert plate.plate_normal is not None
     pokes: dict[str, tuple[Floats, list[Bools]]] = {}
     for profile in PROFILES:
         trial = poke.emulated(options.seed, profile)
