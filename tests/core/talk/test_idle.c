@@ -103,6 +103,21 @@ TEST(a_start_is_answered_with_a_frame_at_every_phase)
     }
 }
 
+// seq is that of the wrench again after 655.36 s.
+TEST(a_wrench_from_before_a_rest_is_never_repeated)
+{
+    static const bt_map map;
+    const bt_solve_settings mapped = {.map = &map};
+    bt_finger *finger = &session.finger[0];
+    play_level(50, 2000);
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    play_level(1, 2000);
+    finger->kept = (bt_kept_wrench){.valid = true, .seq = (uint16_t)(finger->seq - 1)};
+    assert_int_equal(bt_finger_wrench_age(finger, &mapped), 0);
+    play_level(65536, 2000);
+    assert_true(bt_finger_wrench_age(finger, &mapped) > BT_REPEAT_MAX_ROUNDS);
+}
+
 // ---- what ends the silence -------------------------------------------------------------------------
 
 TEST(a_rest_that_has_moved_beyond_noise_is_shown)
