@@ -736,7 +736,7 @@ typedef struct {
     uint8_t fingers; // [bit mask] bit f: finger f; others stay as they are
 } bt_msg_hold;
 
-// These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT) is tared as residue.
+// These fingers hold nothing: until the next contact, or until they are pressed anew, what may be a light hold or residue of a press (DOUBT) is tared as residue.
 #define BT_RELEASE_ID 0x99
 #define BT_RELEASE_BYTES 2
 typedef struct {

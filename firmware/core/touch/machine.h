@@ -31,6 +31,7 @@ typedef struct {
     bool tared;             // there is a tare
     bool held;              // the host says so: no new tare is taken
     bool released;          // the host says so: what is in doubt is residue
+    int16_t left_pdc;       // the least pressure above the tare since it said so, not below 0
     uint8_t drifted_sweeps; // of rest, until all electrodes have long not moved alike by more than drift does
     bool unsure;            // no release has confirmed the tare: START's, or one that the reading contradicts
     bool likely;            // nor this one, of a host or a SHIFT; what the finger read does not contradict it

@@ -236,6 +236,7 @@ static void end_hold(bt_tare *tare, uint8_t reason)
 void bt_tare_release(bt_tare *tare)
 {
     tare->released = true;
+    tare->left_pdc = BT_FULL_SCALE_COUNT;
     if (tare->unsure && tare->state == BT_TARE_STATE_REST) {
         tare->unsure = false;
         tare->likely = true;

@@ -885,7 +885,7 @@ typedef struct {
 void bt_msg_hold_pack(const bt_msg_hold *msg, uint8_t out[BT_HOLD_BYTES]);
 void bt_msg_hold_unpack(bt_msg_hold *msg, const uint8_t in[BT_HOLD_BYTES]);
 
-// These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT) is tared as residue.
+// These fingers hold nothing: until the next contact, or until they are pressed anew, what may be a light hold or residue of a press (DOUBT) is tared as residue.
 #define BT_RELEASE_ID 0x99
 #define BT_RELEASE_BYTES 2
 typedef struct {

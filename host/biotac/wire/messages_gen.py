@@ -2212,7 +2212,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT) is tared as residue."""
+    """These fingers hold nothing: until the next contact, or until they are pressed anew, what may be a light hold or residue of a press (DOUBT) is tared as residue."""
 
     req_id: int
     fingers: int

@@ -176,6 +176,28 @@ TEST(release_settles_what_was_in_doubt)
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RESIDUE);
 }
 
+// The word is of what is left then. Whoever squeezes on, without having let go, holds.
+TEST(what_is_squeezed_anew_after_a_release_is_held)
+{
+    for (int again = 0; again <= 1; again++) {
+        emulated_finger finger = touched_finger(400, 300);
+        run_seconds(&finger, 2);
+        finger.load = 200;
+        finger.pdc_load = 120;
+        run_seconds(&finger, 0.5);
+        bt_tare_release(&finger.tare);
+        run_seconds(&finger, 0.5);
+        finger.load = again ? 350 : 200;
+        finger.pdc_load = again ? 250 : 120;
+        run_seconds(&finger, 2);
+        finger.load = 80;
+        finger.pdc_load = 60;
+        run_seconds(&finger, 5);
+        assert_int_equal(finger.tare.state, again ? BT_TARE_STATE_DOUBT : BT_TARE_STATE_REST);
+        assert_true(again == (tare_error(&finger) < 1));
+    }
+}
+
 TEST(a_lapsed_hold_is_judged_by_its_signals)
 {
     emulated_finger finger = touched_finger(400, 300);
