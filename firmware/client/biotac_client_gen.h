@@ -573,7 +573,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
 } bt_msg_get_point;
 
-// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE.
+// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, and stays so however often it is taken.
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {

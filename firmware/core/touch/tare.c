@@ -171,8 +171,11 @@ uint8_t bt_tare_now(bt_tare *tare)
     // hold's.
     bool pressed =
         bt_tare_touched(tare) && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) >= BT_PDC_PRESSED;
+    // One that pressure has contradicted is no rest for pressure to come back to: said again, it is as
+    // unsure.
+    bool again = tare->unsure && tare->likely && tare->state == BT_TARE_STATE_REST;
     tare->likely = tare->likely || tare->unsure || tare->state != BT_TARE_STATE_REST;
-    tare->unsure = pressed && !tare->witness.flat;
+    tare->unsure = again || (pressed && !tare->witness.flat);
     bt_adopt_present(tare, BT_TARE_REASON_HOST_NOW);
     return BT_ERROR_OK;
 }

@@ -684,7 +684,7 @@ typedef struct {
 void bt_msg_get_point_pack(const bt_msg_get_point *msg, uint8_t out[BT_GET_POINT_BYTES]);
 void bt_msg_get_point_unpack(bt_msg_get_point *msg, const uint8_t in[BT_GET_POINT_BYTES]);
 
-// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE.
+// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, and stays so however often it is taken.
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {

@@ -1666,7 +1666,7 @@ class GetPoint:
 
 @dataclass(frozen=True, slots=True)
 class TareNow:
-    """Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE."""
+    """Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL). If pressure shows a press, the new tare is TARE_UNSURE, and stays so however often it is taken."""
 
     req_id: int
     finger: int

@@ -291,6 +291,19 @@ TEST(a_tare_taken_of_a_hold_is_lost_when_it_ends)
     }
 }
 
+// A host that got no reply says it again, and the tare that pressure contradicted must not be its witness.
+TEST(a_tare_taken_of_a_hold_is_as_unsure_when_it_is_taken_twice)
+{
+    emulated_finger finger = touched_finger(400, 300);
+    for (int times = 0; times < 3; times++) {
+        run_seconds(&finger, 2);
+        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
+        assert_true(finger.tare.unsure);
+    }
+    bt_tare_release(&finger.tare);
+    assert_true(!finger.tare.unsure && finger.tare.likely);
+}
+
 TEST(a_first_tare_taken_of_a_hold_is_lost_when_it_ends)
 {
     emulated_finger finger;
