@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 from dataclasses import replace
@@ -11,7 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biotac import Frame, FrameFlags, Trust
+from biotac import Finger, Frame, FrameFlags, TareState, Trust
+from biotac.sim import SimFinger, Touch
+from biotac.sim.live import LiveFingers
+from biotac.wire import DTYPES, messages, slots
 from biotac_lab.cli import main
 from biotac_lab.grasp import law, runs
 from biotac_lab.grasp.felt import Board, TrueForce
@@ -200,6 +204,33 @@ def test_the_law_in_c_is_the_same() -> None:
         felt = ([None, None], k == 256) if k in (150, *range(250, 262)) else felt
         assert in_c.step(*felt) == pytest.approx(python.step(*felt), abs=2e-2)
     assert (in_c.holds, in_c.slips, in_c.settled) == (python.holds, python.slips, python.settled) and python.slips > 0
+
+
+def test_the_law_in_c_releases_what_it_has_let_go() -> None:
+    """A board that was told HOLD says CONTACT until RELEASE, however far the hand has opened."""
+    library, sent = (law.load(IN_C).step.__globals__[name] for name in ("LIBRARY", "sent"))
+    live, finger, told = LiveFingers({"index": SimFinger(1)}), Finger(), 0.0
+
+    def rounds(count: int, press_n: float) -> float:
+        nonlocal told
+        for _ in range(count):
+            words = live.read({"index": Touch(press_n)})[:, 0]
+            row = finger.feed(words[:, slots.ELECTRODE_SLOT], words[:, slots.PDC_SLOT])[0]
+            data = sent(messages.Frame, **{name: row[name] for name in DTYPES[messages.Frame.ID].names or ()})
+            before, told = told, library.chip_round(data, len(data))[5]
+            if told > before:
+                finger.release()
+        return told
+
+    library.grip_begin(ctypes.c_float(0.8), ctypes.c_float(12.0))
+    before = rounds(500, 0.0)
+    finger.hold()
+    assert rounds(200, 2.0) == before
+    library.grip_end()
+    assert rounds(20, 1.0) == before
+    assert 1 <= rounds(100, 0.0) - before <= 2  # again if it was lost
+    rows = finger.feed(live.read({})[:, 0, slots.ELECTRODE_SLOT])
+    assert rows["tare_state"][0] == TareState.REST and not rows["flags"][0] & FrameFlags.HELD
 
 
 def test_a_hand_on_a_board_grasps_and_does_so_again() -> None:

@@ -1,5 +1,6 @@
 // The law of grip.py on a hand's own controller. firmware/client/example_bare.c talks to the gateway for it;
-// call grip_begin before each grasp, hand_poll often, grip_round every 10 ms, also after grip_end: it opens.
+// call grip_begin before each grasp, hand_poll often, grip_round every 10 ms, also after grip_end: it opens,
+// and 0.5 s later tells the board.
 #include "biotac_client.h"
 #include <math.h>
 
@@ -16,9 +17,8 @@ struct grip {
 static struct felt {
     float normal_n, shear_n, margin_n, half_n; // sums
     float most_n;
-    int frames, strong, lifted, unheld, slipped;
-    int touched; // 1: a finger is, 2: one is not, 3: both
-} felt;          // since the last grip_round
+    int frames, strong, lifted, held, unheld, slipped;
+} felt; // since the last grip_round
 
 void act_on(const bt_msg_frame *frame)
 {
@@ -26,7 +26,7 @@ void act_on(const bt_msg_frame *frame)
     if (!(FINGERS >> frame->finger & 1)) {
         return; // the board's other fingers touch other things
     }
-    felt.touched |= frame->flags & BT_FRAME_FLAG_CONTACT ? 1 : 2;
+    felt.held |= (frame->flags & BT_FRAME_FLAG_HELD) != 0;
     felt.unheld |= !(frame->flags & BT_FRAME_FLAG_HELD);
     if (frame->trust >= BT_TRUST_INTERVAL && bt_valid_i32(force[0]) && bt_valid_i32(force[1])
         && bt_valid_i32(force[2])) {
@@ -111,10 +111,10 @@ void grip_round(void)
     grip.round++;
     if (grip.holds && (!felt.frames || grip.blind)) // also what it does blindly makes the force
         grip.way_mm += grip.speed_mm_s * 0.01f;
-    if (grip.opens) { // RELEASE once nothing is touched: what is left over then is residue
+    if (grip.opens) { // by 10 mm before RELEASE: what is left over then is residue. Until then all is CONTACT
         grip.speed_mm_s = -20;
-        if (grip.opens == 1 && felt.touched == 2)
-            hand_send(BT_RELEASE_ID, &(bt_msg_release){4, FINGERS}), grip.opens = 2;
+        if (grip.opens++ > 50 && felt.held) // again if it was lost
+            hand_send(BT_RELEASE_ID, &(bt_msg_release){4, FINGERS});
     } else if (felt.frames) {
         grip.speed_mm_s = grip.blind ? 0 : grip.speed_mm_s; // what it did blindly is no rate to go on from
         if (felt.slipped || grip.blind_slips)               // it may slip still

@@ -18,10 +18,10 @@ CLIENT = HERE.parents[3] / "firmware/client"
 CHIP = """
 #include "GRIP"
 static const unsigned char *next, *end;
-static float state[5];
+static float state[6];
 static uint32_t ms;
 int uart_next(void) { return next < end ? *next++ : -1; }
-void uart_send(const uint8_t *data, size_t bytes) { (void)data; (void)bytes; }
+void uart_send(const uint8_t *data, size_t bytes) { state[5] += bytes != 0 && data[1] == BT_RELEASE_ID; }
 uint32_t now_ms(void) { return ms; }
 void close_at(float mm_s) { state[0] = mm_s; }
 void hand_poll(void);
