@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import errno
 import importlib
 import io
@@ -124,18 +125,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The message says what became of a file that was being written.
         note(f"interrupted{f'; {interrupt}' if interrupt.args else ''}")
         return ending.INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output closed it; keep Python from complaining while it shuts down.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except MemoryError:
+        note("not enough memory for that; close other programs, or take less of it (`biotac file cut`)")
+        return InputError.exit_code
     except OSError as error:
+        unread = isinstance(error, BrokenPipeError) or (error.errno == errno.EIO and _terminal_closed())
         full = error.errno in (errno.EMFILE, errno.ENFILE)
         cure = (
             "close what is open, or raise the limit (ulimit -n)" if full else "check the path and the free disk space"
         )
-        note(f"{printable(one_line(error))}; {cure}")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return InputError.exit_code
+        if not unread:
+            note(f"{printable(one_line(error))}; {cure}")
+        with contextlib.suppress(OSError):  # what stands for stdout in a notebook has no descriptor
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains while it shuts down
+        return 0 if unread else InputError.exit_code
+
+
+def _terminal_closed() -> bool:
+    """Whether stdout is a terminal that has closed: then it, and not a disk, gave the error."""
+    try:
+        os.get_terminal_size(sys.stdout.fileno())
+    except OSError as error:
+        return error.errno == errno.EIO
+    return False
 
 
 def _make_streams_usable() -> None:

@@ -87,7 +87,8 @@ def find_image() -> Path:
 def read_image(path: Path) -> Image:
     """Read and check an image. Raises InputError saying what is wrong with it."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(8 * FLASH_BYTES + 1)  # more than any board's; in no whole blocks
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); expected an image, .uf2") from error
     try:

@@ -6,6 +6,7 @@ import math
 from importlib import resources
 from pathlib import Path
 
+from ..documents import TOML_BYTES
 from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from .play import play
@@ -59,7 +60,8 @@ def _scenario_bytes(file: Path) -> bytes:
     try:
         if not file.exists() and file.parent == Path() and file.name in bundled_scenarios():
             return bundled_scenario(file.name)
-        return file.read_bytes()
+        with file.open("rb") as stream:
+            return stream.read(4 * TOML_BYTES + 1)  # enough to be refused
     except OSError as error:
         raise InputError(
             f"{file}: cannot be read ({error.strerror}): expected a scenario's path or one of "

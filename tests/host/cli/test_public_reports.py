@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import multiprocessing
 import os
@@ -112,3 +113,28 @@ def test_a_pipe_is_no_recording_and_a_full_disk_has_a_name(tmp_path: Path, capsy
         hand.record("/dev/full", overwrite=True)
         hand.stream("results")
         hand.read(5.0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits a process's memory")
+def test_what_does_not_fit_into_memory_is_told(recorded: Path, tmp_path: Path) -> None:
+    """A file of 20 GB that takes no room on the disk."""
+    for name in ("a.csv", "a.toml", "a.uf2"):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(20 << 30)
+    calibrate = ["calibrate", "wrench", str(recorded), "--finger", "0", "--out", "out", "--reference", "a.csv"]
+    for words, seen in (
+        (calibrate, "not enough memory"),
+        (["record", "sim:a.toml", "b.mcap"], "larger than 1 MiB"),
+        (["flash", "--emulated", "a.uf2"], "not a UF2 file"),
+    ):
+        program = f"import resource as r; r.setrlimit(r.RLIMIT_AS, ({2 << 30}, {2 << 30})); from biotac.cli.main import"
+        program += f" main; raise SystemExit(main({words}))"
+        done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 2 and seen in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+def test_an_error_is_told_whatever_stands_for_stdout(monkeypatch, capsys) -> None:
+    """As in a notebook or behind pytest's capture: it has no file descriptor."""
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert main(["info", "n" * 300 + ".mcap"]) == 2
+    assert "File name too long" in capsys.readouterr().err

@@ -3,12 +3,15 @@ recorded is whole. BIOTAC_SEED chooses the moments; by night there are twenty of
 
 from __future__ import annotations
 
+import fcntl
 import os
+import pty
 import random
 import shutil
 import signal
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -160,6 +163,24 @@ def test_an_ignored_signal_stays_ignored(folder: Path) -> None:
     assert process.poll() is None
     code, output, _ = ended(process, signal.SIGTERM, False)
     assert (code, judge(folder, code, output)) == (0, "")
+
+
+def test_a_terminal_that_closes_ends_a_recording_as_ctrl_c_does(folder: Path) -> None:
+    """Also what it still prints is then an error, of nothing that it has done."""
+    terminal, inside = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "biotac", *VERBS["record"]], cwd=folder, text=True, start_new_session=True,
+        stdin=inside, stdout=inside, stderr=subprocess.PIPE,
+        preexec_fn=lambda: [signal.signal(signal.SIGHUP, signal.SIG_DFL), fcntl.ioctl(inside, termios.TIOCSCTTY, 0)],
+    )  # fmt: skip
+    os.close(inside)
+    while not (folder / "OUT.mcap").exists():
+        time.sleep(0.1)
+    time.sleep(1.5)
+    os.close(terminal)
+    _, output = process.communicate(timeout=60)
+    assert (process.returncode, judge(folder, process.returncode, output)) == (0, "")
+    assert "Errno" not in output
 
 
 def test_two_signals_are_one(folder: Path) -> None:
