@@ -44,7 +44,7 @@ def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Itera
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
 
 
-def refuse_source(out: Path, sources: Iterable[Path]) -> None:
+def refuse_source(out: Path, sources: Iterable[Path | str]) -> None:
     """Raises InputError if ``out`` is one of those files, by whatever name: what was measured cannot be made again."""
     for path in sources:
         with contextlib.suppress(OSError, ValueError):  # one that is not there

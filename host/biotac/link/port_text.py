@@ -30,6 +30,11 @@ def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str,
     return path, options
 
 
+def file_of(port: str) -> str:
+    """The file that a PORT plays; of one that plays none, what is behind its scheme."""
+    return file_and_query(port.partition(":")[2])[0]
+
+
 def file_and_query(text: str) -> tuple[str, str]:
     """What is before a question mark and behind it; one that belongs to the name of a file is not that."""
     longest, _, rest = text.rpartition("?")

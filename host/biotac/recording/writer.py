@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, cast
 from ..board.gap import Gap
 from ..errors import InputError, exists_error, printable
 from ..link.base import AppliedN
-from ..link.port_text import file_and_query
+from ..link.port_text import file_of
 from ..partial_file import refuse_source
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
@@ -85,7 +85,7 @@ class Writer:
         self.paths.append(path)
 
     def _begin(self, path: Path, metadata: dict[str, str]) -> RecordingFile:
-        refuse_source(path, [Path(file_and_query(self._port.partition(":")[2])[0])])
+        refuse_source(path, [file_of(self._port)])
         file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
         self._at = max(0, file.stream.tell() - OWN_BYTES)
         self._own = self._on_disk(file.stream)

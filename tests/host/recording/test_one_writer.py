@@ -58,6 +58,19 @@ def test_what_is_read_is_not_written_over(recorded: Path, tmp_path: Path, capsys
     assert not list(tmp_path.glob(".*"))  # nothing partial
 
 
+@pytest.mark.parametrize("more", [[], ["--bringup"]])
+@pytest.mark.parametrize("way", WAYS)
+def test_a_report_is_not_written_over_what_it_is_about(
+    recorded: Path, tmp_path: Path, capsys, way: str, more: list[str]
+) -> None:
+    rec = Path(shutil.copy(recorded, tmp_path))
+    (tmp_path / "x").mkdir()
+    before = rec.read_bytes()
+    assert main(["doctor", f"replay:{rec}?pace=fast", "--report", str(WAYS[way](rec)), *more]) == 2
+    assert "itself, which would be lost" in capsys.readouterr().err
+    assert rec.read_bytes() == before
+
+
 def test_a_bag_is_not_written_over_the_one_it_is_beside(recorded: Path, tmp_path: Path, capsys) -> None:
     pytest.importorskip("rosbags")
     bag = tmp_path / "a.bag"

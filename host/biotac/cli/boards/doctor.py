@@ -18,7 +18,8 @@ from ...doctor.listening import examine, has_crystal
 from ...doctor.timing import slots_per_s
 from ...hand.hand import Hand
 from ...link import open_link
-from ...partial_file import whole
+from ...link.port_text import file_of
+from ...partial_file import refuse_source, whole
 from ...sim.loading import load_source
 from ...sim.sensor_board import SensorBoard
 from ...version import __version__
@@ -63,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     """Examine the board and print the findings; return 1 if there are any."""
     if args.udev_rule is not None:
         return udev_rule(args)
+    if args.report is not None and args.port is not None:
+        refuse_source(Path(args.report), [file_of(args.port)])
     seen = Bringup()
 
     def first_evening(hand: Hand) -> BoardFacts:
