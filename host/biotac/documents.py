@@ -19,7 +19,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import InputError, exists_error
+from .errors import InputError
+from .partial_file import whole
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -116,14 +117,9 @@ def _parsed(
 
 
 def write_new(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Write a text file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise exists_error(path) from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+    """Write a text file, whole. Raises InputError when it exists and may not be overwritten, or cannot be written."""
+    with whole(path, overwrite=overwrite) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def made_text(made_s: int) -> str:

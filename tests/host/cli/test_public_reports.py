@@ -18,7 +18,7 @@ import pytest
 
 import biotac
 from biotac.cli.main import main
-from biotac.documents import read_text
+from biotac.documents import read_text, write_new
 from biotac.errors import InputError
 from biotac.sim.loading import load_source
 
@@ -138,3 +138,10 @@ def test_an_error_is_told_whatever_stands_for_stdout(monkeypatch, capsys) -> Non
     monkeypatch.setattr(sys, "stdout", io.StringIO())
     assert main(["info", "n" * 300 + ".mcap"]) == 2
     assert "File name too long" in capsys.readouterr().err
+
+
+def test_a_document_that_cannot_be_written_leaves_the_one_before(tmp_path: Path) -> None:
+    write_new(tmp_path / "a.json", "before")
+    with pytest.raises(UnicodeEncodeError):
+        write_new(tmp_path / "a.json", "\udc00", overwrite=True)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.json", "before")]

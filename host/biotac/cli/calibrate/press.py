@@ -26,7 +26,6 @@ from ...hand.hand import Hand
 from ...keep import calibration_file
 from ...map import file as map_file
 from ...map.bound import summary
-from ...partial_file import whole
 from ...recording.reader import Recording
 from ...wire.identity import ascii_text
 from ...wire.sensor_gen import MAX_SENSORS
@@ -270,8 +269,7 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         origin["reference"] = f"{len(held.force_n)} {way.name}; population map from {trained.fingers}"
         origin |= {DOUBT: why_not} if why_not else {}
         text = map_file.dumps_fitted(own, serial=serial, made_s=made_s, provenance=origin)
-        with whole(args.out, overwrite=args.force) as path:
-            path.write_text(text, encoding="utf-8")
+        write_new(args.out, text, overwrite=args.force)
         facts["written"] = str(args.out)
     if hand is not None and not args.no_upload and not refused:
         facts["board"] = upload(hand, finger, own, held.counts, serial=serial, made_s=made_s)
