@@ -31,7 +31,7 @@ def whole(path: Path, *, overwrite: bool, sources: Iterable[Path] = ()) -> Itera
         raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:
         # In a folder of its own it has its right name already: a bag's files are called after it.
-        folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
+        folder = Path(tempfile.mkdtemp(prefix=f".{path.name[:50]}.", suffix=".part", dir=path.parent))
         try:
             part = folder / path.name
             yield part

@@ -9,6 +9,7 @@ is removed is named once more, as ``removed``.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -82,7 +83,7 @@ def read(recording: Path, begin_ns: int, live: Iterable[Label] = ()) -> tuple[li
     """
     latest = {(label.text, label.t_us, label.finger): label for label in live}
     path = beside(recording)
-    if not path.is_file():
+    if not os.path.isfile(path):  # nor can be: a name may be too long with this suffix
         return _in_order(latest.values()), []
     if (size := path.stat().st_size) > MAX_BYTES:
         raise RecordingError(f"{path} has {size} bytes, expected at most {MAX_BYTES}; split the recording")

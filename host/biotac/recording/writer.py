@@ -209,7 +209,7 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
     """Open ``path`` for writing. Raises InputError when it is a folder, exists, or cannot be written."""
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a file in it")
-    if path.suffix != ".mcap" and (path.suffix or not path.exists() or path.is_file()):
+    if path.suffix.lower() != ".mcap" and (path.suffix or not path.exists() or path.is_file()):
         raise InputError(
             f"{path}: a recording is an .mcap file; record to {path.name.partition('.')[0]}.mcap, "
             "then use `biotac export`"

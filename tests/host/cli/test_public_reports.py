@@ -145,3 +145,18 @@ def test_a_document_that_cannot_be_written_leaves_the_one_before(tmp_path: Path)
     with pytest.raises(UnicodeEncodeError):
         write_new(tmp_path / "a.json", "\udc00", overwrite=True)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.json", "before")]
+
+
+def test_a_name_of_any_length_that_the_disk_takes_will_do(recorded: Path, tmp_path: Path, monkeypatch) -> None:
+    """Also where those made of it, of its labels and of what is not whole yet, would be too long."""
+    monkeypatch.chdir(tmp_path)
+    name = "n" * 250
+    shutil.copy(recorded, f"{name}.mcap")
+    assert main(["file", "cut", f"{name}.mcap", f"{name[1:]}m.mcap"]) == 0
+    assert main(["export", f"{name}.mcap", f"{name}.npz"]) == 0
+
+
+def test_a_suffix_in_capitals_is_one(tmp_path: Path) -> None:
+    """As Windows and cameras write it; what reads takes it."""
+    assert main(["record", "sim:press.toml?seconds=1", str(tmp_path / "A.MCAP")]) == 0
+    assert main(["check", str(tmp_path / "A.MCAP")]) == 0
