@@ -83,7 +83,7 @@ class Recording:
     gaps: list[Gap] = _of_contents("gaps")
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] | None = None) -> None:
-        self.path = Path(path)
+        self.path = Path(path).absolute()  # wherever the program goes
         self._index = None if show else Index.read(self.path)
         if self._index is not None:
             blocks = Blocks(self.path, {}, (), index=self._index)

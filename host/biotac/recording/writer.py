@@ -52,7 +52,7 @@ class Writer:
         clock_s: Callable[[], float] = time.monotonic,
         unix_ns: Callable[[], int] = lambda: max(0, time.time_ns()),  # MCAP's times begin in 1970
     ) -> None:
-        self.path = path
+        self.path = path = path.absolute()  # wherever the program goes
         self.paths = [path]
         self._port = port
         self._overwrite = overwrite

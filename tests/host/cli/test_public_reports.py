@@ -160,3 +160,21 @@ def test_a_suffix_in_capitals_is_one(tmp_path: Path) -> None:
     """As Windows and cameras write it; what reads takes it."""
     assert main(["record", "sim:press.toml?seconds=1", str(tmp_path / "A.MCAP")]) == 0
     assert main(["check", str(tmp_path / "A.MCAP")]) == 0
+
+
+@pytest.mark.filterwarnings("ignore::biotac.ReadWarning")  # of the gap
+def test_a_program_that_goes_to_another_folder_keeps_its_recordings(tmp_path: Path, monkeypatch) -> None:
+    """As Hydra's do, a folder for each job."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "else").mkdir()
+    with biotac.open("sim:press.toml?seconds=5", reconnect=True) as hand, hand.record("b.mcap") as recorder:
+        hand.stream("results")
+        hand.read(0.5)
+        monkeypatch.chdir(tmp_path / "else")
+        hand.board.restart()
+        hand.read(0.5)
+    assert recorder.paths == [tmp_path / "b.mcap", tmp_path / "b.2.mcap"] and recorder.path.exists()
+    monkeypatch.chdir(tmp_path)
+    recording = biotac.Recording("b.mcap")
+    monkeypatch.chdir(tmp_path / "else")
+    assert len(recording.select()) > 30
