@@ -61,6 +61,7 @@ class Firmware:
         self.t_us = 0
         self.streams = 0  # that are on
         self.faults = 0
+        self.tare_reason = wire.TareReason.START
         self.idle = True  # all fingers rest: STATUS counts their heartbeats on
         self.frames_idle = 0
         self.mute: set[type] = set()  # what it does not answer
@@ -95,6 +96,10 @@ class Firmware:
             return self._hello(payload, **self.facts)
         if isinstance(message, wire.GetStatus):
             return packed(self.status(message.req_id))
+        if isinstance(message, wire.GetSensorStatus):
+            facts = dict.fromkeys((f.name for f in fields(wire.SensorStatus)), 0)
+            facts |= {"req_id": message.req_id, "finger": message.finger, "tare_reason": self.tare_reason}
+            return packed(wire.SensorStatus(**facts))
         if isinstance(message, wire.SetSetting):
             self.settings[message.setting] = message.value
         if isinstance(message, (wire.SetSetting, wire.GetSetting)):

@@ -188,7 +188,9 @@ class StreamWatch:
             self._repeat_release()
             for tare in self._tares() if reason == "rebooted" else []:
                 with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
-                    board.command(tare)
+                    now = board.ask(wire.GetSensorStatus(0, tare.finger), wire.SensorStatus)
+                    if now.tare_reason != wire.TareReason.RESTORED:  # else the board kept it over a hang
+                        board.command(tare)
             self._stream.resume()
             self._answered_us = None
             self._started = None  # look at once: until a STATUS has come, nobody knows how old a row is
