@@ -15,6 +15,7 @@ from typing import Any
 from ..errors import BiotacError, DeviceLostError, FlashError, NotAGatewayError, installing
 from ..hand.hand import Hand
 from ..link.ports import open_link
+from ..link.serial_port import open_error
 from .image import Image
 from .interfaces import Loader, Show, Target
 from .waiting import wait_for
@@ -72,7 +73,10 @@ class Stm32Loader(Loader):
             raise FlashError(f"an STM32 is flashed by the package stm32loader: {installing('stm32')}") from error
         self.close()
         connection = uart.SerialConnection(self._device, LOADER_BAUD, "E")
-        connection.connect()
+        try:
+            connection.connect()
+        except OSError as error:
+            raise open_error(self._device, error) from error
         connection.timeout = 0.5
         self._error: type[Exception] = bootloader.Stm32LoaderError
         board = bootloader.Stm32Bootloader(connection, device_family="F4", verbosity=0)

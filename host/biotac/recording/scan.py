@@ -228,9 +228,9 @@ class Scan:
             self.cut_off = not whole or self._size - at - length < len(MCAP0_MAGIC)
             magic = _content(stream, self._size - len(MCAP0_MAGIC), len(MCAP0_MAGIC)).read(len(MCAP0_MAGIC))
         if self.cut_off:
+            lost = f"; its last {self._size - good_until} bytes cannot be read" if good_until < self._size else ""
             self.problems.append(
-                f"{self.path.name} ends without its index, as after a kill or a full disk: its last "
-                f"{self._size - good_until} bytes are incomplete or unreadable; everything before them was read"
+                f"{self.path.name} ends without its index, as after a kill or a full disk{lost}; all else was read"
             )
         elif magic != MCAP0_MAGIC or not self._counted or not self._data_end:
             self.problems.append(

@@ -18,7 +18,7 @@ from fake_flash_board import FakeBoard
 from live_board import until
 
 from biotac.cli.main import main
-from biotac.errors import FlashError, InputError
+from biotac.errors import FlashError, InputError, PortError
 from biotac.flash.image import Image, read_image
 from biotac.flash.loader_stm32 import Stm32Loader
 from biotac.flash.note import find, seal
@@ -213,6 +213,11 @@ def test_nobody_there_is_not_ready(tmp_path: Path) -> None:
     assert re.search("0483:df11.*hold BOOT0 high", loader.cure())
     os.close(master)
     os.close(slave)
+
+
+def test_a_port_that_is_not_there_is_no_disk_that_is_full(tmp_path: Path) -> None:
+    with pytest.raises(PortError, match=r"no port .*ttyGONE; `biotac list`"):
+        Stm32Loader(str(tmp_path / "ttyGONE")).ready()
 
 
 def test_a_bin_of_another_board_or_none_is_refused(tmp_path: Path, image) -> None:

@@ -87,6 +87,11 @@ def test_a_program_that_vanishes_makes_room_for_the_next(server: LoadServer) -> 
     assert answer["round"] >= 1
 
 
+def test_loads_from_lines_and_from_a_scenario_are_refused_together(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sim", "press.toml", "--live", "index"]) == 2
+    assert "--live takes its loads from lines, and no SOURCE; drop press.toml" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("names", ["index,index", "index,fault"])
 def test_names_that_a_line_could_not_tell_apart_are_refused(names: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sim", "--live", names]) == 2

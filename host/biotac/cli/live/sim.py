@@ -80,7 +80,9 @@ def run(args: argparse.Namespace) -> int:
         return sensor_board.run(args, seconds)
     values.refuse(args, ("by_time", "keep", "forget"), "is for a sensor board; add --sensor-port PORT")
     if args.live is not None:
-        values.refuse(args, ("source", "fingers", "seconds", "pace", "fault"), "is for a board with a SOURCE; drop it")
+        if args.source is not None:
+            raise InputError(f"--live takes its loads from lines, and no SOURCE; drop {args.source}")
+        values.refuse(args, ("fingers", "seconds", "pace", "fault"), "is for a board with a SOURCE; drop it")
         return serve_loads(args)
     if args.source is None:
         raise InputError("no SOURCE is given, expected a scenario such as press.toml, or recorded counts")
