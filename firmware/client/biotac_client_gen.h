@@ -589,7 +589,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
     uint16_t tare_q4[19]; // [count q4] tare of E1 to E19, in 1/16 count
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: unknown
-    uint32_t age_ms; // [ms] how long ago the finger read this at rest; 0xFFFFFFFF: unknown
+    uint32_t age_ms; // [ms] how long ago this was the finger's tare, or read at rest; 0xFFFFFFFF: unknown
 } bt_msg_tare_set;
 
 // Ask for STATUS.

@@ -350,10 +350,11 @@ CAUSES: dict[str, tuple[tuple[str, ...], str, str]] = {
          "all drift -5 counts/s", "all drift 8 counts/s"),
         "BASE_OLD, of 1 count/s late or none", "lets go from time to time",
     ),
-    "all electrodes drift by 12 to 30 counts/s, or jump by 50": (
-        ("all electrodes drift 20 counts/s", "all electrodes jump by 50", *SQUEEZED_DRIFTS),
-        "BASE_OLD, half a second late in a squeeze; of a jump SENSOR_FAULT", "lets go, to tare",
+    "all electrodes drift by 12 to 30 counts/s": (
+        ("all electrodes drift 20 counts/s", *SQUEEZED_DRIFTS),
+        "BASE_OLD, half a second late in a squeeze", "lets go, to tare",
     ),
+    "all electrodes jump by 50": (("all electrodes jump by 50",), "SENSOR_FAULT", "lets go, to tare"),
     "half of the electrodes drift up by 4 or 12 counts/s, half down": (
         tuple(f"half drift up by {rate} counts/s, half down" for rate in (4, 12)), "DOUBT, after the hold",
         "lets go from time to time",

@@ -702,7 +702,7 @@ typedef struct {
     uint8_t finger; // [1] chip select index
     uint16_t tare_q4[19]; // [count q4] tare of E1 to E19, in 1/16 count
     uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: unknown
-    uint32_t age_ms; // [ms] how long ago the finger read this at rest; 0xFFFFFFFF: unknown
+    uint32_t age_ms; // [ms] how long ago this was the finger's tare, or read at rest; 0xFFFFFFFF: unknown
 } bt_msg_tare_set;
 void bt_msg_tare_set_pack(const bt_msg_tare_set *msg, uint8_t out[BT_TARE_SET_BYTES]);
 void bt_msg_tare_set_unpack(bt_msg_tare_set *msg, const uint8_t in[BT_TARE_SET_BYTES]);

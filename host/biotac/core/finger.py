@@ -160,7 +160,7 @@ class Finger:
     def set_tare(self, counts: Any, pdc: float | None = None, *, age_s: float | None = None) -> None:
         """Do TARE_SET: use ``counts`` (19,), 0..4095 counts, from the next round on; ``pdc`` likewise, None: unknown.
 
-        ``age_s`` is how long ago the finger read this at rest, in s; None: unknown.
+        ``age_s`` is how long ago this was the finger's tare, in s; None: unknown.
 
         Values are rounded to 1/16 count, as in the message. Raises ValueError for other shapes and ranges,
         CommandRefusedError if more than two electrodes are railed.

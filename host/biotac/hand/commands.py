@@ -105,7 +105,7 @@ class Commands:
     ) -> None:
         """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, rounded to 1/16 count; ``pdc_counts`` likewise.
 
-        ``age_s`` is how long ago the finger read this at rest, in s; None: unknown. The board compares it with what the
+        ``age_s`` is how long ago this was the finger's tare, in s; None: unknown. The board compares it with what the
         finger reads, and flags it until a release has confirmed it: TARE_LIKELY if they agree, else TARE_UNSURE.
 
         Raises ValueError for another shape or range.
