@@ -18,7 +18,7 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
     finger->index = index;
     finger->quantities = BT_SUBSCRIBED_AT_FIRST;
     bt_tare_reset(&finger->tare);
-    bt_health_reset(&finger->health);
+    finger->health = (bt_health){0};
     bt_events_reset(&finger->events);
     bt_settings_reset(&initial);
     bt_pressure_use(&finger->pressure, &initial);
@@ -124,7 +124,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
 void bt_finger_forget(bt_finger *finger)
 {
     bt_tare_reset(&finger->tare);
-    bt_health_reset(&finger->health);
+    finger->health = (bt_health){0};
     bt_events_reset(&finger->events);
     finger->answered = false;
 }

@@ -27,11 +27,6 @@
 #define SHAKEN_ROUNDS 8
 #define FLIP_WINDOWS  8 // in which no live electrode jumps back and forth three times
 
-void bt_health_reset(bt_health *health)
-{
-    memset(health, 0, sizeof *health);
-}
-
 static void condemn(bt_health *health, uint32_t electrodes, uint8_t fault)
 {
     health->out |= electrodes;

@@ -55,8 +55,6 @@ typedef struct {
     uint16_t sd_q4;        // of a difference of two means, by noise
 } bt_health;
 
-void bt_health_reset(bt_health *health);
-
 // End a round: judge its words. `touched`: something may touch the finger.
 void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger *trigger,
                      const bt_noise *noise, bool touched);

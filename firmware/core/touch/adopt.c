@@ -46,7 +46,7 @@ void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t rea
     tare->hits = 0;
     tare->contact_rounds = 0;
     tare->released = false;
-    bt_release_begin(&tare->release);
+    tare->release = (bt_release){0};
     bt_thermal_begin(&tare->thermal);
     bt_watch_begin(&tare->watch);
     bt_rollback_start(&tare->rollback, base);

@@ -22,17 +22,17 @@ _Static_assert(BT_ELECTRODES *(int64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT 
 // The squared distances of counts from a tare over all electrodes that have both, and the sum of these.
 static uint32_t distance_count2(const bt_lanes *counts, unsigned shift, const bt_baseline *base, int32_t *sum)
 {
-    uint32_t distance_count2 = 0;
+    uint32_t energy = 0;
     *sum = 0;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         int32_t count = counts->lane[i] >> shift;
         if (base->electrode_q16[i] != BT_TARE_UNKNOWN && count <= BT_FULL_SCALE_COUNT) {
             int32_t e = count - bt_baseline_count(base->electrode_q16[i]);
-            distance_count2 += (uint32_t)(e * e);
+            energy += (uint32_t)(e * e);
             *sum += e;
         }
     }
-    return distance_count2;
+    return energy;
 }
 
 bool bt_inverted(const bt_lanes *smooth, const bt_baseline *base, int32_t pdc_missing)

@@ -2,14 +2,7 @@
 
 #include "fixed_point.h"
 
-#include <string.h>
-
 #define SLOW_SWEEPS 4 // a third of a second: cooling takes 3 counts, a slow release 12
-
-void bt_release_begin(bt_release *release)
-{
-    memset(release, 0, sizeof *release);
-}
 
 void bt_release_pressure(bt_release *release, int32_t above)
 {

@@ -28,7 +28,7 @@ typedef struct {
     bool flat;
 } bt_witness;
 
-// Since the tare was taken.
+// Since the tare was taken; all 0 then.
 typedef struct {
     uint32_t energy_peak;
     uint32_t uneven_peak;
@@ -55,8 +55,6 @@ typedef struct {
     uint8_t still_sweeps;
     uint8_t level_sweeps; // with level pressure
 } bt_release_sweep;
-
-void bt_release_begin(bt_release *release);
 
 // Add a round in contact with a good pressure word.
 void bt_release_pressure(bt_release *release, int32_t above);

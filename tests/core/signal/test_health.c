@@ -17,7 +17,7 @@ static uint32_t wrongs; // electrodes whose words are wrong
 static int begin(void **state)
 {
     (void)state;
-    bt_health_reset(&health);
+    health = (bt_health){0};
     bt_trigger_reset(&trigger);
     memset(&sampled, 0, sizeof sampled);
     noise = (bt_noise){.count2 = 43, .sigma_q4 = 24}; // of 19 electrodes with SIGMA

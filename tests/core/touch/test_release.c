@@ -15,8 +15,7 @@ static const bt_release_sweep held = {.energy_count2 = 100000,
 // A press of this energy, and what stands for a second of this pressure above the tare.
 static bt_witness asked(bt_witness witness, uint32_t uneven_count2, int32_t above, uint8_t still_sweeps)
 {
-    bt_release release;
-    bt_release_begin(&release);
+    bt_release release = {0};
     bt_release_pressure(&release, above);
     for (int k = 0; k < 12; k++) {
         bt_release_sweep sweep = held;
