@@ -203,7 +203,7 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
         report_trust(session, finger);
         return;
     }
-    finger->kept.valid = false; // before the rest, whose length seq tells only up to 655 s
+    finger->kept.valid = false; // seq gives a wrench's age up to 655 s only, and a rest may last longer
     finger->trust = bt_trust(bt_finger_flags(finger), 0, 0);
     report_trust(session, finger);
     session->skips.frames++;

@@ -92,7 +92,7 @@ static void judge_release(bt_tare *tare)
         .level_sweeps = tare->watch.level_sweeps,
         .warmer = bt_thermal_warmed_q8(&tare->thermal) > BT_DEGREE_Q8 / 2,
     };
-    // RELEASE is of what was left then: who is pressed anew holds anew.
+    // RELEASE speaks of what was left at that time: a finger that is pressed anew holds again.
     tare->released = tare->released && sweep.above < tare->left_pdc + BT_PDC_PRESSED;
     tare->left_pdc = (int16_t)bt_clamp(sweep.above, 0, tare->left_pdc);
     bt_release_verdict verdict = bt_release_judge(&tare->release, &tare->witness, &sweep);

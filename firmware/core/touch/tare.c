@@ -171,8 +171,7 @@ uint8_t bt_tare_now(bt_tare *tare)
     // hold's.
     bool pressed =
         bt_tare_touched(tare) && bt_tare_pdc_known(tare) && bt_tare_pdc_above(tare) >= BT_PDC_PRESSED;
-    // One that pressure has contradicted is no rest for pressure to come back to: said again, it is as
-    // unsure.
+    // A tare that pressure contradicted stays unsure however often it is taken: a hold is still in it.
     bool again = tare->unsure && tare->likely && tare->state == BT_TARE_STATE_REST;
     tare->likely = tare->likely || tare->unsure || tare->state != BT_TARE_STATE_REST;
     tare->unsure = again || (pressed && !tare->witness.flat);
