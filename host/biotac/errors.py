@@ -6,7 +6,9 @@ Each message is one line: what was seen, what was expected, and the cure. The co
 
 from __future__ import annotations
 
+from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 LONGEST = 1000  # characters of a message
@@ -35,6 +37,13 @@ def error_text(error: Exception) -> str:
 def exists_error(path: object) -> InputError:
     """What to raise when ``path`` exists and may not be overwritten."""
     return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")
+
+
+def path_text(path: Path) -> str:
+    """A path as a person would type it: relative where it is in the present folder."""
+    with suppress(ValueError, OSError):
+        path = path.relative_to(Path.cwd())
+    return str(path)
 
 
 def installing(extra: str) -> str:

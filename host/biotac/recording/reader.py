@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..board.gap import Gap
 from ..core.bands import bands_of
-from ..errors import InputError, RecordingError
+from ..errors import InputError, RecordingError, path_text
 from ..keep.calibration import own_settings
 from ..markdown import html_table
 from ..wire import messages_gen as wire
@@ -316,13 +316,13 @@ class Recording:
         try:
             if int(metadata["wire"].partition(".")[0]) != wire.WIRE_MAJOR:
                 raise RecordingError(
-                    f"{self.path} uses wire version {metadata['wire']}, this biotac-gateway reads {wire.WIRE_MAJOR}.x; "
-                    "install the version it was recorded with"
+                    f"{path_text(self.path)} uses wire version {metadata['wire']}, this biotac-gateway reads "
+                    f"{wire.WIRE_MAJOR}.x; install the version it was recorded with"
                 )
             facts = Facts.read(metadata)
         except (KeyError, ValueError) as error:
             raise RecordingError(
-                f"{self.path} has damaged metadata ({error}) and cannot be used; try another copy"
+                f"{path_text(self.path)} has damaged metadata ({error}) and cannot be used; try another copy"
             ) from error
         self.metadata = metadata
         self.info, self.sensors, self.names = facts.info, facts.sensors, facts.names

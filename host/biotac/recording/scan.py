@@ -26,7 +26,7 @@ from mcap.records import Channel, Chunk, DataEnd, Footer, McapRecord, Message, M
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
-from ..errors import RecordingError
+from ..errors import RecordingError, path_text
 from ..link.port_text import how_to_record
 from . import layout
 
@@ -183,15 +183,16 @@ class Scan:
             self._size = self.path.stat().st_size
             stream = self.path.open("rb", buffering=1 << 18)
         except OSError as error:
-            raise RecordingError(f"{self.path} cannot be read ({error.strerror}); check the path") from error
+            raise RecordingError(f"{path_text(self.path)} cannot be read ({error.strerror}); check the path") from error
         with stream:
             if self._index is not None:
                 yield from self._by_index(stream, self._index)
                 return
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                how = how_to_record(self.path)
+                path = path_text(self.path)
+                how = how_to_record(path)
                 raise RecordingError(
-                    f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); expected a file "
+                    f"{path} is not an MCAP file ({self._size} bytes, wrong first bytes); expected a file "
                     f"written by `biotac record`{how and '; '}{how}"
                 )
             good_until = len(MCAP0_MAGIC)
@@ -335,7 +336,7 @@ class Scan:
         self._unpacked += size
         if size > _CHUNK_MAX_BYTES or self._unpacked > _FREE_BYTES + _RATIO_MAX * self._size:
             raise RecordingError(
-                f"{self.path} unpacks to {self._unpacked / 1e6:.0f} MB or more from {self._size / 1e6:.1f} MB; "
-                f"expected at most {_CHUNK_MAX_BYTES >> 20} MiB per chunk and {_RATIO_MAX} times the file's size: it "
-                "is not a recording of a board"
+                f"{path_text(self.path)} unpacks to {self._unpacked / 1e6:.0f} MB or more from "
+                f"{self._size / 1e6:.1f} MB; expected at most {_CHUNK_MAX_BYTES >> 20} MiB per chunk and "
+                f"{_RATIO_MAX} times the file's size: it is not a recording of a board"
             )
