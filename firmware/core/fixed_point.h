@@ -72,10 +72,10 @@ static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
     return ((int32_t)magnitude ^ mask) - mask;
 }
 
-// The next count, or the last one that its type holds.
-static inline uint8_t bt_counted(uint8_t count)
+// One more, and never more than `most`.
+static inline uint8_t bt_count_up(uint8_t count, uint8_t most)
 {
-    return (uint8_t)(count + (count < UINT8_MAX));
+    return (uint8_t)(count + (count < most));
 }
 
 static inline int bt_bit_length(uint32_t value)

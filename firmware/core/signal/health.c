@@ -70,10 +70,10 @@ static void judge_repeats(bt_health *health, uint32_t missing, bool noisy)
         health->travel_q4 = 0;
     }
     health->unchanged = unchanged;
-    health->unchanged_windows = unchanged == 0 ? 0 : bt_counted(health->unchanged_windows);
+    health->unchanged_windows = unchanged == 0 ? 0 : bt_count_up(health->unchanged_windows, UINT8_MAX);
     bool alive = health->alive_windows == ALIVE_WINDOWS, dead = health->alive_windows == 0;
     if (!frozen && health->windows > CLEAN_WINDOWS) {
-        health->alive_windows = (uint8_t)(health->alive_windows + !alive);
+        health->alive_windows = bt_count_up(health->alive_windows, ALIVE_WINDOWS);
         if (health->sensor_fault == BT_SENSOR_FAULT_FROZEN) {
             health->sensor_fault = BT_SENSOR_FAULT_NONE;
         }
@@ -230,7 +230,7 @@ static BT_NOINLINE uint32_t judge(bt_health *health, const bt_round *round, cons
     } else if (health->windows == CLEAN_WINDOWS) {
         anchor_all(health, &health->sum[!health->filling]);
     }
-    health->windows = bt_counted(health->windows);
+    health->windows = bt_count_up(health->windows, UINT8_MAX);
     if (health->out != 0) {
         watch_condemned(health, round, &trigger->rest);
     }
@@ -256,7 +256,7 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     uint32_t flips = (trigger->up & health->down) | (trigger->down & health->up);
     health->up = trigger->up;
     health->down = trigger->down;
-    health->still_rounds = trigger->far >> BT_LANE_PDC & 1 ? 0 : bt_counted(health->still_rounds);
+    health->still_rounds = trigger->far >> BT_LANE_PDC & 1 ? 0 : bt_count_up(health->still_rounds, UINT8_MAX);
     if (flips != 0) {
         judge_flips(health, flips, health->still_rounds <= SHAKEN_ROUNDS);
     }

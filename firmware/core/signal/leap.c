@@ -92,7 +92,7 @@ uint8_t bt_leap_round(bt_leap *leap, const bt_round *round, const bt_trigger *tr
         }
     }
     memcpy(leap->pac, round->pac, sizeof leap->pac);
-    leap->rounds = (uint8_t)(leap->rounds + (leap->rounds < BT_LEAP_ROUNDS));
+    leap->rounds = bt_count_up(leap->rounds, BT_LEAP_ROUNDS);
     leap->pac_active = leap->pac_active || swung(round->pac[0], round->pac[BT_PAC_PER_FRAME / 2]);
     const uint16_t pdc = trigger->smooth.lane[BT_LANE_PDC];
     bool leaps = tdc_leaps(leap, round->tdc, pdc);

@@ -22,7 +22,7 @@ void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count
         sample_q8 = 4 * deviation_q6 + bt_div_round_u32(4 * deviation_q6, BT_SWEEP_ROUNDS - 1);
         sample_q8 = sample_q8 < cap_q8 ? sample_q8 : cap_q8;
     }
-    noise->sweeps = (uint8_t)(noise->sweeps + (noise->sweeps < MEAN_SWEEPS)); // a plain mean first: unbiased
+    noise->sweeps = bt_count_up(noise->sweeps, MEAN_SWEEPS); // a plain mean first, so that it starts unbiased
     int32_t change_q8 = (int32_t)(sample_q8 - noise->mean_q8);
     uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), noise->sweeps);
     noise->mean_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);

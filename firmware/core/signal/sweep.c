@@ -48,7 +48,7 @@ void bt_sweep_start_over(bt_sweep *sweep)
         sweep->settled_q3 = sweep->mean_q3;
         sweep->still_sweeps = 0;
     } else {
-        sweep->still_sweeps = bt_counted(sweep->still_sweeps);
+        sweep->still_sweeps = bt_count_up(sweep->still_sweeps, UINT8_MAX);
     }
     sweep->moved = false;
 }

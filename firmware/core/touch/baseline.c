@@ -30,7 +30,7 @@ void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base)
     rollback->countdown = SNAPSHOT_SWEEPS;
     rollback->head = (uint8_t)((rollback->head + 1) % BT_SNAPSHOTS);
     rollback->snapshot[rollback->head] = *base;
-    rollback->count = (uint8_t)(rollback->count + (rollback->count < BT_SNAPSHOTS));
+    rollback->count = bt_count_up(rollback->count, BT_SNAPSHOTS);
 }
 
 void bt_rollback_fill(bt_rollback *rollback, unsigned lane, uint32_t first_q16)

@@ -22,7 +22,7 @@ void bt_drift_learn(bt_drift *drift)
         return;
     }
     bt_drift_rate *now = &drift->now;
-    now->sweeps = (uint8_t)(now->sweeps + (now->sweeps < MEAN_SWEEPS));
+    now->sweeps = bt_count_up(now->sweeps, MEAN_SWEEPS);
     int32_t change_q20 = drift->moved_q16 / BT_ELECTRODES * 16 - now->q20;
     now->q20 = bt_clamp(now->q20 + change_q20 / bt_clamp(now->sweeps, FIRST_SWEEPS, MEAN_SWEEPS),
                         -16 * RATE_Q16, 16 * RATE_Q16);

@@ -56,7 +56,7 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
         release->even_above = sweep->above;
         release->even_sweeps = even;
     } else {
-        release->even_sweeps = bt_counted(release->even_sweeps);
+        release->even_sweeps = bt_count_up(release->even_sweeps, UINT8_MAX);
     }
 }
 
@@ -112,7 +112,7 @@ bt_release_verdict bt_release_judge(bt_release *release, bt_witness *witness, bt
     // Without a witness the energy itself must have fallen, or the first second of a slow load would pass for
     // a residue.
     bool quiet = low && (sweep->witness || energy < release->energy_peak / BT_FALLEN_SHARE);
-    release->quiet_sweeps = quiet ? bt_counted(release->quiet_sweeps) : 0;
+    release->quiet_sweeps = quiet ? bt_count_up(release->quiet_sweeps, UINT8_MAX) : 0;
     count_even(release, sweep);
     bt_release_verdict now = verdict(release, sweep, low);
     // Electrodes feel a real press up to a second before pressure does, so what it lacks counts only later.

@@ -92,7 +92,7 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
 
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
 {
-    watch->creeps = bt_counted(watch->creeps);
+    watch->creeps = bt_count_up(watch->creeps, UINT8_MAX);
     int change_q3 = pressure_mean_q3 == NULL ? LEVEL_Q3 + 1 : *pressure_mean_q3 - watch->level_q3;
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
         // Skin creeps: pressure that took so long to move by so little still counts as level.
@@ -103,7 +103,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
             bt_watch_begin(watch);
         }
     } else {
-        watch->level_sweeps = bt_counted(watch->level_sweeps);
+        watch->level_sweeps = bt_count_up(watch->level_sweeps, UINT8_MAX);
     }
     watch->side_avg_q2 = (int16_t)(watch->side_avg_q2 + watch->side - bt_shift_down(watch->side_avg_q2, 2));
     watch->aligned = watch->side_avg_q2 >= SIDE_MIN_Q2 || watch->side_avg_q2 <= -SIDE_MIN_Q2;
