@@ -169,9 +169,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     if (finger->round.good_words == 0) {
         finger->present = false;
         finger->bands.begun = false; // samples before and after the gap do not belong together
-        if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
-            finger->silent_rounds++;
-        }
+        finger->silent_rounds = bt_count_up(finger->silent_rounds, BT_UNPLUGGED_ROUNDS);
         return false;
     }
     finger->seq++;
