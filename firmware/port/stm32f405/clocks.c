@@ -117,10 +117,13 @@ void leave(bool to_loader)
 
 uint16_t started_by(void)
 {
-    const uint32_t reason = running == RUNNING ? RCC_CSR : 0; // a reset that leaves no word is a crash
-    const uint16_t flag = reason & RCC_CSR_IWDGRSTF  ? BT_FAULT_FLAG_HUNG
-                          : reason & RCC_CSR_SFTRSTF ? BT_FAULT_FLAG_CRASHED
-                                                     : BT_FAULT_FLAG_STARTED;
+    const uint32_t reason = RCC_CSR;
+    uint16_t flag = BT_FAULT_FLAG_STARTED;
+    if (running == RUNNING && reason & RCC_CSR_IWDGRSTF) {
+        flag = BT_FAULT_FLAG_HUNG;
+    } else if (running == RUNNING && reason & RCC_CSR_SFTRSTF) {
+        flag = BT_FAULT_FLAG_CRASHED; // whoever resets the chip on purpose clears `running` first
+    }
     RCC_CSR |= RCC_CSR_RMVF;
     running = RUNNING;
     return flag;
