@@ -62,7 +62,7 @@ def test_the_notebook_runs_and_begins_as_the_page_does(tmp_path: Path, monkeypat
     for cell in cells[:2]:
         exec(compile(cell, NOTEBOOK.name, "exec"), names)
     axes = eval(compile(cells[2], NOTEBOOK.name, "eval"), names)
-    frames = biotac.load("mine.mcap")
+    frames = biotac.load("trial.mcap")
     for line, force_n in zip(axes.lines, frames["force_n"].T, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), force_n)
     for cell in cells[3:]:

@@ -209,18 +209,18 @@ def test_the_law_in_c_is_the_same() -> None:
 def test_the_law_in_c_releases_what_it_has_let_go() -> None:
     """A board that was told HOLD says CONTACT until RELEASE, however far the hand has opened."""
     library, sent = (law.load(IN_C).step.__globals__[name] for name in ("LIBRARY", "sent"))
-    live, finger, told = LiveFingers({"index": SimFinger(1)}), Finger(), 0.0
+    live, finger, releases = LiveFingers({"index": SimFinger(1)}), Finger(), 0.0
 
     def rounds(count: int, press_n: float) -> float:
-        nonlocal told
+        nonlocal releases
         for _ in range(count):
             words = live.read({"index": Touch(press_n)})[:, 0]
             row = finger.feed(words[:, slots.ELECTRODE_SLOT], words[:, slots.PDC_SLOT])[0]
             data = sent(messages.Frame, **{name: row[name] for name in DTYPES[messages.Frame.ID].names or ()})
-            before, told = told, library.chip_round(data, len(data))[5]
-            if told > before:
+            before, releases = releases, library.chip_round(data, len(data))[5]
+            if releases > before:
                 finger.release()
-        return told
+        return releases
 
     library.grip_begin(ctypes.c_float(0.8), ctypes.c_float(12.0))
     before = rounds(500, 0.0)

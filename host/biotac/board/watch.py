@@ -188,8 +188,8 @@ class StreamWatch:
             self._repeat_release()
             for tare in self._tares() if reason == "rebooted" else []:
                 with suppress(CommandRefusedError):  # its sensor's counts are bad: it is untared without it, too
-                    now = board.ask(wire.GetSensorStatus(0, tare.finger), wire.SensorStatus)
-                    if now.tare_reason != wire.TareReason.RESTORED:  # else the board kept it over a hang
+                    state = board.ask(wire.GetSensorStatus(0, tare.finger), wire.SensorStatus)
+                    if state.tare_reason != wire.TareReason.RESTORED:  # else the board kept it over a hang
                         board.command(tare)
             self._stream.resume()
             self._answered_us = None

@@ -61,7 +61,7 @@ def _scenario_bytes(file: Path) -> bytes:
         if not file.exists() and file.parent == Path() and file.name in bundled_scenarios():
             return bundled_scenario(file.name)
         with file.open("rb") as stream:
-            return stream.read(4 * TOML_BYTES + 1)  # enough to be refused
+            return stream.read(4 * TOML_BYTES + 1)  # a character has four at most: more is refused
     except OSError as error:
         raise InputError(
             f"{file}: cannot be read ({error.strerror}): expected a scenario's path or one of "

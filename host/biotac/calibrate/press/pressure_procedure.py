@@ -128,8 +128,8 @@ def calibrate_recording(
     alignment = None if reference is None else _add_force(str(recording.path), rows, reference)
     calibrated = []
     for finger in fingers or present:
-        by = {"needs_force": True} if reference is not None else {"shown_n": forces_n}
-        rest, presses = find(finger, rows[rows["finger"] == finger], len(asked), **by)
+        own_rows, shown_n = rows[rows["finger"] == finger], forces_n if reference is None else ()
+        rest, presses = find(finger, own_rows, len(asked), needs_force=reference is not None, shown_n=shown_n)
         fitted, verified = fit_and_verify(rest, presses)
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
         own = replace(own, pressure_gain_nn=fitted.gain_nn, serial=serials.get(finger, ""), made_s=made_s)

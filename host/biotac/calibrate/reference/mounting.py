@@ -10,7 +10,7 @@ offset hold for the whole run. In a TOML file:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,20 +92,25 @@ def from_json(text: str, where: str) -> Mounting:
 
 
 def _read(load: Callable[[], Any], where: str, form: str) -> Mounting:
+    """The mounting that ``load`` gives the facts of. Raises InputError that begins with ``where``."""
     try:
-        facts = dict(load())
-        for key in [*KEYS, *sorted(facts)]:
-            if key not in facts or key not in KEYS:
-                raise ValueError(f"key {key!r} is {'unknown' if key in facts else 'missing'}")
-        if facts["reads"] not in READS:
-            raise InputError(f"reads is {facts['reads']!r}: expected {READS[0]!r} or {READS[1]!r}")
-        try:
-            rotation, offset = (np.array(facts[key], dtype=np.float64) for key in KEYS[:2])
-        except (TypeError, ValueError, OverflowError):
-            raise InputError("rotation or offset_mm is not numeric: expected 3 by 3 numbers and 3") from None
-        return Mounting(rotation, offset, 1.0 if facts["reads"] == READS[0] else -1.0)
+        return _mounting_of(dict(load()))
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     except (OSError, TypeError, ValueError) as error:
         seen = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{where}: {seen}: expected {form}") from None
+
+
+def _mounting_of(facts: Mapping[str, Any]) -> Mounting:
+    """Raises ValueError for a key that is missing or unknown, InputError for a value that none can have."""
+    missing, unknown = [key for key in KEYS if key not in facts], sorted(set(facts) - set(KEYS))
+    if missing or unknown:
+        raise ValueError(f"key {missing[0]!r} is missing" if missing else f"key {unknown[0]!r} is unknown")
+    if facts["reads"] not in READS:
+        raise InputError(f"reads is {facts['reads']!r}: expected {READS[0]!r} or {READS[1]!r}")
+    try:
+        rotation, offset_mm = (np.array(facts[key], dtype=np.float64) for key in ("rotation", "offset_mm"))
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("rotation or offset_mm is not numeric: expected 3 by 3 numbers and 3") from None
+    return Mounting(rotation, offset_mm, 1.0 if facts["reads"] == READS[0] else -1.0)
