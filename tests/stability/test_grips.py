@@ -202,7 +202,8 @@ def test_after_a_restart_in_a_grip_no_grasp_is_wrong_without_a_flag() -> None:
         assert sum(grasps[later].silent for grasps in found) <= 0.02 * GRIPS  # that drift is not known yet
         assert sum(grasps[later].unsure for grasps in found) <= 0.05 * GRIPS
     most_n = max(grasp.off_n for grasp in first[:60])
-    wrong_by.row("the board starts while it grips: the next grasp", most_n, 0, "TARE_UNSURE", "lets go once, or tares")
+    begun = "the board starts while it grips, and lets go: the next grasp"
+    wrong_by.row(begun, most_n, 0, "TARE_UNSURE", "lets go once, or tares")
 
 
 @pytest.mark.parametrize("lead_s", [10, 30])
