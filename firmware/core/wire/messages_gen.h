@@ -113,6 +113,7 @@ enum bt_board {
     BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
     BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     BT_BOARD_MESSAGES = 7, // a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
+    BT_BOARD_POSIX_LIVE = 8, // a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
     BT_BOARD_PRIVATE = 32768, // the first of the private ids
 };
 

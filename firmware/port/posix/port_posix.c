@@ -384,7 +384,7 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 port_identity port_identify(bt_port *port)
 {
     return (port_identity){
-        .board = BT_BOARD_POSIX_SIM,
+        .board = live ? BT_BOARD_POSIX_LIVE : BT_BOARD_POSIX_SIM,
         .serial = "posix-sim",
         .boot_id = boot_id,
         .started_by = BT_FAULT_FLAG_STARTED,

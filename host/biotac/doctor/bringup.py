@@ -115,7 +115,8 @@ def measure(
     seen.idle.append(hand.board.measure())
     _erase(hand)
     seen.chip.append(hand.board.measure())
-    restarts = RESTARTS if hand.info.board != wire.Board.POSIX_SIM else 0  # a process, whose scenario may end meanwhile
+    is_process = hand.info.board in (wire.Board.POSIX_SIM, wire.Board.POSIX_LIVE)  # whose scenario may end meanwhile
+    restarts = 0 if is_process else RESTARTS
     for k in range(restarts):
         announce(f"restart {k + 1} of {restarts}")
         begun_s = time.monotonic()

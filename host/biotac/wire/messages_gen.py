@@ -125,6 +125,7 @@ class Board(IntEnum):
     STM32F405 = 5  # STM32F405 with a UART to the host (firmware/boards/f405)
     PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     MESSAGES = 7  # a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
+    POSIX_LIVE = 8  # a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
     PRIVATE = 32768  # the first of the private ids
 
 
@@ -324,6 +325,7 @@ BOARD_DOC: dict[int, str] = {
     5: "STM32F405 with a UART to the host (firmware/boards/f405)",
     6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
     7: "a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so",
+    8: "a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads",
     32768: "the first of the private ids",
 }
 

@@ -6,6 +6,7 @@ import json
 import socket
 import struct
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 import biotac
+from biotac.board.watch import LOOK_S, LOOKS_WITHOUT_ROWS
 from biotac.cli.main import main
 from biotac.sim import SimFinger
 from biotac.sim.live import LiveFingers
@@ -23,7 +25,7 @@ PRESS = {"normal_n": 1.0}
 
 
 @pytest.fixture
-def server() -> Iterator[LoadServer]:
+def live() -> Iterator[tuple[LoadServer, biotac.Hand]]:
     fingers = LiveFingers({"index": SimFinger(1), "thumb": SimFinger(2)})
     board = start_board("posix", fingers.at_rest(), pace=0.0, live=True)
     server = LoadServer(fingers, board)
@@ -37,10 +39,15 @@ def server() -> Iterator[LoadServer]:
     with biotac.open(board.path) as hand:  # whose reader the board waits for
         hand.stream("results")
         hand.on_batch(lambda batch: None)
-        yield server
+        yield server, hand
         server._listening.shutdown(socket.SHUT_RDWR)
         serving.join()
     board.close()
+
+
+@pytest.fixture
+def server(live: tuple[LoadServer, biotac.Hand]) -> LoadServer:
+    return live[0]
 
 
 def answers(server: LoadServer, *lines: bytes) -> list[dict[str, Any]]:
@@ -96,3 +103,16 @@ def test_loads_from_lines_and_from_a_scenario_are_refused_together(capsys: pytes
 def test_names_that_a_line_could_not_tell_apart_are_refused(names: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sim", "--live", names]) == 2
     assert "expected different names" in capsys.readouterr().err
+
+
+def test_a_hand_at_the_boards_path_shows_what_the_loads_make_and_waits_while_none_come(
+    live: tuple[LoadServer, biotac.Hand],
+) -> None:
+    """Time that goes by whole rounds is no clock: what a hand knows of the age of a row is when it came."""
+    server, hand = live
+    for round_, stands_still_s in ((0, 0.0), (50, 2 * LOOKS_WITHOUT_ROWS * LOOK_S)):
+        time.sleep(stands_still_s)
+        program = threading.Thread(target=answers, args=(server, *[b"{}"] * 50))
+        program.start()
+        assert hand["index"].next_frame(5.0).seq >= round_
+        program.join()
