@@ -13,6 +13,7 @@ from biotac import EventKind, Finger, InputError
 from biotac.core import geometry as surface
 from biotac.sim import SimFinger, States, sample
 from biotac.wire import messages, slots
+from biotac.wire.fields import INVALID_U8
 
 from ..report import Outcome, Report, Show, Table, check, claim
 
@@ -24,7 +25,10 @@ SLOW_N_S, FAST_N_S = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (8.0, 10.0)
 RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of what biotac.sim draws from
 PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
 REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED, HELD_S = 3.0, 0.1, 0.05, 0.002, 95, 4.2
-SQUEEZED, RELEASED, CALM = ("squeezed: SLIP", 5), ("let go: SLIP", 5), ("at rest and in still holds: level 0", 99)
+STRONG, AWAITED = 22, 4  # what grip.py, which knows that it squeezes, takes for a slip, and for how many rounds
+SQUEEZED, RELEASED, CALM = "squeezed: SLIP", "let go: SLIP", ("at rest and in still holds: level 0", 99)
+KNOWN = f" of level {STRONG}"
+MOST = {SQUEEZED: (5, 20), RELEASED: (5, 20), SQUEEZED + KNOWN: (2, 2), RELEASED + KNOWN: (2, 2)}  # slow, fast
 Found = dict[tuple[str, float, float], list[bool]]  # by what, N/s and rattle
 
 
@@ -53,12 +57,12 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
     rows = [(case, n_s, *[percent[case, n_s, rattle] for rattle in RATTLES]) for case, n_s in kinds]
     tables = [Table("Simulated", ("% of", "N/s", *[f"rattle {rattle:g}" for rattle in RATTLES]), rows, digits=1)]
     checks = []
-    for case, most in (SQUEEZED, RELEASED):
-        for rates, limit in ((SLOW_N_S, most), (FAST_N_S, 20)):
+    for case, limits in MOST.items():
+        for rates, limit in zip((SLOW_N_S, FAST_N_S), limits, strict=True):
             worst = max(np.mean([percent[case, n_s, rattle] for n_s in rates]) for rattle in RATTLES)
             checks.append(check(f"{case}, {rates[0]:g} to {rates[-1]:g} N/s", float(worst), limit, "%"))
     for case, n_s in kinds:
-        if case not in (SQUEEZED[0], RELEASED[0], "poked: SLIP"):
+        if case not in (*MOST, "poked: SLIP"):
             seen, least = min(percent[case, n_s, rattle] for rattle in RATTLES), CALM[1] if case == CALM[0] else 80
             checks.append(claim(f"{case}, {n_s:g} N/s: {seen:.1f} %, at least {least}", seen >= least))
     for path, play in ((args.slides, _real_slides), (args.taps, _real_taps)):
@@ -98,9 +102,12 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
         up = (high_n - 0.5) / n_s
         legs = (0.2, 0.5), (1.3, 0.5), (up, high_n), (0.6, high_n), (up, 0.5), (0.6, 0.5), (0.5 / n_s, 0), (0.5, 0)
         ends_s, slips_s, level = _felt(finger, at, *legs)
-        for case, leg in ((SQUEEZED[0], 2), (RELEASED[0], 4), (RELEASED[0], 6)):
+        for case, leg in ((SQUEEZED, 2), (RELEASED, 4), (RELEASED, 6)):
             during = (slips_s >= ends_s[leg]) & (slips_s < ends_s[leg + 1] + AGAIN_S)
             found[case, n_s, rattle].append(bool(during.any()))
+            rounds = [level[int(at_s * 100) :][:AWAITED] for at_s in slips_s[during]]
+            strong = any((now[now < INVALID_U8] >= STRONG).any() for now in rounds)
+            found[case + KNOWN, n_s, rattle].append(strong)
         still = [k for leg in (1, 3, 5) for k in range(round(ends_s[leg] * 100) + 20, round(ends_s[leg + 1] * 100))]
         found[CALM[0], 0, rattle] += (level[[*range(100, round(REST_S * 100)), *still]] == 0).tolist()
     for n_s, mm_s in ((n_s, mm_s) for n_s in (0.0, *SLOW_N_S[1:-1]) for mm_s in (5.0, 20.0)):
