@@ -135,8 +135,8 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
 
 LINS, POPULATION, PRESSES, MINUTE = "default", "population", "presses", "minute"
 UNTRAINED = (
-    (LINS, "nothing", "Lin's scales, the firmware's", "Lin's scales"),
-    (POPULATION, "nothing", "population map", "population"),
+    (LINS, "nothing", "Lin's scales, an option", "Lin's scales"),
+    (POPULATION, "nothing", "population map, the default", "population"),
     (PRESSES, "five presses on a scale", "population map, scaled", "gated sign-split, 3 axes"),
     (MINUTE, "a minute of force plate", "population map, pulled", "gated sign-split, 3 axes"),
 )

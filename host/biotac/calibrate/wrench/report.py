@@ -130,8 +130,8 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
     lines = [
         f"* weakest axis: {validation.run.axes[axis]}" + ("" if r2[axis] is None else f", R2 {r2[axis]:.3f}"),
         f"* worst region: compression centred at x {worst['x_mm'][0]:.1f} to {worst['x_mm'][1]:.1f} mm, "
-        f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS error "
-        f"{worst['rmse_n']:.3f} N; best region {best['rmse_n']:.3f} N",
+        f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS length of "
+        f"the error {worst['rmse_n']:.3f} N; best region {best['rmse_n']:.3f} N",
         f"* factor by which it is better than Lin's three scales: {gain}",
         f"* error along x/y/z in N by minutes of training data (100 rows per second): {curve}",
         f"* another minute helps most where the compression is centred at x {x[0]:.1f} to {x[1]:.1f} mm, "

@@ -291,7 +291,7 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
         *([gain.format(**facts)] if "gain" in facts else []),
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N, {facts['before_deg']:.1f} deg",
         f"  each press held out:          {numbers(facts['held_out_n'])} N, {facts['held_out_deg']:.1f} deg",
-        f"  of other fingers after five presses, one sigma: {numbers(facts['sigma_n'])} N, with shear",
+        f"  of other fingers, sheared too, after five presses on a scale: {numbers(facts['sigma_n'])} N, one sigma",
         *([f"  not worth using: {facts['why_not']}"] if facts["why_not"] else []),
         *(["  neither written nor uploaded; --force does so all the same"] if facts["refused"] else []),
         *([f"  written: {facts['written']}"] if "written" in facts else []),

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         f"{facts['crc_errors']} CRC errors; host CPU {facts['host_cpu_percent']} % of one core",
         f"on-board against float64: PoC {check['poc_um_max']:.3f} um, force {check['force_mn_max']:.4f} mN, "
         f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)",
-        f"recording {facts['recording']}, report {facts['report']}",
+        f"recording {facts['recording']}, of a board with Lin's scales; report {facts['report']}",
         *([skipped] if facts["rows_skipped"] else []),
         *([f"mean force felt along what was applied to finger 0, ± RMS error{made}:"] if felt else []),
         *felt,
