@@ -132,11 +132,9 @@ class Latest(Consumer):
         Without a row, and where it may not be used, all values are invalid and ``t_us`` is -1.
         """
         self.report()
-        row, age_s = _EMPTY, math.inf
         batch = self._batches.get(finger)
-        if batch is not None:
-            row = _latest_row(batch, finger)
-            age_s = self._age_s(int(row["t_us"][0]), batch.arrived_s)
+        row = _empty(finger, -1, 0, NOTHING_YET) if batch is None else _latest_row(batch, finger)
+        age_s = math.inf if batch is None else self._age_s(int(row["t_us"][0]), batch.arrived_s)
         why = self._why_stale(age_s)
         return (_empty(finger, -1, 0, NOTHING_YET) if why else row), age_s, why
 
@@ -155,10 +153,10 @@ class Latest(Consumer):
             return "the hand is closed"
         if self._reader.lost is not None:
             return "the board is away and being looked for"
-        if age_s <= self.max_age_s:
-            return ""
         if math.isinf(age_s):
             return "nothing has arrived; call hand.stream(), or wait for next_frame()"
+        if age_s <= self.max_age_s:
+            return ""
         if math.isnan(age_s):
             return "the board's clock is not known yet"
         return f"{age_s:.2f} s old, at most {self.max_age_s:g} s is allowed"
@@ -206,9 +204,6 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
         out[field.name] = np.nan if field.dtype[1] == "f" else field.invalid or 0
     out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
     return out
-
-
-_EMPTY = _empty(0, -1, 0, NOTHING_YET)
 
 
 def _value(name: str, convert: Callable[[Any], T], doc: str) -> T:

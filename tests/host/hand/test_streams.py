@@ -317,6 +317,11 @@ def test_values_older_than_the_program_wants_are_not_shown(live: Live) -> None:
         live.hand["index"].next_frame(0)
 
 
+def test_nothing_is_no_value_however_old_values_may_be() -> None:
+    with biotac.open("sim:press.toml?seconds=1", max_age_s=math.inf) as hand:
+        assert hand["index"].stale.startswith("nothing has arrived")
+
+
 def test_next_frame_waits_for_one_that_comes_after_the_call(live: Live) -> None:
     live.hand.stream()
     live.send(frame(1), frame(1, finger=1))
