@@ -7,20 +7,14 @@ import time
 import numpy as np
 
 from ..wire.batches import ROUND_US, Batch
-from ..wire.fields import INVALID_U8
-from ..wire.frames import FRAME_DTYPE, StructArray
-from ..wire.messages_gen import INVALID_COUNT, FrameFlags, Trust
+from ..wire.frames import StructArray, invalid_frames
+from ..wire.messages_gen import FrameFlags, Trust
 
 SILENT_S = 0.1
 LOOK_S = SILENT_S / 2  #: for Hand.batches, so that silence is noticed where nothing comes
 
-_NOTHING = np.zeros(1, FRAME_DTYPE)
-for _name in ("poc_mm", "force_n", "torque_nmm", "normal_n", "normal_half_n", "shear_n", "shear_half_n"):
-    _NOTHING[_name] = np.nan
-for _name in ("counts", "pdc", "tac", "tdc"):
-    _NOTHING[_name] = INVALID_COUNT
+_NOTHING = invalid_frames(1)
 _NOTHING["flags"], _NOTHING["trust"] = int(FrameFlags.FAULT | FrameFlags.POC_INVALID), int(Trust.NONE)
-_NOTHING["slip_level"] = INVALID_U8
 
 
 class Silence:

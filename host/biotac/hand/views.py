@@ -17,8 +17,7 @@ from ..board.gap import FINGERS_IN
 from ..board.reader import Consumer, Reader
 from ..errors import InputError
 from ..wire.batches import Batch
-from ..wire.fields import FRAME_FIELDS
-from ..wire.frames import FRAME_DTYPE, Frame, StructArray, age_ms, frames_from_wire
+from ..wire.frames import Frame, StructArray, age_ms, frames_from_wire, invalid_frames
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags, TareSet, Trust
 from ..wire.sensor_gen import MAX_SENSORS
 
@@ -199,9 +198,7 @@ def _latest_row(batch: Batch, finger: int) -> StructArray:
 
 
 def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
-    out = np.zeros(1, FRAME_DTYPE)
-    for field in FRAME_FIELDS:
-        out[field.name] = np.nan if field.dtype[1] == "f" else field.invalid or 0
+    out = invalid_frames(1)
     out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
     return out
 

@@ -99,6 +99,14 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     return _from_wire(FRAME_FIELDS, FRAME_DTYPE, messages, seq, t_us)
 
 
+def invalid_frames(n: int) -> StructArray:
+    """FRAME_DTYPE (n,) of which every value is invalid, and 0 where a column has no mark for that."""
+    rows = np.zeros(n, FRAME_DTYPE)
+    for column in FRAME_FIELDS:
+        rows[column.name] = np.nan if column.dtype[1] == "f" else column.invalid or 0
+    return rows
+
+
 def bands_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
     """Convert BANDS messages (n,) with unwrapped seq and t_us to BANDS_DTYPE (n,)."""
     return _from_wire(BANDS_FIELDS, BANDS_DTYPE, messages, seq, t_us)

@@ -14,6 +14,7 @@ import pytest
 
 import biotac
 from biotac.bridges.lsl import Outlet, samples
+from biotac.bridges.silence import Silence
 from biotac.cli.main import main
 from biotac.clock import DeviceClock, pac_t_us
 
@@ -112,6 +113,16 @@ def test_a_finger_has_streams_when_it_comes_and_is_nan_once_when_it_goes(inlet) 
         assert stream.pull_sample(timeout=0.0)[0] is None
     assert not np.isnan(values[249]).any() and np.isnan(values[250, :13]).all()
     assert (values[250, 14], values[250, 15]) == (biotac.Trust.NONE, 65535) and (np.diff(stamps_s) > 0).all()
+
+
+def test_a_row_of_silence_has_no_value() -> None:
+    with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
+        both, silence = hand.read_batch(1.0), Silence()
+    one = both.wire["finger"] == 0
+    silence.rows(both)
+    (row,) = silence.rows(replace(both, wire=both.wire[one], seq=both.seq[one], t_us=both.t_us[one] + 1_000_000))
+    assert all(np.isnan(row[name]).all() for name in row.dtype.names if row.dtype[name].base.kind == "f")
+    assert (row["finger"], row["trust"], row["pdc"]) == (1, biotac.Trust.NONE, 65535)
 
 
 def test_columns_are_the_rows() -> None:
