@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 from urllib.parse import parse_qs, urlsplit
+
+from .pyserial_ports import READ_BYTES
 
 FORM = "socket://HOST:PORT, and ?token=T for a simulated board"
 OPEN_S = 5.0
@@ -25,6 +28,7 @@ class TcpPort:
             raise ValueError(f"expected {FORM}")
         self._socket = _connected(parts.hostname, parts.port, room)
         self.write(token.encode())
+        self.readable_fd = self.fileno() if os.name == "posix" else None
 
     def fileno(self) -> int:
         """Of the socket. Raises OSError once it is closed."""
@@ -33,13 +37,11 @@ class TcpPort:
             raise OSError("it was closed")
         return fd
 
-    def wait(self, timeout_s: float) -> bool:
-        """Wait until something can be read, or the far end has hung up."""
-        return bool(select.select([self._socket], [], [], timeout_s)[0])
-
-    def read(self, most: int) -> bytes:
-        """What has come; the wait is for the first byte. Raises OSError when the far end has hung up."""
-        data = self._socket.recv(most)
+    def receive(self, timeout_s: float) -> bytes:
+        """See TtyPort.receive."""
+        if not select.select([self.fileno()], [], [], timeout_s)[0]:
+            return b""
+        data = self._socket.recv(READ_BYTES)
         if not data:
             raise OSError("it hung up")
         return data

@@ -21,7 +21,6 @@ from typing import Any
 
 from ..errors import DeviceLostError, PortError
 from ..link.serial_port import SerialLink
-from ..link.url_port import UrlLink
 from ..wire.native import BUILT
 from .sensor_board import SensorBoard
 from .source import Source
@@ -179,13 +178,13 @@ class SimBoard:
         return " ".join(self._process.stderr.read().decode(errors="replace").split("\n")).strip()
 
 
-class _Loopback(UrlLink):
+class _Loopback(SerialLink):
     """The socket on which a board's sensors are fed."""
 
     patience = 60.0
 
 
-class SimLink(UrlLink):
+class SimLink(SerialLink):
     """A link to a simulated board, which it owns and closes."""
 
     patience = 60.0
@@ -209,23 +208,17 @@ class SimLink(UrlLink):
         return [self.board.path]
 
     def reopen(self, port: str) -> None:
-        if "://" in port:
-            super().reopen(port)
-        else:
-            SerialLink.reopen(self, port)
+        super().reopen(port)
         self.fd = None  # the process must be watched as well
 
-    def _drain(self) -> bytes:
-        return UrlLink._drain(self) if "://" in self.board.path else SerialLink._drain(self)
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for bytes, or for the end of the source; return True if there are bytes to read."""
-        watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd])
+    def _receive(self, timeout_s: float) -> bytes:
+        """Wait for bytes, or for the end of the source."""
+        watched = [self._port.fileno()] + ([] if self.board.over else [self.board.stdout_fd])
         ready, _, _ = select.select(watched, [], [], timeout_s)
         if len(watched) > 1 and watched[1] in ready:
             self.board.receive(0)
         self.ended = self.board.over
-        return self._serial.fileno() in ready
+        return super()._receive(0.0) if watched[0] in ready else b""
 
     def release(self) -> None:
         if self._held:
