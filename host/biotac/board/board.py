@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import cycle
 from typing import Any, TypeVar
 
-from ..clock.host_clock import HostClock, SystemClock
+from ..clock.host_clock import HostClock
 from ..errors import CommandRefusedError, DeviceLostError, InputError
 from ..link import Link
 from ..wire import messages_gen as wire
@@ -32,7 +32,7 @@ class Board:
 
     def __init__(self, link: Link, *, host_clock: HostClock | None = None) -> None:
         self.link = link
-        self.host_clock = host_clock or SystemClock()
+        self.host_clock = host_clock or HostClock()
         self.closed = False
         self._req_ids = cycle(range(1, 256))
         self.ending = threading.RLock()  #: one thread closes it, and others wait until it has

@@ -4,24 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Protocol
 
 
-class HostClock(Protocol):
+class HostClock:
     """Time on this side of the link."""
-
-    def monotonic_s(self) -> float:
-        """Time since some fixed moment; never steps."""
-
-    def sleep(self, seconds: float) -> None:
-        """Let time pass, until ``wake`` at most."""
-
-    def wake(self) -> None:
-        """End all sleeps, current and future ones."""
-
-
-class SystemClock:
-    """The operating system's clock."""
 
     def __init__(self) -> None:
         self._awake = threading.Event()
@@ -29,7 +15,9 @@ class SystemClock:
     monotonic_s = staticmethod(time.monotonic)  # not a method: it is called thousands of times a second
 
     def sleep(self, seconds: float) -> None:
+        """Let time pass, until ``wake`` at most."""
         self._awake.wait(seconds)
 
     def wake(self) -> None:
+        """End all sleeps, current and future ones."""
         self._awake.set()

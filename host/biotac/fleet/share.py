@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..board.gap import Gap
+from ..board.reader import Tap
 from ..errors import BiotacError, CommandRefusedError, PortError
 from ..hand.hand import Hand
 from ..wire import messages_gen as wire
@@ -23,7 +24,7 @@ from . import network, rights
 PAUSE_S = 0.5  # how long the stream stays stopped after a command that needed it stopped
 
 
-class Share:
+class Share(Tap):
     """Shares ``hand`` as ``name`` on ``session`` until closed.
 
     Does not close ``hand`` or ``session``. The hand streams from now on, whether or not anybody listens. Raises
@@ -77,7 +78,7 @@ class Share:
         for entity in before:
             entity.undeclare()
 
-    # ---- what it sends, as a reader.Consumer and tap -------------------------------------------
+    # ---- what it sends, on the reading thread --------------------------------------------------
 
     def put(self, batch: Batch) -> None:
         for message in batch.messages:
@@ -89,9 +90,6 @@ class Share:
         if not self._hand.connected:
             with self._publishing:
                 self._end_epoch()
-
-    def is_full(self) -> bool:
-        return False
 
     def put_raw(self, chunk: bytes) -> None:
         """Publish whole messages only, so that no message is lost in part. Answers to requests are left out."""

@@ -7,7 +7,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock.host_clock import HostClock, SystemClock
+from ...clock.host_clock import HostClock
 from ...errors import CommandRefusedError, DeviceLostError, PortError
 from ...link.base import Link
 from ...link.port_text import file_and_options, parse_pace
@@ -74,7 +74,7 @@ class ReplayLink(Link):
     def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: HostClock | None = None) -> None:
         self.port = port
         self.pace = pace
-        self._clock = clock or SystemClock()
+        self._clock = clock or HostClock()
         self.pacer = Pacer(playback, pace, self._clock)
         self._answers = b""
         self._answering = threading.Lock()  # commands may come from a thread other than the reader

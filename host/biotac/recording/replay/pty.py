@@ -6,7 +6,7 @@ import os
 import select
 from contextlib import suppress
 
-from ...clock.host_clock import SystemClock
+from ...clock.host_clock import HostClock
 from ...errors import PortError
 from .link import CHUNK_BYTES, Pacer
 from .playback import Playback
@@ -16,7 +16,7 @@ class ReplayPty:
     """A pty on which any serial program finds the recorded board, at ``path``."""
 
     def __init__(self, playback: Playback, pace: float) -> None:
-        self._pacer = Pacer(playback, pace, SystemClock())
+        self._pacer = Pacer(playback, pace, HostClock())
         self._out = b""
         try:
             import pty  # here, because Windows has neither
