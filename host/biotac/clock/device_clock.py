@@ -8,9 +8,9 @@ import threading
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..wire.counters import nearest
 from .segment import Fit, Segment
 
-WRAP_US = 2**32
 SEGMENTS_KEPT = 16
 # During this time a drift of 500 ppm, more than any crystal has, moves the clocks against each other by 10 us.
 EVERY_S = 0.02
@@ -84,9 +84,7 @@ class DeviceClock:
         Correct while the guess from the host's time is off by less than 35 minutes: with a crystal's drift, for months
         after the segment began.
         """
-        if not self.segments:
-            return t_us
-        return t_us + WRAP_US * round((self.segments[-1].guess_t_us(host_s) - t_us) / WRAP_US)
+        return nearest(t_us, round(self.segments[-1].guess_t_us(host_s))) if self.segments else t_us
 
     def _segment(self, t_us: int, sent_s: float, arrived_s: float) -> Segment:
         because = self._because

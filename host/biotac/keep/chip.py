@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import re
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from ..errors import InputError, PortError, installing
@@ -61,6 +62,10 @@ def parse_chip(text: str) -> tuple[str, str]:
         raise PortError(f"{text!r} names no known EEPROM ({', '.join(KINDS)}); expected one such as 1:0x50:24c32")
     parse_address(address)
     return address, kind
+
+
+class _SilentError(PortError):
+    """Nothing acknowledged."""
 
 
 class Chip:
@@ -119,7 +124,7 @@ class Chip:
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
             if error.errno in NOT_ACKNOWLEDGED:
-                raise PortError(
+                raise _SilentError(
                     f"{self.name}: no acknowledge ({error.strerror}); check power, SDA, SCL and the address "
                     "(see i2cdetect)"
                 ) from error
@@ -128,12 +133,8 @@ class Chip:
     def _wait(self) -> None:
         """Wait until a write is stored. It polls with reads, which change nothing whatever the chip is."""
         for _ in range(QUESTIONS):
-            try:
-                self._bus.i2c_rdwr(self._message.read(self._address, 1))
-            except OSError as error:
-                if error.errno not in NOT_ACKNOWLEDGED:
-                    raise PortError(f"{self.name}: the bus failed ({error}); check its wires and try again") from error
-            else:
+            with suppress(_SilentError):
+                self._transfer(self._message.read(self._address, 1))
                 return
         raise PortError(
             f"{self.name} did not acknowledge any of {QUESTIONS} polls after a page write; check its power and "

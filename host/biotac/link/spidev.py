@@ -19,6 +19,7 @@ from typing import Any
 
 from ..errors import PortError, installing
 from ..wire import sensor_gen as sensor
+from ..wire.counters import nearest
 from ..wire.native import lib
 from .in_process import InProcessLink
 
@@ -118,9 +119,7 @@ class SpidevLink(InProcessLink):
 
     def _due_ns(self) -> int:
         """When the board is due next: its 32-bit time in us, unwrapped around now, as ns of the clock."""
-        now_us = self._us()
-        ahead_us: int = (lib.bt_sbc_due_us(self._board) - now_us + 2**31) % 2**32 - 2**31
-        return self._start_ns + (now_us + ahead_us) * 1000
+        return self._start_ns + nearest(lib.bt_sbc_due_us(self._board), self._us()) * 1000
 
     def _us(self) -> int:
         return (self._clock.now_ns() - self._start_ns) // 1000

@@ -87,6 +87,8 @@ class WrenchMap:
     @classmethod
     def from_dict(cls, facts: dict[str, Any]) -> WrenchMap:
         """Inverse of to_dict. Raises ValueError, KeyError, TypeError or OverflowError for anything else."""
+        margins = (facts["margin"][name] for name in ("base_mn", "share_q8"))
+        base_mn, share_q8 = ((int(normal), int(shear)) for normal, shear in margins)
         fitted = cls(
             str(facts["model"]),
             tuple(str(axis) for axis in facts["axes"]),
@@ -94,12 +96,7 @@ class WrenchMap:
             int(facts["window_rows"]),
             tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
-            Margin(
-                *(
-                    (int(normal), int(shear))
-                    for normal, shear in (facts["margin"][name] for name in ("base_mn", "share_q8"))
-                )
-            ),
+            Margin(base_mn, share_q8),
         )
         shapes = [(columns.width(columns.blocks(with_pdc=pdc)) + 1, len(fitted.axes)) for pdc in (False, True)]
         if fitted.coefficients.shape not in shapes or fitted.tare.shape != (ELECTRODES,):

@@ -121,9 +121,8 @@ class Likeness:
     def bound(self, off_n: Floats) -> Floats:
         """Of mixed(), where the map is off by at most ``off_n`` (n, 3); what it is mixed with is exact."""
         part = (self.map_part / ALL)[:, None]
-        half = (
-            0.5 + 1e-6
-        )  # what the normals make alone is often off by just a half, give or take float64's own rounding
+        # What the normals make alone is often off by just a half, give or take float64's own rounding.
+        half = 0.5 + 1e-6
         return np.where(part > 0, part * off_n, 0.0) + half / FORCE_LSB_PER_N
 
 

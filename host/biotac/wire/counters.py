@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 
-def nearest(raw: int, near: int, bits: int = 32) -> int:
-    """Of all values that a wrapping counter shows as ``raw``, the one nearest to ``near``."""
-    half, mask = 1 << (bits - 1), (1 << bits) - 1
-    return near + ((raw - near + half) & mask) - half
+def nearest(raw: int, near: int) -> int:
+    """Of all values that a counter of 32 bits shows as ``raw``, the one nearest to ``near``."""
+    return near + (raw - near + 2**31) % 2**32 - 2**31
