@@ -32,8 +32,12 @@ WORDS: Mapping[Reason, str] = {
     "finger": "a sensor fell silent",
     "slow": "this reader was too slow",
 }
-#: The fingers in each bit mask; -1, an unknown one, has all.
-FINGERS_IN = [tuple(f for f in range(MAX_SENSORS) if mask >> f & 1) for mask in range(1 << MAX_SENSORS)]
+_FINGERS_IN = [tuple(f for f in range(MAX_SENSORS) if mask >> f & 1) for mask in range(1 << MAX_SENSORS)]
+
+
+def fingers_in(mask: int) -> tuple[int, ...]:
+    """The fingers in a bit mask that this library knows; -1, an unknown mask, has all. A newer board may have more."""
+    return _FINGERS_IN[mask % len(_FINGERS_IN)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +110,7 @@ class Gaps:
         Without its rows while held fingers have yet to be heard after a loss: they come with a later one.
         ``lost_after`` has (finger, seq, frames missing).
         """
-        seen_us, fingers = self._seen_us, FINGERS_IN[batch.fingers]
+        seen_us, fingers = self._seen_us, fingers_in(batch.fingers)
         gaps: list[Gap] = []
         if self._begun is not None:
             now, later = split(batch, batch.first_t_us() or 0)

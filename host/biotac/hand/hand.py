@@ -14,7 +14,7 @@ from typing import Any, NoReturn, SupportsIndex, cast
 from ..board import handshake
 from ..board.board import Board
 from ..board.consumers import Callbacks, DeferredErrors
-from ..board.gap import Gap
+from ..board.gap import Gap, fingers_in
 from ..board.handshake import HandWarning
 from ..board.reader import THREADS
 from ..board.stream import ALL_FINGERS, Stream
@@ -27,7 +27,6 @@ from ..markdown import html_table
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.frames import Frame, StructArray
-from ..wire.sensor_gen import MAX_SENSORS
 from .commands import Commands, Requests
 from .configuration import Configuration
 from .reading import Reading
@@ -96,7 +95,7 @@ class Hand(Commands, Subscriptions):
     @property
     def fingers(self) -> list[int]:
         """Chip selects of the fingers whose sensor answered when the board was opened, or last came back."""
-        return [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
+        return list(fingers_in(self.info.fingers_present))
 
     @property
     def warnings(self) -> list[HandWarning]:

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..board.board import Board
 from ..board.consumers import DeferredErrors
-from ..board.gap import Gap
+from ..board.gap import Gap, fingers_in
 from ..board.reader import Tap
 from ..errors import BiotacError, DeviceLostError, InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
-from ..wire.sensor_gen import MAX_SENSORS
 from .commands import Requests
 from .configuration import Configuration
 
@@ -182,7 +181,7 @@ class Recorder(Tap):
         from ..recording.facts import Facts
 
         requests, kept, hello = self._requests, self._kept, self._board.info
-        present = [finger for finger in range(MAX_SENSORS) if hello.fingers_present >> finger & 1]
+        present = fingers_in(hello.fingers_present)
         sensors = [requests.ask(wire.GetSensorInfo(0, finger), wire.SensorInfo) for finger in present]
         settings, calibrations, maps = kept.settings(), kept.calibrations(), kept.maps()
         zero_ns = self._board.link.zero_ns

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from ..board.gap import FINGERS_IN, Gap
+from ..board.gap import Gap, fingers_in
 from ..board.reader import Consumer, Reader
 from ..wire.batches import ROUND_US, Batch
 from ..wire.frames import Frame
@@ -57,7 +57,7 @@ class Rounds(Consumer):
         self._rows: dict[int, dict[int, tuple[Batch, int]]] = {}  # by t_us, by finger
         self._events: list[tuple[int, Event]] = []
         self._events_lost = 0  # since a round was given
-        self._expected = set(FINGERS_IN[reader.present])  # fingers that have rows: with these a round is complete
+        self._expected = set(fingers_in(reader.present))  # fingers that have rows: with these a round is complete
         self._news = threading.Condition()
         self._given_us = -1  # the latest round that was given
         self._after_us = -1  # a later one is waited for
@@ -70,7 +70,7 @@ class Rounds(Consumer):
         with self._news:
             if any(type(m) is Gap and m.reason == "rebooted" for m in batch.messages):  # its clock began anew
                 self._rows, self._given_us, self._after_us = {}, -1, -1
-                self._expected = set(FINGERS_IN[self._reader.present])
+                self._expected = set(fingers_in(self._reader.present))
                 self._events = [(-1, event) for _, event in self._events]  # come with the next round, whatever its time
             for row, (t_us, finger) in enumerate(zip(batch.t_us.tolist(), batch.wire["finger"].tolist(), strict=True)):
                 if t_us > self._given_us:
@@ -139,7 +139,7 @@ class Rounds(Consumer):
                 self._rows = {at: row for at, row in self._rows.items() if at > newest}
         frames = {finger: Frame.from_row(batch.frames[row]) for finger, (batch, row) in rows.items()}
         fingers = {}
-        for finger in sorted({*frames, *(event.finger for event in due), *FINGERS_IN[self._reader.present]}):
+        for finger in sorted({*frames, *(event.finger for event in due), *fingers_in(self._reader.present)}):
             own = tuple(event for event in due if event.finger == finger)
             fingers[self._latest.name(finger)] = FingerRound(frames.get(finger), own)
         seq = next((frame.seq for frame in frames.values()), -1)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.consumers import DeferredErrors
-from ..board.gap import FINGERS_IN
+from ..board.gap import fingers_in
 from ..board.reader import Consumer, Reader
 from ..errors import InputError
 from ..wire.batches import Batch
@@ -91,7 +91,7 @@ class Latest(Consumer):
         """Chip select of a finger whose sensor answers, or did. Raises KeyError for any other, naming those."""
         finger = finger_index(self.names, key)
         if not self._reader.present >> finger & 1:
-            present = [repr(self.name(f)) for f in FINGERS_IN[self._reader.present]]
+            present = [repr(self.name(f)) for f in fingers_in(self._reader.present)]
             raise KeyError(f"no sensor answers as {key!r}; those that do: {', '.join(present) or 'none'}")
         return finger
 
@@ -104,7 +104,7 @@ class Latest(Consumer):
         return index(fingers)
 
     def put(self, batch: Batch) -> None:
-        for finger in FINGERS_IN[batch.fingers]:
+        for finger in fingers_in(batch.fingers):
             self._batches[finger] = batch
         for finger in set(batch.wire["finger"][batch.wire["trust"] >= Trust.INTERVAL].tolist()):
             self._trusted[finger] = batch

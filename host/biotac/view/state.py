@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
-from ..board.gap import FINGERS_IN, Gap
+from ..board.gap import Gap, fingers_in
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.counters import nearest
@@ -153,7 +153,7 @@ class State:
             self._health.events.append({"finger": message.finger, "t_us": t_us, "name": name})
             self._health_due_s = 0.0  # publish at once
         elif isinstance(message, Gap):
-            for finger in FINGERS_IN[message.fingers]:
+            for finger in fingers_in(message.fingers):
                 self._health.events.append({"finger": finger, "t_us": message.next_t_us or now_us, "name": "gap"})
         elif isinstance(message, wire.Tare):
             self._finger(message.finger).update(

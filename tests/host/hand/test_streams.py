@@ -317,6 +317,19 @@ def test_values_older_than_the_program_wants_are_not_shown(live: Live) -> None:
         live.hand["index"].next_frame(0)
 
 
+@pytest.mark.parametrize("finger", [5, 255])
+def test_a_finger_that_only_the_board_knows_ends_nothing(live: Live, finger: int) -> None:
+    live.firmware.facts["fingers_present"] = 0xFF
+    live.hand.status()
+    with pytest.raises(TimeoutError):
+        live.hand.next_round(timeout_s=0)
+    live.send(frame(1, finger=finger), frame(1, force_z_n=2.0), heartbeat(40, finger=finger))
+    until(lambda: live.hand["index"].t_us > 0)
+    assert live.hand["index"].force_n[2] == 2.0
+    with pytest.raises(KeyError, match="no finger"):
+        live.hand[finger]
+
+
 def test_nothing_is_no_value_however_old_values_may_be() -> None:
     with biotac.open("sim:press.toml?seconds=1", max_age_s=math.inf) as hand:
         assert hand["index"].stale.startswith("nothing has arrived")
