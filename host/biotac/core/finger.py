@@ -140,8 +140,7 @@ class Finger:
         n = len(electrodes)
         words = np.full((n, slots.SLOTS_PER_FRAME), wire.INVALID_COUNT, np.uint16)
         words[:, slots.ELECTRODE_SLOT] = electrodes
-        slow = (("pdc", slots.PDC_SLOT, pdc), ("tac", slots.TAC_SLOT, tac), ("tdc", slots.TDC_SLOT, tdc))
-        for name, slot, channel in slow:
+        for (name, slot), channel in zip(slots.SLOW_SLOTS.items(), (pdc, tac, tdc), strict=True):
             if channel is not None:
                 words[:, slot] = checked_words(name, channel, n)
         if pac is not None:

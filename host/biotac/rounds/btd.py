@@ -20,10 +20,10 @@ class Btd:
         self.read = read_btd(path)
 
     def __iter__(self) -> Iterator[Message]:
-        read, slow = self.read, (slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT)
+        read = self.read
         for time_s, row in zip(read.t_s - read.t_s[0], read.samples.astype(int), strict=True):
             own = []
             for words, serial in zip(row, read.serials, strict=True):
-                pdc, tac, tdc = (int(words[s]) for s in slow)
+                pdc, tac, tdc = (int(words[slot]) for slot in slots.SLOW_SLOTS.values())
                 own.append(Counts(words[slots.ELECTRODE_SLOT], pdc, tac, tdc, words[slots.PAC_SLOT], serial))
             yield Message(round(time_s * 1e9), (*own, *[None] * (MAX_SENSORS - len(own))), SLOT_US)

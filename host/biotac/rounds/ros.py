@@ -91,7 +91,7 @@ def _slot_us(times: Any) -> Any:
     """Each slot's time after the stamp, if the frame was sampled in our order; else None."""
     at_ns = np.empty(slots.SLOTS_PER_FRAME)
     at_ns[slots.ELECTRODE_SLOT], at_ns[slots.PAC_SLOT] = times.electrode_ns_offset, times.pac_ns_offset
-    for slot, own in zip((slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT), ("pdc", "tac", "tdc"), strict=True):
-        at_ns[slot] = getattr(times, f"{own}_ns_offset")
+    for name, slot in slots.SLOW_SLOTS.items():
+        at_ns[slot] = getattr(times, f"{name}_ns_offset")
     ours = (np.abs(at_ns / 1e3 - SLOT_US) < 1e6 / sensor.SLOT_HZ / 2).all()
     return (at_ns / 1e3).astype(np.uint32) if ours else None

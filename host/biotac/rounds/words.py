@@ -21,8 +21,7 @@ TURNS = 4  # of two serial numbers: one that is damaged takes none
 LATE_FIRST = 400  # messages of a finger that is late in a file, by which it is judged
 BURST = 5.0  # rounds that a source may be behind, and then send at once
 PAC_HZ = sensor.SLOT_HZ / 2
-CHANNELS = {"pdc", "tac", "tdc", "pac"}
-SLOW = {"pdc": slots.PDC_SLOT, "tac": slots.TAC_SLOT, "tdc": slots.TDC_SLOT}
+CHANNELS = {*slots.SLOW_SLOTS, "pac"}
 _NO_US = np.zeros(slots.SLOTS_PER_FRAME, np.uint32)
 
 
@@ -173,7 +172,7 @@ class Rounds:
             if own is None:
                 continue
             words[slots.ELECTRODE_SLOT, f] = self._judged(f, own, message.stamp_ns)
-            for name, slot in SLOW.items():
+            for name, slot in slots.SLOW_SLOTS.items():
                 word = getattr(own, name) if name in self._channels[f] else None
                 words[slot, f] = wire.INVALID_COUNT if word is None else word
             if "pac" in self._channels[f]:

@@ -15,17 +15,12 @@ from ..errors import RecordingError
 from ..recording.btd.file import read_btd
 from ..recording.npz_file import counts_field, read_npz, to_lin_frame
 from ..wire import slots
+from ..wire.fields import Q4_PER_COUNT
 from ..wire.messages_gen import INVALID_COUNT, EmuFault
 from .source import Source
 
-_TARE_FRACTION = 16  # TARE_SET: counts with four fractional bits
-_SLOTS_OF = {
-    "E": slots.ELECTRODE_SLOT,
-    "PDC": np.array([slots.PDC_SLOT]),
-    "TAC": np.array([slots.TAC_SLOT]),
-    "TDC": np.array([slots.TDC_SLOT]),
-    "PAC": slots.PAC_SLOT,
-}
+_SLOW = {name.upper(): np.array([slot]) for name, slot in slots.SLOW_SLOTS.items()}
+_SLOTS_OF = {"E": slots.ELECTRODE_SLOT, **_SLOW, "PAC": slots.PAC_SLOT}
 
 
 def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = None) -> Source:
@@ -46,12 +41,12 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
     samples = np.full((frames, 1, slots.SLOTS_PER_FRAME), EmuFault.NO_CHANNEL, dtype=np.uint16)
     for name, where in _SLOTS_OF.items():
         if name in fields:
-            columns = None if name in ("PDC", "TAC", "TDC") else len(where)
+            columns = None if name in _SLOW else len(where)
             samples[:, 0, where] = counts_field(path, name, fields[name], frames, columns).reshape(frames, -1)
     tare_q4 = force_n = None
     if "E_base" in fields:
         base = counts_field(path, "E_base", fields["E_base"], None, len(slots.ELECTRODE_SLOT))
-        tare_q4 = np.rint(base.mean(axis=0) * _TARE_FRACTION).astype(np.uint16)[None, :]
+        tare_q4 = np.rint(base.mean(axis=0) * Q4_PER_COUNT).astype(np.uint16)[None, :]
     if "F" in fields:
         force = fields["F"]
         if force.shape != (frames, 3) or force.dtype.kind not in "iuf" or not np.isfinite(force).all():
