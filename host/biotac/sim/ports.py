@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import PortError
 from ..link.port_text import options_of, parse_pace
@@ -20,10 +21,10 @@ class SimPort:
     board: str  # "posix", or the name of an emulated board
     source: str
     pace: float
-    fingers: int | None
-    seconds: float | None
-    image: str | None
-    verbs: tuple[str, ...]  # done to an emulated board before it boots
+    fingers: int | None = None
+    seconds: float | None = None
+    image: str | None = None
+    verbs: tuple[str, ...] = ()  # done to an emulated board before it boots
 
 
 FORMS = {
@@ -31,6 +32,7 @@ FORMS = {
     "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S&do=VERB;VERB",
 }
 
+_READ: dict[str, Callable[[str], object]] = {"pace": parse_pace, "fingers": int, "seconds": float}
 _OPTIONS = {"sim": {"pace", "fingers", "seconds"}, "emu": {"pace", "fingers", "seconds", "source", "image", "do"}}
 
 
@@ -38,21 +40,15 @@ def parse_sim(port: str, pace: float) -> SimPort:
     """Split a sim: or emu: port; ``pace`` is the default, in device seconds per second (0: unpaced)."""
     scheme = port.partition(":")[0]
     head, options = options_of(port, _OPTIONS[scheme], FORMS[scheme])
-    board, source = ("posix", head) if scheme == "sim" else (head, options.get("source", ""))
+    board, source = ("posix", head) if scheme == "sim" else (head, options.pop("source", ""))
     if not source:
         raise PortError(f"{port}: no source: expected {FORMS[scheme]}")
+    verbs = tuple(filter(None, options.pop("do", "").split(";")))
     try:
-        return SimPort(
-            board,
-            source,
-            parse_pace(options["pace"]) if "pace" in options else pace,
-            int(options["fingers"]) if "fingers" in options else None,
-            float(options["seconds"]) if "seconds" in options else None,
-            options.get("image"),
-            tuple(filter(None, options.get("do", "").split(";"))),
-        )
+        given: dict[str, Any] = {name: _READ.get(name, str)(text) for name, text in options.items()}
     except ValueError as error:
         raise PortError(f"{port}: {error}; expected {FORMS[scheme]}") from error
+    return SimPort(board, source, verbs=verbs, **{"pace": pace, **given})
 
 
 def open_sim(port: str, pace: float) -> SimLink:

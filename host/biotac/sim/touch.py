@@ -52,9 +52,8 @@ class Touch:
         for name, value, low, high in limits:
             if not _is_number(value) or not low <= value <= high:  # NaN too
                 raise InputError(f"Touch: {name} is {value!r}, expected {low:g} to {high:g}; correct what computes it")
-        if not isinstance(self.at, str) and not (
-            isinstance(self.at, tuple) and len(self.at) == 2 and all(map(_is_number, self.at))
-        ):
+        is_point = isinstance(self.at, tuple) and len(self.at) == 2 and all(map(_is_number, self.at))
+        if not is_point and not (isinstance(self.at, str) and self.at in _sensor.ELECTRODE_NAMES):
             raise InputError(f"Touch: at is {self.at!r}, expected an electrode, E1 to E19, or (x_mm, y_mm)")
         _place_mm(self.at)
 
@@ -75,8 +74,6 @@ Load: TypeAlias = "Touch | Sequence[Touch] | Course | None"
 def _place_mm(at: Place) -> tuple[float, float]:
     """The point's x and y in mm."""
     if isinstance(at, str):
-        if at not in _sensor.ELECTRODE_NAMES:
-            raise InputError(f"Touch: at is {at!r}, expected an electrode, E1 to E19, or (x_mm, y_mm)")
         over = surface.project(surface.ELECTRODE_MM[[_sensor.ELECTRODE_NAMES.index(at)]])[0]
         return float(over[0]), float(over[1])
     x_mm, y_mm = at
