@@ -13,13 +13,18 @@ _PLAYERS = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim", ".b
 
 
 def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
-    """WHAT, and the options by key. Raises PortError, with the expected ``form``, for an option not in ``known``."""
+    """WHAT, and the options by key. Raises PortError, with the expected ``form``, for one that is not in ``known``.
+
+    So does one without a value, which would be as if it were not there; any other word may be of a file's name.
+    """
     target, query = file_and_query(port.partition(":")[2])
-    options = dict(parse_qsl(query))
-    unknown = sorted(set(options) - set(known))
-    if unknown:
-        raise PortError(f"{port}: unknown option {unknown[0]!r}; expected {form}")
-    return target, options
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    for key, value in sorted(options.items()):
+        if value and key not in known:
+            raise PortError(f"{port}: unknown option {key!r}; expected {form}")
+        if not value and key in known:
+            raise PortError(f"{port}: option {key!r} has no value; expected {form}")
+    return target, {key: value for key, value in options.items() if value}
 
 
 def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:

@@ -115,6 +115,8 @@ CASES: list[tuple[int, str, str]] = [
     (2, "name another with --folder", "view sim:press.toml --no-browser --folder +no/where"),
     (3, "`biotac list`", f"stream {NO_PORT}"),
     (3, "expected sim:SOURCE?pace=X", "stream sim:press.toml?pace=quick"),
+    (3, "option 'seconds' has no value; expected sim:", "stream sim:press.toml?seconds="),
+    (3, "option 'pace' has no value", "stream sim:press.toml?pace"),
     (3, "expected socket://HOST:PORT", "info socket:nowhere"),
     (3, "check host and port", "info rfc2217:nowhere"),
     (3, "`biotac list`", f"share {NO_PORT} --lsl"),

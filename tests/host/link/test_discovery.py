@@ -16,6 +16,7 @@ import biotac
 from biotac.cli.main import main
 from biotac.link.discovery import boards, choose, serial_ports
 from biotac.link.holders import Holder, holders
+from biotac.link.port_text import options_of
 from biotac.link.serial_port import open_error
 from biotac.wire import messages_gen as wire
 from biotac.wire.identity import ascii_text, serial_text
@@ -138,6 +139,10 @@ class Proc:
 @pytest.fixture
 def proc(tmp_path: Path) -> Proc:
     return Proc(tmp_path / "proc")
+
+
+def test_a_word_alone_is_no_option() -> None:
+    assert options_of("sim:not?there.toml", ("pace",), "") == ("not", {})
 
 
 def test_who_has_a_port_open_is_found_in_proc(proc: Proc, tmp_path: Path) -> None:
