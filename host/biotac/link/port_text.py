@@ -18,7 +18,7 @@ def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[
     So does one without a value, which would be as if it were not there; any other word may be of a file's name.
     """
     target, query = file_and_query(port.partition(":")[2])
-    options = dict(parse_qsl(query, keep_blank_values=True))
+    options = dict(parse_qsl(query.replace("+", "%2B"), keep_blank_values=True))  # in a form, + is a space
     for key, value in sorted(options.items()):
         if value and key not in known:
             raise PortError(f"{port}: unknown option {key!r}; expected {form}")

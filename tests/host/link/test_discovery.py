@@ -141,8 +141,9 @@ def proc(tmp_path: Path) -> Proc:
     return Proc(tmp_path / "proc")
 
 
-def test_a_word_alone_is_no_option() -> None:
+def test_a_word_alone_is_no_option_and_a_plus_is_no_space() -> None:
     assert options_of("sim:not?there.toml", ("pace",), "") == ("not", {})
+    assert options_of("csv:a.csv?columns=a+b%20c.toml", ("columns",), "") == ("a.csv", {"columns": "a+b c.toml"})
 
 
 def test_who_has_a_port_open_is_found_in_proc(proc: Proc, tmp_path: Path) -> None:
