@@ -27,8 +27,8 @@ QUANTITIES = {
     "events": QuantityFlags.EVENTS,
 }
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
-STREAMS = {str(flag.name).lower(): flag for flag in StreamFlags if flag not in (StreamFlags.FRAMES, StreamFlags.STATUS)}
-NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS, "status")
+STREAMS = {"pac": StreamFlags.PAC, "bands": StreamFlags.BANDS, "status": StreamFlags.STATUS}
+NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS)
 # Messages that a board sends only to those who want them, by the name of what carries them.
 CARRIED_BY = {Touch: "touch", Event: "events", Bands: "bands"}
 
@@ -56,18 +56,15 @@ class Wants:
             raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ:g}, the board's rate")
         quantities = QuantityFlags.REST_FRAMES if rest else QuantityFlags(0)
         # Status is the link's sign of life: without it, a hand without sensors would look dead.
-        streams = StreamFlags.STATUS
+        wants = cls(quantities, StreamFlags.STATUS, fingers, 1 if rate_hz is None else round(FRAME_HZ / rate_hz))
         for name in names or ("results",):
-            quantities |= QUANTITIES.get(name, QuantityFlags(0))
-            streams |= STREAMS.get(name, StreamFlags(0))
-            if name in QUANTITIES or name in IN_EVERY_FRAME:
-                streams |= StreamFlags.FRAMES
+            wants = wants.plus(name)
             if name == "results" and has_room:
-                streams |= StreamFlags.PAC
-        return cls(quantities, streams, fingers, 1 if rate_hz is None else round(FRAME_HZ / rate_hz))
+                wants = wants.plus("pac")
+        return wants
 
     def plus(self, name: str) -> Wants:
-        """These, and what carries the quantity or stream ``name``."""
+        """These, and what carries the quantity or stream ``name``; a FRAME carries all that is no stream."""
         streams = self.streams | STREAMS.get(name, StreamFlags.FRAMES)
         return Wants(self.quantities | QUANTITIES.get(name, QuantityFlags(0)), streams, self.fingers, self.every)
 
