@@ -90,6 +90,7 @@ def compute(
         counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
     if settings is None and wrench_map is None:
         refuse_foreign_results(given)
+    formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
     if wrench_map is not None:
         from ..map.published import by_map  # here: everybody would wait for it at `import biotac`
 
@@ -106,7 +107,6 @@ def compute(
             if quantity & ~quantities:
                 out[name] = np.nan
         return out
-    formulas = _formulas(() if settings is None else tuple(settings.items()), int(quantities))
     # The fast path for one frame with the types of a live frame: there the checks would take longer than the maths.
     # Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:

@@ -13,7 +13,7 @@ import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
 from biotac.core.compiled import default_settings
 from biotac.core.compute import per_frame
-from biotac.map import published_parts
+from biotac.map import population, published_parts
 from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.wire import messages_gen as wire
 
@@ -316,5 +316,6 @@ def test_what_is_not_wanted_is_nan_and_the_rest_is_the_same(wanted) -> None:
 
 @pytest.mark.parametrize("wanted", [0, 8, 15])
 def test_quantities_without_a_result_are_refused(wanted) -> None:
-    with pytest.raises(ValueError, match="expected some of POC, FORCE and TORQUE"):
-        biotac.compute(random_counts(2), TARE, quantities=biotac.QuantityFlags(wanted))
+    for own in (None, population.on_board()):
+        with pytest.raises(ValueError, match="expected some of POC, FORCE and TORQUE"):
+            biotac.compute(random_counts(2), TARE, wrench_map=own, quantities=biotac.QuantityFlags(wanted))
