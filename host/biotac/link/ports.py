@@ -10,22 +10,24 @@ from ..errors import PortError
 from .base import Link
 from .port_text import player
 
-#: What opens each kind of port, as MODULE:FUNCTION. These are names, imported only when such a port is opened: this
-#: folder does not depend on those above it, and the user of a real board does not wait for the simulator to load.
-OPENERS = {
-    "serial": "biotac.link.discovery:open_serial",
-    "uart": "biotac.link.serial_port:open_uart",
-    "spidev": "biotac.link.spidev:SpidevLink",
-    "socket": "biotac.link.serial_port:SerialLink",
-    "rfc2217": "biotac.link.serial_port:SerialLink",
-    "sim": "biotac.sim.ports:open_sim",
-    "emu": "biotac.sim.ports:open_sim",
-    "replay": "biotac.recording.replay.link:open_replay",
-    "bag": "biotac.rounds.ports:open_bag",
-    "csv": "biotac.rounds.ports:open_csv",
-    "foxglove": "biotac.rounds.ports:open_foxglove",
-    "zenoh": "biotac.fleet.zenoh_link:ZenohLink",
+#: The kinds of port by their forms, and what opens each, as MODULE:FUNCTION. These are names, imported only when such a
+#: port is opened: this folder does not depend on those above it, and the user of a real board does not wait for the
+#: simulator to load.
+FORMS = {
+    "serial:NUMBER": "biotac.link.discovery:open_serial",
+    "uart:DEVICE?baud=N": "biotac.link.serial_port:open_uart",
+    "spidev:BUS.DEVICE": "biotac.link.spidev:SpidevLink",
+    "socket://HOST:PORT": "biotac.link.serial_port:SerialLink",
+    "rfc2217://HOST:PORT": "biotac.link.serial_port:SerialLink",
+    "sim:SOURCE": "biotac.sim.ports:open_sim",
+    "emu:pico": "biotac.sim.ports:open_sim",
+    "replay:REC": "biotac.recording.replay.link:open_replay",
+    "bag:FILE": "biotac.rounds.ports:open_bag",
+    "csv:FILE": "biotac.rounds.ports:open_csv",
+    "foxglove://HOST:PORT/TOPIC": "biotac.rounds.ports:open_foxglove",
+    "zenoh:NAME": "biotac.fleet.zenoh_link:ZenohLink",
 }
+OPENERS = {form.partition(":")[0]: opener for form, opener in FORMS.items()}
 PATH = "biotac.link.serial_port:SerialLink"
 PACED = ("sim", "emu", "replay")  # their functions take the default pace; the others have a time of their own
 
@@ -39,11 +41,8 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     scheme, colon, _ = port.partition(":")
     known = colon and scheme in OPENERS
     if not known and colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
-        raise PortError(
-            f"unknown kind of port {scheme!r}; expected a device path, serial:NUMBER, "
-            "uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, "
-            "replay:REC, bag:FILE, csv:FILE, foxglove://HOST:PORT/TOPIC or zenoh:NAME"
-        )
+        *most, last = FORMS
+        raise PortError(f"unknown kind of port {scheme!r}; expected a device path, {', '.join(most)} or {last}")
     cure = player(port)
     if cure and not known:
         raise PortError(f"{port} is a file, not a port; play it with {cure}:{port}")
