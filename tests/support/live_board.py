@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from biotac.board.gap import Gap
+from biotac.clock.host_clock import HostClock
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
@@ -171,21 +172,17 @@ def until(condition: Callable[[], Any]) -> None:
         time.sleep(0.001)
 
 
-class Clock:
-    """A HostClock by hand: ``sleep`` calls ``while_away`` instead of waiting."""
+class Clock(HostClock):
+    """By hand: ``sleep`` calls ``while_away`` instead of waiting."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.pauses = 0
         self.while_away: Callable[[int], None] = lambda n: None
-
-    monotonic_s = staticmethod(time.monotonic)
 
     def sleep(self, seconds: float) -> None:
         self.pauses += 1
         self.while_away(self.pauses)
-
-    def wake(self) -> None:
-        pass
 
 
 def point(link: Path, target: str) -> None:

@@ -101,6 +101,9 @@ def test_a_finger_has_streams_when_it_comes_and_is_nan_once_when_it_goes(inlet) 
         both, alone = hand.read_batch(2.5), hand.read_batch(0.2)
     rows = alone.wire["finger"] == 0
     alone = replace(alone, wire=alone.wire[rows], seq=alone.seq[rows], t_us=alone.t_us[rows])
+    silence = Silence()
+    (row,) = [*silence.rows(both), *silence.rows(alone)]
+    assert all(np.isnan(row[name]).all() for name in row.dtype.names if row.dtype[name].base.kind == "f")
     with biotac.open("sim:press.toml?seconds=0.5") as hand, Outlet(hand) as outlet:
         outlet.push(both)
         late = outlet.infos[3]
@@ -113,16 +116,6 @@ def test_a_finger_has_streams_when_it_comes_and_is_nan_once_when_it_goes(inlet) 
         assert stream.pull_sample(timeout=0.0)[0] is None
     assert not np.isnan(values[249]).any() and np.isnan(values[250, :13]).all()
     assert (values[250, 14], values[250, 15]) == (biotac.Trust.NONE, 65535) and (np.diff(stamps_s) > 0).all()
-
-
-def test_a_row_of_silence_has_no_value() -> None:
-    with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
-        both, silence = hand.read_batch(1.0), Silence()
-    one = both.wire["finger"] == 0
-    silence.rows(both)
-    (row,) = silence.rows(replace(both, wire=both.wire[one], seq=both.seq[one], t_us=both.t_us[one] + 1_000_000))
-    assert all(np.isnan(row[name]).all() for name in row.dtype.names if row.dtype[name].base.kind == "f")
-    assert (row["finger"], row["trust"], row["pdc"]) == (1, biotac.Trust.NONE, 65535)
 
 
 def test_columns_are_the_rows() -> None:
