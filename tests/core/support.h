@@ -1,5 +1,4 @@
-// Shared by the C tests: cmocka with what it needs, reproducible random numbers, vector files.
-// The vector format is in protocol/vectors/README.md.
+// Shared by the C tests: cmocka with what it needs, reproducible random numbers.
 #ifndef BIOTAC_TEST_SUPPORT_H
 #define BIOTAC_TEST_SUPPORT_H
 
@@ -8,13 +7,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
-
-#define LINE_BYTES 4096
 
 // ---- tests -------------------------------------------------------------------------------------
 
@@ -76,51 +72,5 @@ static inline double random_unit(uint64_t *state)
 {
     return (double)(random_u64(state) >> 11) / 9007199254740992.0;
 }
-
-// ---- vector files ------------------------------------------------------------------------------
-
-// "-" and "" are no bytes. Returns how many bytes were written to out, which holds room.
-static inline size_t bytes_from_hex(const char *hex, uint8_t *out, size_t room)
-{
-    size_t n = 0;
-    unsigned byte;
-    if (strcmp(hex, "-") == 0) {
-        return 0;
-    }
-    while (sscanf(hex + 2 * n, "%2x", &byte) == 1) {
-        assert_true(n < room);
-        out[n++] = (uint8_t)byte;
-    }
-    assert_int_equal(strlen(hex), 2 * n);
-    return n;
-}
-
-#ifdef BT_VECTORS
-static inline FILE *open_vectors(const char *name)
-{
-    char path[1024];
-    (void)snprintf(path, sizeof path, "%s/%s", BT_VECTORS, name);
-    FILE *file = fopen(path, "r");
-    if (file == NULL) {
-        fail_msg("%s is missing: run tools/make/vectors.py", path);
-    }
-    return file;
-}
-
-// The next line that says something, without its newline. False at the end, where it closes file.
-static inline bool next_line(FILE *file, char line[LINE_BYTES])
-{
-    while (fgets(line, LINE_BYTES, file) != NULL) {
-        size_t length = strcspn(line, "\n");
-        assert_true(length < LINE_BYTES - 1);
-        line[length] = 0;
-        if (length > 0 && line[0] != '#') {
-            return true;
-        }
-    }
-    (void)fclose(file);
-    return false;
-}
-#endif
 
 #endif
