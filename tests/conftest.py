@@ -210,7 +210,7 @@ def hello() -> Callable[..., bytes]:
     return hello_for
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of real recordings; they are not ours to copy, so the test is skipped without them."""
     if not SHARED_DATA.is_dir():

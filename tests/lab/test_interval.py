@@ -15,15 +15,13 @@ from biotac_lab.calibrate import interval
 from biotac_lab.calibrate.interval import Judged, together
 from biotac_lab.calibrate.training import of_others
 
-RECORDINGS = [Path(__file__).parents[3] / f"shared/data/syntouchcontact/{name}.npz" for name in ("F1", "F2")]
 ALL, BAND, OVER_RMS, OUT = (0.90, 0.99), (0.80, 0.995), 3.0, 0.90
 
 
 @pytest.fixture(scope="module")
-def fingers() -> list[interval.Finger]:
-    if not all(path.exists() for path in RECORDINGS):
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
-    return [interval.Finger.of_run(load(path).run) for path in RECORDINGS]
+def fingers(shared_data: Path) -> list[interval.Finger]:
+    paths = [shared_data / f"syntouchcontact/{name}.npz" for name in ("F1", "F2")]
+    return [interval.Finger.of_run(load(path).run) for path in paths]
 
 
 def misses(judged: Judged) -> list[tuple]:

@@ -27,8 +27,6 @@ from biotac_lab.calibrate import held_out_error, training
 from biotac_lab.calibrate.peer_net import PeerNet
 from biotac_lab.cli import main
 
-SHARED = Path(__file__).parents[3] / "shared/data/syntouchcontact"
-
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
@@ -206,21 +204,18 @@ def test_fingers_of_the_training_agree_with_the_normals_and_a_poke_does_not(
     assert np.mean(share(runs[0].counts, runs[0].tare) > 0) > np.mean(share(poke, runs[0].tare) > 0) == 0.0
 
 
-def contact_of_another_rig() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def contact_of_another_rig(shared_data: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Counts (n, 19), tare, and minus the plate's normal (n, 3), where a plate presses a finger of another rig."""
-    path = SHARED.parent / "robotic_finger/trial_15330.npz"
-    if not path.exists():
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
-    fields = np.load(path)
+    fields = np.load(shared_data / "robotic_finger/trial_15330.npz")
     rest = slice(400)  # nothing touches it
     tare, pdc = np.median(fields["E"][rest], axis=0), np.median(fields["PDC"][rest])
     touched = fields["PDC"] > pdc + 40
     return fields["E"][touched], tare, (fields["z_dir"] * [1.0, -1.0, 1.0])[touched]
 
 
-def test_a_plate_pressed_by_hand_corrects_the_sides_of_a_finger_of_another_rig() -> None:
+def test_a_plate_pressed_by_hand_corrects_the_sides_of_a_finger_of_another_rig(shared_data: Path) -> None:
     """Fitted without force and normal to the first half of the trial, tested on the other."""
-    counts, tare, into = contact_of_another_rig()
+    counts, tare, into = contact_of_another_rig(shared_data)
     half = len(counts) // 2
     press = np.arange(half) // 50
     held = Held(counts[:half].astype(np.float64), tare, press, np.zeros((press[-1] + 1, 3)))
@@ -244,11 +239,9 @@ def test_a_plate_on_one_side_is_refused() -> None:
         of_plate(held, population_map.load(None).population)
 
 
-def test_the_default_force_holds_on_other_rigs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_default_force_holds_on_other_rigs(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """F1 and F2 are all that the map is trained on: a plate on another rig's finger, and two that hold a tool."""
-    files = [SHARED.parent / "robotic_finger/trial_15330.npz", SHARED.parent / "usc_pinch/pinch_2017.npz"]
-    if not all(path.exists() for path in files):
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
+    files = [shared_data / "robotic_finger/trial_15330.npz", shared_data / "usc_pinch/pinch_2017.npz"]
     assert main(["direction", *map(str, files), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     rows = [dict(zip(facts["head"], row, strict=True)) for row in facts["rows"]]
@@ -272,11 +265,9 @@ def test_a_net_of_another_size_is_refused_and_one_of_theirs_gives_forces(tmp_pat
 
 
 @pytest.mark.nightly
-def test_real_fingers_each_by_the_other() -> None:
+def test_real_fingers_each_by_the_other(shared_data: Path) -> None:
     """A tenth above what was reached when direction across rigs was no goal (population.md)."""
-    if not SHARED.exists():
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
-    runs = [training.aligned(load_run(SHARED / name)) for name in ("F1.npz", "F2.npz")]
+    runs = [training.aligned(load_run(shared_data / "syntouchcontact" / name)) for name in ("F1.npz", "F2.npz")]
     fingers = [training.sums_of(run) for run in runs]
     within, after_presses = [], []
     for k, new in ((0, runs[1]), (1, runs[0])):

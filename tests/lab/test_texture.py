@@ -11,8 +11,6 @@ import pytest
 from biotac.errors import InputError
 from biotac_lab.learn import texture
 
-SHARED = Path(__file__).parents[3] / "shared/data"
-
 
 def rubbed(hz: float, seed: int, samples: int = 220) -> Any:
     """A tenth of a second of noise and of a buzz that comes and goes, above rest."""
@@ -48,11 +46,8 @@ def test_what_cannot_be_described_is_refused() -> None:
 
 
 @pytest.mark.nightly
-def test_what_is_held_is_told_by_real_taps() -> None:
-    path = SHARED / "taps/handover.npz"
-    if not path.is_file():
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
-    data = np.load(path)
+def test_what_is_held_is_told_by_real_taps(shared_data: Path) -> None:
+    data = np.load(shared_data / "taps/handover.npz")
     from sklearn.model_selection import cross_val_score
 
     signals = {shape: data[f"handover_{shape}_signals"] for shape in ("rod", "box", "plate")}

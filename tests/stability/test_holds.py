@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from courses import Course, script
+from sensor_faults import longest
 
 from biotac import Finger, FrameFlags, TareReason, TareState
 from biotac.sim.timeline import Pose
@@ -58,12 +59,6 @@ def means(values: np.ndarray) -> np.ndarray:
     """Of each whole second of (n, 3)."""
     whole = len(values) // MEAN_ROWS * MEAN_ROWS
     return values[:whole].reshape(-1, MEAN_ROWS, 3).mean(axis=1)
-
-
-def longest(mask: np.ndarray) -> int:
-    """How many rows in a row."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return int((edges[1::2] - edges[0::2]).max(initial=0))
 
 
 def inverted_rows(case: Grasp, rows: np.ndarray) -> int:

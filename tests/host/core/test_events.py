@@ -12,25 +12,17 @@ from pac_events import pac_events
 import biotac
 from biotac import EventKind
 
-SHARED = Path(__file__).parents[4] / "shared/data"
 SLIDING_M_S = 0.002
 PER_S = 2200
-
-
-def shared(name: str) -> Any:
-    path = SHARED / name
-    if not path.is_file():
-        pytest.skip("no ../shared/data: real recordings are not part of the project")
-    return np.load(path)
 
 
 def of_kind(events: Any, kind: EventKind) -> Any:
     return events[events["kind"] == kind]
 
 
-def test_real_slides_slip_and_begin_to_when_the_robot_moves() -> None:
+def test_real_slides_slip_and_begin_to_when_the_robot_moves(shared_data: Path) -> None:
     # Ten materials, ten slides; the arm's speed is known every 7 ms, with holes of 40 ms.
-    data = shared("slides/slides.npz")
+    data = np.load(shared_data / "slides/slides.npz")
     called, late_s = [], []
     for trial in (f"m{m}_{k}_" for m in range(1, 11) for k in range(1, 11)):
         t_s, at_s = data[trial + "t"], data[trial + "cv_t"]
@@ -46,9 +38,9 @@ def test_real_slides_slip_and_begin_to_when_the_robot_moves() -> None:
     assert np.sum(np.abs(late_s) <= 0.05) >= 28
 
 
-def test_real_taps_are_jolts() -> None:
+def test_real_taps_are_jolts(shared_data: Path) -> None:
     # A tap is visible where the signal leaves, in 70 ms, twice the range it had in the 43 ms before.
-    data = shared("taps/handover.npz")
+    data = np.load(shared_data / "taps/handover.npz")
     signals = np.concatenate([data[f"handover_{what}_signals"] for what in ("rod", "box", "plate")]).astype(int)
     height = np.abs(signals - np.median(signals[:, :95], axis=1, keepdims=True))
     visible = height[:, 95:250].max(axis=1) > 2 * height[:, :95].max(axis=1)
