@@ -63,14 +63,6 @@ def test_a_map_of_the_librarys_own_goes_as_it_is() -> None:
         assert hand.board.get_map(0) == opened.blob
 
 
-def test_another_sensors_is_refused_in_words() -> None:
-    with biotac.open("sim:press.toml") as hand:
-        with pytest.raises(biotac.CommandRefusedError, match=r"EndMap: OTHER_SENSOR .*no serial number to force it"):
-            hand.board.set_map(0, make_map(1, serial="BTOTHER"))
-        hand.board.set_map(0, make_map(1, serial="BTOTHER"), force=True)
-        assert serial_of(hand.board.get_map(0) or b"") == ""
-
-
 # ---- over bad links --------------------------------------------------------------------------------
 
 
