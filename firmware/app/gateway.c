@@ -144,7 +144,7 @@ static void load_settings(bt_gateway *gateway)
 {
     bt_session *session = &gateway->session;
     const bt_flash *flash = &gateway->flash;
-    session->faults |= bt_storage_damaged(flash) ? BT_FAULT_FLAG_STORAGE : 0;
+    session->status.faults |= bt_storage_damaged(flash) ? BT_FAULT_FLAG_STORAGE : 0;
     uint8_t record[BT_STORAGE_MAX_BYTES];
     uint16_t version;
     int bytes = bt_storage_read(flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
@@ -160,7 +160,7 @@ static void load_settings(bt_gateway *gateway)
         if (bytes > 0 && session->board.maps != NULL
             && !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record,
                                    (size_t)bytes)) {
-            session->faults |= BT_FAULT_FLAG_STORAGE;
+            session->status.faults |= BT_FAULT_FLAG_STORAGE;
         }
     }
     bt_session_use_settings(session);
@@ -228,7 +228,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     }
     bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
-    gateway->session.faults |= board.started_by;
+    gateway->session.status.faults |= board.started_by;
     for (uint8_t f = 0; f < can.fingers && !can.no_bus; f++) {
         bt_properties_read(port, f, &gateway->sampler.query[f], &gateway->session.info[f]);
         gateway->session.finger[f].foreign = bt_serial_is_foreign(gateway->session.info[f].serial);
@@ -239,7 +239,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     }
     load_settings(gateway); // only now is it known which sensors a calibration can be for
     if (resumed && bt_kept_tares_restore(gateway->kept, &gateway->session)) {
-        gateway->session.faults |= BT_FAULT_FLAG_TARE_RESTORED;
+        gateway->session.status.faults |= BT_FAULT_FLAG_TARE_RESTORED;
     }
     start_uart(gateway);
     gateway->round_open = false;
@@ -378,7 +378,7 @@ static void read_link(bt_gateway *gateway, unsigned link)
         // A rate may have been saved by mistake, on a board that has no other link: until a good frame has
         // come, what is none has the port's default tried, and this one again.
         gateway->doubtful_bytes += (uint32_t)n;
-        if (gateway->session.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
+        if (gateway->session.status.rx_frames == 0 && gateway->doubtful_bytes >= DOUBTFUL_BYTES) {
             gateway->doubtful_bytes = 0;
             gateway->uart_by_default = !gateway->uart_by_default;
             start_uart(gateway);
@@ -397,13 +397,13 @@ void bt_gateway_poll(bt_gateway *gateway)
     for (int k = 0; k < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); k++) {
         process_slot(gateway, &slot);
     }
-    if (session->slots_late != gateway->sampler.late) {
-        session->slots_late = gateway->sampler.late;
-        session->faults |= BT_FAULT_FLAG_SLOTS_LATE;
+    if (session->status.slots_late != gateway->sampler.late) {
+        session->status.slots_late = gateway->sampler.late;
+        session->status.faults |= BT_FAULT_FLAG_SLOTS_LATE;
     }
     if (gateway->dma_late != gateway->sampler.dma_late) {
         gateway->dma_late = gateway->sampler.dma_late;
-        session->faults |= BT_FAULT_FLAG_SLOT_DMA_LATE;
+        session->status.faults |= BT_FAULT_FLAG_SLOT_DMA_LATE;
     }
     bt_session_tick(session, port_now_us(gateway->port));
 }

@@ -113,7 +113,7 @@ void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uin
     }
     bt_session_end_round(session);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        const bool streams = session->streams & BT_STREAM_FLAG_FRAMES && session->fingers >> f & 1;
+        const bool streams = session->status.streams & BT_STREAM_FLAG_FRAMES && session->fingers >> f & 1;
         if (sp_fingers >> f & 1 && streams) {
             send_sp(session, &session->finger[f], sp_counts + f * BT_FOREIGN_ELECTRODES);
         }

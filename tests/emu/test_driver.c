@@ -68,7 +68,7 @@ TEST(the_slot_rate_is_exact_over_a_minute)
             assert_int_equal(host.pac[f][k].t_us, host.frame[f][k].t_us);
         }
     }
-    assert_int_equal(gateway.session.slots_late, 0);
+    assert_int_equal(gateway.session.status.slots_late, 0);
 }
 
 TEST(interrupt_latency_neither_drifts_nor_breaks_the_settling_time)
@@ -81,7 +81,7 @@ TEST(interrupt_latency_neither_drifts_nor_breaks_the_settling_time)
     run_until(t0_ns + 20000000000ull);
     assert_true(worst_late_ns < 20000);
     assert_in_range(last_slot, 20 * BT_SLOT_HZ, 20 * BT_SLOT_HZ + 1);
-    assert_int_equal(gateway.session.slots_late, 0);
+    assert_int_equal(gateway.session.status.slots_late, 0);
     assert_true(fake.shortest_gap_ns >= 5000);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         assert_int_equal(fake.bus.sensor[f].early_reads, 0);
@@ -94,7 +94,7 @@ TEST(the_clock_may_wrap_in_the_middle)
     boot(wrap_ns - 1500000000ull);
     run_rounds(300);
     assert_in_range(host.frames[0], 298, 300);
-    assert_int_equal(gateway.session.slots_late, 0);
+    assert_int_equal(gateway.session.status.slots_late, 0);
     for (int k = 1; k < host.frames[0]; k++) {
         assert_int_equal((uint32_t)(host.frame[0][k].t_us - host.frame[0][k - 1].t_us), 10000);
         assert_false(host.frame[0][k].flags & BT_FRAME_FLAG_ELECTRODE_MISSING);

@@ -110,7 +110,7 @@ int main(int argc, char **argv)
         atomic_store_explicit(&seen_alarms, before, memory_order_relaxed);
     }
     (void)pthread_join(thread, NULL);
-    printf("%u frames, %u damaged, %u slots late, %u%s\n", frames, damaged, gateway.session.slots_late,
+    printf("%u frames, %u damaged, %u slots late, %u%s\n", frames, damaged, gateway.session.status.slots_late,
            looked, asked ? ", finger 2 was asked who it is" : "");
     return frames < BT_MAX_FINGERS * ROUNDS / 2 || damaged > 0 || !asked;
 }

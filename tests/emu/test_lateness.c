@@ -28,10 +28,10 @@ TEST(a_late_main_loop_loses_whole_slots_that_are_counted_and_marked)
     assert_int_equal(missing_words(0), 0);
     fake_interrupts_until(fake.now_ns + 28000000); // within the ring: nothing is lost
     run_rounds(20);
-    assert_int_equal(gateway.session.slots_late, 0);
+    assert_int_equal(gateway.session.status.slots_late, 0);
     fake_interrupts_until(fake.now_ns + 33000000);
     run_rounds(20);
-    uint32_t lost = gateway.session.slots_late;
+    uint32_t lost = gateway.session.status.slots_late;
     uint32_t shed = 0;
     assert_in_range(lost, 15, 25); // 33 ms are 145 slots, 128 fit
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -43,7 +43,7 @@ TEST(a_late_main_loop_loses_whole_slots_that_are_counted_and_marked)
         }
     }
     assert_int_equal(shed,
-                     gateway.session.scheduler.sheds.frames); // those whose slots had waited for too long
+                     gateway.session.status.frames_shed); // those whose slots had waited for too long
 }
 
 TEST(rounds_lost_whole_leave_a_gap_in_time)
@@ -59,7 +59,7 @@ TEST(rounds_lost_whole_leave_a_gap_in_time)
         gap = step > gap ? step : gap;
     }
     assert_true(gap > 150000);
-    assert_in_range(gateway.session.slots_late, 740, 770);
+    assert_in_range(gateway.session.status.slots_late, 740, 770);
     assert_int_equal(host.frame[0][host.frames[0] - 1].flags & BT_FRAME_FLAG_ELECTRODE_MISSING, 0);
 }
 
@@ -92,8 +92,8 @@ TEST(a_held_off_interrupt_loses_slots_and_never_the_time_base)
     run_rounds(10);
     fake.held_off_ns = 1000000; // four slots and a half
     run_rounds(10);
-    assert_in_range(gateway.session.slots_late, 3, 5);
-    assert_int_equal(missing_words(1), gateway.session.slots_late);
+    assert_in_range(gateway.session.status.slots_late, 3, 5);
+    assert_int_equal(missing_words(1), gateway.session.status.slots_late);
     uint32_t last = host.frame[1][host.frames[1] - 1].t_us;
     assert_int_equal((last - (uint32_t)(t0_ns / 1000)) % 10000, 0);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -161,7 +161,7 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
         fake_started_by = BT_FAULT_FLAG_HUNG;
         boot(START_NS);
         fake_started_by = BT_FAULT_FLAG_STARTED;
-        const uint16_t restored = gateway.session.faults & BT_FAULT_FLAG_TARE_RESTORED;
+        const uint16_t restored = gateway.session.status.faults & BT_FAULT_FLAG_TARE_RESTORED;
         assert_int_equal(restored != 0, damaged < 2);
         for (int f = 0; f < BT_MAX_FINGERS; f++) {
             const bt_tare *tare = &gateway.session.finger[f].tare;
@@ -179,7 +179,7 @@ TEST(a_hang_forgets_no_tare_and_no_hold)
         run_rounds(1);
         boot(START_NS); // power-on: what memory holds then means nothing
         assert_false(gateway.session.finger[0].tare.tared);
-        assert_int_equal(gateway.session.faults & BT_FAULT_FLAG_TARE_RESTORED, 0);
+        assert_int_equal(gateway.session.status.faults & BT_FAULT_FLAG_TARE_RESTORED, 0);
     }
 }
 

@@ -76,7 +76,7 @@ static void run_ms(uint64_t ms)
 // What every overload must leave alone.
 static void slots_and_commands_are_kept(void)
 {
-    assert_int_equal(gateway.session.slots_late, 0);
+    assert_int_equal(gateway.session.status.slots_late, 0);
     answer_id = 0;
     uint64_t asked_ns = fake.now_ns;
     send(BT_STOP_ID, "\1");
@@ -84,7 +84,7 @@ static void slots_and_commands_are_kept(void)
         run_until(fake.now_ns + 1);
     }
     assert_true(fake.now_ns - asked_ns < 100000000);
-    assert_int_equal(gateway.session.streams, 0);
+    assert_int_equal(gateway.session.status.streams, 0);
 }
 
 TEST(what_there_is_time_for_is_all_done)
@@ -93,8 +93,8 @@ TEST(what_there_is_time_for_is_all_done)
     map_ns = 1240000; // of the largest map on the RP2040; 80 % with all the rest
     frame_ns = 200000;
     run_ms(3000);
-    const bt_shed_counts none = {0, 0};
-    assert_memory_equal(&gateway.session.scheduler.sheds, &none, sizeof none);
+    assert_int_equal(gateway.session.status.wrench_repeated, 0);
+    assert_int_equal(gateway.session.status.frames_shed, 0);
     slots_and_commands_are_kept();
 }
 
@@ -129,8 +129,8 @@ TEST(first_goes_a_maps_rate_whose_last_wrench_is_repeated_with_its_age)
         assert_in_range(host.frames[f], 298, 301);
         assert_true(fresh > 3 * 10); // at 150 % no finger is starved
     }
-    assert_int_equal(repeated, gateway.session.scheduler.sheds.wrench);
-    assert_int_equal(gateway.session.scheduler.sheds.frames, 0);
+    assert_int_equal(repeated, gateway.session.status.wrench_repeated);
+    assert_int_equal(gateway.session.status.frames_shed, 0);
     slots_and_commands_are_kept();
 }
 
@@ -141,8 +141,8 @@ TEST(whole_frames_go_last)
     frame_ns = 3000000; // 150 % for packing alone
     map_ns = 500000;
     run_ms(3000);
-    const bt_shed_counts *sheds = &gateway.session.scheduler.sheds;
-    assert_true(sheds->frames > 100 && sheds->wrench > 0);
+    const bt_msg_status *status = &gateway.session.status;
+    assert_true(status->frames_shed > 100 && status->wrench_repeated > 0);
     for (int f = 0; f < FINGERS; f++) {
         for (int k = 1; k < host.frames[f]; k++) {
             const bt_msg_frame *frame = &host.frame[f][k];
@@ -153,7 +153,7 @@ TEST(whole_frames_go_last)
         assert_true(host.frames[f] > 30);
         frames += host.frames[f];
     }
-    assert_in_range(frames + (int)sheds->frames, 1485, 1505); // none is lost without a count
+    assert_in_range(frames + (int)status->frames_shed, 1485, 1505); // none is lost without a count
     slots_and_commands_are_kept();
 }
 

@@ -191,7 +191,7 @@ TEST(a_serial_number_that_could_not_be_read_is_read_later)
     assert_int_equal(gateway.session.info[2].present, 1);
     assert_memory_equal(gateway.session.info[2].serial, "BTEMU00000000003", 16);
     assert_int_equal(gateway.session.unsure, 0);
-    assert_int_equal(gateway.session.slots_late, 0);
+    assert_int_equal(gateway.session.status.slots_late, 0);
     assert_true(fake.shortest_gap_ns >= 5000);
     int last = host.frames[2] - 1;
     assert_false(host.frame[2][last].flags & (BT_FRAME_FLAG_SENSOR_UNSURE | BT_FRAME_FLAG_SENSOR_OTHER));

@@ -102,9 +102,9 @@ static void give_frame(bt_session *session, fuzz_input *in, bool damage, uint32_
     uint8_t nothing = 0;
     bt_session_receive(session, 0, &nothing, 1, now_us); // whatever came before ends here
     int before = host.messages, erases_before = erases;
-    uint32_t dropped = session->messages_dropped;
+    uint32_t dropped = session->status.messages_dropped;
     bt_session_receive(session, 0, encoded, message.wire_bytes, now_us);
-    int answers = host.messages - before + (int)(session->messages_dropped - dropped);
+    int answers = host.messages - before + (int)(session->status.messages_dropped - dropped);
     if (!damage && answers != (message.id >= 0x80)) {
         FAIL("command %02x with %zu bytes is answered %d times", message.id, message.payload_bytes, answers);
     }

@@ -30,13 +30,13 @@ static void subscribe_as_at_first(bt_session *session)
 static void change_owner(bt_session *session)
 {
     const uint8_t before = session->owner, after = session->link;
-    const bool was_in_use = bt_session_is_kept(session) || session->streams != 0;
+    const bool was_in_use = bt_session_is_kept(session) || session->status.streams != 0;
     bt_session_stop(session);
     subscribe_as_at_first(session);
     session->owner = after;
     session->owner_rx_us = session->command_us;
     if (was_in_use) {
-        session->faults |= BT_FAULT_FLAG_LINK_TAKEN;
+        session->status.faults |= BT_FAULT_FLAG_LINK_TAKEN;
         session->link = before;
         bt_session_send_status(session, 0, session->command_us);
         session->link = after;
@@ -61,7 +61,7 @@ static uint8_t take_link(bt_session *session, const uint8_t *payload)
 static uint8_t hello_request(bt_session *session, const uint8_t *payload)
 {
     uint8_t out[BT_HELLO_BYTES];
-    if (session->owner == session->link && session->streams == 0) {
+    if (session->owner == session->link && session->status.streams == 0) {
         subscribe_as_at_first(session); // what another program on this port chose is not this one's
     }
     const bt_identity *identity = &session->identity;
@@ -106,7 +106,7 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
         return BT_ERROR_OK;
     }
     bt_session_end_trial(session);
-    session->streams = msg.streams;
+    session->status.streams = msg.streams;
     session->fingers = msg.fingers;
     session->keepalive_ms = msg.keepalive_ms;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -454,7 +454,7 @@ static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *p
     if (checks & FINGER && payload[BT_COMMAND_FINGER_AT] >= fingers) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
-    if (checks & STOPPED && session->streams != 0) {
+    if (checks & STOPPED && session->status.streams != 0) {
         return BT_ERROR_BUSY;
     }
     return checks & MAPS && session->board.maps == NULL ? BT_ERROR_NOT_HERE : BT_ERROR_OK;

@@ -5,8 +5,8 @@
 
 static void damaged(bt_session *session)
 {
-    session->rx_errors++;
-    session->faults |= BT_FAULT_FLAG_LINK_DAMAGED;
+    session->status.rx_errors++;
+    session->status.faults |= BT_FAULT_FLAG_LINK_DAMAGED;
 }
 
 void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data, size_t bytes,
@@ -17,7 +17,7 @@ void bt_session_receive(bt_session *session, unsigned link, const uint8_t *data,
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(deframer, data[k]);
         if (outcome == BT_DEFRAMED_GOOD) {
-            session->rx_frames++;
+            session->status.rx_frames++;
             bool empty = deframer->payload_bytes == 0; // the id is unknown; there is no req_id
             bt_command(session, deframer->id, empty ? NULL : deframer->buffer + 1, now_us);
         } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {
@@ -36,7 +36,7 @@ static void lapse_holds(bt_session *session, uint32_t now_us)
 {
     // A host that streams may be as silent as its keep-alive allows: without one, where time waits for it,
     // for ever.
-    const bool streams = session->streams != 0;
+    const bool streams = session->status.streams != 0;
     const uint32_t allowed_us = streams ? session->keepalive_ms * 1000u : 0;
     const uint32_t timeout_us = allowed_us > session->hold_timeout_us ? allowed_us : session->hold_timeout_us;
     if (session->hold_timeout_us == 0 || (streams && allowed_us == 0)
@@ -46,7 +46,7 @@ static void lapse_holds(bt_session *session, uint32_t now_us)
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (session->finger[f].tare.held) {
             bt_tare_lapse(&session->finger[f].tare);
-            session->faults |= BT_FAULT_FLAG_HOLD_LAPSED;
+            session->status.faults |= BT_FAULT_FLAG_HOLD_LAPSED;
         }
     }
 }
@@ -55,10 +55,10 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
 {
     while (now_us - session->second_us >= 1000000) {
         session->second_us += 1000000;
-        session->uptime_s++;
+        session->status.uptime_s++;
     }
     if (session->keepalive_ms != 0 && now_us - session->owner_rx_us > session->keepalive_ms * 1000u) {
-        session->faults |= session->streams != 0 ? BT_FAULT_FLAG_HOST_SILENT : 0;
+        session->status.faults |= session->status.streams != 0 ? BT_FAULT_FLAG_HOST_SILENT : 0;
         bt_session_stop(session);
     }
     lapse_holds(session, now_us);
@@ -66,7 +66,7 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
         return;
     }
     session->status_us = now_us;
-    if (session->streams & BT_STREAM_FLAG_STATUS) {
+    if (session->status.streams & BT_STREAM_FLAG_STATUS) {
         bt_session_send_status(session, 0, now_us);
         for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
             if (session->finger[f].present) {

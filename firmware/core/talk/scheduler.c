@@ -29,12 +29,10 @@ static void put_first(bt_scheduler *scheduler, uint8_t finger)
 uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, bool can_repeat)
 {
     if (late_us > FRAME_LATE_US) {
-        scheduler->sheds.frames++;
         put_first(scheduler, finger);
         return BT_SHED_FRAME;
     }
     if (late_us > MAP_LATE_US && can_repeat) {
-        scheduler->sheds.wrench++;
         put_first(scheduler, finger);
         return BT_SHED_MAP;
     }

@@ -6,14 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// What FRAMEs lacked because time was short, in the order of shedding; wrap at 2^32.
 typedef struct {
-    uint32_t wrench; // repeated
-    uint32_t frames;
-} bt_shed_counts;
-
-typedef struct {
-    bt_shed_counts sheds;
     uint8_t first; // first finger of a round: 0, or the first that something was left out for in the last
     uint8_t first_next; // the same, as found in this round; BT_MAX_FINGERS: none so far
 } bt_scheduler;
@@ -23,8 +16,8 @@ void bt_scheduler_begin(bt_scheduler *scheduler);
 // The k-th finger of this round.
 uint8_t bt_scheduler_finger(const bt_scheduler *scheduler, int k);
 
-// What to leave out of a FRAME that begins late_us after its round's last slot: a mask of enum bt_shed,
-// counted. can_repeat: the finger has a wrench to repeat.
+// What to leave out of a FRAME that begins late_us after its round's last slot: a mask of enum bt_shed.
+// can_repeat: the finger has a wrench to repeat.
 uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, bool can_repeat);
 
 void bt_scheduler_end(bt_scheduler *scheduler);

@@ -81,10 +81,10 @@ void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame)
 {
     size_t bytes = bt_frame_seal(id, (size_t)bt_wire_payload_bytes(id), frame);
     if (session->write(session->context, session->link, frame, bytes)) {
-        session->messages_sent++;
+        session->status.messages_sent++;
     } else {
-        session->messages_dropped++;
-        session->faults |= BT_FAULT_FLAG_DROPPED;
+        session->status.messages_dropped++;
+        session->status.faults |= BT_FAULT_FLAG_DROPPED;
     }
 }
 
@@ -114,7 +114,7 @@ void bt_session_end_trial(bt_session *session)
 
 void bt_session_stop(bt_session *session)
 {
-    session->streams = 0;
+    session->status.streams = 0;
     session->keepalive_ms = 0;
     session->upload.open = false;
     session->other = session->refused = 0;
@@ -133,7 +133,7 @@ bool bt_session_is_kept(const bt_session *session)
 
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other)
 {
-    if (session->streams == 0) {
+    if (session->status.streams == 0) {
         use_finger_settings(session, (int)f);
         return;
     }

@@ -50,14 +50,6 @@ typedef struct {
     uint32_t (*now_us)(void *context);                 // device time; NULL: the board is never short of time
 } bt_board_actions;
 
-// Finger-rounds of FRAME streams in which something was skipped because nobody needed it; wrap at 2^32.
-typedef struct {
-    uint32_t frames; // an IDLE was sent instead
-    uint32_t poc;
-    uint32_t force;
-    uint32_t torque;
-} bt_skip_counts;
-
 // What sensors.c knows about which sensor is there.
 typedef struct {
     uint8_t bad_words;   // consecutive, at most BT_AWAY_WORDS
@@ -94,7 +86,9 @@ typedef struct {
     uint8_t owner; // port whose host may change things; BT_NO_LINK until one does
     uint8_t link;  // port that messages go to: the owner's, or while a command runs, its own
 
-    uint8_t streams;              // BT_STREAM_FLAG_*
+    // Streams, faults (faults.h) and counters, kept as they are sent; seq is the next one's, and status.c
+    // fills in t_us, req_id and fingers_present.
+    bt_msg_status status;
     uint8_t fingers;              // bit mask of the fingers that START named
     uint8_t event_fingers;        // bit mask of the fingers that send EVENTs in this round
     uint8_t events_due[BT_SLOTS]; // and of those for which each slot may show one
@@ -103,19 +97,8 @@ typedef struct {
     uint32_t command_us;  // when the latest command came, whoever sent it
     uint32_t status_us;
     uint32_t second_us; // uptime is counted in whole seconds from here
-    uint32_t uptime_s;
-    uint16_t status_seq;
     uint16_t sensor_status_seq;
-
-    uint32_t messages_sent;
-    uint32_t messages_dropped;
-    bt_skip_counts skips;
     bt_scheduler scheduler;
-    uint32_t slots_late;
-    uint32_t rx_frames;
-    uint32_t rx_errors;
-    uint16_t faults;                        // BT_FAULT_FLAG_*, until the host clears them
-    uint32_t finger_faults[BT_MAX_FINGERS]; // BT_FRAME_FLAG_*, likewise (faults.h)
 } bt_session;
 
 // context: the first argument of `write` and of the board's actions.

@@ -1,32 +1,14 @@
 #include "talk/status.h"
 
-#include <string.h>
-
 void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us)
 {
     uint8_t payload[BT_STATUS_BYTES];
-    bt_msg_status msg = {
-        .seq = session->status_seq++,
-        .t_us = now_us,
-        .req_id = req_id,
-        .uptime_s = session->uptime_s,
-        .fingers_present = bt_session_present(session),
-        .streams = session->streams,
-        .messages_sent = session->messages_sent,
-        .messages_dropped = session->messages_dropped,
-        .slots_late = session->slots_late,
-        .rx_frames = session->rx_frames,
-        .rx_errors = session->rx_errors,
-        .frames_idle = session->skips.frames,
-        .poc_skipped = session->skips.poc,
-        .force_skipped = session->skips.force,
-        .torque_skipped = session->skips.torque,
-        .wrench_repeated = session->scheduler.sheds.wrench,
-        .frames_shed = session->scheduler.sheds.frames,
-        .faults = session->faults,
-    };
-    memcpy(msg.finger_faults, session->finger_faults, sizeof msg.finger_faults);
-    bt_msg_status_pack(&msg, payload);
+    bt_msg_status *msg = &session->status;
+    msg->t_us = now_us;
+    msg->req_id = req_id;
+    msg->fingers_present = bt_session_present(session);
+    bt_msg_status_pack(msg, payload);
+    msg->seq++;
     bt_session_send(session, BT_STATUS_ID, payload);
 }
 

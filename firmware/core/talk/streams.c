@@ -7,7 +7,7 @@
 
 static bool streams(const bt_session *session, const bt_finger *finger, uint8_t stream)
 {
-    return (session->streams & stream) && (session->fingers >> finger->index & 1);
+    return (session->status.streams & stream) && (session->fingers >> finger->index & 1);
 }
 
 // A finger that starts sending events starts without a history, and one that stops has no level.
@@ -20,7 +20,7 @@ void bt_streams_begin(bt_session *session)
         const bool asked = session->finger[f].quantities & BT_QUANTITY_FLAG_EVENTS;
         now = (uint8_t)(now | asked << f);
     }
-    const bool streaming = session->streams & (BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC);
+    const bool streaming = session->status.streams & (BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC);
     now = streaming ? now & session->fingers : 0;
     if (now == before) {
         return;
@@ -130,13 +130,13 @@ static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows
     finger->unsent = 0;
 }
 
-static void count_skips(bt_skip_counts *skips, uint32_t quantities)
+static void count_skips(bt_msg_status *status, uint32_t quantities)
 {
     // Torque x needs a point and a force: they are computed for it, though not sent.
     bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
-    skips->poc += !(torque || quantities & BT_QUANTITY_FLAG_POC);
-    skips->force += !(torque || quantities & BT_QUANTITY_FLAG_FORCE);
-    skips->torque += !torque;
+    status->poc_skipped += !(torque || quantities & BT_QUANTITY_FLAG_POC);
+    status->force_skipped += !(torque || quantities & BT_QUANTITY_FLAG_FORCE);
+    status->torque_skipped += !torque;
 }
 
 // How long ago the round's last slot ended. By a clock that stands still, a round that has not ended is not
@@ -160,15 +160,17 @@ static void send_frame(bt_session *session, bt_finger *finger)
     uint32_t shed = bt_scheduler_shed(&session->scheduler, finger->index, late_us(session, finger),
                                       bt_finger_wrench_age(finger, solve) <= BT_REPEAT_MAX_ROUNDS);
     if (shed & BT_SHED_FRAME) {
+        session->status.frames_shed++;
         finger->shed = true;
         return;
     }
+    session->status.wrench_repeated += shed == BT_SHED_MAP;
     uint8_t quantities = bt_sensors_refused(session, finger->index) ? 0 : finger->quantities;
     bt_finger_frame(finger, solve, quantities, shed, &msg);
     bt_faults_of_round(session, finger->index, msg.flags);
     bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
     bt_session_send_sealed(session, BT_FRAME_ID, (uint8_t *)frame);
-    count_skips(&session->skips, finger->quantities);
+    count_skips(&session->status, finger->quantities);
 }
 
 // At the end of a round, in whose last slot it is said to have changed.
@@ -206,8 +208,8 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
     finger->kept.valid = false; // seq gives a wrench's age up to 655 s only, and a rest may last longer
     finger->trust = bt_trust(bt_finger_flags(finger), 0, 0);
     report_trust(session, finger);
-    session->skips.frames++;
-    count_skips(&session->skips, 0);
+    session->status.frames_idle++;
+    count_skips(&session->status, 0);
     if (++finger->unsent >= session->idle_rounds) {
         send_idle(session, finger, false);
     }

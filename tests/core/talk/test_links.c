@@ -80,13 +80,13 @@ TEST(who_streams_with_a_keep_alive_keeps_the_link)
             assert_int_equal(error == BT_ERROR_LINK_BUSY, !asks);
         }
     }
-    assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+    assert_int_equal(session.status.streams, BT_STREAM_FLAG_FRAMES);
     assert_int_equal(frames_go_to(), UART);
     // What the other one asks is no sign of life of the first.
     now_us = 500001;
     assert_int_equal(ask(USB, BT_PING_ID, "\1", 1), BT_ERROR_OK);
     bt_session_tick(&session, now_us);
-    assert_int_equal(session.faults, BT_FAULT_FLAG_HOST_SILENT);
+    assert_int_equal(session.status.faults, BT_FAULT_FLAG_HOST_SILENT);
     assert_int_equal(stream_at(USB, 500), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 0); // nobody had anything
     assert_int_equal(frames_go_to(), USB);
@@ -100,7 +100,7 @@ TEST(a_stream_without_a_keep_alive_is_taken_by_start_and_both_are_told)
     assert_int_equal(subscribe_at(USB, BT_QUANTITY_FLAG_EVENTS), BT_ERROR_OK);
     assert_int_equal(stream_at(USB, 0), BT_ERROR_OK);
     assert_int_equal(ask(UART, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // every program begins with it
-    assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+    assert_int_equal(session.status.streams, BT_STREAM_FLAG_FRAMES);
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
     assert_int_equal(frames_go_to(), UART);
@@ -127,12 +127,12 @@ TEST(the_link_can_be_taken_and_is_kept_until_the_taker_is_silent)
     assert_int_equal(take_link_at(USB, 0), BT_ERROR_OUT_OF_RANGE);
     assert_int_equal(take_link_at(USB, 1000), BT_ERROR_OK);
     assert_int_equal(links_that_sent(), 1 << USB | 1 << UART);
-    assert_int_equal(session.streams, 0);
+    assert_int_equal(session.status.streams, 0);
     assert_true(session.finger[0].tare.held); // what it holds it still holds
     assert_int_equal(stream_at(UART, 500), BT_ERROR_LINK_BUSY);
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\4\1", 2), BT_ERROR_OK);
     bt_session_tick(&session, now_us += 1000001);
-    assert_int_equal(session.faults & BT_FAULT_FLAG_HOST_SILENT, 0); // no stream ended
+    assert_int_equal(session.status.faults & BT_FAULT_FLAG_HOST_SILENT, 0); // no stream ended
     assert_int_equal(stream_at(UART, 500), BT_ERROR_OK);
     assert_int_equal(take_link_at(USB, 1000), BT_ERROR_OK);
     assert_int_equal(ask(USB, BT_STOP_ID, "\2", 1), BT_ERROR_OK); // gives it back
@@ -149,7 +149,7 @@ TEST(a_host_that_only_holds_keeps_the_link_until_its_hold_lapses)
         bt_session_tick(&session, now_us);
     }
     assert_false(session.finger[0].tare.held);
-    assert_int_equal(session.faults, BT_FAULT_FLAG_HOLD_LAPSED);
+    assert_int_equal(session.status.faults, BT_FAULT_FLAG_HOLD_LAPSED);
     assert_int_equal(ask(USB, BT_RELEASE_ID, "\3\1", 2), BT_ERROR_OK);
 }
 
