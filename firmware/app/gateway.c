@@ -19,7 +19,8 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
                    && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
                "every finger's map must have a record of its own");
 
-_Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES && PORT_NAME_BYTES == BT_BOARD_NAME_BYTES,
+_Static_assert(PORT_SERIAL_BYTES == sizeof(((bt_msg_hello *)NULL)->board_serial)
+                   && PORT_NAME_BYTES == sizeof(((bt_msg_hello *)NULL)->board_name),
                "the board's serial number and name go to the host whole");
 _Static_assert(sizeof(bt_kept_tares) <= PORT_KEPT_BYTES, "there is room for what outlives a hang");
 
@@ -209,16 +210,18 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         .ram = can.map_ram,
     };
     const port_identity board = port_identify(port);
-    bt_identity identity = {
+    bt_msg_hello hello = {
+        .firmware_major = BT_VERSION_MAJOR,
+        .firmware_minor = BT_VERSION_MINOR,
+        .firmware_patch = BT_VERSION_PATCH,
         .board = board.board,
         .fingers = can.fingers,
-        .untimed = can.untimed,
-        .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
+        .slot_hz = can.untimed ? 0 : BT_SLOT_HZ,
         .boot_id = board.boot_id,
         .image_crc32 = board.image_crc32,
     };
-    memcpy(identity.board_serial, board.serial, sizeof identity.board_serial);
-    memcpy(identity.board_name, can.name, sizeof identity.board_name);
+    memcpy(hello.board_serial, board.serial, sizeof hello.board_serial);
+    memcpy(hello.board_name, can.name, sizeof hello.board_name);
     const bool resumed =
         board.kept != NULL && board.started_by & (BT_FAULT_FLAG_HUNG | BT_FAULT_FLAG_CRASHED);
     gateway->kept = board.kept;
@@ -226,7 +229,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
     if (!resumed && powered_us < BT_POWER_ON_MS * 1000) { // resumed, the sensors have had power all along
         port_delay_us(port, BT_POWER_ON_MS * 1000 - powered_us);
     }
-    bt_session_init(&gateway->session, &identity, write_link, gateway, port_now_us(port));
+    bt_session_init(&gateway->session, &hello, write_link, gateway, port_now_us(port));
     bt_session_use_board(&gateway->session, &actions);
     gateway->session.status.faults |= board.started_by;
     for (uint8_t f = 0; f < can.fingers && !can.no_bus; f++) {

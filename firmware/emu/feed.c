@@ -1,9 +1,6 @@
 #include "feed.h"
 
 const bt_msg_hello bt_emu_hello = {
-    .wire_major = BT_WIRE_MAJOR,
-    .wire_minor = BT_WIRE_MINOR,
-    .schema_hash = BT_SCHEMA_HASH,
     .board = BT_BOARD_PICO_SENSOR,
     .fingers = BT_MAX_FINGERS,
     .board_name = "simulated",
@@ -30,6 +27,9 @@ static void send_hello(const bt_emu_feed *feed)
     bt_msg_hello hello = *feed->hello;
     hello.req_id = got.hello.req_id;
     hello.nonce = got.hello.nonce;
+    hello.wire_major = BT_WIRE_MAJOR;
+    hello.wire_minor = BT_WIRE_MINOR;
+    hello.schema_hash = BT_SCHEMA_HASH;
     bt_msg_hello_pack(&hello, payload);
     send_message(feed, BT_HELLO_ID, payload);
 }

@@ -8,7 +8,7 @@
 
 typedef struct {
     bt_emu_stream *stream;
-    const bt_msg_hello *hello; // but for the request's number
+    const bt_msg_hello *hello; // but for the request's number, wire versions and schema
     void (*send)(const uint8_t *frame, size_t bytes);
     // What a board has besides. Carry out another command: returns an enum bt_error, OK is answered with
     // EMU_STATUS. NULL: there is none.

@@ -78,9 +78,6 @@ void commands_start(bt_emu_stream *stream)
     const port_identity identity = port_identify(ONLY_BOARD);
     plugged = (1u << BT_MAX_FINGERS) - 1;
     hello = (bt_msg_hello){
-        .wire_major = BT_WIRE_MAJOR,
-        .wire_minor = BT_WIRE_MINOR,
-        .schema_hash = BT_SCHEMA_HASH,
         .firmware_major = BT_VERSION_MAJOR,
         .firmware_minor = BT_VERSION_MINOR,
         .firmware_patch = BT_VERSION_PATCH,

@@ -132,13 +132,16 @@ static bt_session session;
 static inline int new_session(void **state)
 {
     (void)state;
-    bt_identity identity = {.board = BT_BOARD_PICO,
-                            .fingers = BT_MAX_FINGERS,
-                            .firmware_version = {1, 2, 3},
-                            .boot_id = 0xB0071D};
-    memcpy(identity.board_serial, "ABCDEFGHIJKL", 12);
+    bt_msg_hello hello = {.board = BT_BOARD_PICO,
+                          .fingers = BT_MAX_FINGERS,
+                          .firmware_major = 1,
+                          .firmware_minor = 2,
+                          .firmware_patch = 3,
+                          .boot_id = 0xB0071D,
+                          .slot_hz = BT_SLOT_HZ};
+    memcpy(hello.board_serial, "ABCDEFGHIJKL", 12);
     host_reset();
-    bt_session_init(&session, &identity, host_write, NULL, 0);
+    bt_session_init(&session, &hello, host_write, NULL, 0);
     return 0;
 }
 

@@ -246,12 +246,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
 {
     static bt_session session;
-    static const bt_identity identity = {
-        .board = BT_BOARD_PICO, .fingers = BT_MAX_FINGERS, .firmware_version = {1, 2, 3}};
+    static const bt_msg_hello hello = {
+        .board = BT_BOARD_PICO, .fingers = BT_MAX_FINGERS, .slot_hz = BT_SLOT_HZ};
     fuzz_input in = {data, bytes};
     uint32_t now_us = next_u32(&in);
     memset(&host, 0, sizeof host);
-    bt_session_init(&session, &identity, host_write, NULL, now_us);
+    bt_session_init(&session, &hello, host_write, NULL, now_us);
     bt_session_use_board(&session, &actions);
     while (in.left > 0) {
         uint8_t step = next_u8(&in);

@@ -64,28 +64,13 @@ static uint8_t hello_request(bt_session *session, const uint8_t *payload)
     if (session->owner == session->link && session->status.streams == 0) {
         subscribe_as_at_first(session); // what another program on this port chose is not this one's
     }
-    const bt_identity *identity = &session->identity;
     bt_msg_hello_request request;
     bt_msg_hello_request_unpack(&request, payload);
-    bt_msg_hello msg = {
-        .req_id = request.req_id,
-        .nonce = request.nonce,
-        .wire_major = BT_WIRE_MAJOR,
-        .wire_minor = BT_WIRE_MINOR,
-        .schema_hash = BT_SCHEMA_HASH,
-        .firmware_major = identity->firmware_version[0],
-        .firmware_minor = identity->firmware_version[1],
-        .firmware_patch = identity->firmware_version[2],
-        .board = identity->board,
-        .fingers = identity->fingers,
-        .map_bytes = session->board.maps != NULL ? session->board.maps->max_bytes : 0,
-        .boot_id = identity->boot_id,
-        .slot_hz = identity->untimed ? 0 : BT_SLOT_HZ,
-        .fingers_present = bt_session_present(session),
-        .image_crc32 = identity->image_crc32,
-    };
-    memcpy(msg.board_serial, identity->board_serial, sizeof msg.board_serial);
-    memcpy(msg.board_name, identity->board_name, sizeof msg.board_name);
+    bt_msg_hello msg = session->hello;
+    msg.req_id = request.req_id;
+    msg.nonce = request.nonce;
+    msg.map_bytes = session->board.maps != NULL ? session->board.maps->max_bytes : 0;
+    msg.fingers_present = bt_session_present(session);
     bt_msg_hello_pack(&msg, out);
     bt_session_send(session, BT_HELLO_ID, out);
     return BT_ERROR_OK;
@@ -450,7 +435,7 @@ static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *p
     }
     // What is kept for a finger needs the finger; questions about one that the board cannot have are answered
     // as about an absent sensor.
-    uint8_t fingers = checks & STOPPED ? session->identity.fingers : BT_MAX_FINGERS;
+    uint8_t fingers = checks & STOPPED ? session->hello.fingers : BT_MAX_FINGERS;
     if (checks & FINGER && payload[BT_COMMAND_FINGER_AT] >= fingers) {
         return BT_ERROR_NO_SUCH_FINGER;
     }

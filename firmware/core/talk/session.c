@@ -2,11 +2,14 @@
 
 #include <string.h>
 
-void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, void *context,
+void bt_session_init(bt_session *session, const bt_msg_hello *hello, bt_link_write write, void *context,
                      uint32_t now_us)
 {
     memset(session, 0, sizeof *session);
-    session->identity = *identity;
+    session->hello = *hello;
+    session->hello.wire_major = BT_WIRE_MAJOR;
+    session->hello.wire_minor = BT_WIRE_MINOR;
+    session->hello.schema_hash = BT_SCHEMA_HASH;
     session->write = write;
     session->context = context;
     session->status_us = now_us;

@@ -15,20 +15,6 @@
 #include "talk/scheduler.h"
 #include "wire/framing.h"
 
-#define BT_BOARD_SERIAL_BYTES sizeof(((bt_msg_hello *)NULL)->board_serial)
-#define BT_BOARD_NAME_BYTES   sizeof(((bt_msg_hello *)NULL)->board_name)
-
-typedef struct {
-    uint16_t board; // enum bt_board, or a private id
-    uint8_t board_name[BT_BOARD_NAME_BYTES];
-    uint8_t fingers; // it has chip selects for, at most BT_MAX_FINGERS
-    bool untimed;    // rounds come whole: when their slots were sampled is unknown
-    uint8_t firmware_version[3];
-    uint8_t board_serial[BT_BOARD_SERIAL_BYTES];
-    uint32_t boot_id;
-    uint32_t image_crc32; // 0xFFFFFFFF: unknown
-} bt_identity;
-
 // What a sensor says about itself, as sent to the host.
 typedef bt_msg_sensor_info bt_sensor_info;
 
@@ -78,7 +64,7 @@ typedef struct {
     uint32_t status_period_us;
     uint32_t hold_timeout_us; // 0: HOLD never lapses
     uint16_t idle_rounds;
-    bt_identity identity;
+    bt_msg_hello hello; // who this board is, as it is told; commands.c fills in what changes
     bt_link_write write;
     void *context;
     bt_board_actions board;
@@ -101,8 +87,9 @@ typedef struct {
     bt_scheduler scheduler;
 } bt_session;
 
+// hello: the board, with a slot_hz of 0 where rounds come whole; wire versions and schema are added here.
 // context: the first argument of `write` and of the board's actions.
-void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, void *context,
+void bt_session_init(bt_session *session, const bt_msg_hello *hello, bt_link_write write, void *context,
                      uint32_t now_us);
 
 // Until this is called, or where an action is NULL, its commands are answered NOT_HERE.

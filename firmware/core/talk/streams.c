@@ -50,7 +50,7 @@ static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slo
         .seq = finger->seq,
         .t_us = t_us,
         .finger = finger->index,
-        .slot = session->identity.untimed ? BT_SLOT_UNKNOWN : slot,
+        .slot = session->hello.slot_hz == 0 ? BT_SLOT_UNKNOWN : slot,
         .energy_count2 = bt_trigger_energy(&finger->tare.trigger),
     };
     bt_msg_touch_pack(&msg, payload);
@@ -62,7 +62,7 @@ static void send_event(bt_session *session, bt_finger *finger, uint8_t event, ui
     uint8_t payload[BT_EVENT_BYTES];
     bt_msg_event msg;
     bt_finger_event(finger, event, slot, t_us, &msg);
-    msg.slot = session->identity.untimed ? BT_SLOT_UNKNOWN : slot;
+    msg.slot = session->hello.slot_hz == 0 ? BT_SLOT_UNKNOWN : slot;
     bt_msg_event_pack(&msg, payload);
     bt_session_send(session, BT_EVENT_ID, payload);
 }
