@@ -119,18 +119,11 @@ static uint8_t leave(void *context, bool into_bootloader)
 static void measure(void *context, bt_msg_board_facts *msg)
 {
     const bt_gateway *gateway = context;
-    const port_facts facts = port_measure(gateway->port);
-    msg->t_us = facts.t_us;
-    msg->usb_frame = facts.usb_frame;
-    msg->usb_starts = facts.usb_starts;
-    msg->chip_id = facts.chip_id;
-    memcpy(msg->flash_id, facts.flash_id, sizeof msg->flash_id);
-    msg->erase_us = facts.erase_us;
-    msg->supply_mv = facts.supply_mv;
-    msg->die_centi_c = facts.die_centi_c;
-    msg->bus_khz = facts.bus_khz;
+    msg->usb_frame = UINT16_MAX;
+    msg->die_centi_c = BT_INVALID_I16;
+    msg->bus_khz = BT_SPI_HZ / 1000;
     msg->slots_dma_late = gateway->sampler.dma_late;
-    msg->early_faults = facts.early_faults;
+    port_measure(gateway->port, msg);
 }
 
 static void clock_bus(void *context, uint16_t khz)

@@ -4,6 +4,8 @@
 #ifndef BIOTAC_PORT_H
 #define BIOTAC_PORT_H
 
+#include "wire/messages_gen.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -84,22 +86,9 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
 bool port_reboot(bt_port *port, bool into_bootloader);
 
 // ---- what a board measures of itself, for whoever brings it up -------------------------------
-typedef struct {
-    uint32_t t_us;       // when the next two were read
-    uint16_t usb_frame;  // 0xFFFF: no USB
-    uint32_t usb_starts; // of frame, since boot
-    uint32_t chip_id;    // 0: unknown; likewise down to supply_mv
-    uint8_t flash_id[3];
-    uint32_t erase_us; // the longest of a sector so far
-    uint16_t supply_mv;
-    int16_t die_centi_c; // PORT_NOT_MEASURED: unknown
-    uint16_t bus_khz;
-    uint16_t early_faults; // starts before this one that failed before port_init
-} port_facts;
-#define PORT_NOT_MEASURED INT16_MIN
-#define PORT_NO_FACTS                                                                                        \
-    ((port_facts){.usb_frame = UINT16_MAX, .die_centi_c = PORT_NOT_MEASURED, .bus_khz = 4400})
-port_facts port_measure(bt_port *port);
+// Fill in what this board knows. The rest says already that it is unknown, bus_khz that it is the usual one;
+// slots_dma_late is the sampler's.
+void port_measure(bt_port *port, bt_msg_board_facts *facts);
 
 // From the next slot on, clock SPI at the fastest rate there is up to this one, or the slowest, some 1 MHz;
 // 0: the usual one. Does nothing where the rate is fixed.

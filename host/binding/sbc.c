@@ -234,9 +234,8 @@ bool port_reboot(bt_port *board, bool into_bootloader)
     return false;
 }
 
-port_facts port_measure(bt_port *board)
+void port_measure(bt_port *board, bt_msg_board_facts *facts)
 {
-    return PORT_NO_FACTS;
 }
 
 void port_spi_rate(bt_port *board, uint32_t khz)

@@ -184,9 +184,8 @@ bool port_reboot(bt_port *port, bool into_bootloader)
     return fake.has_loader;
 }
 
-port_facts port_measure(bt_port *port)
+void port_measure(bt_port *port, bt_msg_board_facts *facts)
 {
-    return PORT_NO_FACTS;
 }
 
 void port_spi_rate(bt_port *port, uint32_t khz)

@@ -370,9 +370,8 @@ bool port_reboot(bt_port *port, bool into_bootloader)
     return !into_bootloader; // a process has no loader
 }
 
-port_facts port_measure(bt_port *port)
+void port_measure(bt_port *port, bt_msg_board_facts *facts)
 {
-    return PORT_NO_FACTS;
 }
 
 void port_spi_rate(bt_port *port, uint32_t khz)

@@ -61,14 +61,12 @@ bool port_reboot(bt_port *port, bool into_bootloader)
     return true;
 }
 
-port_facts port_measure(bt_port *port)
+void port_measure(bt_port *port, bt_msg_board_facts *facts)
 {
-    port_facts facts = PORT_NO_FACTS;
-    facts.t_us = clock_us();
-    facts.chip_id = DBGMCU_IDCODE;
-    facts.erase_us = flash_erase_us;
-    facts.bus_khz = (uint16_t)spi_khz();
-    return facts;
+    facts->t_us = clock_us();
+    facts->chip_id = DBGMCU_IDCODE;
+    facts->erase_us = flash_erase_us;
+    facts->bus_khz = (uint16_t)spi_khz();
 }
 
 port_identity port_identify(bt_port *port)
