@@ -1,23 +1,16 @@
 #include "gateway.h"
 
-#include "keep/storage.h"
 #include "port.h"
 #include "properties.h"
 #include "talk/host_link.h"
 #include "talk/rounds.h"
+#include "talk/saved.h"
 #include "talk/sensors.h"
 #include "word.h"
 
 #include "version.h"
 
 #include <string.h>
-
-_Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS
-                   && BT_CALIBRATION_RECORD_BYTES <= BT_STORAGE_MAX_BYTES,
-               "every finger's calibration must have a record of its own, and fit it");
-_Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
-                   && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
-               "every finger's map must have a record of its own");
 
 _Static_assert(PORT_SERIAL_BYTES == sizeof(((bt_msg_hello *)NULL)->board_serial)
                    && PORT_NAME_BYTES == sizeof(((bt_msg_hello *)NULL)->board_name),
@@ -48,19 +41,6 @@ static void read_flash(void *port, uint32_t offset, uint8_t *data, size_t bytes)
     port_flash_read(port, offset, data, bytes);
 }
 
-// Maps follow the settings in flash.
-static bool erase_map_sector(void *context, uint32_t sector_offset)
-{
-    const bt_gateway *gateway = context;
-    return port_flash_erase(gateway->port, 2 * gateway->flash.sector_bytes + sector_offset);
-}
-
-static bool program_map_page(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
-{
-    const bt_gateway *gateway = context;
-    return port_flash_program(gateway->port, 2 * gateway->flash.sector_bytes + page_offset, page);
-}
-
 static bool write_link(void *context, unsigned link, const uint8_t *data, size_t bytes)
 {
     const bt_gateway *gateway = context;
@@ -71,43 +51,6 @@ static uint32_t now_us(void *context)
 {
     const bt_gateway *gateway = context;
     return port_now_us(gateway->port);
-}
-
-static uint8_t store(const bt_gateway *gateway, uint16_t id, uint16_t version, const uint8_t *record,
-                     size_t bytes)
-{
-    return bt_storage_write(&gateway->flash, id, version, record, bytes) ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
-}
-
-static uint8_t save_settings(void *context, const bt_settings *settings)
-{
-    uint8_t record[BT_SETTINGS_RECORD_BYTES];
-    bt_settings_pack(settings, record);
-    return store(context, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
-}
-
-static uint16_t calibration_id(uint8_t finger)
-{
-    return (uint16_t)(BT_RECORD_CALIBRATION + finger);
-}
-
-static uint8_t save_calibration(void *context, uint8_t finger, const bt_calibration *calibration)
-{
-    uint8_t record[BT_CALIBRATION_RECORD_BYTES];
-    size_t bytes = bt_calibration_pack(calibration, record);
-    return store(context, calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes);
-}
-
-static uint16_t map_id(uint8_t finger)
-{
-    return (uint16_t)(BT_RECORD_MAP + finger);
-}
-
-static uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
-{
-    uint8_t record[BT_MAP_RECORD_BYTES];
-    size_t bytes = bt_map_place_pack(place, record);
-    return store(context, map_id(finger), BT_MAP_RECORD_VERSION, record, bytes);
 }
 
 static uint8_t leave(void *context, bool into_bootloader)
@@ -134,32 +77,6 @@ static void clock_bus(void *context, uint16_t khz)
 
 // ------------------------------------------------------------------------------------------------------
 
-static void load_settings(bt_gateway *gateway)
-{
-    bt_session *session = &gateway->session;
-    const bt_flash *flash = &gateway->flash;
-    session->status.faults |= bt_storage_damaged(flash) ? BT_FAULT_FLAG_STORAGE : 0;
-    uint8_t record[BT_STORAGE_MAX_BYTES];
-    uint16_t version;
-    int bytes = bt_storage_read(flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
-    if (bytes > 0) {
-        bt_settings_unpack(&session->settings, version, record, (size_t)bytes);
-    }
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bytes = bt_storage_read(flash, calibration_id(f), &version, record, sizeof record);
-        if (bytes > 0) {
-            bt_calibration_unpack(&session->calibration[f], version, record, (size_t)bytes);
-        }
-        bytes = bt_storage_read(flash, map_id(f), &version, record, sizeof record);
-        if (bytes > 0 && session->board.maps != NULL
-            && !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record,
-                                   (size_t)bytes)) {
-            session->status.faults |= BT_FAULT_FLAG_STORAGE;
-        }
-    }
-    bt_session_use_settings(session);
-}
-
 // A slower UART is not used: one FRAME would take longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
 #define DOUBTFUL_BYTES        64 // more than the frame with which a host begins
@@ -176,12 +93,10 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
 {
     const port_abilities can = port_describe(port);
     const bt_board_actions actions = {
-        .save_settings = save_settings,
-        .save_calibration = save_calibration,
-        .save_map = save_map,
         .reboot = leave,
         .measure = measure,
         .set_bus_rate = clock_bus,
+        .flash = &gateway->flash,
         .maps = can.map_bytes != 0 ? &gateway->map_flash : NULL,
         .now_us = can.no_bus ? NULL : now_us,
     };
@@ -192,13 +107,10 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
                                 .program = program_page,
                                 .read = read_flash};
     gateway->map_flash = (bt_map_flash){
-        .sector_bytes = can.erase_bytes,
+        .flash = &gateway->flash,
         .slot_bytes = (can.map_bytes + can.erase_bytes - 1) / can.erase_bytes * can.erase_bytes,
         .max_bytes = can.map_bytes,
         .slots = (uint8_t)BT_MAP_SLOTS_OF(can.fingers),
-        .context = gateway,
-        .erase = erase_map_sector,
-        .program = program_map_page,
         .bytes = can.maps,
         .ram = can.map_ram,
     };
@@ -223,7 +135,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         port_delay_us(port, BT_POWER_ON_MS * 1000 - powered_us);
     }
     bt_session_init(&gateway->session, &hello, write_link, gateway, port_now_us(port));
-    bt_session_use_board(&gateway->session, &actions);
+    gateway->session.board = actions;
     gateway->session.status.faults |= board.started_by;
     for (uint8_t f = 0; f < can.fingers && !can.no_bus; f++) {
         bt_properties_read(port, f, &gateway->sampler.query[f], &gateway->session.info[f]);
@@ -233,7 +145,7 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
             bt_sensors_doubt(&gateway->session, f);
         }
     }
-    load_settings(gateway); // only now is it known which sensors a calibration can be for
+    bt_session_load(&gateway->session); // only now is it known which sensors a calibration can be for
     if (resumed && bt_kept_tares_restore(gateway->kept, &gateway->session)) {
         gateway->session.status.faults |= BT_FAULT_FLAG_TARE_RESTORED;
     }

@@ -8,86 +8,25 @@
 
 #define PART ((uint16_t)BT_MAP_PART_BYTES)
 
-// ---- flash: the slots, and one record a finger ---------------------------------------------------------
-
-static _Alignas(4) uint8_t slots[BT_MAPS_BYTES];
-static int erases;
-static int programs;
-static bool worn; // programs nothing
-static bt_map_place record[BT_MAX_FINGERS];
-static uint8_t refused_finger; // whose record is not kept
-
-static inline bool erase(void *context, uint32_t offset)
-{
-    (void)context;
-    assert_true(offset % BT_FLASH_SECTOR_BYTES == 0 && offset < BT_MAPS_BYTES);
-    memset(slots + offset, 0xFF, BT_FLASH_SECTOR_BYTES);
-    erases++;
-    return true;
-}
-
-static inline bool program(void *context, uint32_t offset, const uint8_t *page)
-{
-    (void)context;
-    assert_true(offset % BT_FLASH_PAGE_BYTES == 0 && offset < BT_MAPS_BYTES);
-    programs++;
-    for (int k = 0; k < BT_FLASH_PAGE_BYTES && !worn; k++) {
-        slots[offset + (uint32_t)k] &= page[k];
-    }
-    return true;
-}
-
-static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-static const bt_map_flash map_flash = {BT_FLASH_SECTOR_BYTES,
-                                       BT_MAP_SLOT_BYTES,
-                                       BT_MAP_MAX_BYTES,
-                                       BT_MAP_SLOTS,
-                                       NULL,
-                                       erase,
-                                       program,
-                                       slots,
-                                       map_ram[0]};
-
-static inline uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
-{
-    (void)context;
-    if (finger == refused_finger) {
-        return BT_ERROR_NOT_STORED;
-    }
-    record[finger] = *place;
-    return BT_ERROR_OK;
-}
-
-static const bt_board_actions actions = {.save_settings = keep_settings,
-                                         .save_calibration = keep_calibration,
-                                         .save_map = save_map,
-                                         .maps = &map_flash};
-
 static bool stored_maps_are_good;
 
 static inline void power_on(void)
 {
-    stored_maps_are_good = true;
     (void)new_session(NULL);
-    bt_session_use_board(&session, &actions);
+    session.board = keeps;
     plug(2, SENSOR);
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        uint8_t bytes[BT_MAP_RECORD_BYTES];
-        size_t n = bt_map_place_pack(&record[f], bytes);
-        bool good = bt_finger_map_load(&session.map[f], &map_flash, f, BT_MAP_RECORD_VERSION, bytes, n);
-        stored_maps_are_good = stored_maps_are_good && (good || n == 0);
-    }
-    bt_session_use_settings(&session);
+    bt_session_load(&session);
+    stored_maps_are_good = !(session.status.faults & BT_FAULT_FLAG_STORAGE);
 }
 
 static inline int new_board(void **state)
 {
     (void)state;
-    memset(slots, 0, sizeof slots); // whatever was there before
-    memset(record, 0, sizeof record);
+    memset(kept, 0xFF, BT_STORAGE_BYTES);
+    memset(SLOTS, 0, BT_MAPS_BYTES); // whatever was there before
     erases = programs = 0;
     worn = false;
-    refused_finger = 0xFF;
+    refused_record = 0;
     power_on();
     return 0;
 }

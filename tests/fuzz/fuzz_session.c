@@ -18,56 +18,6 @@
 
 enum step { RAW, COMMAND, DAMAGED, ROUND, TICK, UNPLUG, LINK_ROOM, UPLOAD, STEPS };
 
-// ---- flash for maps --------------------------------------------------------------------------------
-// Left as it is from one input to the next: what is read of it was written before, or this finds out.
-
-static _Alignas(4) uint8_t slots[BT_MAPS_BYTES];
-static int erases;
-
-static bool erase(void *context, uint32_t offset)
-{
-    (void)context;
-    if (offset % BT_FLASH_SECTOR_BYTES != 0 || offset >= BT_MAPS_BYTES) {
-        FAIL("bad erase at %u", offset);
-    }
-    erases++;
-    memset(slots + offset, 0xFF, BT_FLASH_SECTOR_BYTES);
-    return true;
-}
-
-static bool program(void *context, uint32_t offset, const uint8_t *page)
-{
-    (void)context;
-    if (offset % BT_FLASH_PAGE_BYTES != 0 || offset >= BT_MAPS_BYTES) {
-        FAIL("bad program at %u", offset);
-    }
-    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
-        slots[offset + (uint32_t)k] &= page[k];
-    }
-    return true;
-}
-
-static uint8_t save_map(void *context, uint8_t finger, const bt_map_place *place)
-{
-    (void)context;
-    return finger < BT_MAX_FINGERS && place->slot < BT_MAP_SLOTS ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
-}
-
-static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
-static const bt_map_flash map_flash = {BT_FLASH_SECTOR_BYTES,
-                                       BT_MAP_SLOT_BYTES,
-                                       BT_MAP_MAX_BYTES,
-                                       BT_MAP_SLOTS,
-                                       NULL,
-                                       erase,
-                                       program,
-                                       slots,
-                                       map_ram[0]};
-static const bt_board_actions actions = {.save_settings = keep_settings,
-                                         .save_calibration = keep_calibration,
-                                         .save_map = save_map,
-                                         .maps = &map_flash};
-
 static struct {
     bt_deframer deframer;
     bool full; // the link takes nothing
@@ -228,7 +178,7 @@ static void check_maps(const bt_session *session)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         const bt_finger_map *finger_map = &session->map[f];
-        const uint8_t *blob = slots + finger_map->place.slot * (size_t)BT_MAP_SLOT_BYTES;
+        const uint8_t *blob = SLOTS + finger_map->place.slot * (size_t)BT_MAP_SLOT_BYTES;
         bt_map map;
         if (finger_map->place.bytes == 0) {
             if (session->map_state[f] != BT_CALIBRATION_STATE_NONE) {
@@ -252,7 +202,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     uint32_t now_us = next_u32(&in);
     memset(&host, 0, sizeof host);
     bt_session_init(&session, &hello, host_write, NULL, now_us);
-    bt_session_use_board(&session, &actions);
+    session.board = keeps;
     while (in.left > 0) {
         uint8_t step = next_u8(&in);
         switch (step % STEPS) {

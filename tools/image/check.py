@@ -36,15 +36,12 @@ COMMANDS = (ROOT / "firmware" / "core" / "talk" / "commands.c").read_text(encodi
 # The functions that each call through a pointer in the gateway's source may reach; limits.json has its board's own.
 POINTERS = {
     "session->write(": ("write_link",),
-    "board->save_settings(": ("save_settings",),
-    "board.save_calibration(": ("save_calibration",),
-    "board.save_map(": ("save_map",),
     "board.reboot(": ("leave",),
     "board.measure(": ("measure",),
     "board.set_bus_rate(": ("clock_bus",),
     "board.now_us(": ("now_us",),
-    "flash->erase(": ("erase_sector", "erase_map_sector"),
-    "flash->program(": ("program_page", "program_map_page"),
+    "flash->erase(": ("erase_sector",),
+    "flash->program(": ("program_page",),
     "flash->read(": ("read_flash",),
     "commands[k].run(": tuple(re.findall(r"^    {BT_\w+_ID, .*, (\w+)},$", COMMANDS, re.MULTILINE)),
 }

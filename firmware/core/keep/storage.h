@@ -28,8 +28,8 @@ enum bt_record {
     BT_RECORD_MAP = 8,         // likewise
 };
 
-// Offsets are bytes from the start of the two sectors. erase and program return false if the flash failed;
-// its contents are then unknown.
+// Offsets are bytes from the start of the two sectors, and go on behind them (map/store.h). erase and program
+// return false if the flash failed; its contents are then unknown.
 typedef struct {
     uint32_t sector_bytes; // the unit of erasing, to 0xFF: from 16 pages on, a multiple of a page
     void *context;         // the first argument of all three

@@ -19,17 +19,13 @@
 #define BT_MAPS_BYTES     (BT_MAP_SLOTS * BT_MAP_SLOT_BYTES)
 #define BT_KEPT_BYTES     (BT_STORAGE_BYTES + BT_MAPS_BYTES)
 
-// Offsets are bytes from the first slot. erase and program: as in bt_flash. bytes: all slots as memory, which
-// changes with the flash. ram: max_bytes for each finger's map in force, which is a multiple of 4, aligned
-// to 4.
+// The slots follow the settings' two sectors. bytes: all slots as memory, which changes with the flash. ram:
+// max_bytes for each finger's map in force, which is a multiple of 4, aligned to 4.
 typedef struct {
-    uint32_t sector_bytes; // the unit of erasing: 1024 at least
-    uint32_t slot_bytes;   // a multiple of that, so that a slot is erased without touching another
-    uint16_t max_bytes;    // of a map: at most slot_bytes and BT_MAP_MAX_BYTES
+    const bt_flash *flash;
+    uint32_t slot_bytes; // whole sectors, so that a slot is erased without touching another
+    uint16_t max_bytes;  // of a map: at most slot_bytes and BT_MAP_MAX_BYTES
     uint8_t slots;
-    void *context;
-    bool (*erase)(void *context, uint32_t sector_offset);
-    bool (*program)(void *context, uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
     const uint8_t *bytes;
     uint8_t *ram;
 } bt_map_flash;

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-_Static_assert(BT_MAP_MAX_BYTES / 1024 <= 32, "a bit for every sector of a slot");
+_Static_assert(BT_MAP_MAX_BYTES / BT_FLASH_SECTOR_BYTES <= 32, "a bit for every sector of a slot");
 _Static_assert(BT_FLASH_PAGE_BYTES % BT_MAP_PART_BYTES == 0, "a part lies in one page");
 _Static_assert(BT_MAP_PARTS % 8 == 0, "the parts' bits fill their bytes");
 _Static_assert(BT_MAP_PART_BYTES == sizeof(((bt_msg_map_data *)NULL)->data), "parts must be read as written");
@@ -17,9 +17,10 @@ static bool is_written(const bt_upload *upload, size_t part)
     return upload->written[part / 8] >> part % 8 & 1;
 }
 
-uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t offset,
+uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *maps, uint16_t offset,
                         const uint8_t data[BT_MAP_PART_BYTES])
 {
+    const bt_flash *flash = maps->flash;
     uint8_t page[BT_FLASH_PAGE_BYTES];
     const uint16_t size = upload->place.bytes;
     const size_t part = offset / BT_MAP_PART_BYTES;
@@ -29,11 +30,11 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     }
     const size_t bytes =
         (size_t)(size - offset) < BT_MAP_PART_BYTES ? (size_t)(size - offset) : BT_MAP_PART_BYTES;
-    const uint8_t *stored = bt_map_bytes(flash, &upload->place) + offset;
+    const uint8_t *stored = bt_map_bytes(maps, &upload->place) + offset;
     if (is_written(upload, part)) { // its reply was lost, or another host writes too
         return memcmp(stored, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
     }
-    const uint32_t at = upload->place.slot * flash->slot_bytes + offset;
+    const uint32_t at = 2 * flash->sector_bytes + upload->place.slot * maps->slot_bytes + offset;
     if (!(upload->erased & sector)) {
         // Even if it reads as erased: after an erase cut short by a power failure, that may not last.
         if (!flash->erase(flash->context, at - at % flash->sector_bytes)) {

@@ -21,7 +21,7 @@ void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *plac
 // Write one part; offset is a multiple of BT_MAP_PART_BYTES. What lies beyond the map's end is not written.
 // Erases at most one sector, before its first part. Returns an enum bt_error: OK, also if the part is already
 // there; OUT_OF_RANGE; or NOT_STORED when the flash did not take it or holds another part in its place.
-uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t offset,
+uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *maps, uint16_t offset,
                         const uint8_t data[BT_MAP_PART_BYTES]);
 
 // True once every part has come.

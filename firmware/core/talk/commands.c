@@ -2,6 +2,7 @@
 
 #include "talk/faults.h"
 #include "talk/map_commands.h"
+#include "talk/saved.h"
 #include "talk/sensors.h"
 #include "talk/status.h"
 
@@ -317,33 +318,10 @@ static uint8_t clear_calibration(bt_session *session, const uint8_t *payload)
     return BT_ERROR_OK;
 }
 
-static uint8_t save_calibrations(bt_session *session)
-{
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        // The others stay as stored, maybe by newer firmware with records that this one cannot read.
-        if (session->calibration[f].unsaved) {
-            uint8_t error = session->board.save_calibration(session->context, f, &session->calibration[f]);
-            if (error != BT_ERROR_OK) {
-                return error;
-            }
-            session->calibration[f].unsaved = false;
-        }
-    }
-    return BT_ERROR_OK;
-}
-
 static uint8_t save(bt_session *session, const uint8_t *payload)
 {
     (void)payload;
-    const bt_board_actions *board = &session->board;
-    if (board->save_settings == NULL || board->save_calibration == NULL || board->save_map == NULL) {
-        return BT_ERROR_NOT_HERE;
-    }
-    uint8_t error = board->save_settings(session->context, &session->settings);
-    if (error == BT_ERROR_OK) {
-        error = save_calibrations(session);
-    }
-    return error == BT_ERROR_OK ? bt_save_maps(session) : error;
+    return bt_session_save(session);
 }
 
 static uint8_t reboot(bt_session *session, const uint8_t *payload)

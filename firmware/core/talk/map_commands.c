@@ -101,20 +101,3 @@ uint8_t bt_map_clear(bt_session *session, const uint8_t *payload)
     bt_session_use_settings(session);
     return BT_ERROR_OK;
 }
-
-uint8_t bt_save_maps(bt_session *session)
-{
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_finger_map *map = &session->map[f];
-        // The others stay as stored, maybe by newer firmware with records that this one cannot read.
-        if (map->unsaved) {
-            uint8_t error = session->board.save_map(session->context, f, &map->place);
-            if (error != BT_ERROR_OK) {
-                return error;
-            }
-            map->unsaved = false;
-            map->stored_slot = map->place.bytes != 0 ? map->place.slot : BT_MAP_SLOTS;
-        }
-    }
-    return BT_ERROR_OK;
-}

@@ -1,4 +1,4 @@
-// The commands for wrench maps, and their part of SAVE_SETTINGS.
+// The commands for wrench maps.
 #ifndef BIOTAC_MAP_COMMANDS_H
 #define BIOTAC_MAP_COMMANDS_H
 
@@ -11,7 +11,5 @@ uint8_t bt_map_begin(bt_session *session, const uint8_t *payload);
 uint8_t bt_map_write(bt_session *session, const uint8_t *payload);
 uint8_t bt_map_end(bt_session *session, const uint8_t *payload);
 uint8_t bt_map_clear(bt_session *session, const uint8_t *payload);
-
-uint8_t bt_save_maps(bt_session *session); // enum bt_error
 
 #endif

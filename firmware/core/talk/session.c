@@ -26,11 +26,6 @@ void bt_session_init(bt_session *session, const bt_msg_hello *hello, bt_link_wri
     }
 }
 
-void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
-{
-    session->board = *actions;
-}
-
 // The state of something made for the sensor with this serial number; NULL: there is nothing.
 static uint8_t state_of(const uint8_t *made_for, const bt_sensor_info *info)
 {

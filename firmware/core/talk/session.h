@@ -26,13 +26,11 @@ typedef bool (*bt_link_write)(void *context, unsigned link, const uint8_t *data,
 
 // What the session needs from its board. The actions return an enum bt_error.
 typedef struct {
-    uint8_t (*save_settings)(void *context, const bt_settings *settings);
-    uint8_t (*save_calibration)(void *context, uint8_t finger, const bt_calibration *calibration);
-    uint8_t (*save_map)(void *context, uint8_t finger, const bt_map_place *place);
     uint8_t (*reboot)(void *context, bool into_bootloader); // OK: it happens once the reply is out
     void (*measure)(void *context, bt_msg_board_facts *facts);
     void (*set_bus_rate)(void *context, uint16_t khz); // 0: the usual one
-    const bt_map_flash *maps;                          // where wrench maps are kept; NULL: nowhere
+    const bt_flash *flash;                             // where settings are kept; NULL: nowhere
+    const bt_map_flash *maps;                          // and wrench maps, likewise
     uint32_t (*now_us)(void *context);                 // device time; NULL: the board is never short of time
 } bt_board_actions;
 
@@ -67,7 +65,7 @@ typedef struct {
     bt_msg_hello hello; // who this board is, as it is told; commands.c fills in what changes
     bt_link_write write;
     void *context;
-    bt_board_actions board;
+    bt_board_actions board; // set after bt_session_init; what is NULL is answered NOT_HERE
     bt_deframer deframer[BT_LINKS];
     uint8_t owner; // port whose host may change things; BT_NO_LINK until one does
     uint8_t link;  // port that messages go to: the owner's, or while a command runs, its own
@@ -91,9 +89,6 @@ typedef struct {
 // context: the first argument of `write` and of the board's actions.
 void bt_session_init(bt_session *session, const bt_msg_hello *hello, bt_link_write write, void *context,
                      uint32_t now_us);
-
-// Until this is called, or where an action is NULL, its commands are answered NOT_HERE.
-void bt_session_use_board(bt_session *session, const bt_board_actions *actions);
 
 // Apply changed settings, calibrations or sensors. Not while streaming: one recording, one set of settings.
 void bt_session_use_settings(bt_session *session);

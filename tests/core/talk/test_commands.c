@@ -31,17 +31,6 @@ TEST(settings_hold_their_ranges_and_refused_values_change_nothing)
     assert_int_equal(set_setting(0, 1), BT_ERROR_UNKNOWN_SETTING);
 }
 
-static bt_settings saved;
-static int saves;
-
-static uint8_t save(void *context, const bt_settings *settings)
-{
-    (void)context;
-    saved = *settings;
-    saves++;
-    return BT_ERROR_OK;
-}
-
 static uint8_t save_error(void)
 {
     return host_error(&session, BT_SAVE_SETTINGS_ID, "\5", 1);
@@ -49,18 +38,15 @@ static uint8_t save_error(void)
 
 TEST(a_board_saves_all_or_says_that_it_cannot)
 {
-    saves = 0;
-    for (int missing = 3; missing >= 0; missing--) {
-        const bt_board_actions actions = {
-            .save_settings = missing == 1 ? NULL : save,
-            .save_calibration = missing == 2 ? NULL : keep_calibration,
-            .save_map = missing == 3 ? NULL : keep_no_map,
-        };
-        bt_session_use_board(&session, &actions);
-        assert_int_equal(set_setting(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
-        assert_int_equal(save_error(), missing == 0 ? BT_ERROR_OK : BT_ERROR_NOT_HERE);
-    }
-    assert_true(saves == 1 && bt_settings_get(&saved, BT_SETTING_IDLE_PERIOD_MS) == 250);
+    memset(kept, 0xFF, sizeof kept);
+    assert_int_equal(set_setting(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
+    assert_int_equal(save_error(), BT_ERROR_NOT_HERE);
+    session.board = keeps;
+    assert_int_equal(save_error(), BT_ERROR_OK);
+    (void)new_session(NULL);
+    session.board = keeps;
+    bt_session_load(&session);
+    assert_int_equal(get(BT_SETTING_IDLE_PERIOD_MS), 250);
 }
 
 static uint16_t bus_khz = 4464;
@@ -84,7 +70,7 @@ TEST(a_bus_rate_on_trial_ends_with_start_stop_and_a_closed_port)
     static const uint8_t at_6_mhz[BT_SET_BUS_RATE_BYTES] = {1, 6000 & 0xFF, 6000 >> 8};
     static const bt_board_actions actions = {.measure = measure, .set_bus_rate = set_bus_rate};
     assert_int_equal(host_error(&session, BT_SET_BUS_RATE_ID, at_6_mhz, sizeof at_6_mhz), BT_ERROR_NOT_HERE);
-    bt_session_use_board(&session, &actions);
+    session.board = actions;
     for (int way = 0; way < 3; way++) {
         const received_message *answer = host_ask(&session, BT_SET_BUS_RATE_ID, at_6_mhz, sizeof at_6_mhz);
         assert_true(bus_khz == 6000 && answer->id == BT_BOARD_FACTS_ID);
