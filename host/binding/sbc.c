@@ -91,12 +91,10 @@ void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[BT_SERIAL_BYTES]
 static void send_sp(bt_session *session, const bt_finger *finger,
                     const uint16_t counts[BT_FOREIGN_ELECTRODES])
 {
-    uint8_t payload[BT_SP_COUNTS_BYTES];
     bt_msg_sp_counts msg = {
         .seq = (uint16_t)(finger->seq - 1), .t_us = finger->round.t_us, .finger = finger->index};
     memcpy(msg.counts, counts, sizeof msg.counts);
-    bt_msg_sp_counts_pack(&msg, payload);
-    bt_session_send(session, BT_SP_COUNTS_ID, payload);
+    bt_msg_sp_counts_send(session, &msg);
 }
 
 void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uint16_t *counts,

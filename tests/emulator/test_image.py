@@ -147,7 +147,7 @@ def test_forbidden_symbols() -> None:
         assert symbols.FLOAT_SYMBOL.match(name), name
     for name in ("malloc", "_malloc_r", "free", "calloc", "printf", "snprintf", "_vfiprintf_r", "vsnprintf", "_sbrk"):
         assert symbols.LIBRARY_SYMBOL.match(name), name
-    for name in ("__aeabi_ldivmod", "__aeabi_uidiv", "memcpy", "first_free", "bt_session_send", "print_font"):
+    for name in ("__aeabi_ldivmod", "__aeabi_uidiv", "memcpy", "first_free", "bt_session_stop", "print_font"):
         assert not symbols.FLOAT_SYMBOL.match(name) and not symbols.LIBRARY_SYMBOL.match(name), name
 
 

@@ -123,7 +123,7 @@ def header(contract: Contract) -> str:
         "// Payload length of a message id, without id and CRC; -1 when the id is unknown.",
         "int bt_wire_payload_bytes(uint8_t id);",
         "",
-        "#ifndef BT_CDEF // the rest is macros for the C tests",
+        "#ifndef BT_CDEF // the rest is macros for C alone",
         "// X(name, type, count) for every field, so that tests can compare by name.",
     ]
     about = [

@@ -14,10 +14,8 @@
 
 static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
 {
-    uint8_t payload[BT_REPLY_BYTES];
     bt_msg_reply msg = {.req_id = req_id, .command = command, .error = error};
-    bt_msg_reply_pack(&msg, payload);
-    bt_session_send(session, BT_REPLY_ID, payload);
+    bt_msg_reply_send(session, &msg);
 }
 
 static void subscribe_as_at_first(bt_session *session)
@@ -61,7 +59,6 @@ static uint8_t take_link(bt_session *session, const uint8_t *payload)
 
 static uint8_t hello_request(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_HELLO_BYTES];
     if (session->owner == session->link && session->status.streams == 0) {
         subscribe_as_at_first(session); // what another program on this port chose is not this one's
     }
@@ -72,8 +69,7 @@ static uint8_t hello_request(bt_session *session, const uint8_t *payload)
     msg.nonce = request.nonce;
     msg.map_bytes = session->board.maps != NULL ? session->board.maps->max_bytes : 0;
     msg.fingers_present = bt_session_present(session);
-    bt_msg_hello_pack(&msg, out);
-    bt_session_send(session, BT_HELLO_ID, out);
+    bt_msg_hello_send(session, &msg);
     return BT_ERROR_OK;
 }
 
@@ -211,20 +207,17 @@ static uint8_t get_sensor_status(bt_session *session, const uint8_t *payload)
 
 static uint8_t get_sensor_info(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_SENSOR_INFO_BYTES];
     const uint8_t f = payload[BT_COMMAND_FINGER_AT];
     bt_sensor_info info = session->info[f];
     info.req_id = payload[BT_COMMAND_REQ_ID_AT];
     info.finger = f;
     info.present = info.present && session->finger[f].silent_rounds < BT_UNPLUGGED_ROUNDS;
-    bt_msg_sensor_info_pack(&info, out);
-    bt_session_send(session, BT_SENSOR_INFO_ID, out);
+    bt_msg_sensor_info_send(session, &info);
     return BT_ERROR_OK;
 }
 
 static uint8_t get_point(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_POINT_BYTES];
     const uint8_t f = payload[BT_COMMAND_FINGER_AT];
     bt_msg_point msg = {.req_id = payload[BT_COMMAND_REQ_ID_AT]};
     if (bt_sensors_refused(session, f)) {
@@ -234,17 +227,14 @@ static uint8_t get_point(bt_session *session, const uint8_t *payload)
         return BT_ERROR_NO_SUCH_FINGER;
     }
     bt_finger_point(&session->finger[f], &session->solve[f], &msg);
-    bt_msg_point_pack(&msg, out);
-    bt_session_send(session, BT_POINT_ID, out);
+    bt_msg_point_send(session, &msg);
     return BT_ERROR_OK;
 }
 
 static void send_setting(bt_session *session, uint8_t req_id, uint8_t id)
 {
-    uint8_t payload[BT_SETTING_BYTES];
     bt_msg_setting msg = {.req_id = req_id, .setting = id, .value = bt_settings_get(&session->settings, id)};
-    bt_msg_setting_pack(&msg, payload);
-    bt_session_send(session, BT_SETTING_ID, payload);
+    bt_msg_setting_send(session, &msg);
 }
 
 static uint8_t get_setting(bt_session *session, const uint8_t *payload)
@@ -272,7 +262,6 @@ static uint8_t set_setting(bt_session *session, const uint8_t *payload)
 
 static uint8_t get_calibration(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_CALIBRATION_BYTES];
     const uint8_t f = payload[BT_COMMAND_FINGER_AT];
     const bt_calibration *calibration = &session->calibration[f];
     bt_msg_calibration msg = {
@@ -286,8 +275,7 @@ static uint8_t get_calibration(bt_session *session, const uint8_t *payload)
         msg.value[k] = calibration->present ? calibration->value[k]
                                             : bt_settings_get(&session->settings, bt_calibration_setting[k]);
     }
-    bt_msg_calibration_pack(&msg, out);
-    bt_session_send(session, BT_CALIBRATION_ID, out);
+    bt_msg_calibration_send(session, &msg);
     return BT_ERROR_OK;
 }
 
@@ -338,14 +326,12 @@ static uint8_t reboot(bt_session *session, const uint8_t *payload)
 
 static uint8_t get_board_facts(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_BOARD_FACTS_BYTES];
     bt_msg_board_facts msg = {.req_id = payload[BT_COMMAND_REQ_ID_AT]};
     if (session->board.measure == NULL) {
         return BT_ERROR_NOT_HERE;
     }
     session->board.measure(session->context, &msg);
-    bt_msg_board_facts_pack(&msg, out);
-    bt_session_send(session, BT_BOARD_FACTS_ID, out);
+    bt_msg_board_facts_send(session, &msg);
     return BT_ERROR_OK;
 }
 

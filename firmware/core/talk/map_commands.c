@@ -6,7 +6,6 @@ _Static_assert(BT_SERIAL_BYTES == BT_MAP_SERIAL_BYTES, "a map's serial number is
 
 uint8_t bt_map_get(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_MAP_INFO_BYTES];
     const uint8_t f = payload[BT_COMMAND_FINGER_AT];
     const bt_finger_map *map = &session->map[f];
     bt_msg_map_info msg = {
@@ -17,14 +16,12 @@ uint8_t bt_map_get(bt_session *session, const uint8_t *payload)
         msg.size_bytes = map->place.bytes;
         msg.crc32 = map->place.crc32;
     }
-    bt_msg_map_info_pack(&msg, out);
-    bt_session_send(session, BT_MAP_INFO_ID, out);
+    bt_msg_map_info_send(session, &msg);
     return BT_ERROR_OK;
 }
 
 uint8_t bt_map_read(bt_session *session, const uint8_t *payload)
 {
-    uint8_t out[BT_MAP_DATA_BYTES];
     bt_msg_read_map asked;
     bt_msg_read_map_unpack(&asked, payload);
     const bt_map_place *place = &session->map[asked.finger].place;
@@ -36,8 +33,7 @@ uint8_t bt_map_read(bt_session *session, const uint8_t *payload)
     memset(msg.data, 0xFF, sizeof msg.data);
     memcpy(msg.data, bt_map_bytes(session->board.maps, place) + asked.offset,
            left < sizeof msg.data ? left : sizeof msg.data);
-    bt_msg_map_data_pack(&msg, out);
-    bt_session_send(session, BT_MAP_DATA_ID, out);
+    bt_msg_map_data_send(session, &msg);
     return BT_ERROR_OK;
 }
 

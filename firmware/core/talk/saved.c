@@ -19,8 +19,8 @@ uint8_t bt_session_save(bt_session *session)
         return BT_ERROR_NOT_HERE;
     }
     bt_settings_pack(&session->settings, record);
-    bool kept = bt_storage_write(flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record,
-                                 sizeof record);
+    bool kept =
+        bt_storage_write(flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
     // What has not changed stays as stored, maybe by newer firmware with records that this one cannot read.
     for (int f = 0; f < BT_MAX_FINGERS && kept; f++) {
         bt_calibration *calibration = &session->calibration[f];
@@ -61,8 +61,8 @@ void bt_session_load(bt_session *session)
         }
         bytes = bt_storage_read(flash, MAP_ID(f), &version, record, sizeof record);
         if (bytes > 0 && session->board.maps != NULL) {
-            damaged |= !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record,
-                                           (size_t)bytes);
+            damaged |=
+                !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record, (size_t)bytes);
         }
     }
     session->status.faults |= damaged ? BT_FAULT_FLAG_STORAGE : 0;

@@ -1,4 +1,5 @@
-// What outlives a reset: the settings, and each finger's calibration and wrench map, as records of board.flash.
+// What outlives a reset: the settings, and each finger's calibration and wrench map, as records of
+// board.flash.
 #ifndef BIOTAC_SAVED_H
 #define BIOTAC_SAVED_H
 

@@ -86,13 +86,6 @@ void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame)
     }
 }
 
-void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload)
-{
-    _Alignas(4) uint8_t frame[BT_ENCODED_MAX_BYTES];
-    memcpy(frame + BT_PAYLOAD_AT, payload, (size_t)bt_wire_payload_bytes(id));
-    bt_session_send_sealed(session, id, frame);
-}
-
 uint8_t bt_session_present(const bt_session *session)
 {
     uint8_t mask = 0;

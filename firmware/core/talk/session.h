@@ -107,9 +107,17 @@ void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);
 // Bit mask of the fingers whose sensor answers.
 uint8_t bt_session_present(const bt_session *session);
 
-// Send the payload at frame + BT_PAYLOAD_AT as one message (bt_frame_seal).
+// Send the payload at frame + BT_PAYLOAD_AT as one message (bt_frame_seal), counting it as sent or dropped.
 void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame);
 
-// Send one message, counting it as sent or dropped.
-void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload);
+// bt_msg_reply_send(session, &msg), and so on: pack one message and send it.
+#define BT_SENDER(NAME, message)                                                                             \
+    static inline void message##_send(bt_session *session, const message *msg)                               \
+    {                                                                                                        \
+        _Alignas(4) uint8_t frame[BT_PAYLOAD_AT + BT_##NAME##_BYTES + BT_CRC_BYTES + 1];                     \
+        message##_pack(msg, frame + BT_PAYLOAD_AT);                                                          \
+        bt_session_send_sealed(session, BT_##NAME##_ID, frame);                                              \
+    }
+BT_WIRE_MESSAGES(BT_SENDER)
+
 #endif

@@ -2,14 +2,12 @@
 
 void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us)
 {
-    uint8_t payload[BT_STATUS_BYTES];
     bt_msg_status *msg = &session->status;
     msg->t_us = now_us;
     msg->req_id = req_id;
     msg->fingers_present = bt_session_present(session);
-    bt_msg_status_pack(msg, payload);
+    bt_msg_status_send(session, msg);
     msg->seq++;
-    bt_session_send(session, BT_STATUS_ID, payload);
 }
 
 // Why the electrode that went out last did; of those that say so themselves, the first.
@@ -25,7 +23,6 @@ static uint8_t electrode_fault(const bt_finger *finger)
 
 void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t index, uint32_t now_us)
 {
-    uint8_t payload[BT_SENSOR_STATUS_BYTES];
     const bt_finger *finger = &session->finger[index];
     bt_msg_sensor_status msg = {
         .seq = session->sensor_status_seq++,
@@ -46,6 +43,5 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
         .electrode_fault = electrode_fault(finger),
         .sensor_fault = bt_finger_sensor_fault(finger),
     };
-    bt_msg_sensor_status_pack(&msg, payload);
-    bt_session_send(session, BT_SENSOR_STATUS_ID, payload);
+    bt_msg_sensor_status_send(session, &msg);
 }

@@ -42,7 +42,6 @@ void bt_streams_begin(bt_session *session)
 
 static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slot, uint32_t t_us)
 {
-    uint8_t payload[BT_TOUCH_BYTES];
     if (!streams(session, finger, BT_STREAM_FLAG_FRAMES) || !(finger->quantities & BT_QUANTITY_FLAG_TOUCH)) {
         return;
     }
@@ -53,18 +52,15 @@ static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slo
         .slot = session->hello.slot_hz == 0 ? BT_SLOT_UNKNOWN : slot,
         .energy_count2 = bt_trigger_energy(&finger->tare.trigger),
     };
-    bt_msg_touch_pack(&msg, payload);
-    bt_session_send(session, BT_TOUCH_ID, payload);
+    bt_msg_touch_send(session, &msg);
 }
 
 static void send_event(bt_session *session, bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us)
 {
-    uint8_t payload[BT_EVENT_BYTES];
     bt_msg_event msg;
     bt_finger_event(finger, event, slot, t_us, &msg);
     msg.slot = session->hello.slot_hz == 0 ? BT_SLOT_UNKNOWN : slot;
-    bt_msg_event_pack(&msg, payload);
-    bt_session_send(session, BT_EVENT_ID, payload);
+    bt_msg_event_send(session, &msg);
 }
 
 static void watch(bt_session *session, uint8_t finger, uint8_t before, uint8_t now)
@@ -113,20 +109,16 @@ void bt_streams_slot(bt_session *session, uint8_t slot, uint32_t touched, uint32
 
 static void send_tare(bt_session *session, const bt_finger *finger)
 {
-    uint8_t payload[BT_TARE_BYTES];
     bt_msg_tare msg;
     bt_finger_tare(finger, &msg);
-    bt_msg_tare_pack(&msg, payload);
-    bt_session_send(session, BT_TARE_ID, payload);
+    bt_msg_tare_send(session, &msg);
 }
 
 static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows)
 {
-    uint8_t payload[BT_IDLE_BYTES];
     bt_msg_idle msg;
     bt_finger_idle_message(finger, frame_follows, &msg);
-    bt_msg_idle_pack(&msg, payload);
-    bt_session_send(session, BT_IDLE_ID, payload);
+    bt_msg_idle_send(session, &msg);
     finger->unsent = 0;
 }
 
@@ -217,20 +209,16 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
 
 static void send_pac(bt_session *session, const bt_finger *finger)
 {
-    uint8_t payload[BT_PAC_BYTES];
     bt_msg_pac msg;
     bt_finger_pac(finger, &msg);
-    bt_msg_pac_pack(&msg, payload);
-    bt_session_send(session, BT_PAC_ID, payload);
+    bt_msg_pac_send(session, &msg);
 }
 
 static void send_bands(bt_session *session, bt_finger *finger)
 {
-    uint8_t payload[BT_BANDS_BYTES];
     bt_msg_bands msg;
     bt_finger_bands(finger, &msg);
-    bt_msg_bands_pack(&msg, payload);
-    bt_session_send(session, BT_BANDS_ID, payload);
+    bt_msg_bands_send(session, &msg);
 }
 
 void bt_streams_vibration(bt_session *session, bt_finger *finger)

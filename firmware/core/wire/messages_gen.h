@@ -1020,7 +1020,7 @@ void bt_msg_emu_keep_unpack(bt_msg_emu_keep *msg, const uint8_t in[BT_EMU_KEEP_B
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
 
-#ifndef BT_CDEF // the rest is macros for the C tests
+#ifndef BT_CDEF // the rest is macros for C alone
 // X(name, type, count) for every field, so that tests can compare by name.
 #define BT_HELLO_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1) X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1) X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1) X(image_crc32, u32, 1) X(fingers, u8, 1) X(map_bytes, u16, 1) X(board_name, u8, 16)
 #define BT_REPLY_FIELDS(X) X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
