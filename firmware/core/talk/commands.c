@@ -1,6 +1,5 @@
 #include "talk/commands.h"
 
-#include "talk/faults.h"
 #include "talk/map_commands.h"
 #include "talk/saved.h"
 #include "talk/sensors.h"
@@ -188,7 +187,12 @@ static uint8_t release(bt_session *session, const uint8_t *payload)
 
 static uint8_t clear_faults(bt_session *session, const uint8_t *payload)
 {
-    bt_faults_clear(session, payload);
+    bt_msg_clear_faults seen;
+    bt_msg_clear_faults_unpack(&seen, payload);
+    session->status.faults &= (uint16_t)~seen.faults;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        session->status.finger_faults[f] &= ~seen.finger_faults[f];
+    }
     return BT_ERROR_OK;
 }
 

@@ -1,7 +1,7 @@
 #include "talk/rounds.h"
 
-#include "talk/faults.h"
 #include "talk/sensors.h"
+#include "talk/status.h"
 #include "talk/streams.h"
 
 void bt_session_begin(bt_session *session, uint32_t t_us)

@@ -70,7 +70,7 @@ typedef struct {
     uint8_t owner; // port whose host may change things; BT_NO_LINK until one does
     uint8_t link;  // port that messages go to: the owner's, or while a command runs, its own
 
-    // Streams, faults (faults.h) and counters, kept as they are sent; seq is the next one's, and status.c
+    // Streams, faults (status.h) and counters, kept as they are sent; seq is the next one's, and status.c
     // fills in t_us, req_id and fingers_present.
     bt_msg_status status;
     uint8_t fingers;              // bit mask of the fingers that START named

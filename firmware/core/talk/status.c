@@ -45,3 +45,11 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
     };
     bt_msg_sensor_status_send(session, &msg);
 }
+
+void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags)
+{
+    // Before its first tare a finger is untared in any case.
+    const bool tared = session->finger[f].tare.reason != BT_TARE_REASON_NONE;
+    const uint32_t against = BT_TRUST_FLAGS_LATCHED | (tared ? BT_FRAME_FLAG_UNTARED : 0);
+    session->status.finger_faults[f] |= flags & against;
+}

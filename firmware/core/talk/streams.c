@@ -1,7 +1,7 @@
 #include "talk/streams.h"
 
-#include "talk/faults.h"
 #include "talk/sensors.h"
+#include "talk/status.h"
 
 #include <string.h>
 
