@@ -21,9 +21,6 @@ void bt_session_init(bt_session *session, const bt_msg_hello *hello, bt_link_wri
     bt_settings_reset(&session->settings);
     bt_session_use_settings(session);
     session->owner = session->link = BT_NO_LINK;
-    for (unsigned link = 0; link < BT_LINKS; link++) {
-        bt_deframer_reset(&session->deframer[link]);
-    }
 }
 
 // The state of something made for the sensor with this serial number; NULL: there is nothing.

@@ -40,11 +40,8 @@ static enum bt_deframed finish(bt_deframer *deframer, size_t bytes)
         return BT_DEFRAMED_BAD_CRC;
     }
     size_t covered = (size_t)plain_bytes - BT_CRC_BYTES;
-    uint32_t crc = bt_crc32(buffer, covered);
-    for (size_t k = 0; k < BT_CRC_BYTES; k++) {
-        if (buffer[covered + k] != (uint8_t)(crc >> (8 * k))) {
-            return BT_DEFRAMED_BAD_CRC;
-        }
+    if (bt_get_u32(buffer + covered) != bt_crc32(buffer, covered)) {
+        return BT_DEFRAMED_BAD_CRC;
     }
     deframer->id = buffer[0];
     deframer->payload_bytes = (uint8_t)(covered - 1);
@@ -59,22 +56,15 @@ static enum bt_deframed finish(bt_deframer *deframer, size_t bytes)
 enum bt_deframed bt_deframer_push(bt_deframer *deframer, uint8_t byte)
 {
     if (byte != 0) {
-        if (deframer->filled < BT_FRAME_MAX_BYTES + 1) {
+        if (deframer->filled < sizeof deframer->buffer) {
             deframer->buffer[deframer->filled++] = byte;
-        } else {
-            deframer->too_long = 1;
         }
         return BT_DEFRAMED_NOTHING;
     }
     size_t bytes = deframer->filled;
-    int too_long = deframer->too_long;
     deframer->filled = 0;
-    deframer->too_long = 0;
-    if (too_long) {
-        return BT_DEFRAMED_TOO_LONG;
-    }
     if (bytes == 0) {
         return BT_DEFRAMED_NOTHING;
     }
-    return finish(deframer, bytes);
+    return bytes < sizeof deframer->buffer ? finish(deframer, bytes) : BT_DEFRAMED_TOO_LONG;
 }

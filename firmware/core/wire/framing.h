@@ -33,8 +33,7 @@ typedef struct {
     uint16_t filled;
     uint8_t id;
     uint8_t payload_bytes;
-    uint8_t too_long;
-    uint8_t buffer[BT_FRAME_MAX_BYTES + 2]; // frame, COBS code byte, one spare to notice overflow
+    uint8_t buffer[BT_FRAME_MAX_BYTES + 2]; // frame, COBS code byte, and one more: what fills it is too long
 } bt_deframer;
 
 // All zero is a valid start. The payload of a good frame begins at buffer + 1.

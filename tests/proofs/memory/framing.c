@@ -11,10 +11,9 @@ static uint8_t out[BT_ENCODED_MAX_BYTES];
 void main(void)
 {
     Frama_C_make_unknown((char *)&deframer, sizeof deframer);
-    deframer.filled = (uint16_t)Frama_C_interval(0, BT_FRAME_MAX_BYTES + 1);
-    deframer.too_long = (uint8_t)Frama_C_interval(0, 1);
+    deframer.filled = (uint16_t)Frama_C_interval(0, BT_FRAME_MAX_BYTES + 2);
     (void)bt_deframer_push(&deframer, (uint8_t)Frama_C_interval(0, UINT8_MAX));
-    //@ check deframer.filled <= BT_FRAME_MAX_BYTES + 1 && deframer.too_long <= 1;
+    //@ check deframer.filled <= BT_FRAME_MAX_BYTES + 2;
 
     Frama_C_make_unknown((char *)payload, sizeof payload);
     size_t bytes = (size_t)Frama_C_interval(0, sizeof payload);
