@@ -7,11 +7,6 @@ _Static_assert(BT_FLASH_PAGE_BYTES % BT_MAP_PART_BYTES == 0, "a part lies in one
 _Static_assert(BT_MAP_PARTS % 8 == 0, "the parts' bits fill their bytes");
 _Static_assert(BT_MAP_PART_BYTES == sizeof(((bt_msg_map_data *)NULL)->data), "parts must be read as written");
 
-void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *place)
-{
-    *upload = (bt_upload){.open = true, .finger = finger, .place = *place};
-}
-
 static bool is_written(const bt_upload *upload, size_t part)
 {
     return upload->written[part / 8] >> part % 8 & 1;

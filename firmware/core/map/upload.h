@@ -10,13 +10,10 @@
 typedef struct {
     bool open;
     uint8_t finger;
-    bt_map_place place;
+    bt_map_place place;                // where, and what is announced
     uint32_t erased;                   // bit mask of the slot's sectors
     uint8_t written[BT_MAP_PARTS / 8]; // bit mask of the parts
 } bt_upload;
-
-// place: the slot, the size and the CRC-32. Ends an earlier upload.
-void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *place);
 
 // Write one part; offset is a multiple of BT_MAP_PART_BYTES. What lies beyond the map's end is not written.
 // Erases at most one sector, before its first part. Returns an enum bt_error: OK, also if the part is already

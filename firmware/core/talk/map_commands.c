@@ -44,12 +44,14 @@ uint8_t bt_map_begin(bt_session *session, const uint8_t *payload)
     if (msg.size_bytes == 0 || msg.size_bytes > session->board.maps->max_bytes) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    bt_map_place place = {
-        .slot = bt_map_free_slot(session->board.maps, session->map, session->upload.place.slot),
-        .bytes = msg.size_bytes,
-        .crc32 = msg.crc32,
+    session->upload = (bt_upload){
+        // an earlier one ends
+        .open = true,
+        .finger = msg.finger,
+        .place.slot = bt_map_free_slot(session->board.maps, session->map, session->upload.place.slot),
+        .place.bytes = msg.size_bytes,
+        .place.crc32 = msg.crc32,
     };
-    bt_upload_begin(&session->upload, msg.finger, &place);
     return BT_ERROR_OK;
 }
 
