@@ -52,7 +52,6 @@ static bool end_finger(bt_session *session, unsigned f)
 void bt_session_end_round(bt_session *session)
 {
     uint32_t answering = 0; // bit mask
-    bt_scheduler_begin(&session->scheduler);
     for (int k = 0; k < BT_MAX_FINGERS; k++) {
         const uint8_t f = bt_scheduler_finger(&session->scheduler, k);
         if (end_finger(session, f)) {

@@ -7,39 +7,25 @@
 #define MAP_LATE_US   11000
 #define FRAME_LATE_US 22000
 
-void bt_scheduler_begin(bt_scheduler *scheduler)
-{
-    scheduler->first_next = BT_MAX_FINGERS;
-}
-
 uint8_t bt_scheduler_finger(const bt_scheduler *scheduler, int k)
 {
     const int finger = scheduler->first + k;
     return (uint8_t)(finger < BT_MAX_FINGERS ? finger : finger - BT_MAX_FINGERS);
 }
 
-// The first finger for which a wrench or a FRAME is left out comes first in the next round.
-static void put_first(bt_scheduler *scheduler, uint8_t finger)
-{
-    if (scheduler->first_next == BT_MAX_FINGERS) {
-        scheduler->first_next = finger;
-    }
-}
-
 uint32_t bt_scheduler_shed(bt_scheduler *scheduler, uint8_t finger, int32_t late_us, bool can_repeat)
 {
-    if (late_us > FRAME_LATE_US) {
-        put_first(scheduler, finger);
-        return BT_SHED_FRAME;
+    const uint32_t shed = late_us > FRAME_LATE_US               ? BT_SHED_FRAME
+                          : late_us > MAP_LATE_US && can_repeat ? BT_SHED_MAP
+                                                                : 0;
+    if (shed != 0 && scheduler->first_short == 0) {
+        scheduler->first_short = (uint8_t)(finger + 1);
     }
-    if (late_us > MAP_LATE_US && can_repeat) {
-        put_first(scheduler, finger);
-        return BT_SHED_MAP;
-    }
-    return 0;
+    return shed;
 }
 
 void bt_scheduler_end(bt_scheduler *scheduler)
 {
-    scheduler->first = (uint8_t)(scheduler->first_next % BT_MAX_FINGERS);
+    scheduler->first = (uint8_t)(scheduler->first_short != 0 ? scheduler->first_short - 1 : 0);
+    scheduler->first_short = 0;
 }

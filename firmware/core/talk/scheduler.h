@@ -6,12 +6,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+// All zero is a valid start.
 typedef struct {
-    uint8_t first; // first finger of a round: 0, or the first that something was left out for in the last
-    uint8_t first_next; // the same, as found in this round; BT_MAX_FINGERS: none so far
+    uint8_t first;       // finger of this round: 0, or the first that something was left out for in the last
+    uint8_t first_short; // the same for the next, counted from 1; 0: none so far
 } bt_scheduler;
-
-void bt_scheduler_begin(bt_scheduler *scheduler);
 
 // The k-th finger of this round.
 uint8_t bt_scheduler_finger(const bt_scheduler *scheduler, int k);
