@@ -12,9 +12,6 @@
 
 #include <string.h>
 
-_Static_assert(PORT_SERIAL_BYTES == sizeof(((bt_msg_hello *)NULL)->board_serial)
-                   && PORT_NAME_BYTES == sizeof(((bt_msg_hello *)NULL)->board_name),
-               "the board's serial number and name go to the host whole");
 _Static_assert(sizeof(bt_kept_tares) <= PORT_KEPT_BYTES, "there is room for what outlives a hang");
 
 _Static_assert(PORT_LINKS == BT_LINKS, "the session has a deframer for every link");
@@ -115,18 +112,12 @@ void bt_gateway_init(bt_gateway *gateway, bt_port *port)
         .ram = can.map_ram,
     };
     const port_identity board = port_identify(port);
-    bt_msg_hello hello = {
-        .firmware_major = BT_VERSION_MAJOR,
-        .firmware_minor = BT_VERSION_MINOR,
-        .firmware_patch = BT_VERSION_PATCH,
-        .board = board.board,
-        .fingers = can.fingers,
-        .slot_hz = can.untimed ? 0 : BT_SLOT_HZ,
-        .boot_id = board.boot_id,
-        .image_crc32 = board.image_crc32,
-    };
-    memcpy(hello.board_serial, board.serial, sizeof hello.board_serial);
-    memcpy(hello.board_name, can.name, sizeof hello.board_name);
+    bt_msg_hello hello = board.hello;
+    hello.firmware_major = BT_VERSION_MAJOR;
+    hello.firmware_minor = BT_VERSION_MINOR;
+    hello.firmware_patch = BT_VERSION_PATCH;
+    hello.fingers = can.fingers;
+    hello.slot_hz = can.untimed ? 0 : BT_SLOT_HZ;
     const bool resumed =
         board.kept != NULL && board.started_by & (BT_FAULT_FLAG_HUNG | BT_FAULT_FLAG_CRASHED);
     gateway->kept = board.kept;

@@ -95,14 +95,12 @@ void port_measure(bt_port *port, bt_msg_board_facts *facts);
 void port_spi_rate(bt_port *port, uint32_t khz);
 
 // ---- identity -------------------------------------------------------------------------------
-#define PORT_SERIAL_BYTES 12
-#define PORT_KEPT_BYTES   1056
+#define PORT_KEPT_BYTES 1056
 typedef struct {
-    uint16_t board; // enum bt_board, or a private id from BT_BOARD_PRIVATE on
-    uint8_t serial[PORT_SERIAL_BYTES];
-    uint32_t boot_id;     // random at each boot
-    uint16_t started_by;  // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
-    uint32_t image_crc32; // of the image that runs, read where it is stored; 0xFFFFFFFF where there is none
+    // board, or a private id from BT_BOARD_PRIVATE on; board_serial, board_name; boot_id, random at each
+    // boot; image_crc32 of the image that runs, read where it is stored, 0xFFFFFFFF where there is none.
+    bt_msg_hello hello;
+    uint16_t started_by; // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
     // PORT_KEPT_BYTES, aligned to 4, which a hang or a crash leaves as they are; NULL: none. After power-on
     // they hold anything.
     void *kept;
@@ -110,11 +108,9 @@ typedef struct {
 port_identity port_identify(bt_port *port);
 
 // ---- abilities: constants of the port, of which the host is told ----------------------------
-#define PORT_NAME_BYTES 16
 typedef struct {
-    char name[PORT_NAME_BYTES]; // of the board, for people; ASCII, the rest zeros
-    uint8_t fingers;            // chip selects: 1 to BT_MAX_FINGERS
-    uint32_t erase_bytes;       // flash is erased in these: 4 KiB or more, a multiple of BT_FLASH_PAGE_BYTES
+    uint8_t fingers;      // chip selects: 1 to BT_MAX_FINGERS
+    uint32_t erase_bytes; // flash is erased in these: 4 KiB or more, a multiple of BT_FLASH_PAGE_BYTES
     // Of the largest wrench map that there is room for: a multiple of 4, at most BT_MAP_MAX_BYTES. 0: no
     // maps, and then no slots in flash and nothing below.
     uint16_t map_bytes;

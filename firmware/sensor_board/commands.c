@@ -4,7 +4,6 @@
 #include "feed.h"
 #include "loop.h"
 #include "only_board.h"
-#include "pins.h"
 #include "version.h"
 
 #include <string.h>
@@ -75,22 +74,14 @@ static uint8_t command_besides(uint8_t id, const uint8_t *payload)
 
 void commands_start(bt_emu_stream *stream)
 {
-    const port_identity identity = port_identify(ONLY_BOARD);
     plugged = (1u << BT_MAX_FINGERS) - 1;
-    hello = (bt_msg_hello){
-        .firmware_major = BT_VERSION_MAJOR,
-        .firmware_minor = BT_VERSION_MINOR,
-        .firmware_patch = BT_VERSION_PATCH,
-        .board = identity.board,
-        .fingers = BT_MAX_FINGERS,
-        .board_name = IMAGE_BOARD_NAME,
-        .boot_id = identity.boot_id,
-        .slot_hz = BT_SLOT_HZ,
-        .fingers_present = plugged,
-        .image_crc32 = identity.image_crc32,
-    };
-    _Static_assert(sizeof hello.board_serial == PORT_SERIAL_BYTES, "the board's serial number is sent whole");
-    memcpy(hello.board_serial, identity.serial, sizeof hello.board_serial);
+    hello = port_identify(ONLY_BOARD).hello;
+    hello.firmware_major = BT_VERSION_MAJOR;
+    hello.firmware_minor = BT_VERSION_MINOR;
+    hello.firmware_patch = BT_VERSION_PATCH;
+    hello.fingers = BT_MAX_FINGERS;
+    hello.slot_hz = BT_SLOT_HZ;
+    hello.fingers_present = plugged;
     feed = (bt_emu_feed){
         .stream = stream, .hello = &hello, .send = send_frame, .obey = command_besides, .fill = fill_status};
     bt_emu_feed_begin(&feed);

@@ -244,21 +244,19 @@ void port_spi_rate(bt_port *board, uint32_t khz)
 
 port_identity port_identify(bt_port *board)
 {
-    static const port_identity identities[] = {
-        {.board = BT_BOARD_LINUX_SBC, .serial = "linux-spidev"},
-        {.board = BT_BOARD_MESSAGES, .serial = "messages"},
+    static const bt_msg_hello who[] = {
+        {.board = BT_BOARD_LINUX_SBC, .board_serial = "linux-spidev", .board_name = "Linux spidev"},
+        {.board = BT_BOARD_MESSAGES, .board_serial = "messages", .board_name = "messages"},
     };
-    port_identity identity = identities[board->no_bus];
-    identity.boot_id = board->boot_id;
-    identity.started_by = BT_FAULT_FLAG_STARTED;
-    identity.image_crc32 = UINT32_MAX;
+    port_identity identity = {.hello = who[board->no_bus], .started_by = BT_FAULT_FLAG_STARTED};
+    identity.hello.boot_id = board->boot_id;
+    identity.hello.image_crc32 = UINT32_MAX;
     return identity;
 }
 
 port_abilities port_describe(bt_port *board)
 {
-    static const char *const name[] = {"Linux spidev", "messages"};
-    port_abilities abilities = {
+    return (port_abilities){
         .no_bus = board->no_bus,
         .untimed = board->untimed,
         .fingers = BT_MAX_FINGERS,
@@ -267,6 +265,4 @@ port_abilities port_describe(bt_port *board)
         .map_ram = board->map_ram[0],
         .maps = board->maps,
     };
-    memcpy(abilities.name, name[board->no_bus], strlen(name[board->no_bus]));
-    return abilities;
 }

@@ -194,10 +194,11 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 
 port_identity port_identify(bt_port *port)
 {
-    return (port_identity){.board = BT_BOARD_POSIX_SIM,
-                           .serial = "fake-board-1",
-                           .boot_id = 42,
-                           .image_crc32 = UINT32_MAX,
+    return (port_identity){.hello = {.board = BT_BOARD_POSIX_SIM,
+                                     .board_serial = "fake-board-1",
+                                     .board_name = "fake",
+                                     .boot_id = 42,
+                                     .image_crc32 = UINT32_MAX},
                            .started_by = fake_started_by,
                            .kept = fake_kept};
 }
@@ -205,7 +206,6 @@ port_identity port_identify(bt_port *port)
 port_abilities port_describe(bt_port *port)
 {
     return (port_abilities){
-        .name = "fake",
         .fingers = BT_MAX_FINGERS,
         .erase_bytes = BT_FLASH_SECTOR_BYTES,
         .map_bytes = BT_MAP_MAX_BYTES,

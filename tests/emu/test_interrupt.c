@@ -213,13 +213,12 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 
 port_identity port_identify(bt_port *port)
 {
-    return (port_identity){.board = BT_BOARD_POSIX_SIM, .boot_id = 1, .image_crc32 = UINT32_MAX};
+    return (port_identity){.hello = {.board = BT_BOARD_POSIX_SIM, .boot_id = 1, .image_crc32 = UINT32_MAX}};
 }
 
 port_abilities port_describe(bt_port *port)
 {
     return (port_abilities){
-        .name = "fake",
         .fingers = BT_MAX_FINGERS,
         .erase_bytes = BT_FLASH_SECTOR_BYTES,
         .map_bytes = BT_MAP_MAX_BYTES,

@@ -307,10 +307,11 @@ void port_flash_read(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes
 port_identity __wrap_port_identify(bt_port *port)
 {
     return (port_identity){
-        .board = IMAGE_BOARD,
-        .serial = "emulated",
-        .boot_id = boot_id,
+        .hello = {.board = IMAGE_BOARD,
+                  .board_serial = "emulated",
+                  .board_name = IMAGE_BOARD_NAME,
+                  .boot_id = boot_id,
+                  .image_crc32 = UINT32_MAX},
         .started_by = BT_FAULT_FLAG_STARTED,
-        .image_crc32 = UINT32_MAX,
     };
 }

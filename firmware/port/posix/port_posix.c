@@ -383,11 +383,12 @@ void port_spi_rate(bt_port *port, uint32_t khz)
 port_identity port_identify(bt_port *port)
 {
     return (port_identity){
-        .board = live ? BT_BOARD_POSIX_LIVE : BT_BOARD_POSIX_SIM,
-        .serial = "posix-sim",
-        .boot_id = boot_id,
+        .hello = {.board = live ? BT_BOARD_POSIX_LIVE : BT_BOARD_POSIX_SIM,
+                  .board_serial = "posix-sim",
+                  .board_name = "simulator",
+                  .boot_id = boot_id,
+                  .image_crc32 = UINT32_MAX},
         .started_by = BT_FAULT_FLAG_STARTED,
-        .image_crc32 = UINT32_MAX,
     };
 }
 
@@ -395,7 +396,6 @@ port_abilities port_describe(bt_port *port)
 {
     static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
     return (port_abilities){
-        .name = "simulator",
         .fingers = BT_MAX_FINGERS,
         .erase_bytes = BT_FLASH_SECTOR_BYTES,
         .map_bytes = BT_MAP_MAX_BYTES,

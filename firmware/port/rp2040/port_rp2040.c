@@ -132,13 +132,14 @@ port_identity port_identify(bt_port *port)
 {
     static uint32_t kept[PORT_KEPT_BYTES / 4] __attribute__((section(".kept"))); // neither zeroed nor copied
     port_identity identity = {
-        .board = IMAGE_BOARD,
-        .boot_id = boot_id,
+        .hello = {.board = IMAGE_BOARD,
+                  .board_name = IMAGE_BOARD_NAME,
+                  .boot_id = boot_id,
+                  .image_crc32 = image_crc32()},
         .started_by = started_by,
-        .image_crc32 = image_crc32(),
         .kept = kept,
     };
-    memcpy(identity.serial, has_id ? (const void *)unique_id : no_id,
+    memcpy(identity.hello.board_serial, has_id ? (const void *)unique_id : no_id,
            has_id ? FLASH_ID_BYTES : sizeof no_id - 1);
     return identity;
 }

@@ -125,7 +125,6 @@ port_abilities port_describe(bt_port *port)
 {
     static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
     return (port_abilities){
-        .name = IMAGE_BOARD_NAME,
         .fingers = BT_MAX_FINGERS,
         .erase_bytes = BT_FLASH_SECTOR_BYTES,
         .map_bytes = BT_MAP_MAX_BYTES,

@@ -72,14 +72,17 @@ void port_measure(bt_port *port, bt_msg_board_facts *facts)
 port_identity port_identify(bt_port *port)
 {
     static uint32_t kept[PORT_KEPT_BYTES / 4] __attribute__((section(".noinit")));
-    port_identity identity = {.board = IMAGE_BOARD,
-                              .boot_id = boot_id,
-                              .started_by = why_started,
-                              .image_crc32 = image_crc32(),
-                              .kept = kept};
+    port_identity identity = {
+        .hello = {.board = IMAGE_BOARD,
+                  .board_name = IMAGE_BOARD_NAME,
+                  .boot_id = boot_id,
+                  .image_crc32 = image_crc32()},
+        .started_by = why_started,
+        .kept = kept,
+    };
     for (int k = 0; k < 3; k++) {
         uint32_t word = UNIQUE_ID[k];
-        memcpy(identity.serial + 4 * k, &word, 4);
+        memcpy(identity.hello.board_serial + 4 * k, &word, 4);
     }
     return identity;
 }
@@ -87,6 +90,5 @@ port_identity port_identify(bt_port *port)
 port_abilities port_describe(bt_port *port)
 {
     // No maps: eleven slots that are erased one by one cannot be had of a flash in sectors of 128 KiB.
-    return (port_abilities){
-        .name = IMAGE_BOARD_NAME, .fingers = BT_MAX_FINGERS, .erase_bytes = SETTINGS_SECTOR_BYTES};
+    return (port_abilities){.fingers = BT_MAX_FINGERS, .erase_bytes = SETTINGS_SECTOR_BYTES};
 }
