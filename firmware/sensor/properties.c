@@ -9,8 +9,8 @@
 #define ERROR_HIGH     (BT_ERROR_WORD_UNKNOWN_COMMAND >> 8)
 #define VERSION_BYTES  4
 #define READS_IN(form) ((form) == BT_FORM_BYTES ? 3 : 4)
-_Static_assert(4 + VERSION_BYTES / 2 + 3 * BT_SERIAL_CHARS / 2 <= BT_SLOTS
-                   && 3 + VERSION_BYTES + 2 * BT_SERIAL_CHARS <= BT_SLOTS,
+_Static_assert(4 + VERSION_BYTES / 2 + 3 * BT_SERIAL_BYTES / 2 <= BT_SLOTS
+                   && 3 + VERSION_BYTES + 2 * BT_SERIAL_BYTES <= BT_SLOTS,
                "one round must suffice to ask in each form");
 
 // Sends the command, or reads what is next: a word, a byte or, with the select held, two. True once all are
@@ -50,7 +50,7 @@ void bt_serial_query_begin(bt_serial_query *query)
 {
     query->whole = 0;
     query->read[0] = begin(BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES, query->form);
-    query->read[1] = begin(BT_PROPERTY_SERIAL, BT_SERIAL_CHARS, query->form);
+    query->read[1] = begin(BT_PROPERTY_SERIAL, BT_SERIAL_BYTES, query->form);
     query->read[2] = query->read[3] = query->read[1];
 }
 
@@ -76,9 +76,9 @@ static bool trim_text(uint8_t *text, unsigned bytes)
 }
 
 // BT2P0220B11E0004 and BTSP050400018017 are known; both have digits here.
-static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
+static bool trim_serial(uint8_t serial[BT_SERIAL_BYTES])
 {
-    return trim_text(serial, BT_SERIAL_CHARS) && memcmp(serial, "BT", 2) == 0
+    return trim_text(serial, BT_SERIAL_BYTES) && memcmp(serial, "BT", 2) == 0
            && (uint8_t)(serial[5] - '0') < 10 && (uint8_t)(serial[6] - '0') < 10
            && (uint8_t)(serial[7] - '0') < 10;
 }
@@ -86,14 +86,14 @@ static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
 #define PATIENCE    2 // rounds that a form may fail in which the sensor has answered
 #define HELD_ROUNDS 6 // with the select held low a round costs the other fingers theirs
 
-bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
+bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_BYTES])
 {
     query->driven = (uint8_t)(query->read[1].got[0] + 1) > 1; // neither 0x00 nor 0xFF
     for (int k = 1; k < query->whole; k++) {
         uint8_t *got = query->read[k].got;
         if (trim_serial(got)) {
-            const bool same = memcmp(query->serial, got, BT_SERIAL_CHARS) == 0;
-            memcpy(query->serial, got, BT_SERIAL_CHARS);
+            const bool same = memcmp(query->serial, got, BT_SERIAL_BYTES) == 0;
+            memcpy(query->serial, got, BT_SERIAL_BYTES);
             query->readings = (uint8_t)(same ? query->readings + 1 : 1);
             query->forms = (uint8_t)((same ? query->forms : 0) | 1u << query->form);
         }
@@ -109,7 +109,7 @@ bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHA
         query->held = (uint8_t)(query->held + hold);
         query->form = hold ? BT_FORM_HELD : query->form == BT_FORM_BYTES ? BT_FORM_WORDS : BT_FORM_BYTES;
     }
-    memcpy(serial, query->serial, BT_SERIAL_CHARS);
+    memcpy(serial, query->serial, BT_SERIAL_BYTES);
     return sure;
 }
 

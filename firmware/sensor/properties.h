@@ -14,8 +14,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BT_SERIAL_CHARS sizeof(((bt_msg_sensor_info *)0)->serial)
-
 enum bt_form { BT_FORM_WORDS, BT_FORM_HELD, BT_FORM_BYTES };
 
 // A property being read. Zeroed except for selector, bytes and form.
@@ -24,7 +22,7 @@ typedef struct {
     uint8_t bytes, form; // an even number; enum bt_form
     uint8_t at;
     bool asked;
-    uint8_t got[BT_SERIAL_CHARS]; // no property that we read is longer
+    uint8_t got[BT_SERIAL_BYTES]; // no property that we read is longer
 } bt_property;
 
 // Asks for the serial number in at most as many steps as a round has slots, which the sampler's interrupt
@@ -37,7 +35,7 @@ typedef struct {
     uint8_t patience;    // rounds that may fail before it is another; 0: the sensor has never answered in it
     bool driven;         // in the latest round; not, where nobody is there or the line is stuck
     uint8_t held;        // rounds with the select held, without an answer
-    uint8_t serial[BT_SERIAL_CHARS], readings, forms; // read so far, how often, and bit mask of the forms
+    uint8_t serial[BT_SERIAL_BYTES], readings, forms; // read so far, how often, and bit mask of the forms
 } bt_serial_query;
 
 void bt_serial_query_begin(bt_serial_query *query);
@@ -45,7 +43,7 @@ void bt_serial_query_step(bt_serial_query *query, bt_port *port, uint8_t finger)
 
 // The serial number, padded with zeros, of whatever kind (bt_serial_is_foreign). Returns false if it is not
 // sure yet. Once after each round; chooses the next one's form.
-bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS]);
+bool bt_serial_query_answer(bt_serial_query *query, uint8_t serial[BT_SERIAL_BYTES]);
 
 // Read all properties into info, before sampling begins; takes some 1.5 ms, and up to 10 of a sensor that
 // answers otherwise than by words. present is 1 if there is a serial number, and it is not that of a BioTac

@@ -78,10 +78,10 @@ TEST(one_flipped_bit_anywhere_changes_nothing)
 // One round of a query: so many readings of a text. Whether it is sure.
 static bool answers(bt_serial_query *query, const char *text, int readings)
 {
-    uint8_t serial[BT_SERIAL_CHARS];
+    uint8_t serial[BT_SERIAL_BYTES];
     bt_serial_query_begin(query);
     for (int k = 1; k <= readings; k++) {
-        memcpy(query->read[k].got, text, BT_SERIAL_CHARS);
+        memcpy(query->read[k].got, text, BT_SERIAL_BYTES);
     }
     query->whole = (uint8_t)(readings + 1);
     return bt_serial_query_answer(query, serial);

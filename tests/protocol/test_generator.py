@@ -101,6 +101,7 @@ REFUSED = [
     ("map.toml", "BULGE = { value = 3", "BULGE = { value = 9", r"values of \[kind\] must be 0, 1, 2"),
     ("map.toml", 'BULGE = { value = 3, columns = "electrodes"', 'BULGE = { value = 3, columns = "all"',
      "BULGE has unknown columns all"),
+    ("map.toml", "serial_bytes = 16", "serial_bytes = 12", "serial_bytes is not the 16 of SENSOR_INFO"),
     ("sensor.toml", "command = 0x83", "command = 0x82", "command of PDC breaks the parity rule"),
     ("sensor.toml", 'name = "TAC"', 'name = "PDC"', "a channel name occurs twice"),
     ("sensor.toml", '"E1", "PAC", "E2",', '"E1", "PAC", "E99",', "slot E99 is not a channel"),

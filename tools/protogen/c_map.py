@@ -67,7 +67,6 @@ def header(contract: Contract) -> str:
         f"#define BT_MAP_MAX_BYTES {blob['max_bytes']}",
         f"#define BT_MAP_HEADER_BYTES {HEADER_BYTES}",
         f"#define BT_MAP_BLOCK_BYTES {BLOCK_BYTES}",
-        f"#define BT_MAP_SERIAL_BYTES {blob['serial_bytes']}",
         "",
         "// How many axes a map has.",
         *(f"#define BT_MAP_AXES_{name} {count}" for name, count in layout["axes"].items()),

@@ -88,6 +88,7 @@ def header(contract: Contract) -> str:
         f"#define BT_RESTART_MAGIC 0x{wire['restart_magic']:08X}u // likewise",
         f"#define BT_COMMAND_REQ_ID_AT {REQ_ID_AT} // in every command's payload",
         f"#define BT_COMMAND_FINGER_AT {FINGER_AT} // in that of every command to one finger",
+        f"#define BT_SERIAL_BYTES {contract.map['blob']['serial_bytes']} // in every message and map",
         f"#define BT_USB_VENDOR 0x{contract.link['usb']['vendor']:04X}",
         f"#define BT_USB_PRODUCT 0x{contract.link['usb']['product']:04X}",
         "",

@@ -203,6 +203,8 @@ def check_map_sizes(messages: tuple[Message, ...], wrench_map: dict[str, Any]) -
         for field in message.fields:
             if field.name == "size_bytes" and (field.range or (0, 0))[1] != wrench_map["blob"]["max_bytes"]:
                 raise ValueError(f"link.toml: {message.name}'s largest size_bytes differs from max_bytes in map.toml")
+            if field.name == "serial" and field.count != wrench_map["blob"]["serial_bytes"]:
+                raise ValueError(f"map.toml: serial_bytes is not the {field.count} of {message.name} in link.toml")
 
 
 def canonical(contract: Contract, *, with_docs: bool) -> str:

@@ -7,15 +7,6 @@
 #define MADE_AT  BT_SERIAL_BYTES
 #define VALUE_AT (MADE_AT + 4)
 
-_Static_assert(BT_SERIAL_BYTES == sizeof(((bt_msg_sensor_info *)NULL)->serial)
-                   && BT_SERIAL_BYTES == sizeof(((bt_msg_calibration *)NULL)->serial)
-                   && BT_SERIAL_BYTES == sizeof(((bt_msg_set_calibration *)NULL)->serial),
-               "a calibration's serial number is a sensor's");
-_Static_assert(sizeof(((bt_msg_calibration *)NULL)->value) == sizeof(((bt_calibration *)NULL)->value)
-                   && sizeof(((bt_msg_set_calibration *)NULL)->value)
-                          == sizeof(((bt_calibration *)NULL)->value),
-               "both messages carry every value");
-
 bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t serial[BT_SERIAL_BYTES])
 {
     static const uint8_t any[BT_SERIAL_BYTES];

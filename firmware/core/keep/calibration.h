@@ -7,8 +7,6 @@
 
 #include <stdbool.h>
 
-#define BT_SERIAL_BYTES 16
-
 typedef struct {
     bool present;
     bool unsaved;                    // set or cleared since it was stored

@@ -31,7 +31,7 @@ typedef struct {
     uint16_t gates;  // likewise
     uint32_t made_s; // since 1970 UTC; 0: unknown
     bt_margin margin;
-    const uint8_t *serial; // [BT_MAP_SERIAL_BYTES], in the blob like the rest: of the sensor it was made for;
+    const uint8_t *serial; // [BT_SERIAL_BYTES], in the blob like the rest: of the sensor it was made for;
                            // all zero: any sensor
     const uint8_t *blocks;
     const uint8_t *coefficients;

@@ -7,7 +7,6 @@
 #define BT_MAP_MAX_BYTES 20480
 #define BT_MAP_HEADER_BYTES 32
 #define BT_MAP_BLOCK_BYTES 12
-#define BT_MAP_SERIAL_BYTES 16
 
 // How many axes a map has.
 #define BT_MAP_AXES_FORCE 3

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#define MARGIN_AT (8 + BT_MAP_SERIAL_BYTES)
+#define MARGIN_AT (8 + BT_SERIAL_BYTES)
 _Static_assert(
     BT_MAP_HEADER_BYTES == MARGIN_AT + 8 && BT_MAP_HEADER_BYTES % 4 == 0,
     "the header is four bytes, the serial number, a u32 and four u16, and keeps what follows aligned");
@@ -143,7 +143,7 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
     map->axes = blob[1];
     map->block_count = blob[2];
     map->serial = blob + 4;
-    map->made_s = bt_get_u32(blob + 4 + BT_MAP_SERIAL_BYTES);
+    map->made_s = bt_get_u32(blob + 4 + BT_SERIAL_BYTES);
     for (int part = 0; part < 2; part++) {
         map->margin.base_mn[part] = bt_get_u16(blob + MARGIN_AT + 4 * part);
         map->margin.share_q8[part] = bt_get_u16(blob + MARGIN_AT + 4 * part + 2);

@@ -2,8 +2,6 @@
 
 #include <string.h>
 
-_Static_assert(BT_SERIAL_BYTES == BT_MAP_SERIAL_BYTES, "a map's serial number is a sensor's");
-
 uint8_t bt_map_get(bt_session *session, const uint8_t *payload)
 {
     const uint8_t f = payload[BT_COMMAND_FINGER_AT];

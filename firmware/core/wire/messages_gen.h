@@ -21,6 +21,7 @@
 #define BT_RESTART_MAGIC 0x2E57A27Au // likewise
 #define BT_COMMAND_REQ_ID_AT 0 // in every command's payload
 #define BT_COMMAND_FINGER_AT 1 // in that of every command to one finger
+#define BT_SERIAL_BYTES 16 // in every message and map
 #define BT_USB_VENDOR 0x1209
 #define BT_USB_PRODUCT 0x0001
 
