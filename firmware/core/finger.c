@@ -8,9 +8,6 @@
 
 #define PDC_FREE 6 // counts above the tare
 
-// What follows from where the electrodes lie.
-#define BT_GEOMETRY_QUANTITIES (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)
-
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
     bt_settings initial;
@@ -294,7 +291,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
                      bt_msg_frame *msg)
 {
     const bt_round *round = &finger->round;
-    quantities &= finger->foreign ? (uint8_t)~BT_GEOMETRY_QUANTITIES : UINT8_MAX;
+    quantities &= finger->foreign ? (uint8_t)~BT_WANT_ALL : UINT8_MAX; // its electrodes lie elsewhere
     msg->seq = seq_of(finger);
     msg->t_us = round->t_us;
     msg->finger = finger->index;

@@ -1,6 +1,4 @@
-// One frame's results: point of contact, force and torque, and the flags that qualify them.
-// Output units are those of the FRAME message: um, 100 uN, mN*mm, rounded half away from zero; a result that
-// cannot be given is the type's minimum, never 0 and never an older one.
+// One frame's results: point of contact, force and torque (solve.h), and the flags that qualify them.
 #ifndef BIOTAC_RESULTS_H
 #define BIOTAC_RESULTS_H
 

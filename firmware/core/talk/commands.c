@@ -224,7 +224,7 @@ static uint8_t get_point(bt_session *session, const uint8_t *payload)
 {
     const uint8_t f = payload[BT_COMMAND_FINGER_AT];
     bt_msg_point msg = {.req_id = payload[BT_COMMAND_REQ_ID_AT]};
-    if (bt_sensors_refused(session, f)) {
+    if (session->refused >> f & 1) {
         return BT_ERROR_OTHER_SENSOR;
     }
     if (!session->finger[f].present) {

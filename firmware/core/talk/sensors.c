@@ -93,8 +93,3 @@ uint32_t bt_sensors_flags(const bt_session *session, unsigned f)
     uint32_t unsure = session->unsure >> f & 1, other = session->other >> f & 1;
     return (unsure ? BT_FRAME_FLAG_SENSOR_UNSURE : 0) | (other ? BT_FRAME_FLAG_SENSOR_OTHER : 0);
 }
-
-bool bt_sensors_refused(const bt_session *session, unsigned f)
-{
-    return session->refused >> f & 1;
-}

@@ -29,7 +29,4 @@ void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_
 // The BT_FRAME_FLAG_SENSOR_* of FRAMEs and IDLEs.
 uint32_t bt_sensors_flags(const bt_session *session, unsigned f);
 
-// True while no result of this finger would be right.
-bool bt_sensors_refused(const bt_session *session, unsigned f);
-
 #endif

@@ -49,7 +49,7 @@ typedef struct {
     uint8_t asked;   // bit masks of fingers: asked for their serial number in this round, not sampled
     uint8_t unsure;  // may be another sensor than info says
     uint8_t other;   // is another one than at START
-    uint8_t refused; // likewise, and calibration or map are not its own
+    uint8_t refused; // likewise, and calibration or map are not its own: no result would be right
     bool bus_rate_overridden; // at a rate of SET_BUS_RATE
     bt_settings settings;
     bt_calibration calibration[BT_MAX_FINGERS];

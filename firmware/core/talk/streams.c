@@ -157,7 +157,7 @@ static void send_frame(bt_session *session, bt_finger *finger)
         return;
     }
     session->status.wrench_repeated += shed == BT_SHED_MAP;
-    uint8_t quantities = bt_sensors_refused(session, finger->index) ? 0 : finger->quantities;
+    uint8_t quantities = session->refused >> finger->index & 1 ? 0 : finger->quantities;
     bt_finger_frame(finger, solve, quantities, shed, &msg);
     bt_faults_of_round(session, finger->index, msg.flags);
     bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
