@@ -17,10 +17,9 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
         if (settings->map != NULL) {
             flags[k] = bt_solve_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc, force, torque,
                                        torsion_mnmm + k, guess_mn);
-        } else if (settings->population) {
-            flags[k] = bt_solve_uncalibrated(e_q4, settings, BT_WANT_ALL, poc, force, torque, guess_mn);
         } else {
-            flags[k] = bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque);
+            flags[k] = bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque,
+                                settings->population ? guess_mn : NULL);
         }
     }
 }

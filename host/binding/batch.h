@@ -11,7 +11,7 @@
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). pdc_above_rest_q4, which a map may
 // need, torsion_mnmm, flags: (n,); of flags POC_INVALID, POPULATION and OUTSIDE only. Every row goes through
-// bt_signals_q4, and bt_solve_mapped, bt_solve_uncalibrated or bt_solve, as on the board.
+// bt_signals_q4, and bt_solve_mapped or bt_solve, as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const int32_t *pdc_above_rest_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags);

@@ -54,7 +54,7 @@ static uint32_t run_wanted(const frame_input *in, uint32_t wanted, int16_t poc_u
 {
     bt_solve_settings settings = {.poc_weights = in->weights,
                                   .gains = bt_gains_from(in->force_nn, in->torque_nn)};
-    return bt_solve(in->e_q4, &settings, wanted, poc_um, force_100un, torque_mnmm);
+    return bt_solve(in->e_q4, &settings, wanted, poc_um, force_100un, torque_mnmm, NULL);
 }
 
 // Whatever else is wanted or not, what is wanted has the same value, and the rest is marked.

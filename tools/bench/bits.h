@@ -133,7 +133,7 @@ static inline uint32_t bits_hash(void)
             e_q4[i] = bench_step(&seed) & 3 ? -magnitude : magnitude;
         }
         settings.poc_weights = k % 3;
-        uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
+        uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm, NULL);
         for (int d = 0; d < 3; d++) {
             chain[1 + d] = (uint32_t)force_100un[d];
             chain[4 + d] = (uint32_t)torque_mnmm[d] ^ (uint32_t)(uint16_t)poc_um[d] << 16;

@@ -51,7 +51,7 @@ static signal_shape signals(const uint16_t counts[BT_ELECTRODES], const bt_tare 
                             int32_t e_q4[BT_ELECTRODES])
 {
     signal_shape shape = {0, 0};
-    if (tare->trigger.without == 0 && !(tare->trigger.unknown & ((1u << BT_ELECTRODES) - 1))) {
+    if (tare->trigger.without == 0 && !(tare->trigger.unknown & BT_ALL_ELECTRODES)) {
         shape = all_signals(counts, tare->electrode_q4, e_q4);
     } else {
         bt_signals_q4(counts, tare->electrode_q4, e_q4);
@@ -138,7 +138,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;
         // With nothing wanted, the kernel marks everything invalid and reads no signal.
-        (void)bt_solve(NULL, settings, 0, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+        (void)bt_solve(NULL, settings, 0, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         return;
     }
     int32_t e_q4[BT_ELECTRODES];
@@ -164,10 +164,10 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
         uncertainty.guess_mn[1] += LOST_BY_MAP_MN * out.lost;
     } else if (settings->population) {
         uncertainty.margin = &bt_population.margin;
-        flags |= bt_solve_uncalibrated(e_q4, settings, quantities, msg->poc_um, msg->force_100un,
-                                       msg->torque_mnmm, uncertainty.guess_mn);
+        flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm,
+                          uncertainty.guess_mn);
     } else {
-        flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+        flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm, NULL);
         bt_lin_guess(bt_strength_100un(e_q4), uncertainty.guess_mn);
         // Static pressure says how hard it is pressed at least: no finger makes 1000 counts of a newton.
         int32_t above_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16));

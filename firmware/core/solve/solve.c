@@ -94,10 +94,8 @@ static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], int32_t forc
     return BT_FRAME_FLAG_POPULATION | outside(&likeness, guess_mn);
 }
 
-// Force comes from the gains, or from the population map if guess_mn is given; all else is the same.
-static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
-                                         uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
-                                         int32_t torque_mnmm[3], uint32_t guess_mn[2])
+uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
+                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3], uint32_t guess_mn[2])
 {
     bt_point point;
     uint32_t flags = 0;
@@ -121,19 +119,6 @@ static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], cons
         mark(force_100un);
     }
     return flags | (asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0);
-}
-
-uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
-                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
-{
-    return solve_without_map(e_q4, settings, wanted, poc_um, force_100un, torque_mnmm, NULL);
-}
-
-uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
-                               uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
-                               int32_t torque_mnmm[3], uint32_t guess_mn[2])
-{
-    return solve_without_map(e_q4, settings, wanted, poc_um, force_100un, torque_mnmm, guess_mn);
 }
 
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,

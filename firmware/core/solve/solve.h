@@ -31,15 +31,18 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings);
 #define BT_WANT_TORQUE BT_QUANTITY_FLAG_TORQUE
 #define BT_WANT_ALL    (BT_WANT_POC | BT_WANT_FORCE | BT_WANT_TORQUE)
 
-// Results from signals, by the gains. Returns POC_INVALID if PoC or torque is wanted and there is no PoC,
-// else 0. The host runs recorded counts through this same function.
+// Results from signals, without a map. Force comes from the gains or, if guess_mn is given, from the
+// population map and from what it is mixed with; torque y and z are Eq 4's, and x is derived from that force.
+// Returns POC_INVALID if PoC or torque is wanted and there is no PoC; by the population map also POPULATION
+// if a force was computed, and OUTSIDE as bt_population_force says. guess_mn then is bt_population_guess's,
+// left as it is without a force. The host runs recorded counts through this same function.
 uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
-                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3]);
+                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3], uint32_t guess_mn[2]);
 
 // The same with settings->map, for a frame whose signals are e_q4. Force comes from the map, and torque if
 // the map has it; otherwise torque y and z are Eq 4's, and x is derived from the map's force. Torsion comes
 // only from a map, and only if torque is wanted. A map of the population map's blocks is judged as that one:
-// its force is mixed, OUTSIDE is returned and guess_mn written as below.
+// its force is mixed, OUTSIDE is returned and guess_mn written as above.
 typedef struct {
     const uint16_t *counts;    // [BT_ELECTRODES]
     const uint16_t *tare_q4;   // [BT_ELECTRODES]
@@ -49,13 +52,5 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
                          const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
                          int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm,
                          uint32_t guess_mn[2]);
-
-// The same without a map, for settings->population: force comes from the population map and from what it is
-// mixed with. Torque y and z are Eq 4's, and x is derived from that force. Also returns POPULATION if a force
-// was computed, and OUTSIDE as bt_population_force says; guess_mn is bt_population_guess's, left as it is
-// without a force.
-uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings,
-                               uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
-                               int32_t torque_mnmm[3], uint32_t guess_mn[2]);
 
 #endif

@@ -149,7 +149,7 @@ TEST(a_map_of_the_same_blocks_is_judged_alike)
         settings.map = &same;
         flags[0] =
             bt_solve_mapped(e_q4, &frame, &settings, BT_WANT_ALL, poc, force[0], torque, &torsion, guess[0]);
-        flags[1] = bt_solve_uncalibrated(e_q4, &settings, BT_WANT_ALL, poc, force[1], torque, guess[1]);
+        flags[1] = bt_solve(e_q4, &settings, BT_WANT_ALL, poc, force[1], torque, guess[1]);
         assert_int_equal(flags[0] | BT_FRAME_FLAG_POPULATION, flags[1]);
         assert_memory_equal(force[0], force[1], sizeof force[0]);
         assert_memory_equal(guess[0], guess[1], sizeof guess[0]);
@@ -189,7 +189,7 @@ static uint32_t published(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un
     int16_t poc[3];
     int32_t torque[3];
     uint32_t guess_mn[2];
-    return bt_solve_uncalibrated(e_q4, &settings, BT_WANT_FORCE, poc, force_100un, torque, guess_mn);
+    return bt_solve(e_q4, &settings, BT_WANT_FORCE, poc, force_100un, torque, guess_mn);
 }
 
 // Nothing in the training is like a point that presses on one electrode or between two; the skin's normal

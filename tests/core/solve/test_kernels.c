@@ -112,7 +112,7 @@ static void check_all_weights(const int32_t e_q4[BT_ELECTRODES], const gains_nn 
                                       .gains = bt_gains_from(gains->force_nn, gains->torque_nn)};
         int16_t poc_um[3];
         int32_t force_100un[3], torque_mnmm[3];
-        uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
+        uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm, NULL);
         lin2013_result want = reference(e_q4, weights, gains);
         check_wrench(&want, size, gains, force_100un, torque_mnmm);
         if (isnan(want.poc_mm[0])) {

@@ -19,7 +19,7 @@ static results kernel(const int32_t e_q4[BT_ELECTRODES], int weights)
 {
     results out;
     bt_solve_settings settings = {.poc_weights = weights, .gains = bt_gains_from(force_nn, torque_nn)};
-    out.flags = bt_solve(e_q4, &settings, BT_WANT_ALL, out.poc_um, out.force_100un, out.torque_mnmm);
+    out.flags = bt_solve(e_q4, &settings, BT_WANT_ALL, out.poc_um, out.force_100un, out.torque_mnmm, NULL);
     return out;
 }
 

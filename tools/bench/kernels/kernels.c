@@ -9,7 +9,7 @@ static bool kernel_shipped(const int32_t e_q4[BT_ELECTRODES], const kernel_setti
                            uint32_t wanted, kernel_output *out)
 {
     return bt_solve(e_q4, &settings->shipped, wanted, out->integer.poc_um, out->integer.force_100un,
-                    out->integer.torque_mnmm)
+                    out->integer.torque_mnmm, NULL)
            == 0;
 }
 
