@@ -107,13 +107,6 @@ void bt_streams_slot(bt_session *session, uint8_t slot, uint32_t touched, uint32
     }
 }
 
-static void send_tare(bt_session *session, const bt_finger *finger)
-{
-    bt_msg_tare msg;
-    bt_finger_tare(finger, &msg);
-    bt_msg_tare_send(session, &msg);
-}
-
 static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows)
 {
     bt_msg_idle msg;
@@ -146,7 +139,9 @@ static void send_frame(bt_session *session, bt_finger *finger)
     _Alignas(4) uint16_t frame[(BT_ENCODED_MAX_BYTES + 1) / 2];
     bt_msg_frame msg;
     if (finger->tare_unsent) {
-        send_tare(session, finger);
+        bt_msg_tare tare;
+        bt_finger_tare(finger, &tare);
+        bt_msg_tare_send(session, &tare);
     }
     const bt_solve_settings *solve = &session->solve[finger->index];
     uint32_t shed = bt_scheduler_shed(&session->scheduler, finger->index, late_us(session, finger),
@@ -207,26 +202,16 @@ void bt_streams_frame(bt_session *session, bt_finger *finger)
     }
 }
 
-static void send_pac(bt_session *session, const bt_finger *finger)
-{
-    bt_msg_pac msg;
-    bt_finger_pac(finger, &msg);
-    bt_msg_pac_send(session, &msg);
-}
-
-static void send_bands(bt_session *session, bt_finger *finger)
-{
-    bt_msg_bands msg;
-    bt_finger_bands(finger, &msg);
-    bt_msg_bands_send(session, &msg);
-}
-
 void bt_streams_vibration(bt_session *session, bt_finger *finger)
 {
     if (streams(session, finger, BT_STREAM_FLAG_PAC)) {
-        send_pac(session, finger);
+        bt_msg_pac pac;
+        bt_finger_pac(finger, &pac);
+        bt_msg_pac_send(session, &pac);
     }
     if (streams(session, finger, BT_STREAM_FLAG_BANDS)) {
-        send_bands(session, finger);
+        bt_msg_bands bands;
+        bt_finger_bands(finger, &bands);
+        bt_msg_bands_send(session, &bands);
     }
 }
