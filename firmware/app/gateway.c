@@ -210,8 +210,9 @@ static void close_round(bt_gateway *gateway)
     }
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         if (gateway->queried >> f & 1) {
-            bool answered = bt_serial_query_answer(&gateway->sampler.query[f], serial);
-            bt_sensors_answer(session, f, answered ? serial : NULL);
+            if (bt_serial_query_answer(&gateway->sampler.query[f], serial)) {
+                bt_sensors_answer(session, f, serial);
+            }
             if (!session->finger[f].present) {
                 gateway->sampler.query[f].form =
                     BT_FORM_WORDS; // nobody for whom the others should give a round up

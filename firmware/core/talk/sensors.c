@@ -65,9 +65,6 @@ uint8_t bt_sensors_to_ask(bt_session *session)
 void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_SERIAL_BYTES])
 {
     bt_sensor_info *info = &session->info[f];
-    if (serial == NULL) {
-        return;
-    }
     session->finger[f].foreign = bt_serial_is_foreign(serial);
     if (session->finger[f].foreign) {
         return; // it stays in doubt, as nothing kept can be for it

@@ -23,7 +23,7 @@ void bt_sensors_slot(bt_session *session, const uint16_t count[BT_MAX_FINGERS]);
 // they are not sampled (bt_session.asked).
 uint8_t bt_sensors_to_ask(bt_session *session);
 
-// Finger f's answer; NULL: nothing that could be read.
+// Finger f's answer. One that could not be read is none: it is asked again.
 void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_SERIAL_BYTES]);
 
 // The BT_FRAME_FLAG_SENSOR_* of FRAMEs and IDLEs.
