@@ -14,9 +14,7 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
     memset(finger, 0, sizeof *finger);
     finger->index = index;
     finger->quantities = BT_SUBSCRIBED_AT_FIRST;
-    bt_tare_reset(&finger->tare);
-    finger->health = (bt_health){0};
-    bt_events_reset(&finger->events);
+    bt_finger_forget(finger);
     bt_settings_reset(&initial);
     bt_pressure_use(&finger->pressure, &initial);
     bt_round_clear(&finger->round);
