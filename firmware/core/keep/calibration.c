@@ -15,14 +15,12 @@ bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t seria
 
 uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings)
 {
-    bt_settings own = *settings;
     for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
-        uint8_t error = bt_settings_set(&own, bt_calibration_setting[k], calibration->value[k]);
+        uint8_t error = bt_settings_set(settings, bt_calibration_setting[k], calibration->value[k]);
         if (error != BT_ERROR_OK) {
             return error;
         }
     }
-    *settings = own;
     return BT_ERROR_OK;
 }
 

@@ -19,8 +19,8 @@ typedef struct {
 // serial number (all zero: unknown).
 bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t serial[BT_SERIAL_BYTES]);
 
-// Replace the settings' values with the calibration's. Returns an enum bt_error: OK, or OUT_OF_RANGE and
-// settings unchanged.
+// Replace the settings' values with the calibration's. Returns an enum bt_error: OK, or OUT_OF_RANGE, with
+// some of them replaced.
 uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings);
 
 // The stored record, little-endian: u8 serial[16], u32 made_s, i32 value[8]. A cleared calibration is a
