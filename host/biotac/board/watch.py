@@ -75,7 +75,7 @@ class StreamWatch:
             stream.end()
         elif stream.on and link.pace:
             self._look()
-        elif stream.on and reader.silent_s > SILENCE_S * link.patience:
+        elif stream.on and not link.lock_step and reader.silent_s > SILENCE_S * link.patience:
             raise DeviceLostError(f"{link.port} has been silent for {reader.silent_s:.0f} s while streaming")
 
     def _is_due(self) -> bool:
@@ -118,8 +118,6 @@ class StreamWatch:
             self._stopped(started, status)
         elif not (started.fingers & status.fingers_present and started.streams & status.streams & ROWS):
             self._looks = 0  # no rows are due
-        elif status.t_us == self._answered_us and not self._board.link.keeps_time:
-            self._looks = 0  # nor are they while a simulated board's time stands still
         elif self._reader.rows != self._rows or status.frames_idle != self._idle:
             self._looks = self._restarts = 0
         else:

@@ -72,7 +72,8 @@ def shake_hands(link: Link, *, calibrations: Mapping[int, Calibration] | None = 
                 f"{link.port} is a sensor board, not a gateway: feed it with `biotac sim SOURCE --sensor-port "
                 f"{link.port}`, and open the port of the gateway it is wired to"
             )
-        link.keeps_time &= hand.info.board != wire.Board.POSIX_LIVE
+        if hand.info.board == wire.Board.POSIX_LIVE:
+            link.follow_loads()
         for finger, calibration in (calibrations or {}).items():
             hand.board.set_calibration(finger, calibration)
         if source and source.tare_q4 is not None:

@@ -25,6 +25,10 @@ class Played(Protocol):
         """Force (n, 3) in N on fingers (n,) in rounds ``since_us`` (n,) after round 0; NaN outside, None if unknown."""
 
 
+#: Of a board that is a process on this computer.
+PATIENCE = 60.0
+
+
 class Link(Protocol):
     """A byte pipe to a board. Raises DeviceLostError when the board goes away. The defaults here suit a real board."""
 
@@ -55,6 +59,10 @@ class Link(Protocol):
     #: Whether the board streams to this link alone, so that a STATUS tells what was started here. Not so for
     #: recordings, nor for a board that several share.
     owns_stream: bool = True
+
+    def follow_loads(self) -> None:
+        """From now on, device time is known to wait for the program that feeds a simulated board's sensors."""
+        self.pace, self.lock_step, self.keeps_time, self.patience = 0.0, True, False, PATIENCE
 
     def applied_n(
         self, finger: NDArray[np.uint8], t_us: NDArray[np.int64], round0_us: int | None

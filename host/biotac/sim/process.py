@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DeviceLostError, PortError
+from ..link.base import PATIENCE
 from ..link.serial_port import SerialLink
 from ..wire.native import BUILT
 from .sensor_board import SensorBoard
@@ -181,13 +182,13 @@ class SimBoard:
 class _Loopback(SerialLink):
     """The socket on which a board's sensors are fed."""
 
-    patience = 60.0
+    patience = PATIENCE
 
 
 class SimLink(SerialLink):
     """A link to a simulated board, which it owns and closes."""
 
-    patience = 60.0
+    patience = PATIENCE
     room = 16384
 
     def __init__(self, port: str, board: SimBoard) -> None:
