@@ -43,7 +43,7 @@ def report(verbs: str, folder: Path) -> tuple[dict[str, str], str]:
     """Findings by code, the first of each, and the page."""
     seen, steps = Bringup(), []
     facts = examine(
-        f"emu:pico?source=press.toml&fingers={FINGERS}&seconds=120&pace=fast&do={verbs}",
+        f"emu:pico?source=press.toml&fingers={FINGERS}&seconds=120&pace=fast" + (f"&do={verbs}" if verbs else ""),
         expected_fingers=FINGERS,
         by=lambda hand: bringup.measure(hand, seen, steps.append, seconds=1.0, press_s=5.0),
     )

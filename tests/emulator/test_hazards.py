@@ -181,7 +181,7 @@ def test_a_host_without_power_is_at_the_other_end(board: Board) -> None:
 
 @known_from("USB 2.0, 9.6.3; Linux refuses more since 2.6.16")
 def test_a_hub_without_a_supply_gives_100_ma(board: Board) -> None:
-    """it asks for no more, which is what the board draws; sensors are powered apart"""
+    """it asks for no more, which is what the Pico draws; sensors have to be powered apart"""
     assert board.open("hub gives 100 mA")[1].counters()["usb"]["state"] == "configured"
 
 

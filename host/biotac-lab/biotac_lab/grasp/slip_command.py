@@ -13,7 +13,6 @@ from biotac import EventKind, Finger, InputError
 from biotac.core import geometry as surface
 from biotac.sim import SimFinger, States, sample
 from biotac.wire import messages, slots
-from biotac.wire.fields import INVALID_U8
 
 from ..report import Outcome, Report, Show, Table, check, claim
 
@@ -25,6 +24,7 @@ SLOW_N_S, FAST_N_S = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (8.0, 10.0)
 RATTLES = (1.25, 2.5, 5.0)  # counts of PAC in a squeeze of 1 N/s: the ends and the middle of what biotac.sim draws from
 PLACES_MM = ((-3.0, 0.0), (-5.0, 5.0))  # on the pad and off it
 REST_S, AGAIN_S, SOON_S, SLIDING_M_S, TAPPED, HELD_S = 3.0, 0.1, 0.05, 0.002, 95, 4.2
+NO_LEVEL = 255  # in slip_level
 STRONG, AWAITED = 22, 4  # what grip.py, which knows that it squeezes, takes for a slip, and for how many rounds
 SQUEEZED, RELEASED, CALM = "squeezed: SLIP", "let go: SLIP", ("at rest and in still holds: level 0", 99)
 KNOWN = f" of level {STRONG}"
@@ -106,7 +106,7 @@ def _press(found: Found, finger: SimFinger, at: tuple[float, float]) -> None:
             during = (slips_s >= ends_s[leg]) & (slips_s < ends_s[leg + 1] + AGAIN_S)
             found[case, n_s, rattle].append(bool(during.any()))
             rounds = [level[int(at_s * 100) :][:AWAITED] for at_s in slips_s[during]]
-            strong = any((now[now < INVALID_U8] >= STRONG).any() for now in rounds)
+            strong = any((now[now < NO_LEVEL] >= STRONG).any() for now in rounds)
             found[case + KNOWN, n_s, rattle].append(strong)
         still = [k for leg in (1, 3, 5) for k in range(round(ends_s[leg] * 100) + 20, round(ends_s[leg + 1] * 100))]
         found[CALM[0], 0, rattle] += (level[[*range(100, round(REST_S * 100)), *still]] == 0).tolist()
