@@ -312,7 +312,7 @@ def test_a_finger_without_news_does_not_look_touched(make_player, view_of, open_
     page = open_page(view_of(lambda: player))
     player.script.put(touch)
     page.wait_for_selector("body[data-stale] #touched:text('not known')")
-    assert "what is shown is old" in page.text_content("#link-words")
+    page.wait_for_selector("#link-words:has-text('what is shown is old')")
     player.script.put(touch)
     page.wait_for_selector("body:not([data-stale]) #touched:text-is('contact')")
 
