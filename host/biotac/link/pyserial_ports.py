@@ -8,7 +8,6 @@ import time
 from contextlib import suppress
 
 import serial
-from serial import rfc2217
 
 READ_BYTES = 65536
 TTY_BYTES = 4000  # nearly the most that one tty read gives
@@ -53,21 +52,22 @@ class TtyPort(serial.Serial):  # type: ignore[misc]
         return b"".join(pieces)
 
 
-class Rfc2217Port(rfc2217.Serial):  # type: ignore[misc]
+class Rfc2217Port:
     """Several times slower than a port of this computer. Raises OSError, or ValueError for a port of another form."""
 
     readable_fd: int | None = None  # Telnet is underneath, which pyserial has to parse
 
     def __init__(self, port: str, bits_per_s: int) -> None:
-        super().__init__(port, bits_per_s, timeout=WAIT_S)
+        self._serial = serial.serial_for_url(port, bits_per_s, timeout=WAIT_S)  # imports Telnet only here
+        self.write, self.close = self._serial.write, self._serial.close
 
     def receive(self, timeout_s: float) -> bytes:
         """See TtyPort.receive."""
         deadline_s = time.monotonic() + timeout_s
         while True:
-            first = bytes(self.read(1))
+            first = bytes(self._serial.read(1))
             if first:
-                return first + bytes(self.read(min(self.in_waiting, READ_BYTES)))
+                return first + bytes(self._serial.read(min(self._serial.in_waiting, READ_BYTES)))
             if time.monotonic() >= deadline_s:
                 return b""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import select
 import socket
 from urllib.parse import parse_qs, urlsplit
 
-from .pyserial_ports import READ_BYTES
+from .pyserial_ports import IS_POSIX, READ_BYTES
 
 FORM = "socket://HOST:PORT, and ?token=T for a simulated board"
 OPEN_S = 5.0
@@ -28,7 +27,7 @@ class TcpPort:
             raise ValueError(f"expected {FORM}")
         self._socket = _connected(parts.hostname, parts.port, room)
         self.write(token.encode())
-        self.readable_fd = self.fileno() if os.name == "posix" else None
+        self.readable_fd = self.fileno() if IS_POSIX else None
 
     def fileno(self) -> int:
         """Of the socket. Raises OSError once it is closed."""
