@@ -78,7 +78,7 @@ def test_slides_and_slips_are_counted() -> None:
 
 
 def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> None:
-    grip, plant, sense = law.load(law.EXAMPLE)(), Plant(ITEM), TrueForce(2)
+    grip, plant, sense = law.load(law.EXAMPLE)["Grip"](), Plant(ITEM), TrueForce(2)
     speed = 10.0
     for _ in range(150):
         plant.step(speed, 0.0)
@@ -127,7 +127,7 @@ def test_the_law_stays_where_nothing_is_known_and_believes_strong_slips() -> Non
 def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
     """A hand's clock beats against the board's: three rounds of sixteen without a frame, of a thing of 1 N/mm."""
     (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
-    grip, way_mm, most_n = law.load(law.EXAMPLE)(), -3.0, 0.0
+    grip, way_mm, most_n = law.load(law.EXAMPLE)["Grip"](), -3.0, 0.0
     for k in range(3000):
         press_n = max(way_mm, 0.0)
         flags = FrameFlags.CONTACT if press_n > 0.05 else FrameFlags(0)
@@ -135,7 +135,7 @@ def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
         way_mm += 0.01 * grip.step([None, None] if k % 16 < 3 else [shown, shown], False)
         most_n = max(most_n, press_n)
     assert grip.holds and 0.7 < press_n < most_n < 1.5
-    grip = law.load(law.EXAMPLE)()
+    grip = law.load(law.EXAMPLE)["Grip"]()
     pressed = replace(frame, force_n=np.array([0.0, 0.0, 30.0]), flags=FrameFlags.CONTACT, trust=Trust.ACT)
     assert (
         grip.step([pressed, replace(frame, flags=FrameFlags(0), trust=Trust.ACT)], False) == 0.0
@@ -145,7 +145,7 @@ def test_the_law_neither_stops_nor_ratchets_where_rounds_are_missing() -> None:
 def test_a_slip_is_pressed_and_learnt_where_no_force_is_known_when_it_is_told() -> None:
     """As after a restart, of a thing of 1 N/mm: the board tells slips before its tare is back."""
     (frame, _), _ = TrueForce(2).feel(Plant(ITEM))
-    grip, way_mm = law.load(law.EXAMPLE)(), 0.0
+    grip, way_mm = law.load(law.EXAMPLE)["Grip"](), 0.0
 
     def step(trust: Trust, slipped: bool = False) -> float:
         nonlocal way_mm
@@ -196,7 +196,7 @@ def test_six_things_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_the_law_in_c_is_the_same() -> None:
     """Round by round on the same frames, to what a wire message can say."""
-    python, in_c, plant, sense = law.load(law.EXAMPLE)(), law.load(IN_C)(), Plant(ITEM), TrueForce(2)
+    python, in_c, plant, sense = law.load(law.EXAMPLE)["Grip"](), law.load(IN_C)["Grip"](), Plant(ITEM), TrueForce(2)
     for k in range(400):
         plant.step(python.speed_mm_s, 2.0 if k > 200 else 0.0)
         felt = sense.feel(plant)
@@ -208,7 +208,7 @@ def test_the_law_in_c_is_the_same() -> None:
 
 def test_the_law_in_c_releases_what_it_has_let_go() -> None:
     """A board that was told HOLD says CONTACT until RELEASE, however far the hand has opened."""
-    library, sent = (law.load(IN_C).step.__globals__[name] for name in ("LIBRARY", "sent"))
+    library, sent = (law.load(IN_C)[name] for name in ("LIBRARY", "sent"))
     live, finger, releases = LiveFingers({"index": SimFinger(1)}), Finger(), 0.0
 
     def rounds(count: int, press_n: float) -> float:

@@ -14,9 +14,9 @@ EXAMPLE = _BESIDE if _BESIDE.exists() else Path(__file__).resolve().parents[3] /
 
 
 @cache
-def load(path: Path) -> Any:
-    """The file's ``Grip``. Raises InputError."""
-    made = runpy.run_path(str(path)).get("Grip") if path.is_file() else None
-    if made is None:
+def load(path: Path) -> dict[str, Any]:
+    """What the file defines: a class ``Grip``, and constants. Raises InputError."""
+    made = runpy.run_path(str(path)) if path.is_file() else {}
+    if "Grip" not in made:
         raise InputError(f"{path} is no file with a class Grip; give one like host/docs/guides/examples/grip.py")
     return made

@@ -69,7 +69,7 @@ def run_trial(case: Case, number: int, law_file: Path, made: Any = None, trace: 
     if case.controller == "constant":
         press = {"least_n": CONSTANT_N, "most_n": CONSTANT_N}
     to = [towards("E17" if true else case.at)] * case.fingers
-    rule = law.load(law_file)(towards=to, shares=SHARES[case.fingers], **press)
+    rule = law.load(law_file)["Grip"](towards=to, shares=SHARES[case.fingers], **press)
     if true:
         sense = TrueForce(case.fingers, **TRUE[case.controller])
     else:
