@@ -42,8 +42,8 @@ uint8_t bt_map_begin(bt_session *session, const uint8_t *payload)
     if (msg.size_bytes == 0 || msg.size_bytes > session->board.maps->max_bytes) {
         return BT_ERROR_OUT_OF_RANGE;
     }
+    // An earlier upload ends; the slot after its own is taken, so that one that failed is passed over.
     session->upload = (bt_upload){
-        // an earlier one ends
         .open = true,
         .finger = msg.finger,
         .place.slot = bt_map_free_slot(session->board.maps, session->map, session->upload.place.slot),

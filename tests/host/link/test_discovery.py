@@ -142,7 +142,7 @@ def proc(tmp_path: Path) -> Proc:
 
 
 def test_a_word_alone_is_no_option_and_a_plus_is_no_space() -> None:
-    assert options_of("sim:not?there.toml", ("pace",), "") == ("not", {})
+    assert options_of("sim:absent?file.toml", ("pace",), "") == ("absent", {})
     assert options_of("csv:a.csv?columns=a+b%20c.toml", ("columns",), "") == ("a.csv", {"columns": "a+b c.toml"})
 
 
