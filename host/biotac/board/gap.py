@@ -87,7 +87,8 @@ class Gaps:
     def __init__(self) -> None:
         self.count = 0
         self.held = 0  #: bit mask of the fingers that the program holds
-        self._seen_us: dict[int, int] = {}  # by finger: device time of its latest row, to within a batch
+        self._seen_us: dict[int, int] = {}  # by finger: device time of its latest row, or up to LONG_US more
+        self._latest: dict[int, Batch] = {}  # by finger: the batch with that row
         self._last_s = time.monotonic()  # when the latest row was taken
         self._begun: tuple[Reason, int | None, int] | None = None
         self._held_back: list[Batch] = []
@@ -128,10 +129,9 @@ class Gaps:
         is_long = first_us is not None and last_us - first_us > LONG_US
         jumps = not gaps and any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers)
         rows = _rows(batch) if is_long or jumps else {}
-        if not gaps and rows:
-            gaps = self._jumps(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
+        gaps = gaps or self._jumps(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
         for finger in fingers:
-            seen_us[finger] = last_us
+            seen_us[finger], self._latest[finger] = last_us, batch
         if is_long:
             seen_us |= {finger: own[-1][0] for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
@@ -152,7 +152,8 @@ class Gaps:
         """Gaps of single fingers, while the stream went on; none where heartbeats cover the time."""
         gaps: list[Gap] = []
         for finger in rows:
-            last_us = self._seen_us.get(finger, rows[finger][0][0])
+            before = _rows(self._latest[finger]).get(finger) if finger in self._seen_us else None
+            last_us = before[-1][0] if before else rows[finger][0][0]
             for t_us, seq, covered_us, _ in rows[finger]:
                 if t_us - last_us - covered_us > JUMP_US:
                     reason: Reason = "lost" if (finger, seq) in losses else "finger"
