@@ -13,18 +13,15 @@ _PLAYERS = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim", ".b
 
 
 def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
-    """WHAT, and the options by key. Raises PortError, with the expected ``form``, for one that is not in ``known``.
-
-    So does one without a value, which would be as if it were not there; any other word may be of a file's name.
-    """
+    """WHAT, and the options by key. Raises PortError, with ``form``, for one not in ``known`` or without a value."""
     target, query = file_and_query(port.partition(":")[2])
     options = dict(parse_qsl(query.replace("+", "%2B"), keep_blank_values=True))  # in a form, + is a space
     for key, value in sorted(options.items()):
-        if value and key not in known:
+        if key not in known:
             raise PortError(f"{port}: unknown option {key!r}; expected {form}")
-        if not value and key in known:
+        if not value:
             raise PortError(f"{port}: option {key!r} has no value; expected {form}")
-    return target, {key: value for key, value in options.items() if value}
+    return target, options
 
 
 def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:

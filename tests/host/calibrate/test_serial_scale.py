@@ -85,7 +85,7 @@ def test_what_is_no_reading_is_one_line(printed: bytes, message: str) -> None:
     assert message in str(refused.value) and "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("query", ["?baud=fast", "?speed=9600", "?parity=X"])
+@pytest.mark.parametrize("query", ["?baud=fast", "?baud=", "?speed=9600", "?parity=X"])
 def test_a_form_that_is_not_known_is_refused(query: str) -> None:
     with pytest.raises(InputError, match="baud=9600"):
         SerialScale(f"/dev/null{query}")

@@ -141,8 +141,7 @@ def proc(tmp_path: Path) -> Proc:
     return Proc(tmp_path / "proc")
 
 
-def test_a_word_alone_is_no_option_and_a_plus_is_no_space() -> None:
-    assert options_of("sim:absent?file.toml", ("pace",), "") == ("absent", {})
+def test_a_plus_in_an_option_is_no_space() -> None:
     assert options_of("csv:a.csv?columns=a+b%20c.toml", ("columns",), "") == ("a.csv", {"columns": "a+b c.toml"})
 
 

@@ -65,6 +65,7 @@ def test_ports_that_name_nothing(clone: Path) -> None:
     assert "no source" in refusal("emu:pico")
     assert "option 'finger'" in refusal("emu:pico?source=press.toml&finger=2")
     assert "option 'image'" in refusal("sim:press.toml?image=x.bin")
+    assert "option 'pase'" in refusal("sim:press.toml?pase")
 
 
 def test_an_image_for_a_board_that_has_none(capsys: pytest.CaptureFixture[str]) -> None:

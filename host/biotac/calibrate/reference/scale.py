@@ -39,7 +39,7 @@ class SerialScale:
 
     def __init__(self, port: str, patience_s: float = PATIENCE_S) -> None:
         device, _, query = port.partition("?")
-        options = _OPTIONS | dict(parse_qsl(query))
+        options = _OPTIONS | dict(parse_qsl(query, keep_blank_values=True))
         self._port, self._patience_s = device, patience_s
         try:
             if set(options) != set(_OPTIONS):
