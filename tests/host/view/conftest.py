@@ -97,9 +97,9 @@ def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
 def view_of(view, monkeypatch) -> Callable[..., Viewing]:
     """Serves what an opener makes."""
 
-    def serve(opener: Opener, **options: Any) -> Viewing:
+    def serve(opener: Opener, retry_s: float = 0.02, **options: Any) -> Viewing:
         monkeypatch.setattr("biotac.view.serving.opener_of", lambda source, folder: opener)
-        monkeypatch.setattr("biotac.view.reader.RETRY_S", 0.02)
+        monkeypatch.setattr("biotac.view.reader.RETRY_S", retry_s)
         return view("scripted", **options)
 
     return serve

@@ -320,7 +320,7 @@ def test_a_finger_without_news_does_not_look_touched(make_player, view_of, open_
 def test_nothing_is_shown_of_a_board_that_came_back_without_its_sensor(make_player, view_of, open_page, touch) -> None:
     ready = [make_player() for _ in range(2)]
     before = ready[0]
-    page = open_page(view_of(lambda: ready.pop(0)))
+    page = open_page(view_of(lambda: ready.pop(0), retry_s=0.0))  # the page hears nothing of so short a loss
     assert page.text_content("#touched") == "not known"
     before.script.put(touch)
     page.wait_for_selector("#touched:text-is('contact')")

@@ -29,7 +29,6 @@ class Page {
     ];
     this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));
     this.readMs = 0;
-    this.lost = false;
     this.turn = false;
     this.themes = new ThemeSwitch(() => (this.theme = readTheme()));
     this.stream = new Stream({
@@ -75,11 +74,10 @@ class Page {
     this.model.update(news);
     const { health } = this.model;
     if (!news.health) return;
-    if (before && before.epoch !== health.epoch) this.hand.clear();
-    if (health.link === "lost") this.lost = true;
-    else if (this.lost && health.link === "live") {
-      this.lost = false;
-      showReply("The board is connected again.");
+    // By epochs: of a loss that is over within milliseconds, no news says that the board was lost.
+    if (before?.epoch && before.epoch !== health.epoch) {
+      this.hand.clear();
+      if (health.live) showReply("The board is connected again.");
     }
     this.showState();
   }
