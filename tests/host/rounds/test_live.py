@@ -19,7 +19,7 @@ from biotac.errors import CommandRefusedError, DeviceLostError, PortError
 from biotac.wire import messages_gen as wire
 
 SUPPORT = Path(__file__).parents[2] / "support"
-SECONDS = float(os.environ.get("BIOTAC_LIVE_SECONDS", "30"))  # a minute for both kinds; by hand 600
+SECONDS = float(os.environ.get("BIOTAC_LIVE_SECONDS", "10"))  # by hand 600
 
 
 class Bridge:
