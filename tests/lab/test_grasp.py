@@ -73,7 +73,7 @@ def test_slides_and_slips_are_counted() -> None:
     rows = ["S", "St", "Stu", "", "t", *[""] * 12, "t", *[""] * 12, "S", *[""] * 12, "S", "S", "tu"]
     for k, row in enumerate(rows):
         slides.round(k, "S" in row, "t" in row, "u" in row)
-    expected = {"told": 5, "used": 2, "false": 1, "slides": 3, "missed": 1, "reaction_ms": [20, 20]}
+    expected = {"reported": 5, "used": 2, "false": 1, "slides": 3, "missed": 1, "reaction_ms": [20, 20]}
     assert slides.facts() == expected
 
 

@@ -127,7 +127,7 @@ BT_NOINLINE void bt_adopt_first_words(bt_tare *tare)
     tare->trigger.first_words = 0;
 }
 
-void bt_adopt_none(bt_tare *tare)
+void bt_discard_tare(bt_tare *tare)
 {
     bt_adopt_report(tare, BT_TARE_REASON_INVERTED);
     tare->state = BT_TARE_STATE_INIT;

@@ -52,7 +52,7 @@ void bt_adopt_doubt(bt_tare *tare);
 void bt_adopt_contact(bt_tare *tare);
 
 // Drop the tare: it proved wrong, and there is no other.
-void bt_adopt_none(bt_tare *tare);
+void bt_discard_tare(bt_tare *tare);
 
 // Take note of channels whose first word has come.
 void bt_adopt_first_words(bt_tare *tare);

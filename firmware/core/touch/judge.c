@@ -49,7 +49,7 @@ BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
     bool inverted = bt_inverted(&tare->trigger.smooth, &tare->base, missing);
     tare->inverted_rounds = inverted ? (uint8_t)(tare->inverted_rounds + 1) : 0;
     if (tare->inverted_rounds == BT_INVERTED_ROUNDS) {
-        bt_adopt_none(tare);
+        bt_discard_tare(tare);
     }
 }
 

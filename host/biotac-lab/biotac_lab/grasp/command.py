@@ -113,6 +113,6 @@ def _figures(rows: list[Facts]) -> list[Any]:
         known = [value for value in values if value is not None]
         return float(np.median(known)) if known else None
 
-    counts = [sum(row[name] for row in rows) for name in ("slides", "missed", "told", "used", "false")]
+    counts = [sum(row[name] for row in rows) for name in ("slides", "missed", "reported", "used", "false")]
     reactions = [ms for row in rows for ms in row["reaction_ms"]]
     return [middle([r["hold_per_need"] for r in rows]), *counts, middle(reactions), middle([r["off_n"] for r in rows])]

@@ -21,12 +21,12 @@ ECHO_ROUNDS = 10  # a SLIP belongs to a slide until so long after it
 class Slides:
     """Counts slides and SLIPs from the lift on, until it is let go.
 
-    SLIPs ``told`` are ``used`` by the law or ignored, and ``false`` where nothing slid; a slide is ``missed`` without
-    any. ``reaction_ms`` is from a slide's onset to the first SLIP that the law acts on.
+    SLIPs ``reported`` are ``used`` by the law or ignored, and ``false`` where nothing slid; a slide without any is
+    ``missed``. ``reaction_ms`` is from a slide's onset to the first SLIP that the law acts on.
     """
 
     def __init__(self) -> None:
-        self.told = self.used = self.false = self.slides = self.missed = 0
+        self.reported = self.used = self.false = self.slides = self.missed = 0
         self.reaction_ms: list[int] = []
         self._quiet, self._onset = ECHO_ROUNDS + 1, 0  # rounds without a slide
         self._reported = self._reacted = True
@@ -37,7 +37,7 @@ class Slides:
             self.missed += not self._reported
             self.slides, self._onset, self._reported, self._reacted = self.slides + 1, k, False, False
         self._quiet = 0 if slides else self._quiet + 1
-        self.told, self.used = self.told + slip, self.used + used
+        self.reported, self.used = self.reported + slip, self.used + used
         self.false += slip and self._quiet > ECHO_ROUNDS
         if self._quiet <= ECHO_ROUNDS:
             self._reported |= slip

@@ -9,7 +9,7 @@ from .detector import Press, Procedure, Step
 from .force_source import ForceSource, rows_of
 
 
-class Face(Protocol):
+class Prompt(Protocol):
     """The user interface of a guided procedure."""
 
     def show(self, step: Step | None) -> None:
@@ -23,21 +23,21 @@ def guide(
     hand: Hand,
     procedure: Procedure,
     reference: ForceSource | None,
-    face: Face | None,
+    prompt: Prompt | None,
 ) -> dict[int, list[Press]]:
     """Feed ``procedure`` with what ``hand`` streams until it is done; the presses by finger, each with its force.
 
-    The force is the ``reference``'s, or what ``face`` gives; a scenario, which presses by itself, needs no face. Starts
-    the stream if necessary and leaves it on. Raises InputError when a finger waits too long, or a simulated source ends
-    first.
+    The force is the ``reference``'s, or what ``prompt`` gives; a scenario, which presses by itself, needs no prompt.
+    Starts the stream if necessary and leaves it on. Raises InputError when a finger waits too long, or a simulated
+    source ends first.
     """
     forces_n: list[float] = []
 
     def show(step: Step | None) -> None:
-        if face is not None:
+        if prompt is not None:
             if reference is None:
-                ask_forces(procedure, forces_n, face)
-            face.show(step)
+                ask_forces(procedure, forces_n, prompt)
+            prompt.show(step)
 
     shown = procedure.step
     show(shown)
@@ -53,6 +53,6 @@ def guide(
     return procedure.finish(forces_n)
 
 
-def ask_forces(procedure: Procedure, forces_n: list[float], face: Face) -> None:
+def ask_forces(procedure: Procedure, forces_n: list[float], prompt: Prompt) -> None:
     """Ask for the force of every press without one: several, when somebody presses faster than they type."""
-    forces_n += [face.force_n(step) for _, step in procedure.asked()[len(forces_n) :]]
+    forces_n += [prompt.force_n(step) for _, step in procedure.asked()[len(forces_n) :]]

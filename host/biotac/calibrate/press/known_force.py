@@ -20,7 +20,7 @@ from ..wrench.figures import angles_deg, rmse
 from .detector import Press, Procedure, find
 from .few_shot import SCALE, Scale, Way, fit, scale_of
 from .force_source import ForceSource, rows_of
-from .guide import Face, guide
+from .guide import Prompt, guide
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
@@ -157,19 +157,19 @@ def guided(
     hand: Hand,
     finger: int,
     forces_n: Sequence[float],
-    face: Face,
+    prompt: Prompt,
     *,
     reference: ForceSource | None = None,
     toward: Sequence[Sequence[float]] | None = None,
 ) -> Held:
-    """Presses on a board, one for each of ``forces_n`` (k,): ``face`` says what to do, and gives the force of each.
+    """Presses on a board, one for each of ``forces_n`` (k,): ``prompt`` says what to do, and gives the force of each.
 
     A ``reference`` gives the force instead. ``toward`` (k, 3) are directions, straight down if not given. Raises
     InputError for too few presses, for one that does not come, or for one without a complete frame.
     """
     _check_enough(len(forces_n))
     procedure = Procedure([finger], forces_n, needs_force=reference is not None)
-    presses = guide(hand, procedure, reference, face)[finger]
+    presses = guide(hand, procedure, reference, prompt)[finger]
     hand.stop()
     return _held(presses, toward)
 

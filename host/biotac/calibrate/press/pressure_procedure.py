@@ -23,17 +23,17 @@ from ...wire.identity import ascii_text, serial_text
 from ..reference.samples import Reference
 from .detector import Procedure, find
 from .force_source import rows_of, truth_of
-from .guide import Face, guide
+from .guide import Prompt, guide
 from .pressure import CALIBRATION_FORCES_N, MIN_PRESSES, VERIFICATION_FORCES_N, Calibrated, Fit, fit_and_verify
 
 
 def calibrate(
-    hand: Hand, face: Face, *, fingers: Sequence[int] = (), made_s: int, force: bool = False
+    hand: Hand, prompt: Prompt, *, fingers: Sequence[int] = (), made_s: int, force: bool = False
 ) -> list[Calibrated]:
     """K of each of ``fingers`` (none: all) on a board, from the paper's presses; in force until the next reboot.
 
     One with a reason ``why_not`` is not put into force, except with ``force``. The force is the board's scenario's, or
-    what ``face`` gives. Raises InputError for presses that cannot be used, for a finger without a sensor, and for a
+    what ``prompt`` gives. Raises InputError for presses that cannot be used, for a finger without a sensor, and for a
     sensor that was changed meanwhile.
     """
     absent = sorted(set(fingers) - set(hand.fingers))
@@ -44,7 +44,7 @@ def calibrate(
     serials = {finger: _serial(hand, finger) for finger in fingers}
     reference = truth_of(hand)
     procedure = Procedure(fingers, CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, needs_force=reference is not None)
-    held = guide(hand, procedure, reference, face)
+    held = guide(hand, procedure, reference, prompt)
     hand.stop()
     source = {"from": hand.port, "board_serial": serial_text(hand.info)}
     calibrated = []

@@ -40,7 +40,7 @@ AIR_SHARES = (0.05, 0.01)
 AIR_COST = 1.1  # factor on the squared error
 AIR_LAMBDA = 1e-4
 SHIFTS_COUNTS = (0.0, 100.0, -100.0)  # un-tared drift that the result is tested with
-LESS = (0.25, 0.5)  # shares of the training blocks, to see what a longer recording would gain
+TRAINING_SHARES = (0.25, 0.5)  # shares of the training blocks, to see what a longer recording would gain
 THREADS = 2
 
 Show = Callable[[str], None]
@@ -53,7 +53,7 @@ class Fit:
 
     ``lag_rows`` are for each axis. ``weights`` (axes, m) are those of POOL's models with both LAMBDAS, and, if a map of
     other fingers is given, again with both OTHERS_LAMBDAS. ``air_share`` is the weight of the frames in free air as a
-    share of the run's, 0 without any. ``less`` are the pool's coefficients (p + 1, axes) from LESS of its blocks.
+    share of the run's, 0 without any. ``less`` are the pool's coefficients (p + 1, axes) by TRAINING_SHARES.
     """
 
     lag_rows: tuple[int, ...]
@@ -74,8 +74,8 @@ class Validation:
     """Held-out results, and the final training.
 
     ``predicted`` (3, n, axes) is at SHIFTS_COUNTS, for each row by the fold that holds it out. ``by_model`` gives by
-    name the RMSE (3, axes) of each model with its own nested lambda. ``less`` (2, axes) is the RMSE with LESS of the
-    blocks. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
+    name the RMSE (3, axes) of each model with its own nested lambda. ``less`` (2, axes) is the RMSE by
+    TRAINING_SHARES. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
     the lag common to all axes over the whole run, before any correction; ``affine_r2`` is the affine model's held-out
     R2 at that lag.
     """
@@ -153,7 +153,7 @@ def validate(
         trainer = _Trainer(run, blocks, trainings, others, pool)
         predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
         errors: dict[str, Floats] = {}
-        less = np.zeros((len(LESS), axes))
+        less = np.zeros((len(TRAINING_SHARES), axes))
         fits: list[Fit] = []
         for block, fit in enumerate(pool.map(trainer.train, trainings)):
             fits.append(fit)
@@ -275,7 +275,7 @@ class _Trainer:
         weights = _weights(np.concatenate(inner[FIRST_OF_POOL:], axis=1), tested, rows)
         by_model[POOLED] = _mean(weights, alone[FIRST_OF_POOL:])
         less = []
-        for part in LESS:
+        for part in TRAINING_SHARES:
             sums = every.over(training.strips & self._blocks.own(training.blocks[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
             less.append(_mean(weights, self._pulled(sums, POOL)))

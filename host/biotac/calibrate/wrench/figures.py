@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...map.columns import Signals, centroid_mm, columns, with_one
-from .crossvalidation import LESS, SHIFTS_COUNTS, Validation
+from .crossvalidation import SHIFTS_COUNTS, TRAINING_SHARES, Validation
 from .models import LAMBDAS, LIN, POOL, POOLED
 from .moments import moved
 from .splits import BLOCKS
@@ -87,7 +87,7 @@ def minutes(validation: Validation) -> list[dict[str, Any]]:
     """Error against the amount of training: ``minutes`` at ROWS_PER_S, and the held-out ``rmse`` of each axis."""
     rows = len(validation.run.truth) * (BLOCKS - 1) / BLOCKS
     whole = rmse(validation.predicted[0], validation.run.truth)
-    steps = [*zip(LESS, validation.less, strict=True), (1.0, whole)]
+    steps = [*zip(TRAINING_SHARES, validation.less, strict=True), (1.0, whole)]
     return [{"minutes": part * rows / ROWS_PER_S / 60.0, "rmse": _list(error)} for part, error in steps]
 
 
@@ -99,7 +99,7 @@ def next_minute(validation: Validation) -> dict[str, Any]:
     """
     full = np.linalg.norm(rmse(validation.predicted[0], validation.run.truth)[:3])
     before = np.linalg.norm(validation.less[-1][:3])
-    power = max(float(np.log(before / full) / np.log(1.0 / LESS[-1])), 0.0)
+    power = max(float(np.log(before / full) / np.log(1.0 / TRAINING_SHARES[-1])), 0.0)
     result = []
     for region in regions(validation):
         share = region["rows"] / (region["rows"] + 60 * ROWS_PER_S)

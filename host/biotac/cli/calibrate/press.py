@@ -125,7 +125,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 class _Guide:
-    """A Face that prints instructions on stderr, leaving stdout to the result; ``press`` words a press."""
+    """A Prompt that prints instructions on stderr, leaving stdout to the result; ``press`` words a press."""
 
     def __init__(self, press: Callable[[Step], str], force_n: Callable[[Step], float], held: str) -> None:
         self._press, self.force_n, self._held = press, force_n, held
