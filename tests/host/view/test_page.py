@@ -348,6 +348,19 @@ def test_a_finger_of_the_list_says_why_it_has_no_force(make_player, view_of, ope
         page.wait_for_selector(says.format(words))
 
 
+@pytest.mark.parametrize("width", [1440, 1000, 390])
+def test_the_page_keeps_its_height_whatever_the_flags_say(make_player, view_of, open_page, touch, width: int) -> None:
+    player, seen = make_player(), []
+    page = open_page(view_of(lambda: player), viewport={"width": width, "height": 800})
+    for flags, count in ((0, 0), (wire.FrameFlags.CONTACT, 1), (0x7FFFFFFF, 31)):
+        flagged = replace(touch, wire=touch.wire.copy())
+        flagged.wire["flags"] = flags
+        player.script.put(flagged)
+        until(page, "n => document.querySelectorAll('#flags li, #notices li').length === n", count)
+        seen.append(page.evaluate("document.documentElement.scrollHeight"))
+    assert len(set(seen)) == 1, seen
+
+
 def test_a_page_behind_a_slow_line_says_how_old_it_is(make_player, view_of, open_page, touch, monkeypatch) -> None:
     player, late_s, monotonic = make_player(), [0.0], time.monotonic
     monkeypatch.setattr("biotac.view.state.time", SimpleNamespace(monotonic=lambda: monotonic() - late_s[0]))
