@@ -29,10 +29,10 @@ _DATA = "uint16 tdc_data\nuint16 tac_data\nuint16 pdc_data\nuint16[22] pac_data\
 
 
 class Robot:
-    """A driver: ``kind`` is ALL or HAND, ``pac``: whether BiotacAll has all samples of PAC."""
+    """A driver: ``kind`` is ALL or HAND, ``pac``, ``timed``: whether BiotacAll has all PAC, BioTacHand times."""
 
-    def __init__(self, kind: str = ALL, *, pac: bool = False, ros1: bool = True) -> None:
-        self.kind, self.pac, self.ros1 = kind, pac, ros1
+    def __init__(self, kind: str = ALL, *, pac: bool = False, ros1: bool = True, timed: bool = True) -> None:
+        self.kind, self.pac, self.ros1, self.timed = kind, pac, ros1, timed
         self.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
         texts = {
             "sr_robot_msgs/msg/Biotac": _BIOTAC + ("int16[] pac\n" if pac else ""),
@@ -40,7 +40,7 @@ class Robot:
             "biotac_sensors/msg/BioTacData": f"string bt_serial\nuint16 bt_position\n{_DATA}",
             "biotac_sensors/msg/BioTacTime": f"{_TIMES}uint32[19] electrode_ns_offset\n",
             HAND: "std_msgs/Header header\nstring hand_id\nbiotac_sensors/BioTacData[] bt_data\n"
-            "biotac_sensors/BioTacTime bt_time\n",
+            + "biotac_sensors/BioTacTime bt_time\n" * timed,
         }
         types: dict[str, Any] = {}
         for name, text in texts.items():
@@ -78,7 +78,7 @@ class Robot:
             )
             for f, (row, (pdc, tac, tdc)) in enumerate(zip(words, slow, strict=True))
         ]  # fmt: skip
-        return types[HAND](header, "left", data, times)
+        return types[HAND](header, "left", data, *[times] * self.timed)
 
     def write(self, path: Path, samples: Any, *, stamps_ns: Any = None, topics: tuple[str, ...] = ("/rh/tactile",),
               serials: tuple[str, ...] = ()) -> str:  # fmt: skip

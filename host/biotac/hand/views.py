@@ -153,7 +153,7 @@ class Latest(Consumer):
         if self._reader.lost is not None:
             return "the board is away and being looked for"
         if math.isinf(age_s):
-            return "nothing has arrived; call hand.stream(), or wait for next_frame()"
+            return "nothing has arrived yet; wait for next_frame(), or call hand.stream() first"
         if age_s <= self.max_age_s:
             return ""
         if math.isnan(age_s):

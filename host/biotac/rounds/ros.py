@@ -83,15 +83,15 @@ def _hand(message: Any, stamp_ns: int, logged_ns: int) -> Message:
         serial = own.bt_serial.encode("ascii", "replace")[:SENSOR_SERIAL_BYTES]
         channels = own.electrode_data, own.pdc_data, own.tac_data, own.tdc_data, own.pac_data
         found.add(f"at position {own.bt_position}", *channels, serial)
-    more = {"logged_ns": logged_ns, "positions": positions, "slot_us": _slot_us(message.bt_time)}
+    more = {"logged_ns": logged_ns, "positions": positions, "slot_us": _slot_us(getattr(message, "bt_time", None))}
     return found.message(stamp_ns, places=len(positions), **more)
 
 
 def _slot_us(times: Any) -> Any:
-    """Each slot's time after the stamp, if the frame was sampled in our order; else None."""
+    """Each slot's time after the stamp, if they are given and the frame was sampled in our order; else None."""
     at_ns = np.empty(slots.SLOTS_PER_FRAME)
-    at_ns[slots.ELECTRODE_SLOT], at_ns[slots.PAC_SLOT] = times.electrode_ns_offset, times.pac_ns_offset
-    for name, slot in slots.SLOW_SLOTS.items():
-        at_ns[slot] = getattr(times, f"{name}_ns_offset")
+    all_slots = {"electrode": slots.ELECTRODE_SLOT, "pac": slots.PAC_SLOT, **slots.SLOW_SLOTS}
+    for name, slot in all_slots.items():
+        at_ns[slot] = getattr(times, f"{name}_ns_offset", np.nan)
     ours = (np.abs(at_ns / 1e3 - SLOT_US) < 1e6 / sensor.SLOT_HZ / 2).all()
     return (at_ns / 1e3).astype(np.uint32) if ours else None

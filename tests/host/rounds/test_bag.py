@@ -59,6 +59,12 @@ def test_a_bag_with_every_slot_is_bit_for_bit_the_simulated_board(tmp_path: Path
     assert events(batch) == events(simulated) and {"JOLT", "SLIP", "TOUCH"} <= kinds(batch)
 
 
+def test_a_hand_that_gives_no_times_of_its_slots_is_read(tmp_path: Path, simulated: Batch) -> None:
+    batch, notes, hello = played(Robot(HAND, timed=False).write(tmp_path / "a.bag", samples()))
+    assert notes == [] and hello.slot_hz == 0
+    np.testing.assert_array_equal(np.sort(batch.frames["counts"], axis=0), np.sort(simulated.frames["counts"], axis=0))
+
+
 @pytest.mark.parametrize("ros1", [True, False])
 def test_shadows_message_has_its_fingers_and_slip_only_with_all_pac(tmp_path: Path, ros1: bool) -> None:
     rows = [[row[0], None, None, None, row[1]] for row in samples()]

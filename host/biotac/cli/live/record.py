@@ -23,7 +23,7 @@ FILES = ("bag:", "csv:", "replay:")  # ports that end by themselves
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_port(parser, "")
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
-    parser.add_argument("--seconds", type=values.seconds, help="device time to record at least (default: until Ctrl-C)")
+    parser.add_argument("--seconds", type=values.seconds, help="at least (default: until Ctrl-C or the source's end)")
     parser.add_argument("--note", default="", metavar="TEXT", help="a label of the whole recording")
     parser.add_argument("--fact", metavar="NAME=VALUE", action="append", default=[], help="subject=S07, for one")
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
