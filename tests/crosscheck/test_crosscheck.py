@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from core_in_units import on_board
 
+import biotac
 from biotac import FrameFlags, Setting
 from biotac.core.compiled import default_settings
 from biotac.recording.crosscheck import CrossCheck
@@ -44,6 +45,15 @@ def test_what_a_board_sends_is_never_called_wrong(gain_nn: int, weights: int) ->
     outcome = CrossCheck()
     outcome.add(frames(20_000, settings), settings)
     assert (outcome.frames, outcome.violations, outcome.findings) == (20_000, 0, [])
+
+
+@pytest.mark.parametrize("setting", Setting)
+def test_a_press_is_never_called_wrong_whatever_setting_is_at_an_end(setting: Setting) -> None:
+    outcome, ends = CrossCheck(), wire.SETTINGS[setting]
+    with biotac.open("sim:press.toml?seconds=3") as hand:
+        hand.board.set_setting(setting, ends.high if ends.default != ends.high else ends.low)
+        outcome.add(hand.read_batch(3.0).wire, hand.board.settings())
+    assert (outcome.frames, outcome.violations, outcome.findings) == (300, 0, [])
 
 
 @pytest.mark.parametrize(
