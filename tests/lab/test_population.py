@@ -15,7 +15,7 @@ from biotac.calibrate.population import Population, Trained
 from biotac.calibrate.press import known_force
 from biotac.calibrate.press.few_shot import PLATE, Scale, scale_of, shrink_to
 from biotac.calibrate.press.known_force import Held, angles_deg, of_plate
-from biotac.calibrate.wrench.run import Run, load_run
+from biotac.calibrate.wrench.plate_recording import Run, load_run
 from biotac.cli.main import main as gateway
 from biotac.core import geometry as surface
 from biotac.errors import InputError

@@ -1,4 +1,4 @@
-// The largest magnitudes of a map's factors, by which bt_map_open bounds its sums; evaluate.c asserts them.
+// The largest magnitudes of a map's factors, by which bt_map_open bounds its sums; wrench_map.c asserts them.
 #ifndef BIOTAC_MAP_BOUNDS_H
 #define BIOTAC_MAP_BOUNDS_H
 

@@ -77,7 +77,7 @@ static uint32_t uneven_count2(const bt_tare *tare)
 
 // After a sweep in contact: has it ended? A tare is made of means, and right after a release these are still
 // the press's, so both the pressure and its mean must have fallen.
-static void judge_release(bt_tare *tare)
+static void act_on_release(bt_tare *tare)
 {
     int32_t mean = tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3;
     int32_t now = tare->trigger.smooth.lane[BT_LANE_PDC];
@@ -148,7 +148,7 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
         bt_watch_return(&tare->watch, &tare->sweep, tare->trigger.unknown, BT_STILL_SPAN_Q3);
     }
     if (!tare->partial) { // else the sums mix electrodes served in different states
-        judge_release(tare);
+        act_on_release(tare);
     }
 }
 

@@ -5,8 +5,8 @@
 #ifndef BIOTAC_MACHINE_H
 #define BIOTAC_MACHINE_H
 
+#include "signal/absence.h"
 #include "signal/noise.h"
-#include "signal/silence.h"
 #include "signal/sweep.h"
 #include "signal/trigger.h"
 #include "touch/baseline.h"

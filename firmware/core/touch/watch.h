@@ -9,7 +9,7 @@
 #ifndef BIOTAC_WATCH_H
 #define BIOTAC_WATCH_H
 
-#include "signal/silence.h"
+#include "signal/absence.h"
 #include "signal/sweep.h"
 #include "touch/baseline.h"
 

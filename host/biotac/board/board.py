@@ -138,13 +138,13 @@ class Board:
     @contextmanager
     def _awaiting(self) -> Iterator[None]:
         self.reader.replies.clear()
-        self.reader.awaited += 1
+        self.reader.replies_awaited += 1
         self.reader.notify_space()
         try:
             yield
         finally:
             self.reader.quiet_id = 0
-            self.reader.awaited -= 1
+            self.reader.replies_awaited -= 1
 
     def _answer(self, request: Any, reply: type[Any], timeout_s: float) -> tuple[Any, float]:
         """The reply and when it arrived; (None, 0) when there is none in time."""

@@ -82,7 +82,7 @@ class Reader:
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
         self._round0_us: int | None = None  # device time of round 0, of the boot that the board was opened in
         self.silent_s = 0.0  #: for how long it has listened in vain
-        self.awaited = 0  #: how many replies are awaited
+        self.replies_awaited = 0
         self.replies: deque[tuple[Any, float]] = deque()  #: what came meanwhile, and when
         self.quiet_id = 0  #: the req_id of a question whose answer no consumer is to see
         self.parked = False  #: nothing is read, because the board is lost
@@ -233,7 +233,7 @@ class Reader:
             self.parked = False
 
     def _is_full(self) -> bool:
-        if self.awaited:
+        if self.replies_awaited:
             return False
         return any(consumer.is_full() for consumer in self.consumers)
 
@@ -278,7 +278,7 @@ class Reader:
             for consumer in self.consumers:
                 consumer.put(counted)
         # Now, so that whoever has the reply knows that what came before it has reached every consumer.
-        if messages and self.awaited:
+        if messages and self.replies_awaited:
             self.replies.extend((message, batch.arrived_s) for message in messages)
             with self.changed:
                 self.changed.notify_all()

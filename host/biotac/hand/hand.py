@@ -17,8 +17,8 @@ from ..board.consumers import Callbacks, DeferredErrors
 from ..board.gap import Gap, fingers_in
 from ..board.handshake import HandWarning
 from ..board.reader import THREADS
+from ..board.recovery import StreamWatch
 from ..board.stream import ALL_FINGERS, Stream
-from ..board.watch import StreamWatch
 from ..clock import DeviceClock
 from ..clock.host_clock import HostClock
 from ..errors import DeviceLostError, InputError, ReadWarning

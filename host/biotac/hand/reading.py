@@ -8,8 +8,8 @@ from contextlib import contextmanager
 
 from ..board.board import Board
 from ..board.consumers import Queue
+from ..board.recovery import SILENCE_S
 from ..board.stream import Stream
-from ..board.watch import SILENCE_S
 from ..errors import InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join, split

@@ -90,7 +90,7 @@ def _hand(message: Any, stamp_ns: int, logged_ns: int) -> Message:
 def _slot_us(times: Any) -> Any:
     """Each slot's time after the stamp, if they are given and the frame was sampled in our order; else None."""
     at_ns = np.empty(slots.SLOTS_PER_FRAME)
-    all_slots = {"electrode": slots.ELECTRODE_SLOT, "pac": slots.PAC_SLOT, **slots.SLOW_SLOTS}
+    all_slots: dict[str, Any] = {"electrode": slots.ELECTRODE_SLOT, "pac": slots.PAC_SLOT, **slots.SLOW_SLOTS}
     for name, slot in all_slots.items():
         at_ns[slot] = getattr(times, f"{name}_ns_offset", np.nan)
     ours = (np.abs(at_ns / 1e3 - SLOT_US) < 1e6 / sensor.SLOT_HZ / 2).all()

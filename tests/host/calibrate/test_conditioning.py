@@ -12,7 +12,7 @@ import wrench_run
 
 from biotac.calibrate.press import few_shot, pressure
 from biotac.calibrate.wrench import models, moments
-from biotac.calibrate.wrench.run import MAX_CONDITION, NOTED_CONDITION, check_loads, load_run
+from biotac.calibrate.wrench.plate_recording import MAX_CONDITION, NOTED_CONDITION, check_loads, load_run
 from biotac.errors import InputError
 from biotac.sim.gains import fit_gains
 

@@ -15,7 +15,7 @@ import biotac
 from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
-from biotac.calibrate.wrench.run import load_run
+from biotac.calibrate.wrench.plate_recording import load_run
 from biotac.calibrate.wrench.share import share
 from biotac.calibrate.wrench.sources import Loaded, check_serial
 from biotac.cli.main import main

@@ -17,7 +17,7 @@ import wrench_run
 
 from biotac.calibrate.wrench import figures, models, moments
 from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
-from biotac.calibrate.wrench.run import MIN_ROWS, Run, load_run
+from biotac.calibrate.wrench.plate_recording import MIN_ROWS, Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
 from biotac.cli.main import main
 from biotac.errors import InputError

@@ -12,7 +12,7 @@ import wrench_run
 
 from biotac.calibrate.wrench import contact, figures, models, moments
 from biotac.calibrate.wrench.crossvalidation import AIR_SHARES, validate
-from biotac.calibrate.wrench.run import Run, load_run
+from biotac.calibrate.wrench.plate_recording import Run, load_run
 from biotac.calibrate.wrench.splits import BLOCKS, Blocks
 from biotac.core import geometry as surface
 from biotac.errors import RecordingError

@@ -325,7 +325,7 @@ def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, he
             return b""
         return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
 
-    monkeypatch.setattr("biotac.board.watch.LOOK_S", 0.001)  # times its patience: only the silence is brief
+    monkeypatch.setattr("biotac.board.recovery.LOOK_S", 0.001)  # times its patience: only the silence is brief
     assert "did not answer GetStatus" in line_of(capsys, 6, ["stream", scripted_board(answer).path])
 
 

@@ -11,7 +11,7 @@ import pytest
 from live_board import Clock, Firmware, Live, point, until
 
 import biotac
-from biotac.board import watch
+from biotac.board import recovery
 from biotac.link.serial_port import SerialLink
 
 SERIAL = (7,) * 12
@@ -29,7 +29,7 @@ def live(scripted_board, hello) -> Iterator[Live]:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """The watch looks all the time, and waits for answers as long as ever."""
-    monkeypatch.setattr(watch, "LOOK_S", 0.005)
+    monkeypatch.setattr(recovery, "LOOK_S", 0.005)
     monkeypatch.setattr(SerialLink, "patience", 12_000.0)
     return lambda: None
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import biotac
-from biotac.board.watch import LOOK_S, LOOKS_WITHOUT_ROWS
+from biotac.board.recovery import LOOK_S, LOOKS_WITHOUT_ROWS
 from biotac.cli.main import main
 from biotac.sim import SimFinger
 from biotac.sim.live import LiveFingers

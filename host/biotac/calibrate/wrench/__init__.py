@@ -14,7 +14,7 @@ from .crossvalidation import Validation, validate
 from .figures import angles_deg, rmse
 from .lag import Lags
 from .moments import DRIFT_NODES
-from .run import Run, load_run, numbers, run_of
+from .plate_recording import Run, load_run, numbers, run_of
 from .sources import load
 from .splits import Blocks
 

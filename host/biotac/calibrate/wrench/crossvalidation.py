@@ -26,8 +26,8 @@ from . import models
 from .lag import Lags
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, row_weights, smoothed, stacked, strip_sums
+from .plate_recording import Run
 from .plausible import check_sense
-from .run import Run
 from .splits import BLOCKS, Blocks
 
 INNER_FOLDS = 5

@@ -19,7 +19,7 @@ from ...wire import messages_gen as wire
 from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units
 from ..reference.samples import Reference
 from . import contact
-from .run import (
+from .plate_recording import (
     MIN_REST_ROWS,
     REST_N,
     Run,

@@ -13,7 +13,7 @@ from ...errors import RecordingError
 from ...map.columns import Signals
 from .models import solve
 from .moments import NO_DRIFT, at, linear_columns, moved, stacked, strip_sums
-from .run import Run
+from .plate_recording import Run
 from .splits import BLOCKS, Blocks
 
 SEARCH_ROWS = 50

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from ...core.geometry import Floats
 from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
-from .run import Run
+from .plate_recording import Run
 
 # A finger drifts by some 100 counts in two minutes of warm-up; a hold sees of it what comes after the board's tare.
 # Training for more takes some of the shear from light touches, whose signals are as small.

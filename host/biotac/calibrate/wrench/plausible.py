@@ -10,7 +10,7 @@ import numpy as np
 from ...core.compute import compute
 from ...errors import RecordingError
 from ...wire.sensor_gen import FULL_SCALE_COUNT
-from .run import Run
+from .plate_recording import Run
 
 FIRM_N = 1.0
 # Where both say that an axis has so much of the force, they agree on its sign in at least .91 of the rows (F1, F2 and

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import RecordingError
 from ...recording.npz_file import read_npz, to_lin_frame
 from ...wire.sensor_gen import FULL_SCALE_COUNT
-from .run import MIN_REST_ROWS, Run, load_run
+from .plate_recording import MIN_REST_ROWS, Run, load_run
 
 UNITS = {"E": "count", "E_base": "count", "PDC": "count above its least", "F": "N", "M": "N mm about Lin's origin"}
 FRAME = "F and M: X lateral, to E11's side; Y to the tip; Z out of the pad; force on the finger"

@@ -23,7 +23,7 @@ from ..reference.mcap_file import read_mcap
 from ..reference.mounting import Mounting
 from ..reference.samples import Reference
 from .joined import Joined, board_of, choose_finger, join
-from .run import Run, load_run
+from .plate_recording import Run, load_run
 
 
 def read_reference(text: str, mounting: Mounting | None = None, *, size: bool = False) -> Reference:

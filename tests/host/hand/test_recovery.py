@@ -12,7 +12,7 @@ from live_board import Firmware, Live, frame, gaps_of, heartbeat, until
 
 import biotac
 from biotac.board import gap as gap_module
-from biotac.board import watch
+from biotac.board import recovery
 from biotac.wire import messages_gen as wire
 
 OTHER = (8,) * 12
@@ -35,7 +35,7 @@ def stops_at_the_next_look(firmware: Firmware, after_us: int) -> None:
 
 
 def test_a_started_stream_is_looked_at_at_once(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr(watch, "LOOK_S", 600.0)
+    monkeypatch.setattr(recovery, "LOOK_S", 600.0)
     live.hand.stream()
     live.firmware.wait_for(wire.GetStatus)
     live.hand.stream("raw")

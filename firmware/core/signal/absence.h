@@ -3,8 +3,8 @@
 //
 // Measured in device time, which every FRAME carries, so that a recording recomputes bit for bit although it
 // lacks the silent rounds. A silence of more than 71 minutes wraps and looks shorter than it was.
-#ifndef BIOTAC_SILENCE_H
-#define BIOTAC_SILENCE_H
+#ifndef BIOTAC_ABSENCE_H
+#define BIOTAC_ABSENCE_H
 
 #include "signal/trigger.h"
 

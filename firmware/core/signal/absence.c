@@ -1,4 +1,4 @@
-#include "signal/silence.h"
+#include "signal/absence.h"
 
 #include "fixed_point.h"
 #include "signal/sweep.h"
