@@ -59,7 +59,7 @@ static BT_NOINLINE void judge_flips(bt_health *health, uint32_t flips, bool shak
 
 static void judge_repeats(bt_health *health, uint32_t missing, bool noisy)
 {
-    bool frozen = (health->same | health->out) == BT_ALL_ELECTRODES && missing == 0;
+    bool frozen = (health->same | health->out | missing) == BT_ALL_ELECTRODES && bt_usable_without(missing);
     uint32_t unchanged = health->unchanged & health->same;
     if (unchanged == 0) {
         if (health->unchanged != BT_ALL_ELECTRODES && health->unchanged_windows > health->longest) {
