@@ -1,4 +1,4 @@
-// The parts of a force that solve/grip.h computes on boards, in double.
+// The parts of a force that solve/interval.h computes on boards, in double.
 #ifndef BIOTAC_GRIP_PARTS_H
 #define BIOTAC_GRIP_PARTS_H
 

@@ -3,7 +3,7 @@
 #include "grip_parts.h"
 #include "map/map_gen.h"
 #include "map/population.h"
-#include "solve/grip.h"
+#include "solve/interval.h"
 
 #include <math.h>
 #include <stdbool.h>

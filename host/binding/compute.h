@@ -18,7 +18,7 @@ typedef struct {
 } bt_formulas;
 
 // A row of biotac.RESULT_DTYPE. The half widths are a board's for a tare that is confirmed and a finger
-// without noise (solve/grip.h); NaN where an electrode is missing, which is not estimated here.
+// without noise (solve/interval.h); NaN where an electrode is missing, which is not estimated here.
 typedef struct {
     lin2013_result lin;
     double normal_n, normal_half_n, shear_n, shear_half_n;

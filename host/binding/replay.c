@@ -1,6 +1,6 @@
 #include "replay.h"
 
-#include "solve/grip.h"
+#include "solve/interval.h"
 
 #include <string.h>
 

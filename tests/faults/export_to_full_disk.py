@@ -1,6 +1,6 @@
 """Run by test_exports.py: exports of a recording under growing limits of a file's size, as a disk that is nearly full.
 
-    python full_disk.py RECORDING FOLDER SUFFIX SIZE...
+    python export_to_full_disk.py RECORDING FOLDER SUFFIX SIZE...
 
 A program that dies, as HDF5 did, has a process of its own to die in. Prints two lines a size: the error or what was
 written, and what lies in the folder.

@@ -1,6 +1,6 @@
 """Run by test_full_recordings.py: recordings under limits of a file's size, as on a disk that gets full.
 
-    python full_disk_recording.py PORT FOLDER SIZE...
+    python record_to_full_disk.py PORT FOLDER SIZE...
 
 Prints a line of JSON a size: whether an OSError told of it, and how many frames were read until then.
 """

@@ -23,8 +23,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_full_disk_ends_an_export_in_a_line_and_leaves_nothing(tmp_path: Path, recorded: Path, suffix: str) -> None:
-    words = [sys.executable, Path(__file__).with_name("full_disk.py"), recorded, tmp_path, suffix, *map(str, LIMITS)]
-    done = subprocess.run(words, capture_output=True, text=True)
+    words = [Path(__file__).with_name("export_to_full_disk.py"), recorded, tmp_path, suffix, *map(str, LIMITS)]
+    done = subprocess.run([sys.executable, *words], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert len(lines) == 2 * len(LIMITS)

@@ -26,7 +26,7 @@ def test_what_fitted_is_kept_but_for_a_second(tmp_path: Path, sizes: int) -> Non
     frames, whole_bytes = biotac.load(whole), whole.stat().st_size
     draw = random.Random(sizes)
     limits = [draw.randrange(whole_bytes // 4, whole_bytes * 9 // 10) for _ in range(sizes)]
-    script = Path(__file__).with_name("full_disk_recording.py")
+    script = Path(__file__).with_name("record_to_full_disk.py")
     words = [sys.executable, str(script), PORT, str(tmp_path), *map(str, limits)]
     done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

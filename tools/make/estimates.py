@@ -4,7 +4,7 @@
 tools/make/estimates.py F1.npz F2.npz      ../shared/data/syntouchcontact: E (n, 19), and E_base (n, 19) without load
 tools/make/estimates.py --test F2.npz F1.npz   fit to the others, print how far off the estimates of this one are
 
-The signals are bounded as firmware/core/map/complete.c does it. Each frame counts by its pattern, as a unit vector, and
+The signals are bounded as firmware/core/map/estimate.c does it. Each frame counts by its pattern, as a unit vector, and
 by its mirror image; a ridge of a hundredth of the variance keeps the weights small.
 """
 

@@ -12,7 +12,7 @@ SOURCE = "firmware/core/map/estimates.json"
 
 
 def header(root: Path) -> str:
-    """The header, which only core/map/complete.c includes. Raises ValueError for a weight that does not fit."""
+    """The header, which only core/map/estimate.c includes. Raises ValueError for a weight that does not fit."""
     facts: dict[str, Any] = json.loads((root / SOURCE).read_text(encoding="utf-8"))
     rows = facts["weights"]
     if max(abs(weight) for row in rows for weight in row) > 127:

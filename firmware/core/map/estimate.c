@@ -1,4 +1,4 @@
-#include "map/complete.h"
+#include "map/estimate.h"
 
 #include "fixed_point.h"
 #include "map/estimates_gen.h"

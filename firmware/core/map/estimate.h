@@ -3,8 +3,8 @@
 // signal was off by a quarter of itself (RMS; tools/make/estimates.py --test).
 //
 // Units: counts; signals in 1/16 count (q4), rounded down.
-#ifndef BIOTAC_COMPLETE_H
-#define BIOTAC_COMPLETE_H
+#ifndef BIOTAC_ESTIMATE_H
+#define BIOTAC_ESTIMATE_H
 
 #include "wire/sensor_gen.h"
 

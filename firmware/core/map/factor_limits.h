@@ -1,6 +1,6 @@
 // The largest magnitudes of a map's factors, by which bt_map_open bounds its sums; wrench_map.c asserts them.
-#ifndef BIOTAC_MAP_BOUNDS_H
-#define BIOTAC_MAP_BOUNDS_H
+#ifndef BIOTAC_FACTOR_LIMITS_H
+#define BIOTAC_FACTOR_LIMITS_H
 
 #include "map/conductance.h"
 

@@ -16,7 +16,7 @@
 #include <stdint.h>
 
 // The 95 % interval about a force on frames that its map had not seen: so much, and a share of its normal and
-// shear part together (solve/grip.h). Of the normal, then of the shear; base_mn 65535: unknown.
+// shear part together (solve/interval.h). Of the normal, then of the shear; base_mn 65535: unknown.
 typedef struct {
     uint16_t base_mn[2];
     uint16_t share_q8[2];

@@ -1,6 +1,6 @@
 #include "map/map.h"
 
-#include "map/bounds.h"
+#include "map/factor_limits.h"
 #include "map/words.h"
 #include "wire/little_endian.h"
 

@@ -1,5 +1,5 @@
 // Evaluates a map: 16-bit factors and coefficients, 32-bit sums.
-#include "map/bounds.h"
+#include "map/factor_limits.h"
 #include "map/map.h"
 #include "map/words.h"
 #include "signal/signals.h"

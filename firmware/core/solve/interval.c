@@ -1,4 +1,4 @@
-#include "solve/grip.h"
+#include "solve/interval.h"
 
 #include "fixed_point.h"
 #include "wire/sensor_gen.h"

@@ -14,8 +14,8 @@
 // - tare: a hold that may be in a tare which nothing has confirmed
 //
 // Units: mN, rounded to nearest; a component of the force saturates at 37 N, a half width at 65.534 N.
-#ifndef BIOTAC_GRIP_H
-#define BIOTAC_GRIP_H
+#ifndef BIOTAC_INTERVAL_H
+#define BIOTAC_INTERVAL_H
 
 #include "map/map.h"
 #include "wire/messages_gen.h"

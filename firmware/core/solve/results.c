@@ -1,11 +1,11 @@
 #include "solve/results.h"
 
 #include "fixed_point.h"
-#include "map/complete.h"
+#include "map/estimate.h"
 #include "map/population.h"
 #include "signal/signals.h"
 #include "solve/flags.h"
-#include "solve/grip.h"
+#include "solve/interval.h"
 
 #include <stddef.h>
 

@@ -2,7 +2,7 @@
 
 #include "fixed_point.h"
 #include "map/population.h"
-#include "solve/grip.h"
+#include "solve/interval.h"
 #include "solve/poc.h"
 #include "touch/thermal.h"
 

@@ -12,7 +12,7 @@ from .link import MessagesLink
 def open_bag(port: str) -> MessagesLink:
     """``bag:FILE?topic=T``, of ROS 1 or ROS 2."""
     path, options = file_and_options(port, ("topic",), "bag:FILE?topic=/rh/tactile")
-    bag = imported("biotac.rounds.bag", port, "robot")
+    bag = imported("biotac.foreign.bag", port, "robot")
     return MessagesLink(port, bag.Bag(Path(path), options.get("topic", "")))
 
 
@@ -27,5 +27,5 @@ def open_csv(port: str) -> MessagesLink:
 def open_foxglove(port: str) -> MessagesLink:
     """``foxglove://HOST:PORT/topic``."""
     host, _, topic = port.partition("://")[2].partition("/")
-    foxglove = imported("biotac.rounds.foxglove", port, "robot")
+    foxglove = imported("biotac.foreign.foxglove", port, "robot")
     return MessagesLink(port, foxglove.Foxglove(port, host, topic and f"/{topic}"))

@@ -11,7 +11,7 @@ from ..errors import PortError
 ROUND_US = 10_000
 # More between two messages, and the fingers fell silent meanwhile: the tare machine's measure of that (SPEC.md).
 SILENCE_US = 90_000
-LEAST_HZ, MOST_HZ = 50.0, 125.0
+LEAST_HZ = 50.0
 # Steps within these times the median are of one message: the others span some that never came, if they are the fewer.
 NEAR, NEAR_SHARE, NEAR_TIME = (0.5, 1.6), 0.6, 0.3
 LATEST, LOOK_EVERY = 100, 10  # steps whose median shows a change
@@ -36,10 +36,10 @@ class Rate:
         self.step_us = float(used_us.mean()) if len(used_us) else np.inf
         if self.step_us > 1e6 / LEAST_HZ:
             raise PortError(
-                f"{port}: {len(stamps_ns)} messages at {1e6 / self.step_us:.0f} a second, expected {LEAST_HZ:.0f} to "
-                f"{MOST_HZ:.0f}, as tare and contact count rounds; let the driver publish at 100 Hz"
+                f"{port}: {len(stamps_ns)} messages, {1e6 / self.step_us:.0f} a second, not {LEAST_HZ:g} or more, "
+                "as tare and contact count rounds; let a driver publish at 100 Hz, and give a table's times in seconds"
             )
-        self.each = max(1, round(ROUND_US / self.step_us)) if self.step_us < 1e6 / MOST_HZ else 1
+        self.each = max(1, round(ROUND_US / self.step_us))
 
     def missing(self, step_us: int) -> int:
         """How many messages never came within a step; a longer one is a pause, in which nobody published."""

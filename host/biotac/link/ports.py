@@ -22,9 +22,9 @@ FORMS = {
     "sim:SOURCE": "biotac.sim.ports:open_sim",
     "emu:pico": "biotac.sim.ports:open_sim",
     "replay:REC": "biotac.recording.replay.link:open_replay",
-    "bag:FILE": "biotac.rounds.ports:open_bag",
-    "csv:FILE": "biotac.rounds.ports:open_csv",
-    "foxglove://HOST:PORT/TOPIC": "biotac.rounds.ports:open_foxglove",
+    "bag:FILE": "biotac.foreign.ports:open_bag",
+    "csv:FILE": "biotac.foreign.ports:open_csv",
+    "foxglove://HOST:PORT/TOPIC": "biotac.foreign.ports:open_foxglove",
     "zenoh:NAME": "biotac.fleet.zenoh_link:ZenohLink",
 }
 OPENERS = {form.partition(":")[0]: opener for form, opener in FORMS.items()}

@@ -1,10 +1,10 @@
 // The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and what is unlike
 // the training goes along the normals.
 #include "keep/settings.h"
-#include "map/complete.h"
+#include "map/estimate.h"
 #include "map/population.h"
 #include "map/population_gen.h"
-#include "solve/grip.h"
+#include "solve/interval.h"
 #include "solve/solve.h"
 #include "solve/wrench.h"
 #include "support.h"

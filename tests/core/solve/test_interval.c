@@ -3,7 +3,7 @@
 #include "support.h"
 
 #include "grip_parts.h"
-#include "solve/grip.h"
+#include "solve/interval.h"
 #include "solve/solve.h"
 
 #include <math.h>

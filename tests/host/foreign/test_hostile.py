@@ -13,9 +13,9 @@ from robot_messages import ALL, HAND, START_NS, Robot
 
 import biotac
 from biotac.errors import BiotacError, PortError
-from biotac.rounds.message import RefusedError
-from biotac.rounds.ros import decoder
-from biotac.rounds.words import Rounds
+from biotac.foreign.message import RefusedError
+from biotac.foreign.ros import decoder
+from biotac.foreign.words import Rounds
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 

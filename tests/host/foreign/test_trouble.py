@@ -14,10 +14,10 @@ from rosbags.rosbag1 import Writer
 
 import biotac
 from biotac.errors import InputError, PortError
-from biotac.rounds.foxglove import Foxglove
-from biotac.rounds.message import Counts, Message
-from biotac.rounds.stamps import Stamps
-from biotac.rounds.words import Rounds
+from biotac.foreign.foxglove import Foxglove
+from biotac.foreign.message import Counts, Message
+from biotac.foreign.stamps import Stamps
+from biotac.foreign.words import Rounds
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots

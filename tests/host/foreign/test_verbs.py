@@ -16,7 +16,7 @@ import biotac
 from biotac.cli.live import record
 from biotac.cli.main import main
 from biotac.errors import InputError
-from biotac.rounds.ros import decoder
+from biotac.foreign.ros import decoder
 from biotac.sim.loading import load_source
 
 ROWS = load_source("press.toml", fingers=1, seconds=4.0).samples.astype(int)

@@ -71,6 +71,10 @@ class Found:
     before_deg: float
     held_out_deg: float
 
+    def to_state_n(self, sigma_n: Floats) -> Floats:
+        """RMS error (3,) to state: held out; of x and y, which straight presses do not test, ``sigma_n`` if more."""
+        return np.array([*np.maximum(self.held_out_n, sigma_n)[:2], self.held_out_n[2]])
+
     def why_not(self, sigma_n: Floats) -> str:
         """Why the own map should not be used; empty if it should.
 

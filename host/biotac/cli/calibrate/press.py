@@ -261,6 +261,7 @@ def _fit_map(args: argparse.Namespace, held: known_force.Held, serial: str, hand
         "why_not": why_not,
         "refused": refused,
         "sigma_n": trained.sigma_scale5_n.tolist(),
+        "state_n": found.to_state_n(trained.sigma_scale5_n).tolist(),
         "fixed_point": summary(own, held.counts),
     }
     if args.out is not None and not refused:
@@ -286,16 +287,17 @@ def _map_lines(facts: dict[str, Any], how: str) -> list[str]:
     gain = (
         "  z gain {gain:.3f} (one sigma {gain_sigma:.3f}), balance {balance:+.3f} N/N (one sigma {balance_sigma:.3f})"
     )
+    state = "/".join(f"{error_n:.2f}" for error_n in facts["state_n"])
     return [
         f"finger {facts['finger']}, {facts['presses']} {how}",
         *([gain.format(**facts)] if "gain" in facts else []),
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N, {facts['before_deg']:.1f} deg",
         f"  each press held out:          {numbers(facts['held_out_n'])} N, {facts['held_out_deg']:.1f} deg",
         f"  of other fingers, sheared too, after five presses on a scale: {numbers(facts['sigma_n'])} N, one sigma",
-        *([f"  not worth using: {facts['why_not']}"] if facts["why_not"] else []),
         *(["  neither written nor uploaded; --force does so all the same"] if facts["refused"] else []),
         *([f"  written: {facts['written']}"] if "written" in facts else []),
         "  on the board; without --save, only until it restarts" if "board" in facts else "  no board was changed",
+        f"  not worth using: {facts['why_not']}" if facts["why_not"] else f"  usable: state an error of {state} N RMS",
     ]
 
 

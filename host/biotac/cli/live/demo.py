@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)",
         f"recording {facts['recording']}, of a board with Lin's scales; report {facts['report']}",
         *([skipped] if facts["rows_skipped"] else []),
-        *([f"mean force felt along what was applied to finger 0, ± RMS length of the error{made}:"] if felt else []),
+        *([f"felt (mean ± RMS length of the error) of what was applied to finger 0, in bands{made}:"] if felt else []),
         *felt,
         f"picture {facts['picture']}",
     ]

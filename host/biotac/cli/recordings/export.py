@@ -13,14 +13,14 @@ from ...documents import read_json
 from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
+from ...foreign.btd import Btd
+from ...foreign.link import MessagesLink
 from ...hand.opening import shake_hands
 from ...link.port_text import how_to_record
 from ...partial_file import whole
 from ...recording.layout import finger_of
 from ...recording.reader import Recording
 from ...recording.recompute import recompute
-from ...rounds.btd import Btd
-from ...rounds.link import MessagesLink
 from ...wire import messages_gen as wire
 from ...wire.identity import setting_text
 from .. import outputs
