@@ -4,7 +4,6 @@
 #include "support.h"
 
 #include "keep/storage.h"
-#include "wire/little_endian.h"
 
 #ifndef SECTOR // tests/CMakeLists.txt has it again for a chip with larger ones
 #define SECTOR BT_FLASH_SECTOR_BYTES
@@ -83,62 +82,6 @@ static int stored(uint16_t id)
     return version;
 }
 
-TEST(a_new_flash_holds_nothing)
-{
-    assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
-    memset(bytes_of_flash, 0, sizeof bytes_of_flash); // nor does one that is full of something else
-    assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
-    assert_true(write_record(BT_RECORD_SETTINGS, 1));
-    assert_int_equal(stored(BT_RECORD_SETTINGS), 1);
-}
-
-TEST(the_latest_record_of_each_id_is_found_over_many_writes)
-{
-    int last[BT_STORAGE_IDS + 1] = {0};
-    for (int number = 1; number < 1000; number++) {
-        uint16_t id = (uint16_t)random_range(&nor.seed, 1, BT_STORAGE_IDS);
-        assert_true(write_record(id, number));
-        last[id] = number;
-        for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
-            assert_int_equal(stored(other), last[other] == 0 ? -1 : last[other]);
-        }
-    }
-    // Twelve of fifteen pages are taken after a change of sector: three writes lie between two, at least.
-    assert_in_range(nor.erases, 1000 / (16 * TIMES - 1), 1000 / (16 * TIMES - 12));
-}
-
-TEST(a_damaged_page_is_told)
-{
-    assert_false(bt_storage_damaged(&flash)); // nothing was ever saved
-    for (int number = 1; number <= SAVES; number++) {
-        assert_true(write_record(1, number));
-        assert_false(bt_storage_damaged(&flash));
-    }
-    size_t last = 0;
-    for (size_t at = 0; at < sizeof bytes_of_flash; at += BT_FLASH_PAGE_BYTES) {
-        last = bt_storage_page_is(bytes_of_flash + at, 1) && bt_get_u16(bytes_of_flash + at + 6) == SAVES
-                   ? at
-                   : last;
-    }
-    for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // what is read is then an older one
-        bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
-        assert_true(bt_storage_damaged(&flash));
-        assert_int_equal(stored(1), SAVES - 1);
-        bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
-    }
-    const size_t used = last / SECTOR * SECTOR;
-    bytes_of_flash[used] ^= 1; // the sector in use: what is read is then of the one before
-    assert_true(bt_storage_damaged(&flash));
-}
-
-TEST(the_same_again_wears_nothing)
-{
-    assert_true(write_record(1, 5));
-    nor.bytes_left = 1000;
-    assert_true(write_record(1, 5));
-    assert_int_equal(nor.bytes_left, 1000);
-}
-
 TEST(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record)
 {
     for (long dud = 0; dud < (long)sizeof bytes_of_flash; dud += BT_FLASH_PAGE_BYTES) {
@@ -150,27 +93,6 @@ TEST(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record)
             *kept = write_record((uint16_t)(1 + number % 2), number) ? number : *kept;
             assert_true(stored(1) == last[0] && stored(2) == last[1]);
         }
-    }
-}
-
-TEST(what_does_not_fit_is_refused)
-{
-    uint8_t data[BT_STORAGE_MAX_BYTES + 1] = {0};
-    assert_false(bt_storage_write(&flash, 1, 0, data, sizeof data));
-    assert_false(bt_storage_write(&flash, 0, 0, data, 1));
-    assert_false(bt_storage_write(&flash, BT_STORAGE_IDS + 1, 0, data, 1));
-    assert_true(bt_storage_write(&flash, 1, 0, data, BT_STORAGE_MAX_BYTES));
-}
-
-TEST(generations_may_wrap)
-{
-    assert_true(write_record(1, 0));
-    const uint8_t last[4] = {0xFF, 0xFF, 0xFF, 0xFF}; // generation, which the sector in use claims
-    bt_storage_make_page(bytes_of_flash, bt_get_u16(bytes_of_flash + 4), 0, last, sizeof last);
-    assert_int_equal(stored(1), 0);
-    for (int number = 1; number < SAVES; number++) {
-        assert_true(write_record(1, number));
-        assert_int_equal(stored(1), number);
     }
 }
 
@@ -249,23 +171,6 @@ TEST(nor_where_and_how_an_operation_is_cut)
     for (int turn = 0; turn < 4; turn++) {
         nor.inside = turn > 0;
         assert_true(cut_everywhere(&nor.operations_left, 1) >= SAVES);
-    }
-}
-
-TEST(no_more_is_read_than_there_is_or_there_is_room_for)
-{
-    uint8_t data[BT_STORAGE_MAX_BYTES], out[BT_STORAGE_MAX_BYTES];
-    uint16_t version;
-    memset(data, 0x5A, sizeof data);
-    for (size_t bytes = 0; bytes <= sizeof data; bytes += sizeof data / 4) {
-        assert_true(bt_storage_write(&flash, 3, 1, data, bytes));
-        for (size_t room = 0; room <= sizeof out; room += sizeof out / 4) {
-            memset(out, 1, sizeof out);
-            assert_int_equal(bt_storage_read(&flash, 3, &version, out, room), bytes);
-            for (size_t k = 0; k < sizeof out; k++) {
-                assert_int_equal(out[k], k < bytes && k < room ? 0x5A : 1);
-            }
-        }
     }
 }
 
