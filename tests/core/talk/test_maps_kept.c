@@ -49,21 +49,6 @@ TEST(what_is_out_of_range_is_refused)
     assert_true(erases == 0 && programs == 0);
 }
 
-TEST(a_map_is_not_whole_until_its_last_byte_has_come)
-{
-    memset(blob, 0xFF, sizeof blob); // as flash reads where nothing was written: the CRC cannot tell
-    for (size_t over = 1; over < PART; over++) { // bytes of the last part
-        size_t bytes = 2 * PART + over;
-        uint32_t crc32 = bt_crc32(blob, bytes);
-        assert_int_equal(begin(0, (uint16_t)bytes, crc32), BT_ERROR_OK);
-        assert_int_equal(write_part(0, blob, bytes, 0), BT_ERROR_OK);
-        assert_int_equal(write_part(0, blob, bytes, 1), BT_ERROR_OK);
-        assert_int_equal(end(0, crc32), BT_ERROR_NOT_WHOLE);
-        assert_int_equal(write_part(0, blob, bytes, 2), BT_ERROR_OK);
-        assert_int_equal(end(0, crc32), BT_ERROR_OUT_OF_RANGE); // whole, and no map
-    }
-}
-
 TEST(a_record_that_cannot_be_is_no_map)
 {
     size_t bytes = make_map(blob, 1, 2, "");
@@ -139,23 +124,6 @@ TEST(flash_that_takes_nothing_is_told_and_passed_by)
     refused_record = 0;
 }
 
-TEST(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored)
-{
-    for (uint32_t turn = 0; turn < 4; turn++) {
-        for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-            size_t bytes = make_map(blob, 10 * turn + f, 2, "");
-            assert_int_equal(upload(f, blob, bytes), BT_ERROR_OK);
-            assert_has(f, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
-        }
-        assert_int_equal(turn == 0 ? save() : BT_ERROR_OK, BT_ERROR_OK);
-    }
-    power_on();
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        size_t bytes = make_map(blob, f, 2, "");
-        assert_has(f, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
-    }
-}
-
 // Uploads, broken off or not, clears, saves and boots at random: what is in force and what is stored is what
 // it should be, byte for byte, every time. numbers: of the map that a finger has and has stored; 0: none.
 TEST(whatever_happens_nothing_that_is_kept_is_written_to)
@@ -192,31 +160,6 @@ TEST(whatever_happens_nothing_that_is_kept_is_written_to)
             assert_has(f, has[f] == 0 ? NULL : other, size, has[f] == 0 ? 0 : BT_CALIBRATION_STATE_IN_FORCE);
         }
     }
-}
-
-// One that is in force and whose flash has gone leaves none when another cannot be had.
-TEST(a_map_whose_flash_is_gone_is_none)
-{
-    size_t bytes = make_map(blob, 1, 2, "");
-    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
-    bt_finger_map map = session.map[0];
-    const bt_map_place place = map.place;
-    SLOTS[place.slot * (size_t)BT_MAP_SLOT_BYTES + bytes - 1] ^= 1;
-    assert_int_equal(bt_finger_map_use(&map, &map_flash, 0, &place, NULL), BT_ERROR_NOT_WHOLE);
-    assert_true(map.place.bytes == 0 && map.map.axes == 0 && map.map.blocks == NULL);
-}
-
-// Of a record of a later version, the slot is all that is to be known.
-TEST(a_record_cut_short_is_no_map_and_one_of_none_is_right)
-{
-    bt_finger_map map;
-    uint8_t packed[BT_MAP_RECORD_BYTES] = {3}; // a slot, and no bytes
-    for (size_t bytes = 0; bytes <= 5; bytes++) {
-        assert_false(bt_finger_map_load(&map, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, bytes));
-        assert_int_equal(map.stored_slot, bytes < 4 ? BT_MAP_SLOTS : 3);
-    }
-    assert_true(bt_finger_map_load(&map, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
-    assert_true(map.place.bytes == 0 && map.map.axes == 0);
 }
 
 int main(void)
