@@ -80,19 +80,6 @@ static void play(int rounds)
     }
 }
 
-// `rounds` in which PAC swings with this amplitude.
-static void shaken(int rounds, double counts, double hz)
-{
-    for (int k = 0; k < rounds; k++) {
-        for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
-            double t_s = run.t_us * 1e-6 + i / 2200.0;
-            run.pac[i] = counts * sin(2 * 3.14159265358979324 * hz * t_s);
-        }
-        play(1);
-    }
-    memset(run.pac, 0, sizeof run.pac);
-}
-
 static int count_of(uint8_t event)
 {
     int n = 0;
@@ -171,157 +158,12 @@ TEST(pressure_that_stays_is_no_lift)
     assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 1);
 }
 
-// A swing of 120 to 220 Hz: both ways of it take some milliseconds to be seen.
-TEST(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds)
-{
-    int reported_late = 0, onset_off = 0;
-    for (int k = 0; k < 200; k++) {
-        (void)new_course(NULL);
-        run.seed = (uint64_t)(100 + k);
-        run.pac_sigma = 5;
-        hold();
-        const uint32_t begins_us = run.t_us;
-        shaken(30, 60, 120 + k / 2);
-        const bt_msg_event *slip = first(BT_EVENT_KIND_SLIP);
-        reported_late += slip->t_us - begins_us > 10000;
-        onset_off += abs((int32_t)(slip->onset_us - begins_us)) > 5000;
-        assert_in_range(slip->peak_count, 40, 160);
-        assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
-        assert_int_equal(count_of(BT_EVENT_KIND_JOLT), 1);
-        assert_int_equal(slip->energy_count2, UINT32_MAX);
-        play(60);
-        assert_int_equal(count_of(BT_EVENT_KIND_STUCK), 1);
-        assert_int_equal(first(BT_EVENT_KIND_STUCK)->onset_us, slip->onset_us);
-    }
-    assert_in_range(reported_late, 0, 10);
-    assert_in_range(onset_off, 0, 10);
-}
-
-TEST(held_for_ten_minutes_in_noise_nothing_is_told)
-{
-    run.pac_sigma = 5;
-    run.sigma = 1.5;
-    hold();
-    play(60000);
-    assert_int_equal(run.count, 0);
-}
-
 TEST(a_resting_worn_finger_tells_nothing)
 {
     run.pac_sigma = 5;
     run.sigma = 5;
     play(6000);
     assert_int_equal(run.count, 0);
-}
-
-// An arm that hums: what was there at rest is no slip later.
-TEST(noise_at_rest_raises_what_it_takes)
-{
-    play(300);
-    shaken(600, 20, 150);
-    run.count = 0;
-    run.load = 120;
-    run.pdc = PDC_REST + 60;
-    shaken(300, 20, 150);
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
-    shaken(20, 400, 150);
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
-}
-
-TEST(a_glitch_is_no_event)
-{
-    hold();
-    for (int k = 0; k < 50; k++) {
-        run.pac[k % BT_PAC_PER_FRAME] = k % 2 ? 1500 : -1500;
-        play(1);
-        memset(run.pac, 0, sizeof run.pac);
-        play(20);
-    }
-    assert_int_equal(run.count, 0);
-}
-
-TEST(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip)
-{
-    hold();
-    for (int i = 6; i < BT_PAC_PER_FRAME; i++) {
-        run.pac[i] = 40 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
-    }
-    play(1);
-    memset(run.pac, 0, sizeof run.pac);
-    play(50);
-    assert_int_equal(count_of(BT_EVENT_KIND_JOLT), 1);
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
-    assert_in_range(first(BT_EVENT_KIND_JOLT)->peak_count, 20, 60);
-}
-
-// PAC of a ramp of pressure, as the sensor's high-pass of 10 Hz leaves it.
-static void squeezed(int rounds, double counts_per_s)
-{
-    static double level;
-    for (int k = 0; k < rounds; k++) {
-        for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
-            level += (counts_per_s / (2 * 3.14159265 * 10) - level) / (2200 / (2 * 3.14159265 * 10));
-            run.pac[i] = level;
-        }
-        play(1);
-    }
-    memset(run.pac, 0, sizeof run.pac);
-}
-
-TEST(squeezing_harder_is_no_slip)
-{
-    hold();
-    for (int n_s = 1; n_s <= 20; n_s++) {
-        squeezed(50, 98.6 * 100 * n_s);
-        squeezed(50, 0);
-    }
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
-}
-
-// White noise that grows with the squeeze, as skin may rattle; and skin that slides at 150 Hz meanwhile.
-TEST(a_slip_within_a_rattling_squeeze_is_told_and_the_squeeze_is_not)
-{
-    for (int slides = 0; slides <= 1; slides++) {
-        (void)new_course(NULL);
-        hold();
-        run.pac_sigma = 16;
-        play(30);
-        assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
-        assert_int_equal(run.finger.events.slip_level, 0);
-        shaken(5, slides ? 60 : 0, 150);
-        assert_int_equal(count_of(BT_EVENT_KIND_SLIP), slides);
-        // The mean of four samples changes by 2 x .87 of the amplitude, which has 1 / sqrt(2) of it as rms.
-        assert_in_range(run.finger.events.slip_level, slides ? 50 : 0, slides ? 85 : 0);
-        run.pac_sigma = 4;
-        play(20);
-        assert_int_equal(count_of(BT_EVENT_KIND_STUCK), slides);
-    }
-}
-
-TEST(a_landing_is_no_slip)
-{
-    play(300);
-    run.load = 120;
-    run.pdc = PDC_REST + 60;
-    shaken(20, 200, 130);
-    play(100);
-    assert_int_equal(count_of(BT_EVENT_KIND_TOUCH), 1);
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 0);
-    shaken(20, 200, 130);
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
-}
-
-// The slip is over in the PAC slot behind the word that showed the release.
-TEST(a_slip_ends_with_the_hold)
-{
-    hold();
-    shaken(10, 100, 150);
-    assert_int_equal(count_of(BT_EVENT_KIND_SLIP), 1);
-    run.load = 0;
-    run.pdc = PDC_REST;
-    shaken(3, 100, 150);
-    assert_int_equal(count_of(BT_EVENT_KIND_LIFT), 1);
-    assert_int_equal(count_of(BT_EVENT_KIND_STUCK), 1);
 }
 
 TEST(missing_words_are_no_event)
