@@ -4,6 +4,7 @@
 #include "spi_word_by_word.h"
 #include "wire/messages_gen.h"
 
+#include <stdatomic.h>
 #include <string.h>
 
 #define TRANSFER_NS (16u * 1000000000u / BT_SPI_HZ)
@@ -13,6 +14,16 @@ uint16_t fake_started_by = BT_FAULT_FLAG_STARTED;
 uint32_t fake_kept[PORT_KEPT_BYTES / 4];
 uint8_t fake_map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 bool (*fake_host_accepts)(const uint8_t *data, size_t bytes);
+
+static uint64_t now_ns(void)
+{
+    return atomic_load_explicit(&fake.now_ns, memory_order_relaxed);
+}
+
+static void pass(uint64_t ns)
+{
+    atomic_store_explicit(&fake.now_ns, now_ns() + ns, memory_order_relaxed);
+}
 
 static uint64_t released_ns;
 static bool released;
@@ -43,7 +54,7 @@ bool fake_next_interrupt(void)
     }
     // The alarm's time in 64 bits, from a difference modulo 2^32 as port.h defines it.
     int32_t ahead_us = (int32_t)(alarm_us - port_now_us(ONLY_BOARD));
-    uint64_t at_ns = ahead_us > 0 ? (fake.now_ns / 1000 + (uint64_t)ahead_us) * 1000 : fake.now_ns;
+    uint64_t at_ns = ahead_us > 0 ? (now_ns() / 1000 + (uint64_t)ahead_us) * 1000 : now_ns();
     if (fake.latency_ns > 0) {
         seed ^= seed << 13;
         seed ^= seed >> 7;
@@ -52,7 +63,7 @@ bool fake_next_interrupt(void)
     }
     at_ns += fake.held_off_ns;
     fake.held_off_ns = 0;
-    fake.now_ns = at_ns > fake.now_ns ? at_ns : fake.now_ns;
+    pass(at_ns > now_ns() ? at_ns - now_ns() : 0);
     armed = false;
     (void)bt_port_alarm();
     return true;
@@ -60,7 +71,7 @@ bool fake_next_interrupt(void)
 
 void fake_interrupts_until(uint64_t end_ns)
 {
-    while (fake.now_ns < end_ns && fake_next_interrupt()) {
+    while (now_ns() < end_ns && fake_next_interrupt()) {
     }
 }
 
@@ -74,12 +85,12 @@ void fake_host_sends(const uint8_t *data, size_t bytes)
 
 uint32_t port_now_us(bt_port *port)
 {
-    return (uint32_t)(fake.now_ns / 1000);
+    return (uint32_t)(now_ns() / 1000);
 }
 
 void port_delay_us(bt_port *port, uint32_t us)
 {
-    fake.now_ns += (uint64_t)us * 1000;
+    pass((uint64_t)us * 1000);
 }
 
 void port_alarm_at(bt_port *port, uint32_t at_us)
@@ -91,36 +102,36 @@ void port_alarm_at(bt_port *port, uint32_t at_us)
 void port_spi_select(bt_port *port, uint8_t mask)
 {
     uint8_t selected = fake.bus.selected;
-    if (selected == 0 && mask != 0 && released && fake.now_ns - released_ns < fake.shortest_gap_ns) {
-        fake.shortest_gap_ns = fake.now_ns - released_ns;
+    if (selected == 0 && mask != 0 && released && now_ns() - released_ns < fake.shortest_gap_ns) {
+        fake.shortest_gap_ns = now_ns() - released_ns;
     }
     if (selected != 0 && mask == 0) {
-        released_ns = fake.now_ns;
+        released_ns = now_ns();
         released = true;
     }
-    bt_emu_bus_select(&fake.bus, mask, fake.now_ns);
+    bt_emu_bus_select(&fake.bus, mask, now_ns());
 }
 
 uint16_t port_spi_transfer16(bt_port *port, uint16_t mosi)
 {
     uint8_t selected = fake.bus.selected;
     if (mosi & 0x8000) {
-        sent_command command = {.t_ns = fake.now_ns, .mosi = mosi, .mask = selected};
+        sent_command command = {.t_ns = now_ns(), .mosi = mosi, .mask = selected};
         if (fake.on_command != NULL) {
             fake.on_command(&command);
         }
     } else if (selected == 0 || (selected & (selected - 1)) != 0) {
         fake.selected_reads++;
     }
-    uint16_t miso = bt_emu_bus_transfer16(&fake.bus, mosi, fake.now_ns);
-    fake.now_ns += TRANSFER_NS;
+    uint16_t miso = bt_emu_bus_transfer16(&fake.bus, mosi, now_ns());
+    pass(TRANSFER_NS);
     return miso;
 }
 
 uint8_t port_spi_transfer8(bt_port *port, uint8_t mosi)
 {
-    uint8_t miso = bt_emu_bus_transfer8(&fake.bus, mosi, fake.now_ns);
-    fake.now_ns += TRANSFER_NS / 2;
+    uint8_t miso = bt_emu_bus_transfer8(&fake.bus, mosi, now_ns());
+    pass(TRANSFER_NS / 2);
     return miso;
 }
 

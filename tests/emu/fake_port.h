@@ -22,7 +22,9 @@ typedef struct {
 } sent_command;
 
 typedef struct {
-    uint64_t now_ns;
+    // The port's own accesses to it are relaxed: of two threads (test_interrupt.c) it must not order what
+    // they share.
+    _Atomic uint64_t now_ns;
     bt_emu_bus bus;
     uint64_t latency_ns;  // from the alarm's time to its interrupt: at most this, at random
     uint64_t held_off_ns; // the next interrupt comes this much later, once
