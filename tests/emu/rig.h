@@ -57,6 +57,8 @@ static struct {
     bt_msg_frame frame[BT_MAX_FINGERS][MAX_ROUNDS];
     int frames[BT_MAX_FINGERS];
     bt_msg_pac pac[BT_MAX_FINGERS][MAX_ROUNDS];
+    uint8_t id;    // of the latest message
+    uint8_t error; // that the latest REPLY tells
     bt_deframer deframer;
 } host;
 
@@ -70,34 +72,63 @@ static inline bool host_accept(const uint8_t *data, size_t bytes)
         }
         const uint8_t *payload = host.deframer.buffer + 1;
         uint8_t finger = payload[6];
-        if (host.deframer.id == BT_FRAME_ID) {
+        host.id = host.deframer.id;
+        if (host.id == BT_REPLY_ID) {
+            host.error = payload[2];
+        } else if (host.id == BT_FRAME_ID) {
             assert_true(host.frames[finger] < MAX_ROUNDS);
             bt_msg_frame_unpack(&host.frame[finger][host.frames[finger]++], payload);
-        } else if (host.deframer.id == BT_PAC_ID) {
+        } else if (host.id == BT_PAC_ID) {
             bt_msg_pac_unpack(&host.pac[finger][host.frames[finger] - 1], payload);
         }
     }
     return true;
 }
 
+#define NO_REPLY 0xFF
+
+// Returns how many bytes that are.
+static inline size_t send(uint8_t id, const void *payload)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES];
+    size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
+    fake_host_sends(encoded, bytes);
+    host.error = NO_REPLY;
+    return bytes;
+}
+
+// The error that REPLY tells, while no time passes.
+static inline uint8_t ask(uint8_t id, const void *payload)
+{
+    size_t bytes = send(id, payload);
+    for (size_t polled = 0; polled < bytes; polled += 64) { // of which the gateway takes so many in a turn
+        bt_gateway_poll(&gateway);
+    }
+    return host.error;
+}
+
+// Flash stays as it is, all else is lost.
+static inline void power_cycle(void)
+{
+    memset(&gateway, 0, sizeof gateway);
+    bt_gateway_init(&gateway, ONLY_BOARD);
+}
+
 static uint64_t t0_ns; // of the first sample command
 
 static inline void boot(uint64_t start_ns)
 {
-    uint8_t encoded[BT_ENCODED_MAX_BYTES];
     uint8_t payload[BT_START_BYTES];
     bt_msg_start msg = {1, BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC, 0x1F, 0};
     memset(&host, 0, sizeof host);
-    memset(&gateway, 0, sizeof gateway);
     first_command_ns = 0;
     fake_reset(source, start_ns);
     fake_host_accepts = host_accept;
     fake.bus.sensor[trouble.finger].present = !trouble.absent;
-    bt_gateway_init(&gateway, ONLY_BOARD);
+    power_cycle();
     t0_ns = (uint64_t)gateway.sampler.slot_start_us * 1000;
     bt_msg_start_pack(&msg, payload);
-    fake_host_sends(encoded, bt_frame_encode(BT_START_ID, payload, sizeof payload, encoded));
-    bt_gateway_poll(&gateway);
+    (void)ask(BT_START_ID, payload);
 }
 
 static inline void run_until(uint64_t end_ns)

@@ -1,58 +1,22 @@
 // Settings and calibrations from the command through the gateway into flash, and back at the next boot.
 #include "rig.h"
 
-static uint8_t error;
-
-static bool accept_reply(const uint8_t *data, size_t bytes)
-{
-    for (size_t k = 0; k < bytes; k++) {
-        if (bt_deframer_push(&host.deframer, data[k]) == BT_DEFRAMED_GOOD
-            && host.deframer.id == BT_REPLY_ID) {
-            error = host.deframer.buffer[1 + 2];
-        }
-    }
-    return true;
-}
-
-static uint8_t ask(uint8_t id, const void *payload, size_t bytes)
-{
-    uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    fake_host_accepts = accept_reply;
-    error = 0xFF;
-    fake_host_sends(encoded, bt_frame_encode(id, payload, bytes, encoded));
-    bt_gateway_poll(&gateway);
-    return error;
-}
-
 static void set(uint8_t setting, int32_t value)
 {
     uint8_t payload[BT_SET_SETTING_BYTES];
     bt_msg_set_setting msg = {.req_id = 1, .setting = setting, .value = value};
     bt_msg_set_setting_pack(&msg, payload);
-    (void)ask(BT_SET_SETTING_ID, payload, sizeof payload);
+    (void)ask(BT_SET_SETTING_ID, payload);
     assert_int_equal(bt_settings_get(&gateway.session.settings, setting), value);
-}
-
-static uint8_t plain(uint8_t id)
-{
-    static const uint8_t req_id = 1;
-    return ask(id, &req_id, 1);
-}
-
-// Flash stays as it is, all else is lost.
-static void power_cycle(void)
-{
-    memset(&gateway, 0, sizeof gateway);
-    bt_gateway_init(&gateway, ONLY_BOARD);
 }
 
 TEST(saved_settings_are_in_force_after_the_next_boot)
 {
     boot(START_NS);
-    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_BUSY);
-    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_SAVE_SETTINGS_ID, "\1"), BT_ERROR_BUSY);
+    assert_int_equal(ask(BT_STOP_ID, "\1"), BT_ERROR_OK);
     set(BT_SETTING_IDLE_PERIOD_MS, 250);
-    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_SAVE_SETTINGS_ID, "\1"), BT_ERROR_OK);
     set(BT_SETTING_CONTACT_ENERGY_COUNT2, 77); // not saved
     power_cycle();
     assert_int_equal(bt_settings_get(&gateway.session.settings, BT_SETTING_IDLE_PERIOD_MS), 250);
@@ -73,20 +37,20 @@ static uint8_t calibrate(uint8_t finger, int32_t gain_nn, bool forced)
         memcpy(msg.serial, gateway.session.info[finger].serial, sizeof msg.serial);
     }
     bt_msg_set_calibration_pack(&msg, payload);
-    (void)ask(BT_SET_CALIBRATION_ID, payload, sizeof payload);
+    (void)ask(BT_SET_CALIBRATION_ID, payload);
     return gateway.session.calibration_state[finger];
 }
 
 TEST(a_saved_uart_rate_is_believed_after_a_good_frame)
 {
     boot(START_NS);
-    (void)plain(BT_STOP_ID);
+    (void)ask(BT_STOP_ID, "\1");
     set(BT_SETTING_UART_BITS_PER_S, 9600);
-    (void)plain(BT_SAVE_SETTINGS_ID);
+    (void)ask(BT_SAVE_SETTINGS_ID, "\1");
     power_cycle();
     for (int k = 0; k < 6; k++) { // a host at another rate, and from the third time on one at this
         assert_int_equal(fake.bits_per_s, k == 1 ? 0 : 9600);
-        assert_int_equal(k < 2 ? 0 : plain(BT_STOP_ID), BT_ERROR_OK);
+        assert_int_equal(k < 2 ? 0 : ask(BT_STOP_ID, "\1"), BT_ERROR_OK);
         fake_host_sends((uint8_t[64]){1, 2, 3}, 64);
         bt_gateway_poll(&gateway);
     }
@@ -96,11 +60,11 @@ TEST(saved_calibrations_hold_for_their_own_sensors_alone)
 {
     const bt_session *session = &gateway.session;
     boot(START_NS);
-    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_STOP_ID, "\1"), BT_ERROR_OK);
     assert_int_equal(calibrate(0, 10, false), BT_CALIBRATION_STATE_IN_FORCE);
     assert_int_equal(calibrate(1, 20, true), BT_CALIBRATION_STATE_IN_FORCE);
     assert_int_equal(calibrate(4, 30, false), BT_CALIBRATION_STATE_IN_FORCE);
-    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_SAVE_SETTINGS_ID, "\1"), BT_ERROR_OK);
     assert_int_equal(calibrate(2, 40, false), BT_CALIBRATION_STATE_IN_FORCE); // not saved
     power_cycle();
     static const uint8_t same[BT_MAX_FINGERS] = {BT_CALIBRATION_STATE_IN_FORCE, BT_CALIBRATION_STATE_IN_FORCE,
@@ -126,14 +90,14 @@ TEST(a_cleared_calibration_stays_cleared_once_saved)
 {
     static const uint8_t finger_1[2] = {1, 1};
     boot(START_NS);
-    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_STOP_ID, "\1"), BT_ERROR_OK);
     assert_int_equal(calibrate(1, 20, false), BT_CALIBRATION_STATE_IN_FORCE);
-    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
-    assert_int_equal(ask(BT_CLEAR_CALIBRATION_ID, finger_1, 2), BT_ERROR_OK);
+    assert_int_equal(ask(BT_SAVE_SETTINGS_ID, "\1"), BT_ERROR_OK);
+    assert_int_equal(ask(BT_CLEAR_CALIBRATION_ID, finger_1), BT_ERROR_OK);
     power_cycle();
     assert_int_equal(gateway.session.calibration_state[1], BT_CALIBRATION_STATE_IN_FORCE);
-    assert_int_equal(ask(BT_CLEAR_CALIBRATION_ID, finger_1, 2), BT_ERROR_OK);
-    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_CLEAR_CALIBRATION_ID, finger_1), BT_ERROR_OK);
+    assert_int_equal(ask(BT_SAVE_SETTINGS_ID, "\1"), BT_ERROR_OK);
     power_cycle();
     assert_int_equal(gateway.session.calibration_state[1], BT_CALIBRATION_STATE_NONE);
 }
@@ -141,9 +105,9 @@ TEST(a_cleared_calibration_stays_cleared_once_saved)
 TEST(a_flash_that_takes_nothing_is_told)
 {
     boot(START_NS);
-    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_STOP_ID, "\1"), BT_ERROR_OK);
     fake.flash_broken = true;
-    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_NOT_STORED);
+    assert_int_equal(ask(BT_SAVE_SETTINGS_ID, "\1"), BT_ERROR_NOT_STORED);
 }
 
 TEST(a_board_without_a_loader_says_so)
@@ -152,9 +116,9 @@ TEST(a_board_without_a_loader_says_so)
     bt_msg_reboot_bootloader msg = {.req_id = 1, .magic = BT_BOOTLOADER_MAGIC};
     bt_msg_reboot_bootloader_pack(&msg, payload);
     boot(START_NS);
-    assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload), BT_ERROR_NOT_HERE);
+    assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload), BT_ERROR_NOT_HERE);
     fake.has_loader = true;
-    assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload), BT_ERROR_OK);
+    assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload), BT_ERROR_OK);
     assert_int_equal(fake.reboots, 2);
 }
 
