@@ -1,5 +1,5 @@
 // What the flags of a FRAME say of its words, its press, its point and its torsion; the rest of a FRAME:
-// test_skips.c, test_driver.c, test_idle.c.
+// test_skips.c, test_lateness.c, test_idle.c.
 #include "support.h"
 
 #include "finger.h"

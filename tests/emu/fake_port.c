@@ -31,7 +31,6 @@ static bool armed;
 static uint32_t alarm_us;
 static uint8_t incoming[512];
 static size_t incoming_bytes;
-static uint64_t seed;
 
 void fake_reset(bt_emu_source source, uint64_t start_ns)
 {
@@ -43,7 +42,6 @@ void fake_reset(bt_emu_source source, uint64_t start_ns)
     released = false;
     armed = false;
     incoming_bytes = 0;
-    seed = 1;
     bt_emu_bus_init(&fake.bus, BT_MAX_FINGERS, "", source, NULL);
 }
 
@@ -55,12 +53,6 @@ bool fake_next_interrupt(void)
     // The alarm's time in 64 bits, from a difference modulo 2^32 as port.h defines it.
     int32_t ahead_us = (int32_t)(alarm_us - port_now_us(ONLY_BOARD));
     uint64_t at_ns = ahead_us > 0 ? (now_ns() / 1000 + (uint64_t)ahead_us) * 1000 : now_ns();
-    if (fake.latency_ns > 0) {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        at_ns += seed % fake.latency_ns;
-    }
     at_ns += fake.held_off_ns;
     fake.held_off_ns = 0;
     pass(at_ns > now_ns() ? at_ns - now_ns() : 0);

@@ -26,7 +26,6 @@ typedef struct {
     // they share.
     _Atomic uint64_t now_ns;
     bt_emu_bus bus;
-    uint64_t latency_ns;  // from the alarm's time to its interrupt: at most this, at random
     uint64_t held_off_ns; // the next interrupt comes this much later, once
 
     // What the bus saw.

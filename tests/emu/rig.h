@@ -11,7 +11,7 @@
 #include "wire/framing.h"
 
 #define ROUND_NS   10000000ull
-#define MAX_ROUNDS 6100
+#define MAX_ROUNDS 600
 #define START_NS   1234567ull
 
 static bt_gateway gateway;

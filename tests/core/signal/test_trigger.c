@@ -1,5 +1,5 @@
 // The trigger at its edges, and without what is left out; touches, glitches and losses: test_tare*.c,
-// test_driver.c.
+// test_lateness.c.
 #include "emulated_finger.h"
 
 #define LIMIT 1000
