@@ -105,44 +105,6 @@ TEST(a_serial_number_has_its_letters_and_digits_and_two_forms_or_three_readings)
     }
 }
 
-TEST(the_form_that_costs_the_others_their_rounds_is_given_up)
-{
-    bt_serial_query query = {0};
-    int held = 0;
-    for (int k = 0; k < 200; k++) {
-        held += query.form == BT_FORM_HELD;
-        assert_false(answers(&query, "no serial number", 1));
-    }
-    assert_int_equal(held, 6);
-}
-
-static uint16_t error_words(uint64_t n)
-{
-    return n > 60 ? BT_EMU_FAULT_NO_CHANNEL : 0;
-}
-
-TEST(an_error_word_is_no_value)
-{
-    bt_msg_sensor_info info;
-    line = error_words; // from the property behind the serial number on
-    read_all(0, &info);
-    assert_int_equal(info.present, 1);
-    assert_int_equal(info.cpu_khz, 0);
-    assert_int_equal(info.sampling_hz, 0);
-    static const uint8_t none[4];
-    assert_memory_equal(info.flex_version, none, 2);
-}
-
-TEST(a_line_that_is_stuck_is_nobody)
-{
-    bt_msg_sensor_info info;
-    fake.bus.sensor[0].present = false;
-    read_all(0, &info);
-    static const uint8_t none[16];
-    assert_int_equal(info.present, 0);
-    assert_memory_equal(info.serial, none, 16);
-}
-
 // A BioTac SP has 24 electrodes, elsewhere: its counts come, and no force of them is ever sure.
 TEST(a_sensor_of_another_type_is_named_and_never_sure)
 {
@@ -167,35 +129,6 @@ TEST(a_sensor_of_another_type_is_named_and_never_sure)
         assert_true(host.frame[2][k].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
         assert_true(k < 40 || host.frame[2][k].force_100un[2] == BT_INVALID_I32);
     }
-}
-
-TEST(a_mute_sensor_finds_its_voice)
-{
-    bt_msg_sensor_info info;
-    fake.bus.sensor[0].mute = true;
-    read_all(0, &info);
-    assert_int_equal(info.present, 1);
-    assert_false(fake.bus.sensor[0].mute);
-}
-
-// At start the whole serial number is garbled; it is asked for again while sampling goes on.
-TEST(a_serial_number_that_could_not_be_read_is_read_later)
-{
-    trouble.finger = 2;
-    trouble.period = 1;
-    trouble.fault = BT_EMU_FAULT_BAD_PARITY;
-    boot(START_NS);
-    assert_int_equal(gateway.session.info[2].present, 0);
-    trouble.period = 0;
-    run_rounds(30);
-    assert_int_equal(gateway.session.info[2].present, 1);
-    assert_memory_equal(gateway.session.info[2].serial, "BTEMU00000000003", 16);
-    assert_int_equal(gateway.session.unsure, 0);
-    assert_int_equal(gateway.session.status.slots_late, 0);
-    assert_true(fake.shortest_gap_ns >= 5000);
-    int last = host.frames[2] - 1;
-    assert_false(host.frame[2][last].flags & (BT_FRAME_FLAG_SENSOR_UNSURE | BT_FRAME_FLAG_SENSOR_OTHER));
-    assert_true(host.frame[2][0].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
 }
 
 int main(void)
