@@ -90,6 +90,7 @@ def test_a_scale_that_holds_its_value_is_no_scale(firm: Population) -> None:
     judged = replace(found(prior, presses, SCALE), before_n=np.array([9.0, 0, 1]), held_out_n=np.array([1.0, 0, 1.2]))
     assert "held out, z is off by 1.20 N, more than the 1.00 N" in judged.why_not(np.full(3, 1.1))
     assert not judged.why_not(np.full(3, 1.3))  # less than the map is known to
+    assert judged.to_state_n(np.array([0.5, 0.3, 2.0])).tolist() == [1.0, 0.3, 1.2]
 
 
 @pytest.mark.parametrize(
