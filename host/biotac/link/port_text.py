@@ -17,11 +17,11 @@ def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[
     target, query = file_and_query(port.partition(":")[2])
     options = dict(parse_qsl(query.replace("+", "%2B"), keep_blank_values=True))  # in a form, + is a space
     for key, value in sorted(options.items()):
-        if key not in known:
+        if key not in known and (value or "." not in key):  # a word may end the name of a file that is not there
             raise PortError(f"{port}: unknown option {key!r}; expected {form}")
-        if not value:
+        if key in known and not value:
             raise PortError(f"{port}: option {key!r} has no value; expected {form}")
-    return target, options
+    return target, {key: value for key, value in options.items() if value}
 
 
 def file_and_options(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:

@@ -4,6 +4,7 @@
 #include "support.h"
 
 #include "keep/storage.h"
+#include "wire/little_endian.h"
 
 #ifndef SECTOR // tests/CMakeLists.txt has it again for a chip with larger ones
 #define SECTOR BT_FLASH_SECTOR_BYTES
@@ -80,6 +81,30 @@ static int stored(uint16_t id)
     assert_int_equal(bytes, make(want, id, version));
     assert_memory_equal(data, want, (size_t)bytes);
     return version;
+}
+
+TEST(a_damaged_page_is_told)
+{
+    assert_false(bt_storage_damaged(&flash)); // nothing was ever saved
+    for (int number = 1; number <= SAVES; number++) {
+        assert_true(write_record(1, number));
+        assert_false(bt_storage_damaged(&flash));
+    }
+    size_t last = 0;
+    for (size_t at = 0; at < sizeof bytes_of_flash; at += BT_FLASH_PAGE_BYTES) {
+        last = bt_storage_page_is(bytes_of_flash + at, 1) && bt_get_u16(bytes_of_flash + at + 6) == SAVES
+                   ? at
+                   : last;
+    }
+    for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // what is read is then an older one
+        bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
+        assert_true(bt_storage_damaged(&flash));
+        assert_int_equal(stored(1), SAVES - 1);
+        bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
+    }
+    const size_t used = last / SECTOR * SECTOR;
+    bytes_of_flash[used] ^= 1; // the sector in use: what is read is then of the one before
+    assert_true(bt_storage_damaged(&flash));
 }
 
 TEST(a_page_that_takes_nothing_without_a_word_is_never_taken_for_a_record)
