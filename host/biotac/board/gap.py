@@ -87,8 +87,7 @@ class Gaps:
     def __init__(self) -> None:
         self.count = 0
         self.held = 0  #: bit mask of the fingers that the program holds
-        self._seen_us: dict[int, int] = {}  # by finger: device time of its latest row, or up to LONG_US more
-        self._latest: dict[int, Batch] = {}  # by finger: the batch with that row
+        self._latest: dict[int, tuple[int, Batch]] = {}  # by finger: its latest row's time, to LONG_US, and batch
         self._last_s = time.monotonic()  # when the latest row was taken
         self._begun: tuple[Reason, int | None, int] | None = None
         self._held_back: list[Batch] = []
@@ -97,13 +96,13 @@ class Gaps:
         """The stream has stopped. Two losses without a row in between are one gap."""
         if self._begun is None:
             lost_at_ns = time.time_ns() - round((time.monotonic() - self._last_s) * 1e9)
-            self._begun = reason, max(self._seen_us.values(), default=None), lost_at_ns
+            self._begun = reason, max((seen_us for seen_us, _ in self._latest.values()), default=None), lost_at_ns
         elif reason == "rebooted":
             self._begun = (reason, *self._begun[1:])
 
     def forget(self) -> None:
         """The stream was stopped on purpose, and all of it has come: what follows is no gap."""
-        self._seen_us = {}
+        self._latest = {}
 
     def through(self, batch: Batch, last_us: int, boot_id: int, lost_after: list[tuple[int, int, int]]) -> Batch:
         """``batch``, whose latest row is of ``last_us``, with a Gap if one ends here.
@@ -111,7 +110,7 @@ class Gaps:
         Without its rows while held fingers have yet to be heard after a loss: they come with a later one.
         ``lost_after`` has (finger, seq, frames missing).
         """
-        seen_us, fingers = self._seen_us, fingers_in(batch.fingers)
+        latest, fingers = self._latest, fingers_in(batch.fingers)
         gaps: list[Gap] = []
         if self._begun is not None:
             now, later = split(batch, batch.first_t_us() or 0)
@@ -127,13 +126,13 @@ class Gaps:
             batch.fingers = sum(1 << finger for finger in fingers)
         first_us = batch.first_t_us()
         is_long = first_us is not None and last_us - first_us > LONG_US
-        jumps = not gaps and any(last_us - seen_us.get(finger, last_us) > JUMP_US for finger in fingers)
+        jumps = not gaps and any(last_us - latest[finger][0] > JUMP_US for finger in fingers if finger in latest)
         rows = _rows(batch) if is_long or jumps else {}
-        gaps = gaps or self._jumps(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
-        for finger in fingers:
-            seen_us[finger], self._latest[finger] = last_us, batch
+        if not gaps and rows:
+            gaps = self._jumps(rows, {(finger, seq + n + 1) for finger, seq, n in lost_after[-64:]})
+        latest |= dict.fromkeys(fingers, (last_us, batch))
         if is_long:
-            seen_us |= {finger: own[-1][0] for finger, own in rows.items()}
+            latest |= {finger: (own[-1][0], batch) for finger, own in rows.items()}
         self._last_s = batch.taken_s if batch.taken_s == batch.taken_s else batch.arrived_s
         self.count += len(gaps)
         batch.messages[:0] = [replace(gap, back_at_ns=time.time_ns(), boot_id=boot_id) for gap in gaps]
@@ -142,9 +141,9 @@ class Gaps:
     def _loss(self, reason: Reason, last_us: int | None, lost_at_ns: int, next_us: int, flags: dict[int, int]) -> Gap:
         lapsed = self.held & ~sum(1 << finger for finger, bits in flags.items() if bits & FrameFlags.HELD)
         self.held &= ~lapsed
-        missed = sum(_rounds_between(seen, next_us) for seen in self._seen_us.values())
-        fingers = sum(1 << finger for finger in self._seen_us)
-        self._seen_us.clear()
+        missed = sum(_rounds_between(seen, next_us) for seen, _ in self._latest.values())
+        fingers = sum(1 << finger for finger in self._latest)
+        self._latest.clear()
         known = None if reason == "rebooted" else missed
         return Gap(reason, last_us, next_us, lost_at_ns, 0, 0, fingers, known, lapsed)
 
@@ -152,8 +151,9 @@ class Gaps:
         """Gaps of single fingers, while the stream went on; none where heartbeats cover the time."""
         gaps: list[Gap] = []
         for finger in rows:
-            before = _rows(self._latest[finger]).get(finger) if finger in self._seen_us else None
-            last_us = before[-1][0] if before else rows[finger][0][0]
+            last_us, batch = self._latest.get(finger, (rows[finger][0][0], None))
+            if batch is not None and (before := _rows(batch).get(finger)):
+                last_us = before[-1][0]
             for t_us, seq, covered_us, _ in rows[finger]:
                 if t_us - last_us - covered_us > JUMP_US:
                     reason: Reason = "lost" if (finger, seq) in losses else "finger"
