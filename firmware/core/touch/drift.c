@@ -3,10 +3,10 @@
 #include "fixed_point.h"
 #include "wire/sensor_gen.h"
 
-#define RATE_Q16   (4 * 328) // per sweep; 15 counts/min; what drifts faster is followed late (constants.md)
-#define NEAR_SHIFT 5         // share of the distance in a step
-#define SETTLE_SWEEPS 8      // until what is followed is drift and not the noise of taking the tare
-#define FIRST_SWEEPS  16     // a mean is over at least this many
+#define RATE_Q16      (4 * 328) // per sweep; 15 counts/min, and constants.md has fingers that drift faster
+#define NEAR_SHIFT    5         // share of the distance in a step
+#define SETTLE_SWEEPS 8         // until what is followed is drift and not the noise of taking the tare
+#define FIRST_SWEEPS  16        // a mean is over at least this many
 #define KNOWN_SWEEPS  32
 #define MEAN_SWEEPS   128    // and at most this many
 #define LAST_SWEEPS   1024   // that an unseen rate is taken to last for

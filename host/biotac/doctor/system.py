@@ -68,7 +68,7 @@ def usb_ids(root: Path) -> Iterable[tuple[str, tuple[int, int]]]:
 
 def owner(path: Path) -> str:
     """Who owns the port, in words."""
-    with suppress(OSError, KeyError, NotImplementedError):  # Windows has none
+    with suppress(OSError, KeyError, NotImplementedError):  # Path.owner() raises the last on Windows
         return f"{path.owner()}, group {path.group()}, mode {path.stat().st_mode & 0o777:o}"
     return "another user"
 

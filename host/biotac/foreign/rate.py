@@ -36,8 +36,8 @@ class Rate:
         self.step_us = float(used_us.mean()) if len(used_us) else np.inf
         if self.step_us > 1e6 / LEAST_HZ:
             raise PortError(
-                f"{port}: {len(stamps_ns)} messages, {1e6 / self.step_us:.0f} a second, not {LEAST_HZ:g} or more, "
-                "as tare and contact count rounds; let a driver publish at 100 Hz, and give a table's times in seconds"
+                f"{port}: {len(stamps_ns)} messages at {1e6 / self.step_us:.0f} a second, expected at least "
+                f"{LEAST_HZ:g}, as tare and contact count rounds; let a driver publish at 100 Hz; a table is in seconds"
             )
         self.each = max(1, round(ROUND_US / self.step_us))
 

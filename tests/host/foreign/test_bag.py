@@ -132,7 +132,7 @@ def test_each_pause_is_a_gap_and_a_long_one_loses_no_number(tmp_path: Path) -> N
     assert [(gap.fingers, gap.seconds) for gap in gaps] == [(1, 0.31), (1, 0.51), (1, 0.41), (1, 1000.01)]
 
 
-@pytest.mark.parametrize(("step_ms", "words"), [(25, "40 a second, not 50 or more"), (1000, "1 a second")])
+@pytest.mark.parametrize(("step_ms", "words"), [(25, "40 a second, expected at least 50"), (1000, "1 a second")])
 def test_a_slow_topic_is_refused(tmp_path: Path, step_ms: int, words: str) -> None:
     ns = START_NS + step_ms * 1_000_000 * np.arange(100)
     with pytest.raises(PortError, match=words):

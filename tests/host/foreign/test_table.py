@@ -51,7 +51,7 @@ def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
         ('rate_hz = 100\n[[finger]]\nelectrodes = "F{}"', "no column 'F1', expected one of t, label, E1"),
         ('rate_hz = 100\n[[finger]]\nelectrodes = "label"', "expected numbers"),
         ("rate_hz = [", "cannot be read"),
-        (f'time = "E1"\n{ONE}', "not 50 or more|no messages"),
+        (f'time = "E1"\n{ONE}', "expected at least 50|no messages"),
     ],
 )
 def test_a_table_that_says_too_little_is_refused(tmp_path: Path, columns: str, words: str) -> None:
