@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import BiotacError, InputError, printable
 from ..version import __version__
-from . import ending
+from . import ending, gone
 from .outputs import note
 
 #: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
@@ -31,9 +31,8 @@ VERBS = {
     "file": ("recordings.file", "Label a recording, cut some seconds out of it, or recover a damaged one."),
     "export": (
         "recordings.export",
-        "Write a recording for other programs, as a picture or recomputed; many to a lake.",
+        "Write a recording for other programs, as a picture or recomputed; many as Parquet.",
     ),
-    "lake": ("recordings.lake", "Check a lake of recordings, or query it in SQL."),
     "calibrate": (
         "calibrate",
         "Fit a finger's wrench or pressure to a reference, test it on held-out data, and upload.",
@@ -114,6 +113,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
     _make_streams_usable()
     arguments = sys.argv[1:] if argv is None else argv
+    if arguments and arguments[0] in gone.VERBS:
+        note(gone.VERBS[arguments[0]])
+        return InputError.exit_code
     args = parser(arguments[:1]).parse_args(arguments)
     try:
         ending.by_interrupt()

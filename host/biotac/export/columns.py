@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..recording.labels import of_rows
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
-from ..wire.fields import AXES, BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
+from ..wire.fields import AXES, BANDS_FIELDS, FRAME_FIELDS, PAC_FIELDS, Field
 from ..wire.frames import StructArray
 
 #: Called with the share of the work done, 0 to 1.
@@ -42,9 +42,8 @@ PAC_COLUMNS = _stamped(PAC_FIELDS)
 #: One row per finger and round: a spectrogram of PAC, in octaves.
 BANDS_COLUMNS = _stamped(BANDS_FIELDS)
 
-#: Tables in every export. A lake has heartbeats, too.
+#: Tables in every export.
 EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS, "bands": BANDS_COLUMNS}
-HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": _stamped(IDLE_FIELDS)}
 
 
 @dataclass(frozen=True)
@@ -90,13 +89,14 @@ def described(made: list[Table]) -> dict[str, tuple[Field, ...]]:
     return {**EXPORTED, **{table.kind: table.columns for table in made}}
 
 
-def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORTED) -> list[Table]:
-    """Tables of the given ``kinds`` for every finger that has such rows, ordered by finger.
+def tables(recording: Recording, *, applied: bool = True) -> list[Table]:
+    """Tables of each kind for every finger that has such rows, ordered by finger.
 
-    Exported frames of simulated fingers have APPLIED, too.
+    With ``applied``, frames of simulated fingers have APPLIED, too.
     """
     made = []
-    if kinds is EXPORTED and recording.applied_n is not None:
+    kinds = EXPORTED
+    if applied and recording.applied_n is not None:
         kinds = {**EXPORTED, "frames": (*COLUMNS, APPLIED)}
     for finger in recording.fingers:
         for kind, columns in kinds.items():

@@ -12,7 +12,7 @@ from ..errors import InputError, imported
 from ..partial_file import whole
 from ..recording.reader import Recording
 from .columns import Show, Table, tables
-from .messages import trace_tables
+from .trace import trace_tables
 
 
 @dataclass(frozen=True)

@@ -188,12 +188,12 @@ def test_record_tells_faults_of_its_time_only(capsys, tmp_path: Path) -> None:
         ("fly", "invalid choice: 'fly'"),
         *((f"stream P --seconds {text}", "expected") for text in ("0", "-1", "nan", "inf", "soon")),
         ("stream P --rate 1e-308", "expected"),
-        ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
+        ("export rec.mcap out --partition -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
         ("calibrate press P --scale --readings 1,nan", "seen '1,nan'; expected numbers, separated by commas"),
         ("calibration clear P --finger 5", "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4"),
         ("calibrate press P --pressure --finger thumb,9", "expected one of 'index', 'middle'"),
         ("record P OUT --forc", "unrecognized arguments: --forc"),
-        ("lake check OUT --js", "unrecognized arguments: --js"),
+        ("check OUT --js", "unrecognized arguments: --js"),
     ],
 )
 def test_usage_errors_exit_2(capsys, command: str, message: str) -> None:

@@ -33,7 +33,7 @@ VERBS: dict[str, list[str]] = {
     "check": ["check", "REC"],
     "export": ["export", "REC", "OUT.csv", "--force"],
     "recompute": ["export", "REC", "OUT2.mcap", "--force", "--recompute"],
-    "lake, two jobs": ["export", "--lake", "LAKE", "-j", "2", "REC", "REC2"],
+    "partition, two jobs": ["export", "REC", "REC2", "MANY", "--partition", "--force", "-j", "2"],
     "cut": ["file", "cut", "REC", "OUT3.mcap", "--force"],
     "sim": ["sim", "press.toml"],
     "view": ["view", LONG, "--no-browser", "--port", "0"],
@@ -69,7 +69,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def begun(words: list[str], folder: Path, *, ignored: bool = False) -> subprocess.Popen[str]:
-    places = {"REC2": "b.mcap", "REC": "a.mcap", "LAKE": "lake", "IMAGE": str(IMAGE)}
+    places = {"REC2": "b.mcap", "REC": "a.mcap", "MANY": "many", "IMAGE": str(IMAGE)}
     program = "import sys, biotac.cli.ending as e; e.by_leaving(); print('ready', file=sys.stderr, flush=True); "
     program += "from biotac.__main__ import program; sys.exit(program())"
     handler = signal.SIG_IGN if ignored else signal.SIG_DFL
@@ -105,7 +105,7 @@ def judge(folder: Path, code: int, output: str) -> str:
         if path.exists() and path.stat().st_size and biotac.Recording(path).damage:
             return f"{name}: {biotac.Recording(path).damage[0]}"
         path.unlink(missing_ok=True)
-    if parts := [path.name for path in folder.glob(".*")]:
+    if parts := [path.name for pattern in (".*", "many/.*") for path in folder.glob(pattern)]:
         return f"left behind {parts}"
     return ""
 

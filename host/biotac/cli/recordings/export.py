@@ -1,4 +1,4 @@
-"""biotac export REC OUT, and biotac export REC... --lake DIR"""
+"""biotac export REC OUT, and biotac export REC... DIR --partition"""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from ...recording.reader import Recording
 from ...recording.recompute import recompute
 from ...wire import messages_gen as wire
 from ...wire.identity import setting_text
-from .. import outputs
+from .. import gone, outputs, values
 from ..progress import Progress
-from . import lake
+from . import many
 from .loading import code, load
 
-EXAMPLE = "biotac export grasp.mcap grasp.parquet, or biotac export trials/*.mcap --lake trials.lake -j 4"
+EXAMPLE = "biotac export grasp.mcap grasp.parquet, or biotac export trials/*.mcap trials --partition -j 4"
 RECORDING = ".mcap"
 
 
@@ -37,11 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record, or SynTouch's .btd(.gz)"
     )
     formats = "; ".join(f"{suffix} {kind.meaning}" for suffix, kind in FORMATS.items())
-    # Without --lake the last word is OUT. It is here for argparse's help; run() takes it from the recordings.
+    # The last word is OUT. It is here for argparse's help; run() takes it from the recordings.
     parser.add_argument(
         "out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}; .mcap of a .btd, or recomputed"
     )
-    parser.add_argument("--force", action="store_true", help="overwrite OUT, or the recordings' files in the lake")
+    parser.add_argument("--force", action="store_true", help="overwrite OUT, or a recording's files in DIR")
     parser.add_argument("--recompute", action="store_true", help="run the counts through the maths again")
     names = [weights.name.lower() for weights in wire.PocWeights]
     parser.add_argument("--poc-weights", choices=names, help="recompute with these weights of the point of contact")
@@ -62,7 +62,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a finger's frame: index=rh_ffdistal, for rviz",
     )
     parser.add_argument("--beside", metavar="BAG", type=Path, help="with all messages of this bag, in .bag or .ros2")
-    lake.add_export_arguments(parser)
+    text = "write every REC into the folder OUT, as Parquet by day and finger"
+    parser.add_argument("--partition", action="store_true", help=text)
+    parser.add_argument("-j", dest="jobs", metavar="N", type=values.count(1024), default=1, help="with N processes")
+    parser.add_argument("--lake", help=argparse.SUPPRESS)  # gone, and told what replaces it
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,11 +73,15 @@ def run(args: argparse.Namespace) -> int:
     paths = [*args.recordings, *([args.out] if args.out else [])]
     recomputes = bool(args.recompute or args.poc_weights or args.settings or args.keep_tare)
     if args.lake is not None:
-        if recomputes:
-            raise InputError("a lake takes recordings as they are; recompute them to .mcap files first")
-        return lake.run_export(args, paths)
+        raise InputError(gone.LAKE)
+    if args.partition:
+        if recomputes or args.trace or args.frame or args.beside:
+            raise InputError("--partition takes recordings as they are; export each of them by itself with that option")
+        return many.run(args, paths)
     if len(paths) != 2:
-        raise InputError(f"{len(paths)} files given, expected REC OUT; to export many recordings, use --lake DIR")
+        raise InputError(
+            f"{len(paths)} files given, expected REC OUT; to export many recordings, add --partition and name a folder"
+        )
     source, out = paths
     imports = source.name.lower().endswith((".btd", ".btd.gz"))
     if out.suffix.lower() != RECORDING:
