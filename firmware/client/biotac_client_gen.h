@@ -8,7 +8,7 @@
 #ifndef BIOTAC_MESSAGES_GEN_H // the core's header has the same, if a program needs both
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x0CE42ED2u
+#define BT_SCHEMA_HASH 0x14E68552u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -191,8 +191,7 @@ enum bt_event_kind {
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS every status_period_ms
-#define BT_STREAM_FLAG_BANDS (1u << 3) // BANDS messages
-#define BT_STREAM_FLAGS 0xFu // all there are
+#define BT_STREAM_FLAGS 0x7u // all there are
 
 // What a host can SUBSCRIBE to. The board does not compute the rest.
 #define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; TORSION_OK needs it
@@ -477,17 +476,6 @@ typedef struct {
     uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began, of means of four samples; else 0xFFFF
     uint8_t trust; // [enum trust] TRUST: the new one; else 255
 } bt_msg_event;
-
-// How strongly dynamic pressure vibrated in one round, in six octave bands (SPEC.md, Bands).
-#define BT_BANDS_ID 0x18
-#define BT_BANDS_BYTES 32
-typedef struct {
-    uint16_t seq; // [1] seq of the same round's FRAME
-    uint32_t t_us; // [us] t_us of the same round's PAC
-    uint8_t finger; // [1] chip select index
-    uint8_t good; // [1] number of samples with a good word; the others repeat the last good one
-    uint32_t energy_q4[6]; // [count^2 q4] energy of each band over the round, in 1/16 count^2, lowest band first; 0xFFFFFFFF: no good word
-} bt_msg_bands;
 
 // What a board measures of itself. Reply to GET_BOARD_FACTS.
 #define BT_BOARD_FACTS_ID 0x19
@@ -866,7 +854,6 @@ static const uint8_t bt_client_layout[] = {
     BT_IDLE_ID, 8, 0x41, 0x81, 0x02, 0x81, 0x41, 0x81, 0x42, 0x01,
     BT_TOUCH_ID, 4, 0x41, 0x81, 0x02, 0x81,
     BT_EVENT_ID, 6, 0x41, 0x81, 0x04, 0x82, 0x41, 0x01,
-    BT_BANDS_ID, 4, 0x41, 0x81, 0x02, 0x86,
     BT_BOARD_FACTS_ID, 9, 0x01, 0x81, 0x41, 0x82, 0x03, 0x81, 0x43, 0x81, 0x41,
     BT_SP_COUNTS_ID, 4, 0x41, 0x81, 0x01, 0x58,
     BT_HELLO_REQUEST_ID, 2, 0x01, 0x81,
@@ -925,7 +912,6 @@ typedef char bt_msg_sensor_status_lies_so[sizeof(bt_msg_sensor_status) == 52 ? 1
 typedef char bt_msg_idle_lies_so[sizeof(bt_msg_idle) == 32 ? 1 : -1];
 typedef char bt_msg_touch_lies_so[sizeof(bt_msg_touch) == 16 ? 1 : -1];
 typedef char bt_msg_event_lies_so[sizeof(bt_msg_event) == 24 ? 1 : -1];
-typedef char bt_msg_bands_lies_so[sizeof(bt_msg_bands) == 36 ? 1 : -1];
 typedef char bt_msg_board_facts_lies_so[sizeof(bt_msg_board_facts) == 44 ? 1 : -1];
 typedef char bt_msg_sp_counts_lies_so[sizeof(bt_msg_sp_counts) == 60 ? 1 : -1];
 typedef char bt_msg_hello_request_lies_so[sizeof(bt_msg_hello_request) == 8 ? 1 : -1];
@@ -984,7 +970,6 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1) X(trust, u8, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1) X(trust, u8, 1)
-#define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
 #define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
 #define BT_SP_COUNTS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(counts, u16, 24)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
@@ -1024,7 +1009,7 @@ typedef char bt_msg_emu_keep_lies_so[sizeof(bt_msg_emu_keep) == 12 ? 1 : -1];
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1) X(live, u8, 1)
 #define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif

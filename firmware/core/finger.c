@@ -163,7 +163,6 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     bt_finger_pass(finger);
     if (finger->round.good_words == 0) {
         finger->present = false;
-        finger->bands.begun = false; // samples before and after the gap do not belong together
         finger->silent_rounds = bt_count_up(finger->silent_rounds, BT_UNPLUGGED_ROUNDS);
         return false;
     }
@@ -357,14 +356,6 @@ void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg)
     msg->t_us = first_pac_us(finger);
     msg->finger = finger->index;
     memcpy(msg->pac, finger->round.pac, sizeof msg->pac);
-}
-
-void bt_finger_bands(bt_finger *finger, bt_msg_bands *msg)
-{
-    msg->seq = seq_of(finger);
-    msg->t_us = first_pac_us(finger);
-    msg->finger = finger->index;
-    msg->good = bt_bands_round(&finger->bands, finger->round.pac, msg->energy_q4);
 }
 
 void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg)

@@ -4,7 +4,6 @@
 #define BIOTAC_FINGER_H
 
 #include "events/events.h"
-#include "signal/bands.h"
 #include "signal/health.h"
 #include "signal/round.h"
 #include "solve/flags.h"
@@ -56,7 +55,6 @@ typedef struct {
     bt_lanes sent; // filtered counts when the last FRAME was sent
     bt_kept_wrench kept;
     bt_events events;       // updated only while a host subscribes to them
-    bt_bands bands;         // updated only while they are streamed
     uint32_t sensor_flags;  // BT_FRAME_FLAG_SENSOR_*, by the sensor's serial number
     uint8_t trust;          // enum bt_trust of the latest FRAME or IDLE
     uint8_t trust_reported; // what hosts were told, with the FRAMEs or by events
@@ -132,7 +130,6 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8
                      bt_msg_frame *msg);
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
-void bt_finger_bands(bt_finger *finger, bt_msg_bands *msg); // once a round
 
 // Where the finger is touched now, from each electrode's latest word, whether of this round or of the one
 // before.

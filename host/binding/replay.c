@@ -103,10 +103,3 @@ int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t
     }
     return list.found;
 }
-
-void bt_replay_bands(bt_bands *bands, int64_t n, const uint16_t *pac, uint8_t *good, uint32_t *energy_q4)
-{
-    for (int64_t k = 0; k < n; k++) {
-        good[k] = bt_bands_round(bands, pac + k * BT_PAC_PER_FRAME, energy_q4 + k * BT_BANDS);
-    }
-}

@@ -21,7 +21,5 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
 int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
                          const uint32_t *t_us, uint8_t *events, int64_t room);
 
-// BANDS of PAC alone, (n, BT_PAC_PER_FRAME): energy_q4 (n, BT_BANDS), and good (n).
-void bt_replay_bands(bt_bands *bands, int64_t n, const uint16_t *pac, uint8_t *good, uint32_t *energy_q4);
 
 #endif

@@ -44,7 +44,6 @@ from .wire.frames import FRAME_DTYPE as FRAME_DTYPE
 from .wire.frames import IDLE_DTYPE as IDLE_DTYPE
 from .wire.frames import PAC_DTYPE as PAC_DTYPE
 from .wire.frames import Frame as Frame
-from .wire.messages_gen import Bands as Bands
 from .wire.messages_gen import CalibrationState as CalibrationState
 from .wire.messages_gen import Event as Event
 from .wire.messages_gen import EventKind as EventKind

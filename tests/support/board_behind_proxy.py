@@ -19,7 +19,7 @@ from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 
-ROWS = {wire.Frame.ID, wire.Pac.ID, wire.Idle.ID, wire.Bands.ID}
+ROWS = {wire.Frame.ID, wire.Pac.ID, wire.Idle.ID}
 
 
 class BoardBehindProxy:

@@ -75,7 +75,7 @@ static inline void bits_add(uint32_t *chain, const uint8_t *payload, size_t byte
     *chain = *chain * 31 ^ bt_crc32(payload, bytes);
 }
 
-// All that a finger says of every round, standard deviations too, its EVENTs and its BANDS.
+// All that a finger says of every round, standard deviations too, and its EVENTs.
 static inline uint32_t bits_finger_hash(void)
 {
     static bt_finger finger;
@@ -107,10 +107,6 @@ static inline uint32_t bits_finger_hash(void)
             bt_finger_frame(&finger, &solve, finger.quantities, 0, &msg);
             bt_msg_frame_pack(&msg, payload);
             bits_add(&chain, payload, BT_FRAME_BYTES);
-            bt_msg_bands bands;
-            bt_finger_bands(&finger, &bands);
-            bt_msg_bands_pack(&bands, payload);
-            bits_add(&chain, payload, BT_BANDS_BYTES);
         }
     }
     return chain;

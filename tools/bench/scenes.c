@@ -135,13 +135,6 @@ SCENE(events_slipping)
     events(&slip_events);
 }
 
-SCENE(bands_of_a_round)
-{
-    static bt_msg_bands bands;
-    bt_finger_bands(&slip_events, &bands);
-    sink = bands.energy_q4[0];
-}
-
 // A FRAME to bytes for the link, with the table's CRC: on an RP2040 the DMA makes it, in 1100 cycles less.
 SCENE(framed)
 {
@@ -209,7 +202,6 @@ const bench_scene bench_scenes[] = {
     {"events", "shaken, nothing told", events_shaken},
 
     {"events", "slipping", events_slipping},
-    {"bands", "a round", bands_of_a_round},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME packed, with CRC and COBS", framed},
     {NULL, NULL, NULL},

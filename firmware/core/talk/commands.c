@@ -93,7 +93,6 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         session->finger[f].fresh = true;
         session->finger[f].unsent = 0;
-        session->finger[f].bands.begun = false;
     }
     return BT_ERROR_OK;
 }

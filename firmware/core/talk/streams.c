@@ -209,9 +209,4 @@ void bt_streams_vibration(bt_session *session, bt_finger *finger)
         bt_finger_pac(finger, &pac);
         bt_msg_pac_send(session, &pac);
     }
-    if (streams(session, finger, BT_STREAM_FLAG_BANDS)) {
-        bt_msg_bands bands;
-        bt_finger_bands(finger, &bands);
-        bt_msg_bands_send(session, &bands);
-    }
 }

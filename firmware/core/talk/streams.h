@@ -1,5 +1,4 @@
-// The messages of a round that are subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT, PAC and BANDS. rounds.c
-// says when.
+// The messages of a round that are subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT and PAC. rounds.c says when.
 #ifndef BIOTAC_STREAMS_H
 #define BIOTAC_STREAMS_H
 
@@ -16,7 +15,7 @@ void bt_streams_slot(bt_session *session, uint8_t slot, uint32_t touched, uint32
 // After a finger's round: FRAME with its TARE, or IDLE.
 void bt_streams_frame(bt_session *session, bt_finger *finger);
 
-// Then PAC and BANDS.
+// Then PAC.
 void bt_streams_vibration(bt_session *session, bt_finger *finger);
 
 #endif

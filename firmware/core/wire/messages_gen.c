@@ -836,38 +836,6 @@ void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES])
     (void)at;
 }
 
-void bt_msg_bands_pack(const bt_msg_bands *msg, uint8_t out[BT_BANDS_BYTES])
-{
-    uint8_t *at = out;
-    at = put(at, (uint32_t)msg->seq, 2);
-    at = put(at, (uint32_t)msg->t_us, 4);
-    at = put(at, (uint32_t)msg->finger, 1);
-    at = put(at, (uint32_t)msg->good, 1);
-    for (int k = 0; k < 6; k++) {
-        at = put(at, (uint32_t)msg->energy_q4[k], 4);
-    }
-    (void)at;
-}
-
-void bt_msg_bands_unpack(bt_msg_bands *msg, const uint8_t in[BT_BANDS_BYTES])
-{
-    const uint8_t *at = in;
-    uint32_t value;
-    at = get(at, &value, 2);
-    msg->seq = (uint16_t)value;
-    at = get(at, &value, 4);
-    msg->t_us = (uint32_t)value;
-    at = get(at, &value, 1);
-    msg->finger = (uint8_t)value;
-    at = get(at, &value, 1);
-    msg->good = (uint8_t)value;
-    for (int k = 0; k < 6; k++) {
-        at = get(at, &value, 4);
-        msg->energy_q4[k] = (uint32_t)value;
-    }
-    (void)at;
-}
-
 void bt_msg_board_facts_pack(const bt_msg_board_facts *msg, uint8_t out[BT_BOARD_FACTS_BYTES])
 {
     uint8_t *at = out;
@@ -1815,8 +1783,6 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_TOUCH_BYTES;
     case BT_EVENT_ID:
         return BT_EVENT_BYTES;
-    case BT_BANDS_ID:
-        return BT_BANDS_BYTES;
     case BT_BOARD_FACTS_ID:
         return BT_BOARD_FACTS_BYTES;
     case BT_SP_COUNTS_ID:

@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x0CE42ED2u
+#define BT_SCHEMA_HASH 0x14E68552u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -202,8 +202,7 @@ enum bt_event_kind {
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS every status_period_ms
-#define BT_STREAM_FLAG_BANDS (1u << 3) // BANDS messages
-#define BT_STREAM_FLAGS 0xFu // all there are
+#define BT_STREAM_FLAGS 0x7u // all there are
 
 // What a host can SUBSCRIBE to. The board does not compute the rest.
 #define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; TORSION_OK needs it
@@ -569,19 +568,6 @@ typedef struct {
 } bt_msg_event;
 void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES]);
 void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES]);
-
-// How strongly dynamic pressure vibrated in one round, in six octave bands (SPEC.md, Bands).
-#define BT_BANDS_ID 0x18
-#define BT_BANDS_BYTES 32
-typedef struct {
-    uint16_t seq; // [1] seq of the same round's FRAME
-    uint32_t t_us; // [us] t_us of the same round's PAC
-    uint8_t finger; // [1] chip select index
-    uint8_t good; // [1] number of samples with a good word; the others repeat the last good one
-    uint32_t energy_q4[6]; // [count^2 q4] energy of each band over the round, in 1/16 count^2, lowest band first; 0xFFFFFFFF: no good word
-} bt_msg_bands;
-void bt_msg_bands_pack(const bt_msg_bands *msg, uint8_t out[BT_BANDS_BYTES]);
-void bt_msg_bands_unpack(bt_msg_bands *msg, const uint8_t in[BT_BANDS_BYTES]);
 
 // What a board measures of itself. Reply to GET_BOARD_FACTS.
 #define BT_BOARD_FACTS_ID 0x19
@@ -1039,7 +1025,6 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1) X(trust, u8, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1) X(trust, u8, 1)
-#define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
 #define BT_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1) X(t_us, u32, 1) X(usb_frame, u16, 1) X(usb_starts, u32, 1) X(chip_id, u32, 1) X(flash_id, u8, 3) X(erase_us, u32, 1) X(supply_mv, u16, 1) X(die_centi_c, i16, 1) X(bus_khz, u16, 1) X(slots_dma_late, u32, 1) X(early_faults, u16, 1)
 #define BT_SP_COUNTS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(counts, u16, 24)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
@@ -1079,7 +1064,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
 #define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1) X(live, u8, 1)
 #define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif

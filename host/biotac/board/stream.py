@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import CommandRefusedError, InputError
-from ..wire.messages_gen import Bands, Error, Event, QuantityFlags, Start, Stop, StreamFlags, Subscribe, Touch
+from ..wire.messages_gen import Error, Event, QuantityFlags, Start, Stop, StreamFlags, Subscribe, Touch
 from ..wire.sensor_gen import MAX_SENSORS
 from ..wire.slots import FRAME_HZ
 from . import bandwidth
@@ -27,10 +27,10 @@ QUANTITIES = {
     "events": QuantityFlags.EVENTS,
 }
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
-STREAMS = {"pac": StreamFlags.PAC, "bands": StreamFlags.BANDS, "status": StreamFlags.STATUS}
+STREAMS = {"pac": StreamFlags.PAC, "status": StreamFlags.STATUS}
 NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS)
 # Messages that a board sends only to those who want them, by the name of what carries them.
-CARRIED_BY = {Touch: "touch", Event: "events", Bands: "bands"}
+CARRIED_BY = {Touch: "touch", Event: "events"}
 
 
 @dataclass(frozen=True, slots=True)

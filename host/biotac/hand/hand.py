@@ -207,7 +207,7 @@ class Hand(Commands, Subscriptions):
     ) -> None:
         """Choose what the board computes and sends, and start the stream; again, to choose anew.
 
-        Names are force, poc, torque, pressure, touch, events, raw, pdc, temperature, pac, bands, status, and
+        Names are force, poc, torque, pressure, touch, events, raw, pdc, temperature, pac, status, and
         ``results``, the default: force, poc, torque and pressure, with pac unless the port is a UART, which is slow.
         Raw counts, pdc and temperature are in every FRAME, so each of them only asks for frames; status is always sent.
         What is left out is not computed; it arrives as NaN, with the flag NOT_ASKED. What callbacks wait for is added.

@@ -55,13 +55,6 @@ class Subscriptions:
         """
         return self._on(wire.Touch, self._if_new(fn))
 
-    def on_bands(self, fn: Callable[[wire.Bands], Any]) -> Unsubscribe:
-        """Call ``fn`` with how strongly dynamic pressure vibrated, by octave, 100 times a second for each finger.
-
-        Adds bands to what is streamed.
-        """
-        return self._on(wire.Bands, fn)
-
     def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
         """Call ``fn`` with every change of a tare."""
         return self._on(wire.Tare, fn)

@@ -18,8 +18,7 @@ from ..errors import InputError, RecordingError, path_text
 from ..keep.calibration import own_settings
 from ..markdown import html_table
 from ..wire import messages_gen as wire
-from ..wire.dtypes_gen import DTYPES
-from ..wire.frames import BANDS_DTYPE, FORCE_LSB_PER_N, StructArray, bands_from_wire, frames_from_wire, to_units
+from ..wire.frames import BANDS_DTYPE, FORCE_LSB_PER_N, StructArray, frames_from_wire, to_units
 from ..wire.framing import FramingCounts
 from ..wire.messages_gen import Setting
 from . import labels as labels_module
@@ -32,7 +31,7 @@ from .labels import Label
 from .layout import finger_of
 from .scan import Index
 from .selection import Selection, fields_named, part_of
-from .stamps import Stamps, unwrapped_us
+from .stamps import Stamps
 from .summary import lines, summary
 
 
@@ -142,17 +141,9 @@ class Recording:
 
     @cached_property
     def bands(self) -> StructArray:
-        """Energy of PAC per octave, BANDS_DTYPE (n,), finger by finger: as recorded, or else computed from ``pac``."""
-        recorded = [message for message in self.messages if isinstance(message, wire.Bands)]
-        parts = [np.empty(0, BANDS_DTYPE)]
-        for finger in sorted({m.finger for m in recorded} | set(np.unique(self.pac["finger"]).tolist())):
-            sent = np.frombuffer(b"".join(m.pack() for m in recorded if m.finger == finger), DTYPES[wire.Bands.ID])
-            if len(sent):
-                seq = np.unwrap(sent["seq"].astype(np.int64), period=2**16)
-                parts.append(bands_from_wire(sent, seq, unwrapped_us(self.begin_us, sent["t_us"])))
-            else:
-                parts.append(bands_of(self.pac[self.pac["finger"] == finger]))
-        return np.concatenate(parts)
+        """Energy of PAC per octave, BANDS_DTYPE (n,), finger by finger."""
+        each = [bands_of(self.pac[self.pac["finger"] == finger]) for finger in np.unique(self.pac["finger"])]
+        return np.concatenate([np.empty(0, BANDS_DTYPE), *each])
 
     def select(
         self,
@@ -336,9 +327,9 @@ class Recording:
 
     @property
     def fingers(self) -> list[int]:
-        """Fingers with at least one frame, heartbeat, PAC, BANDS or EVENT."""
+        """Fingers with at least one frame, heartbeat, PAC or EVENT."""
         rows = (self._contents.sent, self.idle, self.pac)
-        others = {m.finger for m in self.messages if isinstance(m, (wire.Bands, wire.Event))}
+        others = {m.finger for m in self.messages if isinstance(m, wire.Event)}
         return sorted(others | {int(finger) for table in rows for finger in np.unique(table["finger"])})
 
     @property

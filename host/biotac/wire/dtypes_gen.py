@@ -228,15 +228,6 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("trust", "u1"),
         ]
     ),
-    wire.Bands.ID: np.dtype(
-        [
-            ("seq", "<u2"),
-            ("t_us", "<u4"),
-            ("finger", "u1"),
-            ("good", "u1"),
-            ("energy_q4", "<u4", (6,)),
-        ]
-    ),
     wire.BoardFacts.ID: np.dtype(
         [
             ("req_id", "u1"),

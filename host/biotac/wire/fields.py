@@ -121,19 +121,17 @@ FRAME_FIELDS = (
 #: One row per finger and round: 22 samples, sample k (from 0) is k/2200 s after t_us.
 PAC_FIELDS = (_FINGER, *_TIME, _count("pac", "dynamic pressure", PAC_SAMPLES))
 
-#: One row per finger and round: how strongly PAC vibrated, by octave (SPEC.md, Bands).
+#: One row per finger and round: how strongly PAC vibrated, by octave (core/bands.py).
 BANDS_FIELDS = (
     _FINGER,
     *_TIME,
-    Field("good", "u1", "1", "samples that came as a good word", (), "good"),
+    Field("good", "u1", "1", "samples that came as a good word"),
     Field(
         "energy_count2",
         "<f8",
         "count^2",
         "sum of squares of the signal in the band, over 22 samples; NaN without a good word",
         ("18hz", "36hz", "72hz", "147hz", "309hz", "over527hz"),
-        "energy_q4",
-        Q4_PER_COUNT,
     ),
 )
 

@@ -107,11 +107,6 @@ def invalid_frames(n: int) -> StructArray:
     return rows
 
 
-def bands_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
-    """Convert BANDS messages (n,) with unwrapped seq and t_us to BANDS_DTYPE (n,)."""
-    return _from_wire(BANDS_FIELDS, BANDS_DTYPE, messages, seq, t_us)
-
-
 def _from_wire(
     columns: Sequence[Field], dtype: np.dtype[Any], messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]
 ) -> StructArray:

@@ -15,7 +15,7 @@ from .named import NamedFlag
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x0CE42ED2
+SCHEMA_HASH = 0x14E68552
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -222,7 +222,6 @@ class StreamFlags(NamedFlag):
     FRAMES = 1 << 0  # FRAME and TARE messages; IDLE and TOUCH as subscribed
     PAC = 1 << 1  # PAC messages
     STATUS = 1 << 2  # STATUS and SENSOR_STATUS every status_period_ms
-    BANDS = 1 << 3  # BANDS messages
 
 
 class QuantityFlags(NamedFlag):
@@ -416,7 +415,6 @@ STREAM_FLAG_DOC: dict[int, str] = {
     1: "FRAME and TARE messages; IDLE and TOUCH as subscribed",
     2: "PAC messages",
     4: "STATUS and SENSOR_STATUS every status_period_ms",
-    8: "BANDS messages",
 }
 
 
@@ -1345,42 +1343,6 @@ class Event:
             v[7],
             v[8],
             v[9],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Bands:
-    """How strongly dynamic pressure vibrated in one round, in six octave bands (SPEC.md, Bands)."""
-
-    seq: int
-    t_us: int
-    finger: int
-    good: int
-    energy_q4: tuple[int, ...]
-
-    ID: ClassVar[int] = 0x18
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBB6I")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 32 bytes."""
-        return self.STRUCT.pack(
-            self.seq,
-            self.t_us,
-            self.finger,
-            self.good,
-            *self.energy_q4,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> Bands:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-            v[3],
-            v[4 : 10],
         )
 
 
@@ -2572,7 +2534,7 @@ class EmuKeep:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2591,7 +2553,6 @@ MESSAGES: dict[int, type[Any]] = {
     Idle.ID: Idle,
     Touch.ID: Touch,
     Event.ID: Event,
-    Bands.ID: Bands,
     BoardFacts.ID: BoardFacts,
     SpCounts.ID: SpCounts,
     HelloRequest.ID: HelloRequest,
@@ -2683,9 +2644,8 @@ STREAMS_OF: dict[type[Any], StreamFlags] = {
     Idle: StreamFlags.FRAMES,
     Touch: StreamFlags.FRAMES,
     Event: StreamFlags.FRAMES | StreamFlags.PAC,
-    Bands: StreamFlags.BANDS,
     SpCounts: StreamFlags.FRAMES,
 }
 
 # What each round of a touched finger consists of, as far as it is streamed.
-EVERY_ROUND = (Frame, Pac, Bands)
+EVERY_ROUND = (Frame, Pac)

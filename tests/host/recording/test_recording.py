@@ -165,12 +165,13 @@ def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:
     assert len(biotac.load(absurd)) == len(recorded[1])  # the index at its end leads past the damage
 
 
-def test_a_finger_that_told_only_bands_is_there(recorded, tmp_path) -> None:
-    bands = wire.Bands(3, 30_227, 1, 22, (1, 2, 3, 4, 5, 6))
-    rewrite(recorded[0], tmp_path / "bands.mcap", lambda _: encode(bands.ID, bands.pack()))
-    answer = biotac.Recording(tmp_path / "bands.mcap")
-    assert answer.fingers == [1] and len(answer.frames) == 0
-    assert set(answer.bands["finger"]) == {1}
+def test_messages_that_are_no_more_are_left_out(recorded, tmp_path) -> None:
+    """BANDS and the emulated sensors' EMU_STATUS, of which earlier recordings have some."""
+    gone = encode(0x18, bytes(36)) + encode(0x40, bytes(50))
+    rewrite(recorded[0], tmp_path / "gone.mcap", lambda block: block + gone)
+    answer, before = biotac.Recording(tmp_path / "gone.mcap"), biotac.Recording(recorded[0])
+    assert not answer.damage and answer.messages == before.messages
+    np.testing.assert_array_equal(answer.frames, before.frames)
 
 
 def test_another_mcap_file_is_not_taken_for_a_recording(tmp_path) -> None:

@@ -28,11 +28,6 @@ def happened(event: biotac.Event) -> None:
     print(kind.name, kind is biotac.EventKind.SLIP)
 
 
-def vibrated(bands: biotac.Bands) -> None:
-    index: int = bands.finger
-    print(index)
-
-
 def missed(gap: biotac.Gap) -> None:
     rounds: int | None = gap.frames_missed
     print(gap.reason, gap.fingers, rounds, gap.holds_lapsed, gap.seconds)
@@ -52,7 +47,6 @@ def main(port: str | None = None) -> float:
         hand.on_status(counted)
         hand.on_event(happened)
         hand.on_slip(happened)
-        hand.on_bands(vibrated)
         hand.on_gap(missed)
         warnings: list[biotac.HandWarning] = hand.warnings
         faults: biotac.Faults = hand.board.clear_faults()

@@ -4,7 +4,7 @@
     found.predict(describe_all(others))
 
 A description holds logarithms, so that rubbing harder is only a shift, and quantiles over time, so that it does not
-matter when the contact was or how long it lasted. BANDS messages give the same: describe(bands["energy_count2"]).
+matter when the contact was or how long it lasted. A recording's bands give the same: describe(bands["energy_count2"]).
 """
 
 from __future__ import annotations
