@@ -35,9 +35,6 @@ function(board_image name port_name cpu linker)
     include(${port}/image.cmake)
   endif()
   leave_out_systick(ARGN)
-  if(EXISTS ${CMAKE_CURRENT_LIST_DIR}/flash.json) # for `biotac flash`, beside the image
-    set(flash_json COMMAND ${CMAKE_COMMAND} -E copy ${CMAKE_CURRENT_LIST_DIR}/flash.json ${name}.flash.json)
-  endif()
   if(NOT BIOTAC_NO_LIMITS)
     set(check COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${port_name}
       --limits ${CMAKE_CURRENT_LIST_DIR}/limits.json --objdump ${CMAKE_OBJDUMP})
@@ -53,7 +50,7 @@ function(board_image name port_name cpu linker)
     COMMAND ${CMAKE_OBJCOPY} -O binary -R .boot_vectors ${name}.elf ${name}.bin
     COMMAND ${Python3_EXECUTABLE} ${tools}/image/note.py ${name}.bin ${name}.elf --objcopy ${CMAKE_OBJCOPY}
     COMMAND ${CMAKE_OBJCOPY} -O ihex ${name}.elf ${name}.hex
-    ${port_after} ${flash_json} ${check})
+    ${port_after} ${check})
 endfunction()
 
 function(gateway_image name port_name cpu linker)

@@ -82,4 +82,5 @@ def _smoothed(line: NDArray[np.int64], before: int, apart: int) -> tuple[NDArray
 
 
 def _per_round(removed: NDArray[np.int64], rounds: int) -> NDArray[np.float64]:
-    return np.square(removed).reshape(rounds, -1).sum(axis=1) / _PER_COUNT2
+    energy: NDArray[np.float64] = np.square(removed).reshape(rounds, -1).sum(axis=1) / _PER_COUNT2
+    return energy

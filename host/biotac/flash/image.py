@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from itertools import accumulate
 from pathlib import Path
-from typing import NamedTuple
 
-from ..documents import read_json
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire.identity import board_text
@@ -39,24 +36,13 @@ CARRIED = Path(__file__).with_name("biotac-pico.uf2")  # host/CMakeLists.txt put
 BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
 
 
-class Chip(NamedTuple):
-    """What an STM32's loader has to be told: its board's flash.json, which the build puts beside the .bin."""
-
-    id: int  #: what the loader says of itself
-    family: str  #: as the package stm32loader names it
-    flash_at: int
-    image_at: int
-    sectors: tuple[int, ...]  #: where each begins, from ``flash_at`` on, and where the last one ends
-
-
 @dataclass(frozen=True)
 class Image:
-    """A checked UF2 file, or for an STM32 a .bin in blocks of 256 bytes and its ``chip``."""
+    """A checked UF2 file."""
 
     path: Path
     blocks: tuple[bytes, ...]
     note: Note
-    chip: Chip | None = None
 
     def boot_last(self) -> tuple[bytes, ...]:
         """The blocks, with that of the second-stage boot last.
@@ -92,27 +78,12 @@ def read_image(path: Path) -> Image:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); expected an image, .uf2") from error
     try:
-        if path.suffix.lower() == ".bin":
-            return read_bin(path, data)
         blocks = split(data)
         payload = join_payloads(blocks)
         check_boot2(payload)
         return Image(path, blocks, find(payload))
     except ValueError as error:
         raise InputError(f"{path} cannot be flashed: {error}") from error
-
-
-def read_bin(path: Path, data: bytes) -> Image:
-    """What an STM32's loader writes. Raises ValueError for another board's."""
-    note, beside = find(data), path.with_suffix(".flash.json")
-    try:
-        info = read_json(beside)
-        sectors = tuple(accumulate((1024 * int(kib) for kib in info["sectors_kib"]), initial=0))
-        chip = Chip(int(info["chip"], 16), str(info["family"]), int(info["flash"], 16), int(info["image"], 16), sectors)
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        how = f"use the build's .uf2 or, for an STM32, its .bin with {beside.name} beside it ({error!r})"
-        raise ValueError(f"it is for a {board_text(note.board)}, and nothing says where it goes: {how}") from error
-    return Image(path, tuple(data[at : at + PAGE_BYTES] for at in range(0, len(data), PAGE_BYTES)), note, chip)
 
 
 def split(data: bytes) -> tuple[bytes, ...]:

@@ -1,17 +1,23 @@
-"""The ROS 2 node against ROS' message definitions and a fake rclpy, whose limits tests/support/fake_ros.py tells."""
+"""The ROS 2 node in this process, on the real rclpy (PyPI's ``ros-rclpy[fastrtps]``): message by message.
+
+test_ros2_real.py has it as a process, with a subscriber.
+"""
 
 from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import math
+import os
 import sys
 import types
 import xml.etree.ElementTree as ET
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-import fake_ros
 import numpy as np
 import pytest
 
@@ -20,21 +26,64 @@ from biotac.clock import DeviceClock
 from biotac.export import export
 from biotac.wire.batches import join
 
+# ROS' own packages use what Python and their dependencies have deprecated.
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning")
+
 PACKAGE = Path(__file__).parents[3] / "host/ros2/biotac_ros2"
 
 
+@dataclass
+class Ros:
+    """What the node published and warned of, and what its clock says."""
+
+    monkeypatch: pytest.MonkeyPatch
+    now_ns: int = 0
+    published: list[tuple[str, Any]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def begin(self, port: str) -> types.ModuleType:
+        """The node's module, which will open ``port``."""
+        self.monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", f"port:={port}"])
+        module = importlib.import_module("biotac_ros2.node")
+        clock = types.SimpleNamespace(now=lambda: types.SimpleNamespace(nanoseconds=self.now_ns))
+        self.monkeypatch.setattr(module.Fingers, "get_clock", lambda node: clock)
+        self.monkeypatch.setattr("rclpy.impl.rcutils_logger.RcutilsLogger.warning", lambda _, text: self.warn(text))
+        return module
+
+    def fingers(self, port: str) -> Any:
+        """A node that runs, as ``main`` makes it."""
+        module = self.begin(port)
+        module.rclpy.init()
+        return module.Fingers()
+
+    def warn(self, text: str) -> bool:
+        self.warnings.append(text)
+        return True
+
+
 @pytest.fixture
-def ros(monkeypatch) -> fake_ros.Ros:
-    ros = fake_ros.Ros()
-    fake_ros.install(monkeypatch, ros)
+def ros(monkeypatch, tmp_path) -> Iterator[Ros]:
+    if importlib.util.find_spec("rclpy") is None and not os.environ.get("BIOTAC_CI"):
+        pytest.skip("rclpy is not installed: pip install '.[test]'")
+    import rclpy
+    from rclpy.publisher import Publisher
+
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(os.getpid() % 100 + 1))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     monkeypatch.syspath_prepend(str(PACKAGE))
     for name in ("biotac_ros2", "biotac_ros2.node"):
         monkeypatch.delitem(sys.modules, name, raising=False)
-    return ros
+    ros, publish = Ros(monkeypatch), Publisher.publish
 
+    def heard(publisher: Any, message: Any) -> None:
+        publish(publisher, message)  # raises what ROS would not carry
+        topic = publisher.topic_name.removeprefix("/")
+        if topic not in ("parameter_events", "rosout"):  # which every node has
+            ros.published.append((topic, message))
 
-def node() -> types.ModuleType:
-    return importlib.import_module("biotac_ros2.node")
+    monkeypatch.setattr(Publisher, "publish", heard)
+    yield ros
+    rclpy.try_shutdown()
 
 
 def unpaced(monkeypatch) -> None:
@@ -46,6 +95,7 @@ def unpaced(monkeypatch) -> None:
 
 def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch, tmp_path) -> None:
     from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
 
     unpaced(monkeypatch)
     source = "sim:shear.toml?fingers=2&seconds=3"
@@ -55,13 +105,13 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
         hand.read(10.0)
     export(biotac.Recording(tmp_path / "a.mcap"), tmp_path / "a.ros2")
     bag: dict[str, list[object]] = {}
+    store = get_typestore(Stores.ROS2_HUMBLE)
     with Reader(tmp_path / "a.ros2") as reader:
         for connection, _, raw in reader.messages():
             topic = connection.topic.removeprefix("/")
-            bag.setdefault(topic, []).append(fake_ros.STORE.deserialize_cdr(raw, connection.msgtype))
+            bag.setdefault(topic, []).append(store.deserialize_cdr(raw, connection.msgtype))
 
-    ros.parameters["port"] = source
-    node().main()
+    ros.begin(source).main()
 
     events = [(topic, message.data) for topic, message in ros.published if topic.endswith("event")]
     assert {("biotac/finger0/event", "TOUCH"), ("biotac/finger1/event", "TOUCH")} <= {*events}
@@ -75,7 +125,7 @@ def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch
         np.testing.assert_allclose(sent, [values(message) for message in bag[topic]], rtol=4e-16)
     forces = np.array([values(m) for t, m in ros.published if t == "biotac/finger0/wrench"])
     assert np.nanmax(forces[:, 2]) > 1.0
-    assert not ros.up
+    assert not importlib.import_module("rclpy").ok()
 
 
 def values(message: object) -> list[float]:
@@ -91,12 +141,10 @@ def values(message: object) -> list[float]:
 
 def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> None:
     unpaced(monkeypatch)
-    ros.up = True
-    ros.parameters["port"] = "sim:press.toml?seconds=0.5"
     # Monotonic time stands still at 70 s, the node's clock says 1000 s: 930 s between them.
     monkeypatch.setattr("biotac.clock.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
     ros.now_ns = 1000 * 10**9
-    fingers = node().Fingers()
+    fingers = ros.fingers("sim:press.toml?seconds=0.5")
     clock = DeviceClock()
     for k in range(20):
         clock.round_trip(50.0 + k, 1_000_000 * k, 50.0 + k)
@@ -115,10 +163,8 @@ def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> Non
 
 def test_without_a_clock_arrival_is_the_stamp_and_that_is_said_once(ros, monkeypatch) -> None:
     unpaced(monkeypatch)
-    ros.up = True
-    ros.parameters["port"] = "sim:press.toml?seconds=0.5"
     ros.now_ns = 1000 * 10**9
-    fingers = node().Fingers()
+    fingers = ros.fingers("sim:press.toml?seconds=0.5")
     with fingers.hand as hand:
         batches = [hand.read_batch(0.2), hand.read_batch(0.2)]
         hand.clock = DeviceClock()
@@ -131,8 +177,7 @@ def test_without_a_clock_arrival_is_the_stamp_and_that_is_said_once(ros, monkeyp
 
 def test_invalid_is_nan_and_never_the_last_good_value(ros, monkeypatch) -> None:
     unpaced(monkeypatch)
-    ros.parameters["port"] = "sim:press.toml?seconds=0.3"
-    node().main()
+    ros.begin("sim:press.toml?seconds=0.3").main()
     points = [m.point for topic, m in ros.published if topic.endswith("poc")]
     flags = [m.data for topic, m in ros.published if topic.endswith("flags")]
     invalid = [bool(value & biotac.FrameFlags.POC_INVALID) for value in flags]
@@ -143,13 +188,11 @@ def test_invalid_is_nan_and_never_the_last_good_value(ros, monkeypatch) -> None:
 
 def test_a_finger_is_published_when_it_comes_and_is_nan_once_when_it_goes(ros, monkeypatch) -> None:
     unpaced(monkeypatch)
-    ros.up = True
-    ros.parameters["port"] = "sim:press.toml?seconds=0.5"
     with biotac.open("sim:press.toml?fingers=2&seconds=3", None) as hand:
         both, first = hand.read_batch(2.5), hand.read_batch(0.2)
     alone = first.wire["finger"] == 0
     first = replace(first, wire=first.wire[alone], seq=first.seq[alone], t_us=first.t_us[alone])
-    fingers = node().Fingers()  # of one finger, when it started
+    fingers = ros.fingers("sim:press.toml?seconds=0.5")  # of one finger, when it started
     last_s = 70.0
     monkeypatch.setattr("biotac.bridges.silence.time", types.SimpleNamespace(monotonic=lambda: last_s))
     with fingers.hand:
@@ -164,7 +207,7 @@ def test_a_finger_is_published_when_it_comes_and_is_nan_once_when_it_goes(ros, m
             last_s += 0.08
 
 
-def last_of(ros: fake_ros.Ros, finger: int) -> list[float]:
+def last_of(ros: Ros, finger: int) -> list[float]:
     """Force, torque, point and grip of the last messages."""
     last = {topic.removeprefix(f"biotac/finger{finger}/"): message for topic, message in ros.published}
     return [number for name in ("wrench", "poc", "grip") for number in values(last[name])]
@@ -172,39 +215,42 @@ def last_of(ros: fake_ros.Ros, finger: int) -> list[float]:
 
 def test_tare_says_which_finger_refused(ros, monkeypatch) -> None:
     unpaced(monkeypatch)
-    ros.up = True
-    ros.parameters["port"] = "sim:press.toml?seconds=4"
-    fingers = node().Fingers()
-    tare = ros.services["biotac/tare"]
+    fingers = ros.fingers("sim:press.toml?seconds=4")
+    (service,) = [own for own in fingers.services if own.srv_name.endswith("biotac/tare")]
+    tare, answer = service.callback, service.srv_type.Response
     with fingers.hand as hand:
-        blank = types.SimpleNamespace
         hand.read(0.2)
-        early = tare(None, blank(success=None, message=None))
+        early = tare(None, answer())
 
         def refuse(finger: int) -> None:
             raise biotac.CommandRefusedError("it moves")
 
         monkeypatch.setattr(hand, "tare", refuse)
-        refused = tare(None, blank(success=None, message=None))
+        refused = tare(None, answer())
     assert isinstance(early.success, bool)
     assert (refused.success, refused.message) == (False, "finger 0: it moves")
 
 
 def test_a_port_that_is_not_there_ends_it_with_a_line_and_the_code(ros, capsys) -> None:
-    ros.parameters["port"] = "/dev/ttyNOWHERE7"
+    node = ros.begin("/dev/ttyNOWHERE7")
     with pytest.raises(SystemExit) as end:
-        node().main()
+        node.main()
     assert end.value.code == biotac.PortError.exit_code
     assert "biotac list" in capsys.readouterr().err
-    assert not ros.up
+    assert not node.rclpy.ok()
 
 
 def test_it_ends_when_ros_does(ros, monkeypatch) -> None:
     unpaced(monkeypatch)
-    ros.parameters["port"] = "sim:press.toml"
-    ros.ok_for_spins = 1
-    node().main()
-    assert ros.spins == 1
+    node, spins = ros.begin("sim:press.toml"), []
+
+    def spin_once(own: Any, timeout_sec: float) -> None:
+        spins.append(own)
+        node.rclpy.shutdown()
+
+    monkeypatch.setattr(node.rclpy, "spin_once", spin_once)
+    node.main()
+    assert len(spins) == 1
 
 
 def test_the_package_declares_what_it_imports() -> None:

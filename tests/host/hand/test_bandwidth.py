@@ -12,10 +12,7 @@ from biotac.board import bandwidth
 from biotac.wire.messages_gen import StreamFlags
 
 ROOT = Path(__file__).resolve().parents[3]
-COLUMNS = [
-    StreamFlags.FRAMES | more
-    for more in (StreamFlags(0), StreamFlags.PAC)
-]
+COLUMNS = [StreamFlags.FRAMES | more for more in (StreamFlags(0), StreamFlags.PAC)]
 WIDTHS = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4}
 
 

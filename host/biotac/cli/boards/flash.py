@@ -18,6 +18,7 @@ from .. import ending, outputs, values
 from ..progress import Progress
 
 EXAMPLE = "biotac flash /dev/ttyACM0"
+STM32 = "an STM32 is written by stm32loader: firmware/boards/f405/README.md has its line"
 EMULATED = "emu:pico?source=press.toml"
 
 
@@ -26,11 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "port",
         metavar="PORT",
         nargs="?",
-        help="device path, uart:DEVICE?baud=N (an STM32) or emu:pico?source=SOURCE (default: the only board on USB)",
+        help="device path, or emu:pico?source=SOURCE (default: the only board on USB)",
     )
-    parser.add_argument(
-        "image", metavar="IMAGE", nargs="?", help="a .uf2 or .bin file (default: the one in this package)"
-    )
+    parser.add_argument("image", metavar="IMAGE", nargs="?", help="a .uf2 file (default: the one in this package)")
     parser.add_argument("--all", action="store_true", help="every connected board that runs another version")
     parser.add_argument("--emulated", action="store_true", help=f"rehearse it on an emulated board: {EMULATED}")
     parser.add_argument(
@@ -118,7 +117,7 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
 
 def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str | None, Path | None]:
     """PORT and IMAGE, both optional: a single word is the image by its ending, or if no PORT is allowed."""
-    if image is None and port is not None and (alone or port.lower().endswith((".uf2", ".bin"))):
+    if image is None and port is not None and (alone or port.lower().endswith(".uf2")):
         port, image = None, port
     if alone and port is not None:
         raise InputError(f"--emulated and --all choose the board, but PORT {port} is given; drop one of them")
@@ -133,9 +132,7 @@ def find_board(port: str | None) -> tuple[Target, list[Loader]]:
         emulated = EmulatedTarget(port)
         return emulated, [EmulatedLoader(emulated.board)]
     if port is not None and port.startswith("uart:"):
-        from ...flash.loader_stm32 import Stm32Loader, UartTarget
-
-        return UartTarget(port), [Stm32Loader(port.removeprefix("uart:").partition("?")[0])]
+        raise InputError(f"{port}: a board with no USB is not flashed from here; {STM32}")
     from ...flash.target_serial import SerialTarget, only_port
 
     loaders = usb_loaders()
