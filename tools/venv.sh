@@ -27,5 +27,5 @@ make_venv() {
     echo "installing the package into .venv"
     # Python compiles what it imports; of all that is installed here that is the smaller part.
     .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile ".${1:+[$1]}" \
-        ${1:+"./host/biotac-lab[bench]"}
+        ${1:+"./host/biotac-lab[bench]" ./host/biotac-rig}
 }

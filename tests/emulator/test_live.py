@@ -8,11 +8,12 @@ from contextlib import closing
 import numpy as np
 import pytest
 from live_board import until
-from two_picos import TwoPicos
 
 from biotac.hand.rounds import Round
-from biotac.sim import SimFinger, Touch, wired_world, world
+from biotac.sim import SimFinger, Touch, world
 from biotac.wire.sensor_gen import SLOTS
+from biotac_rig.two_picos import TwoPicos
+from biotac_rig.wired import wired_world
 
 FINGERS = {"index": SimFinger(1), "thumb": SimFinger(2, "worn")}
 SETTINGS = {"force_model": 0}

@@ -22,11 +22,11 @@ from biotac.errors import BiotacError
 from biotac.hand.opening import shake_hands
 from biotac.link import open_link
 from biotac.link.serial_port import SerialLink
-from biotac.sim.sensor_board import SensorBoard
 from biotac.sim.source import Source
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
 from biotac.wire.sensor_gen import MAX_SENSORS, SLOTS
+from biotac_rig.sensor_board import SensorBoard
 
 # Before the source: samples, so that the gateway has done with whatever was before; then all sensors are taken out, and
 # others come, of whom it knows nothing yet.

@@ -10,9 +10,9 @@ from rig import Rig, start
 
 import biotac
 from biotac.hand.opening import shake_hands
-from biotac.sim.emulated import EmulatedBoard
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
+from biotac_rig.emulated import EmulatedBoard
 
 BOOT_S = 10  # of the board's time, with the second that its watchdog takes
 

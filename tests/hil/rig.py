@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from two_picos import TwoPicos
 
 import biotac
 from bench import BenchPty, open_bench
@@ -21,6 +20,7 @@ from biotac.sim.loading import load_source
 from biotac.sim.ports import parse_sim, start_board
 from biotac.sim.process import SimBoard, SimLink
 from biotac.sim.source import Source
+from biotac_rig.two_picos import TwoPicos
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

@@ -1,6 +1,6 @@
 """Two boards of which only the serial ports are known, as a user's are: the suite and `biotac doctor` by command line.
 
-The boards are emulated Picos (tools/two_boards): what is shown is that nothing but the ports is needed.
+The boards are emulated Picos (biotac-rig two-boards): what is shown is that nothing but the ports is needed.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from rig import ROOT, all_rigs, require
 
 from bench import MID_COUNT, OTHERS_ROUNDS, SETTLED_ROUNDS, staged
 from biotac.cli.main import main
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
+from rig import ROOT, all_rigs, require
 
 Ports = tuple[str, str]
 SUITE = [
@@ -41,7 +41,7 @@ def boards() -> Iterator[Callable[..., Ports]]:
     running: list[subprocess.Popen[str]] = []
 
     def start(*leads: str) -> Ports:
-        command = [sys.executable, ROOT / "tools/two_boards", *leads]
+        command = [sys.executable, "-m", "biotac_rig", "two-boards", *leads]
         running.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
         assert running[-1].stdout is not None
         _, port, _, sensor_port = running[-1].stdout.readline().split()

@@ -22,9 +22,9 @@ from biotac import Calibration, Hand, Setting
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
 from biotac.flash import Image, Outcome, flash, read_backup, read_image
-from biotac.flash.emulated import EmulatedLoader, EmulatedTarget
 from biotac.flash.note import seal
 from biotac.wire import messages_gen as wire
+from biotac_rig.flashing import EmulatedLoader, EmulatedTarget
 
 BUILT = ROOT / "build/pico/biotac-pico.uf2"
 PAGE = 256

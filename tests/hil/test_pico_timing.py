@@ -7,9 +7,9 @@ from rig import Rig
 
 import biotac
 from biotac.hand.opening import shake_hands
-from biotac.sim.emulated import EmulatedBoard
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
+from biotac_rig.emulated import EmulatedBoard
 
 SECONDS = 3
 SLOT_US = 1e6 / 4400

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from rig import all_rigs, require
-from two_picos import TwoPicos
 
 import biotac
 from biotac.doctor import Facts, PairFacts, leads
@@ -18,6 +17,7 @@ from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
 from biotac.wire import messages_gen as wire
+from biotac_rig.two_picos import TwoPicos
 
 RIG = "two_picos"
 DAY_S, NIGHT_S = 1.0, 60.0

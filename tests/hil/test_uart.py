@@ -18,10 +18,10 @@ from biotac.doctor.listening import examine
 from biotac.errors import StreamTakenError
 from biotac.hand.opening import shake_hands
 from biotac.link.serial_port import SerialLink
-from biotac.sim.emulated import EmulatedBoard, new_pty
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode, open_frame
+from biotac_rig.emulated import EmulatedBoard, new_pty
 
 CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
 BAUD = 400_000  # FRAMEs of two fingers fit; with PAC they do not

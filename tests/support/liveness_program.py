@@ -79,7 +79,7 @@ def record(hand: biotac.Hand) -> None:
 
 
 def lsl(hand: biotac.Hand) -> None:
-    from biotac.bridges.lsl import Outlet
+    from biotac.extras.lsl import Outlet
 
     with Outlet(hand) as outlet:
         push, lsl_now = outlet._outlets[hand.fingers[0], ""].push_chunk, outlet._lsl.local_clock

@@ -18,10 +18,10 @@ import numpy as np
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.picture import picture
-from biotac.sim.emulated import EmulatedBoard
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import StructArray
+from biotac_rig.emulated import EmulatedBoard
 from committed import ROOT
 
 BITS_PER_S = 921_600

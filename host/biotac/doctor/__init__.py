@@ -6,9 +6,9 @@ finding's code is in ``catalogue``, which is host/docs/reference/doctor.md.
 
 from __future__ import annotations
 
-from . import channels, connection, leads, sensors, timing
+from . import channels, connection, sensors, timing
 from .catalogue import CATALOGUE, Finding
-from .facts import BoardFacts, Facts, PairFacts, SystemFacts
+from .facts import BoardFacts, Facts, SystemFacts
 
 
 def judge(facts: Facts) -> list[Finding]:
@@ -16,8 +16,12 @@ def judge(facts: Facts) -> list[Finding]:
     board = facts.board
     if board is None:
         return list(connection.check(facts))
-    of_board = *sensors.check(board, facts.expected_fingers), *timing.check(board, facts.pair), *channels.check(board)
-    return [*connection.check(facts), *leads.check(facts), *of_board]
+    of_board = (
+        *sensors.check(board, facts.expected_fingers),
+        *timing.check(board, fed=facts.pair is not None),
+        *channels.check(board),
+    )
+    return [*connection.check(facts), *facts.leads, *of_board]
 
 
-__all__ = ["CATALOGUE", "BoardFacts", "Facts", "Finding", "PairFacts", "SystemFacts", "judge"]
+__all__ = ["CATALOGUE", "BoardFacts", "Facts", "Finding", "SystemFacts", "judge"]

@@ -21,9 +21,9 @@ from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import FRAME_DTYPE, StructArray
 from ..wire.framing import encode
+from ..wire.identity import ascii_text
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
-from .leads import crossed
 from .listening import has_crystal, listen
 
 FLASH = {"ef4015": "W25Q16JV", "ef7015": "W25Q16JV-IM"}  # of a Raspberry Pi Pico
@@ -328,3 +328,12 @@ def _finger(seen: Bringup, finger: int) -> Iterator[Finding]:
     drift = pdc_per_c(seen.rows_of(finger))
     if abs(drift) > PDC_PER_C:
         yield Finding("pdc_warm", f"finger {finger}: {drift:+.0f} counts a degree; expected up to {PDC_PER_C:.0f}")
+
+
+def crossed(board: BoardFacts, serials: tuple[str, ...]) -> Iterator[Finding]:
+    """Of sensors whose serial numbers by finger are known: those that answer at another's select."""
+    for info in board.sensors:
+        serial = ascii_text(info.serial)
+        if serial in serials and serial != serials[info.finger]:
+            ends = serials.index(serial)
+            yield Finding("lead_crossed", f"the select of finger {info.finger} ends at the sensor of finger {ends}")

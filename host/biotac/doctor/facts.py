@@ -14,6 +14,7 @@ from ..link.holders import Holder
 from ..wire import messages_gen as wire
 from ..wire.batches import LinkStats
 from ..wire.frames import StructArray
+from .catalogue import Finding
 
 
 @dataclass(frozen=True)
@@ -69,23 +70,11 @@ class BoardFacts:
 
 
 @dataclass(frozen=True)
-class PairFacts:
-    """What the sensor board at the other end of the leads heard meanwhile; all five of its sensors are plugged in."""
-
-    before: wire.EmuStatus
-    after: wire.EmuStatus
-    serials: tuple[str, ...]  #: by finger, as they were plugged in
-
-    def more(self, counter: str) -> int:
-        """Increase of one of the sensor board's 32-bit counters."""
-        return grown(self.before, self.after, counter)
-
-
-@dataclass(frozen=True)
 class Facts:
     port: str | None  #: None: there is nothing to open
     system: SystemFacts = field(default_factory=SystemFacts)
     error: BiotacError | None = None  #: why the port could not be opened, or was lost
     board: BoardFacts | None = None  #: None when it could not be examined
     expected_fingers: int | None = None
-    pair: PairFacts | None = None  #: set if the sensors are a sensor board of ours
+    pair: object | None = None  #: what a sensor board at the other end of the leads heard meanwhile (biotac-rig)
+    leads: tuple[Finding, ...] = ()  #: and what is wrong with those

@@ -12,7 +12,7 @@ from ..hand.views import DEFAULT_NAMES
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from .catalogue import Finding
-from .facts import BoardFacts, PairFacts, grown
+from .facts import BoardFacts, grown
 
 #: A crystal stays within 100 ppm over age and temperature.
 CRYSTAL_PPM = 100.0
@@ -21,8 +21,11 @@ RP2040, REVISION_B2 = 0x0002927, 2  # SYSINFO_CHIP_ID, data sheet 2.20
 RATE_SHARE = 0.01
 
 
-def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
-    """An early chip, restarts, latched faults, late slots, losses on either side, slot rate, clock drift."""
+def check(board: BoardFacts, *, fed: bool = False) -> Iterator[Finding]:
+    """An early chip, restarts, latched faults, late slots, losses on either side, slot rate, clock drift.
+
+    ``fed``: its sensors are a sensor board's.
+    """
     chip_id = board.chip.chip_id if board.chip is not None else 0
     if chip_id & 0x0FFFFFFF == RP2040 and chip_id >> 28 < REVISION_B2:
         yield Finding("chip_old", f"chip id 0x{chip_id:08X}; from B2 on its first digit is 2")
@@ -30,7 +33,7 @@ def check(board: BoardFacts, pair: PairFacts | None) -> Iterator[Finding]:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters restarted and tell nothing
     earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # set on every board
-    if pair is not None:  # a sensor board is silent until it has a tape
+    if fed:  # a sensor board is silent until it has a tape
         earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)
     if faults := faults_of(earlier, DEFAULT_NAMES):
         yield Finding("faults_latched", str(faults).replace("\n", "; "))

@@ -13,9 +13,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import InputError
-from ..foreign.bag import is_ros1, opened
 from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
+from .bags import is_ros1, opened
 from .columns import Show, Table
 
 KINDS_APART = False

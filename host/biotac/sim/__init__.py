@@ -26,7 +26,7 @@ from .scenario import FLAT_MM
 from .source import Source, Truth
 from .timeline import Pose, Track
 from .touch import Course, Load, Touch
-from .world import LockStep, World, wired_world, world
+from .world import LockStep, World, world
 
 SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 
@@ -34,5 +34,5 @@ __all__ = [
     "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Finger", "Footprints",
     "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track",
     "Truth", "World", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source", "plate_recording",
-    "random_loads", "resistance_at", "resistance_share", "sample", "tdc_counts", "wired_world", "world",
+    "random_loads", "resistance_at", "resistance_share", "sample", "tdc_counts", "world",
 ]  # fmt: skip

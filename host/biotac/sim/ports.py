@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
+from .. import extra
 from ..errors import PortError
 from ..link.port_text import options_of, parse_pace
-from .emulated import EmulatedBoard
 from .loading import load_source
 from .process import SimBoard, SimLink
 from .source import Source
@@ -68,4 +68,5 @@ def start_board(
     """
     if board == "posix":
         return SimBoard(source, pace=pace, hold=True, live=live)
-    return EmulatedBoard(board, source, pace=pace, hold=True, live=live, image=image, verbs=verbs)
+    how: dict[str, Any] = {"pace": pace, "hold": True, "live": live, "image": image, "verbs": verbs}
+    return extra.rig(f"a {board} in an emulator", lambda rig: cast(SimBoard, rig.EmulatedBoard(board, source, **how)))

@@ -23,7 +23,7 @@ from ..errors import DeviceLostError, PortError
 from ..link.base import PATIENCE
 from ..link.serial_port import SerialLink
 from ..wire.native import BUILT
-from .sensor_board import SensorBoard
+from .feed import SensorFeed
 from .source import Source
 from .tape import write_tape
 
@@ -42,7 +42,7 @@ class SimBoard:
         """
         self.source = source
         self.pace = pace
-        self.sensors: SensorBoard | None = None
+        self.sensors: SensorFeed | None = None
         self.over = False  # the tape has been played, and everything handed over
         self._received = b""
         self._answers: list[str] = []
@@ -67,7 +67,7 @@ class SimBoard:
             raise
         try:
             if live:
-                self.sensors = SensorBoard(_Loopback(self._announced("control")))
+                self.sensors = SensorFeed(_Loopback(self._announced("control")))
                 self.sensors.listen()
                 self.sensors.put(source.samples)  # an emulated board samples as it boots
             self.path = self._announced("pty", "socket")

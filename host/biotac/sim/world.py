@@ -23,17 +23,15 @@ from typing import Any, TypeVar
 
 from ..errors import DeviceLostError, InputError
 from ..hand.hand import Hand
-from ..hand.opening import open as open_hand
 from ..hand.opening import shake_hands
 from ..hand.rounds import FingerRound, Round, Rounds
-from ..link import open_link
 from ..wire.messages_gen import Setting
 from ..wire.slots import FRAME_HZ
+from .feed import SensorFeed
 from .live import LiveFingers, LiveLink
 from .physics import Finger
 from .ports import start_board
 from .process import SimBoard
-from .sensor_board import SensorBoard
 from .touch import Load
 
 PATIENCE_S = 60.0
@@ -54,7 +52,7 @@ class World:
     A load acts some rounds after its step. Where a program is late the sensors feel the round before once more.
     """
 
-    def __init__(self, fingers: LiveFingers, sensors: SensorBoard, hand: Hand | None, closes: ExitStack) -> None:
+    def __init__(self, fingers: LiveFingers, sensors: SensorFeed, hand: Hand | None, closes: ExitStack) -> None:
         #: The ordinary Hand, streaming; None when another program has the board's port.
         self.hand: Hand = hand  # type: ignore[assignment]
         self.sensors = sensors
@@ -293,32 +291,6 @@ def world(
         made._settle()
         made._closes = closes.pop_all()
     return made
-
-
-def wired_world(
-    fingers: Mapping[str, Finger],
-    *,
-    port: str,
-    sensor_port: str,
-    ahead: int = AHEAD_ROUNDS,
-    streams: Sequence[str] = STREAMS,
-) -> World:
-    """Load simulated fingers through the sensor board at ``sensor_port``, and read them at the gateway's ``port``.
-
-    The program is ``ahead`` rounds ahead of the gateway, 1 to 40. Raises PortError and InputError.
-    """
-    if not 1 <= ahead <= ROOM_ROUNDS:
-        raise InputError(f"ahead is {ahead}, expected 1 to {ROOM_ROUNDS} rounds")
-    feed = LiveFingers(fingers)
-    with ExitStack() as closes:
-        sensors = SensorBoard(open_link(sensor_port))
-        closes.callback(sensors.close)
-        hand = closes.enter_context(open_hand(port, fingers=feed.names))
-        sensors.plug(feed.at_rest(ahead))
-        sensors.play(by_time=True, live=True)
-        sensors.feed()
-        hand.stream(*streams)
-        return World(feed, sensors, hand, closes.pop_all())
 
 
 def _as_one(rounds: Sequence[Round]) -> Round:

@@ -30,8 +30,7 @@ from biotac.wire.framing import encode
 NO_PORT = "/dev/ttyNOWHERE7"
 PORTS = (
     "a device path, serial:NUMBER, uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, "
-    "sim:SOURCE, emu:pico, replay:REC, bag:FILE, csv:FILE, "
-    "foxglove://HOST:PORT/TOPIC or zenoh:NAME"
+    "sim:SOURCE, replay:REC; or bag:, btd:, csv:, "
 )
 #: Verbs with no BiotacError of their own, and why.
 NEVER = {

@@ -303,7 +303,7 @@ def test_dask_writes_and_reads_ten_thousand(sources, tmp_path) -> None:
         distributed.Client(cluster) as client,
     ):
         results = client.gather(client.map(partition, made, folder=out, pure=False))
-        assert sum(result.rows for result in results) == rows_of(out, "frames") + rows_of(out, "pac")
+        assert sum(result.rows for result in results) == sum(rows_of(out, kind) for kind in ("frames", "pac", "bands"))
         frames = dd.read_parquet(out / "frames", columns=["recording", "finger", "force_z_n"])
         largest = frames["force_z_n"].max().compute()
         assert len(frames) == 10_000 * len(biotac.Recording(sources[0]).frames)

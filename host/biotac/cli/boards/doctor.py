@@ -7,28 +7,23 @@ import json
 import platform
 import sys
 import textwrap
-from contextlib import closing
-from dataclasses import asdict, is_dataclass, replace
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from ...doctor import CATALOGUE, BoardFacts, Facts, Finding, PairFacts, bringup_report, judge, udev
+from ... import extra
+from ...doctor import CATALOGUE, BoardFacts, Facts, Finding, bringup_report, judge, udev
 from ...doctor.bringup import Bringup, check, measure
 from ...doctor.listening import examine, has_crystal
 from ...doctor.timing import slots_per_s
 from ...hand.hand import Hand
-from ...link import open_link
 from ...link.port_text import file_of
 from ...partial_file import refuse_source, whole
-from ...sim.loading import load_source
-from ...sim.sensor_board import SensorBoard
 from ...version import __version__
-from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
 from ..outputs import report, step
 
 EXAMPLE = "biotac doctor --fingers 5"
-PLAYED, PLAYED_S = "press.toml", 60.0
 PRESS_S, PLAYED_PRESS_S = 20.0, 8.0
 CODES = f"""
 Exit code 0: healthy; 1: there are findings. Their codes are fixed:
@@ -39,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
-    parser.add_argument("--sensor-port", metavar="SENSOR", help="port of a sensor board that is wired to PORT")
+    parser.add_argument("--sensor-port", metavar="SENSOR", help="of a sensor board wired to PORT, with biotac-rig")
     parser.add_argument(
         "--report",
         metavar="FILE",
@@ -76,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     if args.sensor_port is None:
         facts = examine(args.port, expected_fingers=args.fingers, **how)
     else:
-        facts = examine_pair(args.port, args.sensor_port, **how)
+        facts = extra.rig("--sensor-port", lambda rig: rig.examine_pair(args.port, args.sensor_port, **how))
     findings = judge(facts)
     if args.bringup:
         findings += check(seen, facts)
@@ -95,15 +90,6 @@ def udev_rule(args: argparse.Namespace) -> int:
         text = f"wrote {udev.RULES}; now run sudo udevadm control --reload, and plug the board in again"
     report(args, {"path": str(udev.RULES), "installed": installed, "rule": udev.rule()}, text)
     return 0
-
-
-def examine_pair(port: str | None, sensor_port: str, **how: Any) -> Facts:
-    """Facts about a gateway whose sensors are a sensor board of ours, which plays to it meanwhile."""
-    with closing(SensorBoard(open_link(sensor_port))) as sensors:
-        sensors.plug(load_source(PLAYED, fingers=MAX_SENSORS, seconds=PLAYED_S))
-        with sensors.feeding() as before:
-            facts = examine(port, expected_fingers=MAX_SENSORS, **how)
-        return replace(facts, pair=PairFacts(before, sensors.status(), sensors.serials))
 
 
 def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from ... import extra
 from ...errors import FlashError, InputError, PortError
 from ...flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
 from ...flash.image import find_image, note_text
@@ -127,10 +128,8 @@ def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str |
 def find_board(port: str | None) -> tuple[Target, list[Loader]]:
     """The board, and the ways to reach its boot loader."""
     if port is not None and port.startswith(("emu:", "sim:")):
-        from ...flash.emulated import EmulatedLoader, EmulatedTarget
-
-        emulated = EmulatedTarget(port)
-        return emulated, [EmulatedLoader(emulated.board)]
+        target, loader = extra.rig(port, lambda rig: rig.flash_target(port))
+        return target, [loader]
     if port is not None and port.startswith("uart:"):
         raise InputError(f"{port}: a board with no USB is not flashed from here; {STM32}")
     from ...flash.target_serial import SerialTarget, only_port

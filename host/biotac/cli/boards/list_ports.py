@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import closing, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from serial.tools.list_ports_common import ListPortInfo
 
+from ... import extra
 from ...errors import BiotacError, printable
 from ...hand.hand import Hand
 from ...link import open_link
@@ -88,11 +89,7 @@ def _command_line(process: Path) -> list[str]:
 
 
 def _shared(endpoint: str | None) -> list[dict[str, Any]]:
-    """What those who share boards report about them."""
-    from ...fleet import network  # here, because most calls list this computer only
-
-    with closing(network.open_session("biotac list", connect=endpoint)) as session:
-        return [{"port": f"zenoh:{facts['name']}", **facts} for facts in network.shared(session)]
+    return extra.call(extra.BRIDGES, "zenoh", lambda bridge: list(bridge.listed(endpoint)))
 
 
 def describe(port: ListPortInfo, *, ask: bool) -> dict[str, Any]:

@@ -6,11 +6,13 @@ import argparse
 import time
 from pathlib import Path
 
+from ... import extra
 from ...documents import write_new
 from ...errors import InputError
 from ...hand.opening import shake_hands
 from ...link import open_link
 from ...recording.replay.playback import Playback
+from ...sim.faults import fault_named
 from ...sim.live import LiveFingers
 from ...sim.load_server import LoadServer
 from ...sim.loading import bundled_scenario, load_source
@@ -21,12 +23,12 @@ from ...sim.process import SimBoard
 from .. import values
 from ..outputs import report
 from ..recordings.loading import load
-from . import sensor_board
 from .board_on_pty import announce, announce_end, until_ctrl_c
 
 LOOK_S = 0.5
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
 SCENARIO_S = 600.0
+NO_FAULT = "none"  # ends the one that a sensor board has
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,7 +66,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
     parser.add_argument("--new", metavar="FILE", type=Path, help="only write a scenario with every verb, and comments")
     parser.add_argument("--force", action="store_true", help="with --new: overwrite FILE")
-    sensor_board.add_arguments(parser)
+    add_sensor_board(parser)
+
+
+def add_sensor_board(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "as the sensors of a gateway, by a second Pico (firmware/sensor_board; needs biotac-rig)"
+    )
+    group.add_argument("--sensor-port", metavar="PORT", help="of the sensor board, which plays SOURCE or its last tape")
+    group.add_argument(
+        "--by-time",
+        action="store_true",
+        help="keep the tape to the board's clock: where the gateway's differs, rounds are skipped or repeated",
+    )
+    kept = group.add_mutually_exclusive_group()
+    kept.add_argument(
+        "--keep",
+        action="store_true",
+        help="keep SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, over and over",
+    )
+    kept.add_argument("--forget", action="store_true", help="erase what --keep has stored")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -77,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     seconds = args.seconds or (SCENARIO_S if (args.source or "").endswith(".toml") else None)
     if args.sensor_port is not None:
         values.refuse(args, ("board", "image", "pace", "link"), "is for a board on a pty; drop it, or --sensor-port")
-        return sensor_board.run(args, seconds)
+        return extra.rig("--sensor-port", lambda rig: int(rig.play(args, seconds)))
     values.refuse(args, ("by_time", "keep", "forget"), "is for a sensor board; add --sensor-port PORT")
     if args.live is not None:
         if args.source is not None:
@@ -97,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--image needs a board that has a flash image; add --board pico")
     name = args.source.removeprefix("sim:")
     source = load_source(name, fingers=args.fingers, seconds=seconds)
-    for finger, kind, channel in map(sensor_board.fault_of, args.fault):
+    for finger, kind, channel in map(fault_of, args.fault):
         source = with_fault(source, finger, kind, channel)
     board = start_board(args.board or "posix", source, pace=args.pace or 1.0, image=args.image)
     with until_ctrl_c(board, args.link):
@@ -148,3 +169,14 @@ def prepare(board: SimBoard) -> None:
     link.source = board.source
     shake_hands(link).close()
     board.release()
+
+
+def fault_of(text: str) -> tuple[int, str, str | None]:
+    """Finger, fault and channel of a text such as ``2=stuck_low`` or ``0=electrode stuck@E13``."""
+    finger, _, kind = text.partition("=")
+    kind, _, channel = kind.partition("@")
+    if not finger.isdigit() or not kind:
+        raise InputError(f"--fault {text}: expected FINGER=KIND or FINGER=KIND@CHANNEL, as in 1=stuck@E13")
+    if kind != NO_FAULT:
+        fault_named(kind, channel or None)
+    return int(finger), kind, channel or None

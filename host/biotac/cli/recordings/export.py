@@ -13,11 +13,11 @@ from ...documents import read_json
 from ...errors import InputError, printable
 from ...export import FORMATS, export
 from ...export.formats import writer_for
-from ...foreign.btd import Btd
-from ...foreign.link import MessagesLink
 from ...hand.opening import shake_hands
+from ...link import open_link
 from ...link.port_text import how_to_record
 from ...partial_file import whole
+from ...recording.btd.file import read_btd
 from ...recording.layout import finger_of
 from ...recording.reader import Recording
 from ...recording.recompute import recompute
@@ -150,13 +150,13 @@ def _recording_at(out: Path, source: Path, force: bool, written: list[Path]) -> 
 
 def import_btd(path: Path, out: Path) -> dict[str, Any]:
     """Record what the board's own code makes of a .btd's counts; the numbers of fingers, frames and incomplete ones."""
-    source = Btd(path)
-    with shake_hands(MessagesLink(f"btd:{path.name}", source)) as hand, hand.record(out) as recorder:
+    skipped = read_btd(path).skipped
+    with shake_hands(open_link(f"btd:{path}")) as hand, hand.record(out) as recorder:
         hand.stream("results", "events")
         for _ in hand.batches():
             pass
         recorder.close()
-        counts = {"fingers": len(hand.fingers), "frames": recorder.frames, "skipped": source.read.skipped}
+        counts = {"fingers": len(hand.fingers), "frames": recorder.frames, "skipped": skipped}
         return counts | {"notes": list(hand.link.notes)}
 
 

@@ -16,8 +16,8 @@ from std_msgs.msg import Float64MultiArray, String, UInt8, UInt32
 from std_srvs.srv import Trigger
 
 import biotac
-from biotac.bridges.silence import LOOK_S, Silence
 from biotac.clock.stamps import Stamps
+from biotac.hand.silence import LOOK_S, Silence
 from biotac.recording.layout import frame_id
 
 #: Reliable, so that every subscriber's quality of service fits; half a second of rounds.

@@ -1,0 +1,19 @@
+"""What the gateway's own commands ask of the rig, by the entry point ``biotac.rig``."""
+
+from __future__ import annotations
+
+from biotac.flash.interfaces import Loader, Target
+from biotac.sim.ports import open_sim
+
+from .emulated import EmulatedBoard
+from .flashing import EmulatedLoader, EmulatedTarget
+from .leads import examine_pair
+from .playing import run as play
+
+__all__ = ["EmulatedBoard", "examine_pair", "flash_target", "open_sim", "play"]
+
+
+def flash_target(port: str) -> tuple[Target, Loader]:
+    """An emulated board and its loader, of a PORT ``emu:BOARD?source=SOURCE``."""
+    target = EmulatedTarget(port)
+    return target, EmulatedLoader(target.board)

@@ -1,1 +1,0 @@
-"""Bridges that pass live streams on to other systems."""
