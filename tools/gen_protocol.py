@@ -22,6 +22,7 @@ from protogen import (
     c_sums,
     c_wire,
     docs,
+    emu,
     python_code,
     schema,
     touch,
@@ -31,6 +32,7 @@ from protogen import (
 def outputs(root: Path) -> dict[Path, str]:
     """Every generated path, with the text it must have."""
     contract = schema.load(root / "protocol")
+    sensors = emu.load(root / "protocol", contract)
     verdicts = touch.load(root)
     return {
         root / "firmware/core/wire/sensor_gen.h": c_sensor.header(contract),
@@ -52,6 +54,9 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "host/biotac/wire/messages_gen.py": python_code.wire(contract),
         root / "host/biotac/wire/dtypes_gen.py": python_code.dtypes(contract),
         root / "host/biotac/wire/map_gen.py": python_code.wrench_map(contract),
+        root / "firmware/emu/emu_gen.h": emu.header(sensors),
+        root / "firmware/emu/emu_gen.c": emu.source(sensors),
+        root / "host/biotac/sim/emu_gen.py": emu.python(sensors),
         root / "protocol/MESSAGES.md": docs.messages(contract),
         root / docs.CONTROLLER: docs.controller(root, contract),
         root / "protocol/schema.json": schema.canonical(contract, with_docs=True),

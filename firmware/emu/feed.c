@@ -15,10 +15,10 @@ static union {
     bt_msg_emu_play play;
 } got;
 
-static void send_message(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
+static void send_message(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload, size_t bytes)
 {
     uint8_t frame[BT_ENCODED_MAX_BYTES];
-    feed->send(frame, bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
+    feed->send(frame, bt_frame_encode(id, payload, bytes, frame));
 }
 
 static void send_hello(const bt_emu_feed *feed)
@@ -31,7 +31,7 @@ static void send_hello(const bt_emu_feed *feed)
     hello.wire_minor = BT_WIRE_MINOR;
     hello.schema_hash = BT_SCHEMA_HASH;
     bt_msg_hello_pack(&hello, payload);
-    send_message(feed, BT_HELLO_ID, payload);
+    send_message(feed, BT_HELLO_ID, payload, sizeof payload);
 }
 
 static void send_status(const bt_emu_feed *feed, uint8_t req_id)
@@ -54,7 +54,7 @@ static void send_status(const bt_emu_feed *feed, uint8_t req_id)
         feed->fill(&status);
     }
     bt_msg_emu_status_pack(&status, payload);
-    send_message(feed, BT_EMU_STATUS_ID, payload);
+    send_message(feed, BT_EMU_STATUS_ID, payload, sizeof payload);
 }
 
 // The status says what was not taken.
@@ -122,7 +122,7 @@ static void answer(bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
     }
     uint8_t reply[BT_REPLY_BYTES];
     bt_msg_reply_pack(&(bt_msg_reply){req_id, id, error}, reply);
-    send_message(feed, BT_REPLY_ID, reply);
+    send_message(feed, BT_REPLY_ID, reply, sizeof reply);
 }
 
 void bt_emu_feed_begin(bt_emu_feed *feed)
@@ -131,11 +131,18 @@ void bt_emu_feed_begin(bt_emu_feed *feed)
     bt_deframer_reset(&feed->deframer);
 }
 
+// Of a message of link.toml the deframer has seen to that.
+static bool has_its_length(const bt_deframer *deframer)
+{
+    const int bytes = bt_emu_payload_bytes(deframer->id);
+    return bytes < 0 || bytes == deframer->payload_bytes;
+}
+
 void bt_emu_feed_receive(bt_emu_feed *feed, const uint8_t *bytes, size_t n)
 {
     for (size_t k = 0; k < n; k++) {
         if (bt_deframer_push(&feed->deframer, bytes[k]) == BT_DEFRAMED_GOOD
-            && feed->deframer.payload_bytes > 0) {
+            && feed->deframer.payload_bytes > 0 && has_its_length(&feed->deframer)) {
             answer(feed, feed->deframer.id, feed->deframer.buffer + 1);
         }
     }

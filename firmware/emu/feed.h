@@ -1,5 +1,5 @@
 // A board of emulated sensors as its host sees it, whatever carries the bytes: EMU commands fill a stream and
-// spoil it, and HELLO says who answers (protocol/MESSAGES.md).
+// spoil it, and HELLO says who answers (protocol/emu.toml).
 #ifndef BIOTAC_EMU_FEED_H
 #define BIOTAC_EMU_FEED_H
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 from kept_board import kept_board
-from rig import all_rigs, require
 
 import biotac
 from biotac import Calibration, PocWeights
@@ -19,6 +18,7 @@ from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
 from biotac.wire import messages_gen as wire
+from rig import all_rigs, require
 
 BOARDS = {name: rig for name, rig in all_rigs().items() if "qemu_gateway" in rig.get("command", "")}
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from deframer import Deframer
 
+from biotac.sim import emu_gen as emu
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
@@ -39,8 +40,8 @@ def run(
     image: Path, folder: Path, samples: list[int], course: list[dict[str, Any]], *, then: bytes = b""
 ) -> dict[str, Any]:
     """``then``: what the host says behind the tape."""
-    sent = encode(wire.EmuPlug.ID, wire.EmuPlug(1, 0, 1, (0,) * 16).pack())
-    sent += encode(wire.EmuTape.ID, wire.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
+    sent = encode(emu.EmuPlug.ID, emu.EmuPlug(1, 0, 1, (0,) * 16).pack())
+    sent += encode(emu.EmuTape.ID, emu.EmuTape(2, 1, len(samples), 0, padded(samples)).pack())
     (folder / "said").write_bytes(sent + then)
     (folder / "course").write_text(json.dumps(course))
     words = ["node", Path(__file__).with_name("other_driver.mjs"), image, folder / "said", folder / "course"]
@@ -82,7 +83,7 @@ KEPT = [int(count) for count in np.random.default_rng(20).integers(0, 4096, ROUN
 
 
 def keep(slots: int, crc32: int) -> bytes:
-    return encode(wire.EmuKeep.ID, wire.EmuKeep(3, slots, crc32).pack())
+    return encode(emu.EmuKeep.ID, emu.EmuKeep(3, slots, crc32).pack())
 
 
 def digest(samples: list[int]) -> int:
@@ -90,13 +91,14 @@ def digest(samples: list[int]) -> int:
 
 
 def answers(answer: dict[str, Any]) -> list[Any]:
-    return [wire.MESSAGES[kind].unpack(payload) for kind, payload in Deframer().feed(bytes.fromhex(answer["said"]))]
+    known = {**wire.MESSAGES, **emu.MESSAGES}
+    return [known[kind].unpack(payload) for kind, payload in Deframer().feed(bytes.fromhex(answer["said"]))]
 
 
 def test_a_tape_that_is_kept_is_played_over_and_over_from_power_up_on(image: Path, tmp_path: Path) -> None:
     course = [{"power": True}] + [step for slot in range(3 * ROUND) for step in reading(slot)]
     answer = run(image, tmp_path, KEPT, course, then=keep(ROUND, digest(KEPT)))
-    assert isinstance(answers(answer)[-1], wire.EmuStatus)
+    assert isinstance(answers(answer)[-1], emu.EmuStatus)
     assert answer["words"][1::2] == 3 * [word_of(count) for count in KEPT]
 
 
@@ -109,9 +111,9 @@ def test_what_is_not_whole_is_not_kept_and_what_was_is_forgotten_when_told_so(im
     ]
     then = b"".join(keep(slots, crc32) for slots, crc32 in [*not_these, (ROUND, digest(KEPT)), (0, 0)])
     answer = run(image, tmp_path, KEPT, [{"power": True}, *reading(0)], then=then)
-    refused = wire.Reply(3, wire.EmuKeep.ID, wire.Error.NOT_WHOLE)
+    refused = wire.Reply(3, emu.EmuKeep.ID, wire.Error.NOT_WHOLE)
     assert answers(answer)[-6:-2] == [refused] * 4
-    assert all(isinstance(status, wire.EmuStatus) for status in answers(answer)[-2:])
+    assert all(isinstance(status, emu.EmuStatus) for status in answers(answer)[-2:])
     assert answer["words"][1] == 0x0000  # nothing is played
 
 
@@ -119,10 +121,10 @@ def test_a_hostile_tape_is_refused_or_left_and_what_there_was_is_played(image: P
     nobody, six, empty, too_long = (0, 1, ROUND), (6, 1, ROUND), (1, 0, ROUND), (5, 23, ROUND)
     other_fingers, again, a_gap = (2, 1, ROUND), (1, 1, 3), (1, 1, 99)
     tapes = (nobody, six, empty, too_long, other_fingers, again, a_gap)
-    then = b"".join(encode(wire.EmuTape.ID, wire.EmuTape(7, *facts, (0,) * 220).pack()) for facts in tapes)
+    then = b"".join(encode(emu.EmuTape.ID, emu.EmuTape(7, *facts, (0,) * 220).pack()) for facts in tapes)
     answer = run(image, tmp_path, KEPT, [step for slot in range(ROUND + 1) for step in reading(slot)], then=then)
     refused, left = answers(answer)[-7:-3], answers(answer)[-3:]
-    assert refused == [wire.Reply(7, wire.EmuTape.ID, wire.Error.OUT_OF_RANGE)] * 4
+    assert refused == [wire.Reply(7, emu.EmuTape.ID, wire.Error.OUT_OF_RANGE)] * 4
     assert [status.slots_taken for status in left] == [ROUND] * 3
     # Behind the last slot, as where a host was killed in the middle, a sensor is silent.
     assert answer["words"][1::2] == [*(word_of(count) for count in KEPT), 0x0000]
@@ -131,10 +133,10 @@ def test_a_hostile_tape_is_refused_or_left_and_what_there_was_is_played(image: P
 def test_by_time_a_bus_of_half_the_speed_gets_every_other_round(image: Path, tmp_path: Path) -> None:
     tape = [int(count) for count in np.random.default_rng(21).integers(0, 4096, 4 * ROUND)]
     more = [
-        encode(wire.EmuTape.ID, wire.EmuTape(8, 1, ROUND, at, padded(tape[at : at + ROUND])).pack())
+        encode(emu.EmuTape.ID, emu.EmuTape(8, 1, ROUND, at, padded(tape[at : at + ROUND])).pack())
         for at in range(ROUND, len(tape), ROUND)
     ]
-    by_time = encode(wire.EmuPlay.ID, wire.EmuPlay(9, 2**32 - 1, 1, 0).pack())
+    by_time = encode(emu.EmuPlay.ID, emu.EmuPlay(9, 2**32 - 1, 1, 0).pack())
     course = [step for slot in range(2 * ROUND) for step in reading(slot)]
     for listen in course[1::2]:
         listen["wait_us"] = 2e6 / sensor.SLOT_HZ - SETTLE_US  # and the words themselves

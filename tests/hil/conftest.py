@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from rig import Rig, all_rigs, in_ci, prepare
 
 import biotac
+from rig import Rig, all_rigs, in_ci, prepare
 
 RIGS = all_rigs()
 READY: dict[str, str | None] = {}

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from kept_board import kept_board
-from rig import Rig, start
 
 import biotac
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
 from biotac_rig.emulated import EmulatedBoard
+from rig import Rig, start
 
 BOOT_S = 10  # of the board's time, with the second that its watchdog takes
 

@@ -15,8 +15,8 @@ import pytest
 
 from bench import MID_COUNT, OTHERS_ROUNDS, SETTLED_ROUNDS, staged
 from biotac.cli.main import main
+from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
-from biotac.wire import messages_gen as wire
 from rig import ROOT, all_rigs, require
 
 Ports = tuple[str, str]
@@ -79,8 +79,8 @@ def test_a_source_is_staged_behind_samples_and_a_change_of_sensors() -> None:
     on_bench = staged(source)
     before = SETTLED_ROUNDS + OTHERS_ROUNDS
     assert (on_bench.samples[:SETTLED_ROUNDS] == MID_COUNT).all()
-    assert (on_bench.samples[SETTLED_ROUNDS] == wire.EmuFault.SWAPPED).all()
+    assert (on_bench.samples[SETTLED_ROUNDS] == emu.EmuFault.SWAPPED).all()
     assert (on_bench.samples[before:, :2] == source.samples).all()
-    assert (on_bench.samples[before:, 2:] == wire.EmuFault.UNPLUGGED).all()
+    assert (on_bench.samples[before:, 2:] == emu.EmuFault.UNPLUGGED).all()
     assert len({*on_bench.serials, *staged(source).serials}) == 10  # nobody is known from before
     assert all(len(serial) == 16 for serial in on_bench.serials)

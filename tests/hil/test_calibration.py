@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kept_board import serial_of
-from rig import Rig
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights
 from biotac.errors import CommandRefusedError
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.reader import Recording
+from rig import Rig
 
 OWN = Calibration(
     PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310, 9_500_000

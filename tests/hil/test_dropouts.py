@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from held_press import fault, held_press, of_finger
-from rig import Rig
 
 import biotac
 from biotac import Calibration, CalibrationState, FrameFlags, PocWeights
 from biotac.wire import messages_gen as wire
+from rig import Rig
 
 pytestmark = pytest.mark.long
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 from held_press import fault, held_press, of_finger
-from rig import ROOT, Rig
 
 import biotac
 from biotac import FrameFlags
 from biotac.documents import tomllib
+from biotac.sim.emu_gen import EmuFault
 from biotac.sim.loading import load_source
 from biotac.sim.source import Source
 from biotac.wire import messages_gen as wire
-from biotac.wire.messages_gen import EmuFault
 from biotac.wire.slots import ELECTRODE_SLOT
+from rig import ROOT, Rig
 
 ROWS = [row for row in tomllib.loads((ROOT / "tests/faults/matrix.toml").read_text())["row"] if "play" in row]
 HEALTHY = held_press(2, rest_s=0.5)

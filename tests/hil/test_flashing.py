@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 from fake_flash_board import uf2
 from maps import BIG, make_map
-from rig import ROOT, Rig
 
 from biotac import Calibration, Hand, Setting
 from biotac.cli.main import main
@@ -25,6 +24,7 @@ from biotac.flash import Image, Outcome, flash, read_backup, read_image
 from biotac.flash.note import seal
 from biotac.wire import messages_gen as wire
 from biotac_rig.flashing import EmulatedLoader, EmulatedTarget
+from rig import ROOT, Rig
 
 BUILT = ROOT / "build/pico/biotac-pico.uf2"
 PAGE = 256

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from capture import Capture
-from rig import Rig
 
 import biotac
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
+from rig import Rig
 
 # What a test of silicon would not forgive, and the emulator counts.
 BREACHES = ("toggle_errors", "available_not_last")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from kept_board import serial_of
 from maps import BIG, make_map
-from rig import NO_MAPS, Rig
 from test_calibration import reboot
 
 import biotac
@@ -22,6 +21,7 @@ from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.reader import Recording
 from biotac.wire import messages_gen as wire
 from biotac.wire.identity import board_name
+from rig import NO_MAPS, Rig
 
 SECTOR = 4096
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rig import Rig
 
 import biotac
 from biotac import FaultFlags, Setting
 from biotac.wire import messages_gen as wire
+from rig import Rig
 
 ROOT = Path(__file__).resolve().parents[2]
 XIP = 0x10000000  # where the flash begins for the program

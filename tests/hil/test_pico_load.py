@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from held_press import held_press, of_finger
 from maps import BIG, make_map
-from rig import Rig
 
 import biotac
 from biotac import FaultFlags, FrameFlags
 from biotac.wire.messages_gen import INVALID_COUNT
 from biotac.wire.sensor_gen import SLOT_HZ
+from rig import Rig
 
 FINGERS = 5
 SECONDS = 2

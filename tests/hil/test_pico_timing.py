@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from rig import Rig
 
 import biotac
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
 from biotac_rig.emulated import EmulatedBoard
+from rig import Rig
 
 SECONDS = 3
 SLOT_US = 1e6 / 4400

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig import Rig
 
 import biotac
 from biotac import Calibration, Setting
@@ -19,6 +18,7 @@ from biotac.sim.physics import Profile
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
 from biotac_lab.experiments import navarro2015 as navarro
+from rig import Rig
 
 GAIN_NN = 12_345_678
 

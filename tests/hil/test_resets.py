@@ -11,12 +11,12 @@ import pytest
 from held_press import of_finger
 from maps import make_map
 from restarts import Restarts
-from rig import NO_MAPS, Rig
 
 from biotac import FaultFlags, FrameFlags, Setting, TareReason
 from biotac.map.board_map import PART_BYTES, part
 from biotac.wire import messages_gen as wire
 from biotac.wire.identity import board_name
+from rig import NO_MAPS, Rig
 
 pytestmark = pytest.mark.long
 

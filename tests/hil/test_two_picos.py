@@ -8,16 +8,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from rig import all_rigs, require
 
 import biotac
 from biotac.doctor import Facts, PairFacts, leads
 from biotac.doctor.listening import listen
 from biotac.hand.opening import shake_hands
+from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
-from biotac.wire import messages_gen as wire
 from biotac_rig.two_picos import TwoPicos
+from rig import all_rigs, require
 
 RIG = "two_picos"
 DAY_S, NIGHT_S = 1.0, 60.0
@@ -76,13 +76,13 @@ def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open, seconds: 
 
 
 FAULTS = {
-    wire.EmuFault.BAD_PARITY: "words_parity",
-    wire.EmuFault.STUCK_LOW: "words_stuck",
-    wire.EmuFault.STUCK_HIGH: "words_stuck",
-    wire.EmuFault.TOO_EARLY: "words_error",
-    wire.EmuFault.NO_CHANNEL: "words_error",
-    wire.EmuFault.UNPLUGGED: "words_stuck",
-    wire.EmuFault.SWAPPED: "words_stuck",
+    emu.EmuFault.BAD_PARITY: "words_parity",
+    emu.EmuFault.STUCK_LOW: "words_stuck",
+    emu.EmuFault.STUCK_HIGH: "words_stuck",
+    emu.EmuFault.TOO_EARLY: "words_error",
+    emu.EmuFault.NO_CHANNEL: "words_error",
+    emu.EmuFault.UNPLUGGED: "words_stuck",
+    emu.EmuFault.SWAPPED: "words_stuck",
 }
 
 
@@ -94,7 +94,7 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
         before = [hand.sensor_status(finger) for finger in hand.fingers]
         board.sensor_board.fault(1, fault)
         hand.read_batch(0.2)
-        board.sensor_board.fault(1, wire.EmuFault.NONE)
+        board.sensor_board.fault(1, emu.EmuFault.NONE)
         hand.read_batch(0.3)  # it is asked who it is
         after = [hand.sensor_status(finger) for finger in hand.fingers]
         assert getattr(after[1], counter) > getattr(before[1], counter), fault.name
@@ -105,7 +105,7 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
 
 
 def test_every_fault_is_commanded() -> None:
-    assert set(FAULTS) == set(wire.EmuFault) - {wire.EmuFault.NONE}
+    assert set(FAULTS) == set(emu.EmuFault) - {emu.EmuFault.NONE}
 
 
 LEADS = {

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from held_press import of_finger
-from rig import Rig
 
 import biotac
 from biotac import CommandRefusedError, FaultFlags, FrameFlags, InputError, Setting
@@ -22,6 +21,7 @@ from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode, open_frame
 from biotac_rig.emulated import EmulatedBoard, new_pty
+from rig import Rig
 
 CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
 BAUD = 400_000  # FRAMEs of two fingers fit; with PAC they do not

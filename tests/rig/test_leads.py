@@ -9,6 +9,7 @@ from doctor_facts import RELEASE, board, healthy, hello, info, message, rounds
 
 from biotac import FrameFlags
 from biotac.doctor import Facts, judge
+from biotac.sim import emu_gen as emu
 from biotac.wire import messages_gen as wire
 from biotac_rig import leads
 
@@ -22,7 +23,7 @@ def pair(words: int, *, error: int = 0, good: tuple[int, ...] = (), serials: tup
     ]
     rows = rounds(good) if good else rounds()[:0]
     changed = {"sensors_after": after, "frames": rows, "hello": hello(*RELEASE, fingers_present=0)}
-    status = [message(wire.EmuStatus, words=count) for count in (2**32 - 1, words - 1)]
+    status = [message(emu.EmuStatus, words=count) for count in (2**32 - 1, words - 1)]
     sensors = [info(finger, f"BTEMU{k}") for k, finger in enumerate(good)]
     return leads.paired(board(sensors=sensors, **changed), leads.PairFacts(*status, serials))
 
@@ -53,7 +54,7 @@ def test_of_a_pair_a_finger_that_was_silent_before_it_had_a_tape_is_no_finding()
 
     alone = board(before=silent)
     assert "faults_latched" in codes(alone)
-    status = message(wire.EmuStatus)
+    status = message(emu.EmuStatus)
     assert "faults_latched" not in codes(dataclasses.replace(alone, pair=leads.PairFacts(status, status, ())))
     worn = board(before=dataclasses.replace(silent, faults=int(wire.FaultFlags.STORAGE)))
     assert "faults_latched" in codes(dataclasses.replace(worn, pair=leads.PairFacts(status, status, ())))

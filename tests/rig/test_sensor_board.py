@@ -12,6 +12,7 @@ from biotac.cli.main import main
 from biotac.errors import CommandRefusedError, DeviceLostError, NotAGatewayError, PortError
 from biotac.hand.opening import open as open_hand
 from biotac.link.serial_port import SerialLink
+from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
@@ -27,48 +28,48 @@ class FakeSensorBoard:
         self.room, self.serve, self.deaf_to = room, serve, deaf_to
         self.rows: list[tuple[int, ...]] = []
         self.served = 0
-        self.plugged: dict[int, wire.EmuPlug] = {}
+        self.plugged: dict[int, emu.EmuPlug] = {}
         self.faults: dict[int, int] = {}
         self.parts = 0
-        self.play: wire.EmuPlay | None = None
+        self.play: emu.EmuPlay | None = None
         self.keeping = self.kept = 0
 
     def answer(self, message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:
             return self.hello(payload, board=self.board)
-        if message_id == wire.EmuPlug.ID:
-            plug = wire.EmuPlug.unpack(payload)
+        if message_id == emu.EmuPlug.ID:
+            plug = emu.EmuPlug.unpack(payload)
             self.plugged[plug.finger] = plug
-        elif message_id == wire.EmuTape.ID:
+        elif message_id == emu.EmuTape.ID:
             self.parts += 1
             if self.parts == self.deaf_to:
                 return b""
-            self._add(wire.EmuTape.unpack(payload))
-        elif message_id == wire.EmuSetFault.ID:
-            fault = wire.EmuSetFault.unpack(payload)
+            self._add(emu.EmuTape.unpack(payload))
+        elif message_id == emu.EmuSetFault.ID:
+            fault = emu.EmuSetFault.unpack(payload)
             if fault.finger > 4:
                 return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.NO_SUCH_FINGER).pack())
             self.faults[fault.finger] = fault.fault
-        elif message_id == wire.EmuPlay.ID:
-            self.play = wire.EmuPlay.unpack(payload)
-        elif message_id == wire.EmuKeep.ID:
-            keep = wire.EmuKeep.unpack(payload)
+        elif message_id == emu.EmuPlay.ID:
+            self.play = emu.EmuPlay.unpack(payload)
+        elif message_id == emu.EmuKeep.ID:
+            keep = emu.EmuKeep.unpack(payload)
             if keep.slots and (keep.slots, keep.crc32) != (
                 len(self.rows),
                 zlib.crc32(np.array(self.rows, "<u2").tobytes()),
             ):
                 return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.NOT_WHOLE).pack())
             self.keeping = keep.slots
-        elif message_id == wire.EmuGetStatus.ID:
+        elif message_id == emu.EmuGetStatus.ID:
             self.kept = self.keeping
             self.served = min(len(self.rows), self.served + self.serve)
         else:
             return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_COMMAND).pack())
         room = self.room - (len(self.rows) - self.served)
         facts = (0x1F, len(self.rows), min(room, 0xFFFF), self.served, 0, 0, 0, 0, 0, 0, self.kept, 0, 0, 0)
-        return encode(wire.EmuStatus.ID, wire.EmuStatus(payload[0], *facts).pack())
+        return encode(emu.EmuStatus.ID, emu.EmuStatus(payload[0], *facts).pack())
 
-    def _add(self, part: wire.EmuTape) -> None:
+    def _add(self, part: emu.EmuTape) -> None:
         samples = np.frombuffer(bytes(part.samples), "<u2")[: part.slots * part.fingers]
         fits = part.slots <= self.room - (len(self.rows) - self.served)
         if part.first_slot == len(self.rows) and fits:
@@ -108,7 +109,7 @@ def test_a_fault_of_no_finger_is_refused(scripted_board, hello) -> None:
     fake = FakeSensorBoard(hello)
     board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
     with pytest.raises(CommandRefusedError, match="NO_SUCH_FINGER"):
-        board.fault(5, wire.EmuFault.NONE)
+        board.fault(5, emu.EmuFault.NONE)
     board.close()
 
 
@@ -127,7 +128,7 @@ def test_the_verb_plays_a_source_and_says_how_it_went(scripted_board, hello, cap
     words = ["sim", "press.toml", "--sensor-port", scripted_board(fake.answer).path, "--fingers", "2"]
     assert main([*words, "--seconds", "0.2", "--fault", "1=unplugged"]) == 0
     assert capsys.readouterr().out.startswith("880 of 880 slots served")
-    assert fake.faults == {1: int(wire.EmuFault.UNPLUGGED)}
+    assert fake.faults == {1: int(emu.EmuFault.UNPLUGGED)}
     assert main([*words, "--fault", "2=loose"]) == 2
     assert "no fault 'loose', expected one of" in capsys.readouterr().err
 

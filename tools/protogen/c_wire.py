@@ -2,10 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from .schema import FINGER_AT, GENERATED, REQ_ID_AT, TYPE_BYTES, Contract, Field, Message, c_header, entries, flag_masks
 
 PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
+
+
+# Little-endian bytes of a field, and back.
+HELPERS = [
+    "static uint8_t *put(uint8_t *at, uint32_t value, int bytes)",
+    "{",
+    "    for (int k = 0; k < bytes; k++) {",
+    "        *at++ = (uint8_t)(value >> (8 * k));",
+    "    }",
+    "    return at;",
+    "}",
+    "",
+    "static const uint8_t *get(const uint8_t *at, uint32_t *value, int bytes)",
+    "{",
+    "    *value = 0;",
+    "    for (int k = 0; k < bytes; k++) {",
+    "        *value |= (uint32_t)*at++ << (8 * k);",
+    "    }",
+    "    return at;",
+    "}",
+    "",
+]
 
 
 def struct_name(message: Message) -> str:
@@ -139,30 +163,11 @@ def source(contract: Contract) -> str:
         f"// {GENERATED}",
         '#include "wire/messages_gen.h"',
         "",
-        "static uint8_t *put(uint8_t *at, uint32_t value, int bytes)",
-        "{",
-        "    for (int k = 0; k < bytes; k++) {",
-        "        *at++ = (uint8_t)(value >> (8 * k));",
-        "    }",
-        "    return at;",
-        "}",
-        "",
-        "static const uint8_t *get(const uint8_t *at, uint32_t *value, int bytes)",
-        "{",
-        "    *value = 0;",
-        "    for (int k = 0; k < bytes; k++) {",
-        "        *value |= (uint32_t)*at++ << (8 * k);",
-        "    }",
-        "    return at;",
-        "}",
-        "",
+        *HELPERS,
     ]
     for message in contract.messages:
         out += pack(message) + (pack_even(message) if message.name in PACKED_AS_HALFWORDS else []) + unpack(message)
-    out += ["int bt_wire_payload_bytes(uint8_t id)", "{", "    switch (id) {"]
-    for message in contract.messages:
-        out += [f"    case BT_{message.name}_ID:", f"        return BT_{message.name}_BYTES;"]
-    out += ["    default:", "        return -1;", "    }", "}", ""]
+    out += lengths("bt_wire_payload_bytes", contract.messages)
     out += ["const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {"]
     for name, setting in contract.link["setting"].items():
         low, high = setting["range"]
@@ -170,6 +175,14 @@ def source(contract: Contract) -> str:
     out += ["};", "", "const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {"]
     out += [f"    BT_SETTING_{name.upper()}," for name in contract.per_finger] + ["};", ""]
     return "\n".join(out)
+
+
+def lengths(name: str, messages: Iterable[Message]) -> list[str]:
+    """A function that knows each message's payload length by its id."""
+    out = [f"int {name}(uint8_t id)", "{", "    switch (id) {"]
+    for message in messages:
+        out += [f"    case BT_{message.name}_ID:", f"        return BT_{message.name}_BYTES;"]
+    return [*out, "    default:", "        return -1;", "    }", "}", ""]
 
 
 def each(field: Field, *statements: str) -> list[str]:

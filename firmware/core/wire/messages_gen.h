@@ -12,7 +12,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x14E68552u
+#define BT_SCHEMA_HASH 0x2ECF6E6Fu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -110,24 +110,12 @@ enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
-    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)
     BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
     BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     BT_BOARD_MESSAGES = 7, // a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
     BT_BOARD_POSIX_LIVE = 8, // a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
     BT_BOARD_PRIVATE = 32768, // the first of the private ids
-};
-
-// Faults of an emulated sensor. On a tape, these codes stand in place of counts.
-enum bt_emu_fault {
-    BT_EMU_FAULT_NONE = 0, // no fault
-    BT_EMU_FAULT_SWAPPED = 65529, // unplugged; the sensor plugged in afterwards has another serial number
-    BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
-    BT_EMU_FAULT_TOO_EARLY = 65531, // it answers as if read before its 50 us had passed
-    BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO is always high
-    BT_EMU_FAULT_STUCK_LOW = 65533, // MISO is always low
-    BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word is flipped
-    BT_EMU_FAULT_NO_CHANNEL = 65535, // the sensor has no such channel
 };
 
 // Whether a finger's calibration or wrench map is used.
@@ -913,97 +901,6 @@ typedef struct {
 void bt_msg_set_bus_rate_pack(const bt_msg_set_bus_rate *msg, uint8_t out[BT_SET_BUS_RATE_BYTES]);
 void bt_msg_set_bus_rate_unpack(bt_msg_set_bus_rate *msg, const uint8_t in[BT_SET_BUS_RATE_BYTES]);
 
-// State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md).
-#define BT_EMU_STATUS_ID 0x40
-#define BT_EMU_STATUS_BYTES 47
-typedef struct {
-    uint8_t req_id; // [1] as in the command
-    uint8_t fingers; // [bit mask] bit f is set if finger f's sensor is plugged in
-    uint32_t slots_taken; // [1] slots of the tape received; the next EMU_TAPE begins here
-    uint16_t room_slots; // [1] further slots that fit now
-    uint32_t slots_served; // [1] slots of the tape that the bus has reached
-    uint32_t elapsed_us; // [us] time from the first sample command to the latest, by this board's clock; wraps
-    uint32_t words; // [1] words that the bus has read
-    uint32_t words_late; // [1] words not ready in time: MISO was not driven, or the answer was for another time
-    uint32_t samples_starved; // [1] samples requested beyond what has come of the tape, or during a hold; they read 0x0000
-    uint16_t slowest_us; // [us] longest time from the select's rise until the next answer was ready; the bus allows 50 us
-    int32_t rounds_moved; // [1] with by_time: rounds skipped less rounds replayed; each makes up 10 ms between this board's clock and the bus's
-    uint32_t loop_slots; // [1] slots of the tape in flash; 0: none
-    uint8_t looping; // [bool] 1: the tape in flash is being played
-    uint32_t rounds_late; // [1] live: rounds that had not come when the bus began them; the one before was played again
-    uint32_t link_bytes; // [B] of a simulated gateway that stands still: bytes that it has sent to its host since power-up; wraps
-} bt_msg_emu_status;
-void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES]);
-void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_STATUS_BYTES]);
-
-// Plug a sensor in or out. For finger 0 this also clears the tape, the faults and the counters, so plug it first.
-#define BT_EMU_PLUG_ID 0xC0
-#define BT_EMU_PLUG_BYTES 19
-typedef struct {
-    uint8_t req_id; // [1] 1 to 255
-    uint8_t finger; // [1] chip select index
-    uint8_t present; // [bool] 1: plugged in; 0: not
-    uint8_t serial[16]; // [ASCII] serial number; all zero: a made-up one
-} bt_msg_emu_plug;
-void bt_msg_emu_plug_pack(const bt_msg_emu_plug *msg, uint8_t out[BT_EMU_PLUG_BYTES]);
-void bt_msg_emu_plug_unpack(bt_msg_emu_plug *msg, const uint8_t in[BT_EMU_PLUG_BYTES]);
-
-// The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them.
-#define BT_EMU_TAPE_ID 0xC1
-#define BT_EMU_TAPE_BYTES 227
-typedef struct {
-    uint8_t req_id; // [1] 1 to 255
-    uint8_t fingers; // [1] fingers on the tape; the same for the whole tape
-    uint8_t slots; // [1] slots in this message; slots * fingers is at most 110
-    uint32_t first_slot; // [1] position of the first slot on the tape
-    uint8_t samples[220]; // [1] slots * fingers samples (u16, little-endian), slot by slot: a count or an emu_fault; the rest is ignored
-} bt_msg_emu_tape;
-void bt_msg_emu_tape_pack(const bt_msg_emu_tape *msg, uint8_t out[BT_EMU_TAPE_BYTES]);
-void bt_msg_emu_tape_unpack(bt_msg_emu_tape *msg, const uint8_t in[BT_EMU_TAPE_BYTES]);
-
-// Give a sensor a fault from now on, whatever the tape says.
-#define BT_EMU_SET_FAULT_ID 0xC2
-#define BT_EMU_SET_FAULT_BYTES 4
-typedef struct {
-    uint8_t req_id; // [1] 1 to 255
-    uint8_t finger; // [1] chip select index
-    uint16_t fault; // [enum emu_fault] NONE ends it
-} bt_msg_emu_set_fault;
-void bt_msg_emu_set_fault_pack(const bt_msg_emu_set_fault *msg, uint8_t out[BT_EMU_SET_FAULT_BYTES]);
-void bt_msg_emu_set_fault_unpack(bt_msg_emu_set_fault *msg, const uint8_t in[BT_EMU_SET_FAULT_BYTES]);
-
-// Ask for EMU_STATUS.
-#define BT_EMU_GET_STATUS_ID 0xC3
-#define BT_EMU_GET_STATUS_BYTES 1
-typedef struct {
-    uint8_t req_id; // [1] 1 to 255
-} bt_msg_emu_get_status;
-void bt_msg_emu_get_status_pack(const bt_msg_emu_get_status *msg, uint8_t out[BT_EMU_GET_STATUS_BYTES]);
-void bt_msg_emu_get_status_unpack(bt_msg_emu_get_status *msg, const uint8_t in[BT_EMU_GET_STATUS_BYTES]);
-
-// How to serve the tape. EMU_PLUG of finger 0 restores the defaults: no hold, in the tape's order.
-#define BT_EMU_PLAY_ID 0xC4
-#define BT_EMU_PLAY_BYTES 7
-typedef struct {
-    uint8_t req_id; // [1] 1 to 255
-    uint32_t hold_slot; // [1] first slot of a round at which the tape stops until another EMU_PLAY names a later slot; samples requested meanwhile count as samples_starved. It resumes with a round before which every finger on the tape was asked for a property, as a gateway asks sensors that give no samples, so that all fingers begin in the same round. 0xFFFFFFFF: no hold
-    uint8_t by_time; // [bool] 1: follow this board's clock: skip a round when the bus is a round behind, replay one when it is a round ahead
-    uint8_t live; // [bool] 1: when a round has not come as the bus begins it, the one before is played again and counted in rounds_late; 0: the sensors stay silent
-} bt_msg_emu_play;
-void bt_msg_emu_play_pack(const bt_msg_emu_play *msg, uint8_t out[BT_EMU_PLAY_BYTES]);
-void bt_msg_emu_play_unpack(bt_msg_emu_play *msg, const uint8_t in[BT_EMU_PLAY_BYTES]);
-
-// Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done.
-#define BT_EMU_KEEP_ID 0xC5
-#define BT_EMU_KEEP_BYTES 9
-typedef struct {
-    uint8_t req_id; // [1] 1 to 255
-    uint32_t slots; // [1] slots on the tape; 0: keep none
-    uint32_t crc32; // [1] CRC-32, as zlib's, of its samples (u16, little-endian), slot by slot
-} bt_msg_emu_keep;
-void bt_msg_emu_keep_pack(const bt_msg_emu_keep *msg, uint8_t out[BT_EMU_KEEP_BYTES]);
-void bt_msg_emu_keep_unpack(bt_msg_emu_keep *msg, const uint8_t in[BT_EMU_KEEP_BYTES]);
-
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
 
@@ -1057,14 +954,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CLEAR_FAULTS_FIELDS(X) X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
 #define BT_GET_BOARD_FACTS_FIELDS(X) X(req_id, u8, 1)
 #define BT_SET_BUS_RATE_FIELDS(X) X(req_id, u8, 1) X(bus_khz, u16, 1)
-#define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1) X(rounds_moved, i32, 1) X(loop_slots, u32, 1) X(looping, u8, 1) X(rounds_late, u32, 1) X(link_bytes, u32, 1)
-#define BT_EMU_PLUG_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(serial, u8, 16)
-#define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
-#define BT_EMU_SET_FAULT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
-#define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
-#define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1) X(live, u8, 1)
-#define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BOARD_FACTS, bt_msg_board_facts) X(SP_COUNTS, bt_msg_sp_counts) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TAKE_LINK, bt_msg_take_link) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(GET_BOARD_FACTS, bt_msg_get_board_facts) X(SET_BUS_RATE, bt_msg_set_bus_rate)
 #endif
 
 #endif

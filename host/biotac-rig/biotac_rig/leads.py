@@ -13,8 +13,8 @@ from biotac.doctor.facts import Facts, grown
 from biotac.doctor.listening import examine
 from biotac.doctor.sensors import WORDS
 from biotac.link import open_link
+from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
-from biotac.wire import messages_gen as wire
 from biotac.wire.sensor_gen import MAX_SENSORS
 
 from .sensor_board import SensorBoard
@@ -26,8 +26,8 @@ PLAYED, PLAYED_S = "press.toml", 60.0
 class PairFacts:
     """What the sensor board at the other end of the leads heard meanwhile; all five of its sensors are plugged in."""
 
-    before: wire.EmuStatus
-    after: wire.EmuStatus
+    before: emu.EmuStatus
+    after: emu.EmuStatus
     serials: tuple[str, ...]  #: by finger, as they were plugged in
 
     def more(self, counter: str) -> int:

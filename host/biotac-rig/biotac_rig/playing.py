@@ -12,10 +12,10 @@ from biotac.cli.live.sim import NO_FAULT, fault_of
 from biotac.cli.outputs import report
 from biotac.errors import InputError
 from biotac.link import open_link
+from biotac.sim import emu_gen as emu
 from biotac.sim.faults import BUS_FAULTS
 from biotac.sim.loading import load_source
 from biotac.sim.play import with_fault
-from biotac.wire import messages_gen as wire
 from biotac.wire.sensor_gen import SLOT_HZ, SLOTS
 
 from .sensor_board import SensorBoard
@@ -43,13 +43,13 @@ def run(args: argparse.Namespace, length_s: float | None) -> int:
         if args.forget:
             board.forget()
         for finger, kind in on_bus:
-            board.fault(finger, BUS_FAULTS.get(kind, wire.EmuFault.NONE))
+            board.fault(finger, BUS_FAULTS.get(kind, emu.EmuFault.NONE))
         status = board.keep() if args.keep else board.status() if args.source is None else play(board)
     report(args, asdict(status), summary(status))
     return 0
 
 
-def play(board: SensorBoard) -> wire.EmuStatus:
+def play(board: SensorBoard) -> emu.EmuStatus:
     """Feed until the gateway has read past the last slot, or Ctrl-C."""
     try:
         status = board.feed()
@@ -62,7 +62,7 @@ def play(board: SensorBoard) -> wire.EmuStatus:
     return status
 
 
-def summary(status: wire.EmuStatus) -> str:
+def summary(status: emu.EmuStatus) -> str:
     """The status for people. If the gateway lost no slot, the tape's time less this board's is the clocks' drift."""
     lines = [
         f"{status.slots_served} of {status.slots_taken} slots served in {status.elapsed_us / 1e6:.3f} s by its clock; "

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from biotac.errors import BiotacError, DeviceLostError, InputError
+from biotac.sim import emu_gen as emu
 from biotac.sim.feed import REST_S, SensorFeed
-from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 
 KEEP_S = 20.0  # 39 sectors of flash, each at its longest
@@ -22,7 +22,7 @@ KEEP_S = 20.0  # 39 sectors of flash, each at its longest
 class SensorBoard(SensorFeed):
     """The sensor board on ``link``. If another board answers, closes ``link`` and raises PortError."""
 
-    def keep(self) -> wire.EmuStatus:
+    def keep(self) -> emu.EmuStatus:
         """Store the whole plugged source in the board's flash, to be played in a loop from power-up on.
 
         It must fit the board's memory at once, 3.5 s of five fingers. Raises InputError when it does not, and
@@ -36,7 +36,7 @@ class SensorBoard(SensorFeed):
                 f"{tape_s:g} s of {fingers} fingers do not fit the board: expected up to {room_s:g} s; shorten it"
             )
         digest = zlib.crc32(self._samples.astype("<u2").tobytes())
-        status = self._board.ask(wire.EmuKeep(0, slots, digest), wire.EmuStatus)
+        status = self._board.ask(emu.EmuKeep(0, slots, digest), emu.EmuStatus)
         until_s = time.monotonic() + KEEP_S * self._board.link.patience
         while status.loop_slots != slots:
             if time.monotonic() > until_s:
@@ -47,12 +47,12 @@ class SensorBoard(SensorFeed):
             status = self.status()
         return status
 
-    def forget(self) -> wire.EmuStatus:
+    def forget(self) -> emu.EmuStatus:
         """Erase the tape kept in flash."""
-        return self._board.ask(wire.EmuKeep(0, 0, 0), wire.EmuStatus)
+        return self._board.ask(emu.EmuKeep(0, 0, 0), emu.EmuStatus)
 
     @contextmanager
-    def feeding(self) -> Iterator[wire.EmuStatus]:
+    def feeding(self) -> Iterator[emu.EmuStatus]:
         """Feed the board in a thread meanwhile; yields its status when its room was full for the first time.
 
         If the board goes away, the next request to it raises the error.

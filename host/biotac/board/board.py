@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import cycle
@@ -30,7 +30,9 @@ Reply = TypeVar("Reply")
 class Board:
     """The board that answers on ``link``, which is closed when the handshake fails. Any thread may ask it."""
 
-    def __init__(self, link: Link, *, host_clock: HostClock | None = None) -> None:
+    def __init__(
+        self, link: Link, *, host_clock: HostClock | None = None, messages: Mapping[int, type[Any]] = wire.MESSAGES
+    ) -> None:
         self.link = link
         self.host_clock = host_clock or HostClock()
         self.closed = False
@@ -45,7 +47,7 @@ class Board:
         except BaseException:
             link.close()
             raise
-        self.reader = Reader(link, hello)
+        self.reader = Reader(link, hello, messages)
         self.reader.start()
 
     @property

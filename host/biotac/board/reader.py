@@ -12,7 +12,7 @@ import threading
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NoReturn, Protocol, runtime_checkable
 
@@ -63,8 +63,9 @@ class Reader:
     When the link breaks, reading stops: for good, or where it ``reconnects`` until ``resume`` (watch.py).
     """
 
-    def __init__(self, link: Link, hello: wire.Hello) -> None:
+    def __init__(self, link: Link, hello: wire.Hello, messages: Mapping[int, type[Any]] = wire.MESSAGES) -> None:
         self.link = link
+        self._messages = messages
         #: What the board said about itself when it was opened, or when it last came back.
         self.hello = hello
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
@@ -92,7 +93,7 @@ class Reader:
         #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
         self.changed = threading.Condition()
         self._pid = os.getpid()
-        self._decoder = _decoder(hello)
+        self._decoder = _decoder(hello, self._messages)
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._bytes = self._frames = 0
         self._arrivals = Arrivals(self.clock)
@@ -167,7 +168,7 @@ class Reader:
         """Read on: the link was opened again, and the same board answered with ``hello``."""
         if hello.boot_id != self.hello.boot_id:
             self._past.append(self._decoder.stats(0, 0))
-            self._decoder = _decoder(hello)
+            self._decoder = _decoder(hello, self._messages)
             self.clock.restart()
             self._arrivals.forget()
             self._round0_us = None  # a source plays on while its board starts again
@@ -341,8 +342,8 @@ def thin(batch: Batch, every: int) -> Batch:
     return replace(batch, wire=frames, seq=batch.seq[kept], t_us=batch.t_us[kept], fingers=fingers)
 
 
-def _decoder(hello: wire.Hello) -> StreamDecoder:
-    decoder = StreamDecoder()
+def _decoder(hello: wire.Hello, messages: Mapping[int, type[Any]]) -> StreamDecoder:
+    decoder = StreamDecoder(messages)
     if hello.wire_minor > wire.WIRE_MINOR:
         decoder.accept_newer_minor()
     return decoder

@@ -16,8 +16,9 @@ import numpy as np
 from ..core.geometry import Floats
 from ..errors import InputError
 from ..wire import sensor_gen as _sensor
-from ..wire.messages_gen import INVALID_COUNT, EmuFault
+from ..wire.messages_gen import INVALID_COUNT
 from ..wire.slots import ELECTRODE_SLOT, FRAME_S, PDC_SLOT, SLOTS_PER_FRAME, TDC_SLOT
+from .emu_gen import EmuFault
 from .sampling import Words
 
 

@@ -15,6 +15,7 @@ from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.identity import board_name
+from . import emu_gen as emu
 from .source import Source
 
 SAMPLES_A_MESSAGE = 110
@@ -30,7 +31,7 @@ class SensorFeed:
     """The emulated sensors on ``link``. If another board answers, closes ``link`` and raises PortError."""
 
     def __init__(self, link: Link) -> None:
-        self._board = Board(link)
+        self._board = Board(link, messages={**wire.MESSAGES, **emu.MESSAGES})
         self.info = self._board.info
         if self.info.board != wire.Board.PICO_SENSOR:
             seen = board_name(self.info)
@@ -52,16 +53,16 @@ class SensorFeed:
         for finger in range(sensor.MAX_SENSORS):
             serial = self.serials[finger] if finger < fingers else ""
             padded = tuple(serial.encode().ljust(16, b"\0"))
-            self._board.ask(wire.EmuPlug(0, finger, finger < fingers, padded), wire.EmuStatus)
+            self._board.ask(emu.EmuPlug(0, finger, finger < fingers, padded), emu.EmuStatus)
 
-    def status(self) -> wire.EmuStatus:
-        return self._board.ask(wire.EmuGetStatus(0), wire.EmuStatus)
+    def status(self) -> emu.EmuStatus:
+        return self._board.ask(emu.EmuGetStatus(0), emu.EmuStatus)
 
-    def fault(self, finger: int, fault: wire.EmuFault) -> wire.EmuStatus:
+    def fault(self, finger: int, fault: emu.EmuFault) -> emu.EmuStatus:
         """Give a finger this fault from now on, whatever its tape says; EmuFault.NONE ends it."""
-        return self._board.ask(wire.EmuSetFault(0, finger, fault), wire.EmuStatus)
+        return self._board.ask(emu.EmuSetFault(0, finger, fault), emu.EmuStatus)
 
-    def play(self, *, hold_slot: int | None = None, by_time: bool = False, live: bool = False) -> wire.EmuStatus:
+    def play(self, *, hold_slot: int | None = None, by_time: bool = False, live: bool = False) -> emu.EmuStatus:
         """Set how the tape is served, until the next plug().
 
         Before ``hold_slot``, a round's first, it waits until another play() names a later one or none, and then goes on
@@ -70,9 +71,9 @@ class SensorFeed:
         ``live``: a round that has not come when the gateway begins it is the one before again, and counted.
         """
         self.held_at = NOT_HELD if hold_slot is None else hold_slot
-        return self._board.ask(wire.EmuPlay(0, self.held_at, by_time, live), wire.EmuStatus)
+        return self._board.ask(emu.EmuPlay(0, self.held_at, by_time, live), emu.EmuStatus)
 
-    def feed(self, until_full: bool = False, ended: threading.Event | None = None) -> wire.EmuStatus:
+    def feed(self, until_full: bool = False, ended: threading.Event | None = None) -> emu.EmuStatus:
         """Send the rest of the source as the board has room; return when all is sent, or ``ended`` is set.
 
         ``until_full``: return also when the board has no more room.
@@ -93,7 +94,7 @@ class SensorFeed:
             parts = [(k, min(size, last - k)) for k in range(at, last, size)]
             for first, count in parts[:-1]:
                 self._board.send(self._part(first, count))
-            status = self._board.ask(self._part(*parts[-1]), wire.EmuStatus)
+            status = self._board.ask(self._part(*parts[-1]), emu.EmuStatus)
         return status
 
     def put(self, words: npt.NDArray[np.uint16]) -> None:
@@ -125,7 +126,7 @@ class SensorFeed:
         """Keep reports of standstills for wait_still(): each comes once, the first as soon as time is released."""
         self._board.reader.add(self._reports)
 
-    def wait_still(self) -> wire.EmuStatus:
+    def wait_still(self) -> emu.EmuStatus:
         """Wait until a simulated gateway has computed all that was sent, and its time stands still.
 
         Raises DeviceLostError when it has ended, or takes longer than STILL_S.
@@ -135,14 +136,14 @@ class SensorFeed:
             batch = self._reports.get(wait=True, timeout_s=until_s - time.monotonic())
             self._board.reader.check()
             for message in batch.messages if batch else ():
-                if isinstance(message, wire.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:
+                if isinstance(message, emu.EmuStatus) and message.req_id == 0 and message.slots_taken == sent:
                     return message
         raise DeviceLostError(f"the simulated board computed nothing for {STILL_S:g} s; start another world")
 
-    def _part(self, first: int, count: int) -> wire.EmuTape:
+    def _part(self, first: int, count: int) -> emu.EmuTape:
         data = self._samples[first - self._before : first - self._before + count].astype("<u2").tobytes()
         fingers = self._samples.shape[1]
-        return wire.EmuTape(0, fingers, count, first, tuple(data.ljust(SAMPLE_BYTES, b"\0")))
+        return emu.EmuTape(0, fingers, count, first, tuple(data.ljust(SAMPLE_BYTES, b"\0")))
 
     def close(self) -> None:
         """Give the port back; the board goes on with what it has."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import DeviceLostError, InputError, PortError
 from ..link.serial_port import SerialLink
-from ..wire.messages_gen import EmuStatus
 from ..wire.sensor_gen import MAX_SENSORS
 from . import touch
+from .emu_gen import EmuStatus
 from .faults import BETWEEN_FINGERS, EXCHANGED, begin
 from .physics import Finger
 from .process import SimBoard, SimLink

@@ -16,7 +16,8 @@ from ..recording.btd.file import read_btd
 from ..recording.npz_file import counts_field, read_npz, to_lin_frame
 from ..wire import slots
 from ..wire.fields import Q4_PER_COUNT
-from ..wire.messages_gen import INVALID_COUNT, EmuFault
+from ..wire.messages_gen import INVALID_COUNT
+from .emu_gen import EmuFault
 from .source import Source
 
 _SLOW = {name.upper(): np.array([slot]) for name, slot in slots.SLOW_SLOTS.items()}

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..wire import sensor_gen as _sensor
-from ..wire.messages_gen import EmuFault
+from .emu_gen import EmuFault
 from .source import Source
 
-CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/MESSAGES.md)
+CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/emu.toml)
 
 MAGIC = b"BTTAPE02"
 _HEADER = struct.Struct("<8sIIII")

@@ -10,6 +10,7 @@ import math
 import os
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
@@ -107,7 +108,8 @@ class LinkStats:
 class StreamDecoder:
     """Chunks of bytes in, batches of arrays out; losses are counted by the sequence numbers."""
 
-    def __init__(self) -> None:
+    def __init__(self, messages: Mapping[int, type[Any]] = wire.MESSAGES) -> None:
+        self._messages = messages
         self._state: Any = new("bt_intake *")
         lib.bt_intake_reset(self._state)
         self._alone = threading.Lock()  # needed because the C code runs without Python's lock
@@ -250,7 +252,7 @@ class StreamDecoder:
         if idles:
             idle = _numbered(_frombuffer(raw, IDLE, idles, at), IDLE_DTYPE, *_numbers(raw, idles, 16 * (n + pacs)))
         if others:
-            messages = known(pairs(raw[-others:]))
+            messages = known(pairs(raw[-others:]), self._messages)
         return Batch(sent, seq, t_us, pac, idle, messages, facts.fingers, facts.arrived_ns * 1e-9)
 
 
@@ -270,9 +272,9 @@ def _numbered(sent: StructArray, dtype: np.dtype[np.void], seq: NDArray[np.int64
     return out
 
 
-def known(others: list[tuple[int, bytes]]) -> list[Any]:
-    """The messages with known ids; the others come from a newer peer and are left out."""
-    return [wire.MESSAGES[message_id].unpack(payload) for message_id, payload in others if message_id in wire.MESSAGES]
+def known(others: list[tuple[int, bytes]], messages: Mapping[int, type[Any]] = wire.MESSAGES) -> list[Any]:
+    """Those of these ``messages``; the others come from a newer peer and are left out."""
+    return [messages[message_id].unpack(payload) for message_id, payload in others if message_id in messages]
 
 
 def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:

@@ -15,7 +15,7 @@ from .named import NamedFlag
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x14E68552
+SCHEMA_HASH = 0x2ECF6E6F
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -121,25 +121,12 @@ class Board(IntEnum):
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
-    PICO_SENSOR = 4  # Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    PICO_SENSOR = 4  # Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)
     STM32F405 = 5  # STM32F405 with a UART to the host (firmware/boards/f405)
     PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     MESSAGES = 7  # a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
     POSIX_LIVE = 8  # a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
     PRIVATE = 32768  # the first of the private ids
-
-
-class EmuFault(IntEnum):
-    """Faults of an emulated sensor. On a tape, these codes stand in place of counts."""
-
-    NONE = 0  # no fault
-    SWAPPED = 65529  # unplugged; the sensor plugged in afterwards has another serial number
-    UNPLUGGED = 65530  # no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
-    TOO_EARLY = 65531  # it answers as if read before its 50 us had passed
-    STUCK_HIGH = 65532  # MISO is always high
-    STUCK_LOW = 65533  # MISO is always low
-    BAD_PARITY = 65534  # one bit of the word is flipped
-    NO_CHANNEL = 65535  # the sensor has no such channel
 
 
 class CalibrationState(IntEnum):
@@ -320,24 +307,12 @@ BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
-    4: "Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages",
+    4: "Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)",
     5: "STM32F405 with a UART to the host (firmware/boards/f405)",
     6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
     7: "a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so",
     8: "a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads",
     32768: "the first of the private ids",
-}
-
-
-EMU_FAULT_DOC: dict[int, str] = {
-    0: "no fault",
-    65529: "unplugged; the sensor plugged in afterwards has another serial number",
-    65530: "no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read",
-    65531: "it answers as if read before its 50 us had passed",
-    65532: "MISO is always high",
-    65533: "MISO is always low",
-    65534: "one bit of the word is flipped",
-    65535: "the sensor has no such channel",
 }
 
 
@@ -2282,259 +2257,7 @@ class SetBusRate:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class EmuStatus:
-    """State of emulated sensors. Reply to every EMU command. Counters start at EMU_PLUG of finger 0. A simulated gateway fed live sends one with req_id 0 when its time stands still for want of the next round, and everything it made of those before has gone to its host (host/docs/guides/controller_tests.md)."""
-
-    req_id: int
-    fingers: int
-    slots_taken: int
-    room_slots: int
-    slots_served: int
-    elapsed_us: int
-    words: int
-    words_late: int
-    samples_starved: int
-    slowest_us: int
-    rounds_moved: int
-    loop_slots: int
-    looping: int
-    rounds_late: int
-    link_bytes: int
-
-    ID: ClassVar[int] = 0x40
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIHiIBII")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 47 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-            self.fingers,
-            self.slots_taken,
-            self.room_slots,
-            self.slots_served,
-            self.elapsed_us,
-            self.words,
-            self.words_late,
-            self.samples_starved,
-            self.slowest_us,
-            self.rounds_moved,
-            self.loop_slots,
-            self.looping,
-            self.rounds_late,
-            self.link_bytes,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuStatus:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-            v[3],
-            v[4],
-            v[5],
-            v[6],
-            v[7],
-            v[8],
-            v[9],
-            v[10],
-            v[11],
-            v[12],
-            v[13],
-            v[14],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class EmuPlug:
-    """Plug a sensor in or out. For finger 0 this also clears the tape, the faults and the counters, so plug it first."""
-
-    req_id: int
-    finger: int
-    present: int
-    serial: tuple[int, ...]
-
-    ID: ClassVar[int] = 0xC0
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16B")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 19 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-            self.finger,
-            self.present,
-            *self.serial,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuPlug:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-            v[3 : 19],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class EmuTape:
-    """The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them."""
-
-    req_id: int
-    fingers: int
-    slots: int
-    first_slot: int
-    samples: tuple[int, ...]
-
-    ID: ClassVar[int] = 0xC1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBI220B")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 227 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-            self.fingers,
-            self.slots,
-            self.first_slot,
-            *self.samples,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuTape:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-            v[3],
-            v[4 : 224],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class EmuSetFault:
-    """Give a sensor a fault from now on, whatever the tape says."""
-
-    req_id: int
-    finger: int
-    fault: int
-
-    ID: ClassVar[int] = 0xC2
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBH")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 4 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-            self.finger,
-            self.fault,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuSetFault:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class EmuGetStatus:
-    """Ask for EMU_STATUS."""
-
-    req_id: int
-
-    ID: ClassVar[int] = 0xC3
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 1 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuGetStatus:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class EmuPlay:
-    """How to serve the tape. EMU_PLUG of finger 0 restores the defaults: no hold, in the tape's order."""
-
-    req_id: int
-    hold_slot: int
-    by_time: int
-    live: int
-
-    ID: ClassVar[int] = 0xC4
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIBB")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 7 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-            self.hold_slot,
-            self.by_time,
-            self.live,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuPlay:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-            v[3],
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class EmuKeep:
-    """Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done."""
-
-    req_id: int
-    slots: int
-    crc32: int
-
-    ID: ClassVar[int] = 0xC5
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BII")
-
-    def pack(self) -> bytes:
-        """Payload without id and CRC, 9 bytes."""
-        return self.STRUCT.pack(
-            self.req_id,
-            self.slots,
-            self.crc32,
-        )
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> EmuKeep:
-        """Inverse of pack; struct.error when the length differs."""
-        v = cls.STRUCT.unpack(payload)
-        return cls(
-            v[0],
-            v[1],
-            v[2],
-        )
-
-
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | BoardFacts | SpCounts | HelloRequest | Start | Stop | Ping | Subscribe | TakeLink | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | GetBoardFacts | SetBusRate
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2585,13 +2308,6 @@ MESSAGES: dict[int, type[Any]] = {
     ClearFaults.ID: ClearFaults,
     GetBoardFacts.ID: GetBoardFacts,
     SetBusRate.ID: SetBusRate,
-    EmuStatus.ID: EmuStatus,
-    EmuPlug.ID: EmuPlug,
-    EmuTape.ID: EmuTape,
-    EmuSetFault.ID: EmuSetFault,
-    EmuGetStatus.ID: EmuGetStatus,
-    EmuPlay.ID: EmuPlay,
-    EmuKeep.ID: EmuKeep,
 }
 
 # What each command is answered by.
@@ -2626,12 +2342,6 @@ ANSWERS: dict[type[Any], type[Any]] = {
     ClearFaults: Reply,
     GetBoardFacts: BoardFacts,
     SetBusRate: BoardFacts,
-    EmuPlug: EmuStatus,
-    EmuTape: EmuStatus,
-    EmuSetFault: EmuStatus,
-    EmuGetStatus: EmuStatus,
-    EmuPlay: EmuStatus,
-    EmuKeep: EmuStatus,
 }
 
 # The streams that carry a message; not of answers.

@@ -11,9 +11,9 @@ import pytest
 
 from biotac.errors import InputError, RecordingError
 from biotac.sim import load_source
+from biotac.sim.emu_gen import EmuFault
 from biotac.wire import sensor_gen as _sensor
 from biotac.wire import slots
-from biotac.wire.messages_gen import EmuFault
 
 DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 PDC, TAC, TDC = (_sensor.SLOTS.index(name) for name in ("PDC", "TAC", "TDC"))

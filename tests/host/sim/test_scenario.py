@@ -13,13 +13,13 @@ from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
+from biotac.sim.emu_gen import EmuFault
 from biotac.sim.faults import BUS_FAULTS, FAULTS
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
 from biotac.sim.scenario import STEP_KEYS, parse_scenario
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import slots
-from biotac.wire.messages_gen import EmuFault
 from biotac.wire.slots import ELECTRODE_SLOT, FRAME_S
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
