@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kernel_errors
-from biotac.core.compiled import FORCE_GAINS, default_settings
+from biotac.kernels.compiled import FORCE_GAINS, default_settings
 from biotac.wire.messages_gen import PocWeights
 from kernel_errors import MILLI, NAMES, QUANTITIES
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from biotac import PocWeights, Setting
-from biotac.core.compiled import default_settings, on_board_q4, reference_q4
+from biotac.kernels.compiled import default_settings, on_board_q4, reference_q4
 from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 
 try:

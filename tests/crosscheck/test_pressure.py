@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biotac import Finger, FrameFlags, Setting
-from biotac.core.compiled import default_settings
+from biotac.kernels.compiled import default_settings
 from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES

@@ -22,7 +22,7 @@ from maps import make_map
 from sensor_faults import MODELS, SILENT_ROUNDS, WHEN, outcome
 
 from biotac import Finger, FrameFlags
-from biotac.core.geometry import ELECTRODE_MM
+from biotac.kernels.geometry import ELECTRODE_MM
 from biotac.sim import sampling
 from biotac.sim.faults import FAULTS, noisy_line
 from biotac.sim.loading import load_source

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 import biotac
-from biotac.core.compiled import default_settings
 from biotac.doctor.facts import grown
 from biotac.errors import BiotacError
 from biotac.hand.opening import shake_hands
+from biotac.kernels.compiled import default_settings
 from biotac.link import open_link
 from biotac.link.serial_port import SerialLink
 from biotac.sim import emu_gen as emu

@@ -1,6 +1,6 @@
 """Two boards of which only the serial ports are known, as a user's are: the suite and `biotac doctor` by command line.
 
-The boards are emulated Picos (biotac-rig two-boards): what is shown is that nothing but the ports is needed.
+The boards are emulated Picos (biotac-two-boards): what is shown is that nothing but the ports is needed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def boards() -> Iterator[Callable[..., Ports]]:
     running: list[subprocess.Popen[str]] = []
 
     def start(*leads: str) -> Ports:
-        command = [sys.executable, "-m", "biotac_rig", "two-boards", *leads]
+        command = [sys.executable, "-m", "biotac_rig.two_picos", *leads]
         running.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
         assert running[-1].stdout is not None
         _, port, _, sensor_port = running[-1].stdout.readline().split()

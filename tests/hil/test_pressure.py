@@ -11,7 +11,7 @@ import pytest
 
 import biotac
 from biotac import Calibration, Setting
-from biotac.core.compiled import default_settings
+from biotac.kernels.compiled import default_settings
 from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.reader import Recording
 from biotac.sim.physics import Profile

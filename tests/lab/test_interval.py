@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biotac.calibrate.wrench import load
-from biotac.core.geometry import RADIUS_MM, grip_parts
+from biotac.kernels.geometry import RADIUS_MM, grip_parts
 from biotac.map import Margin, fit_margin, published_parts
 from biotac_lab.calibrate import interval
 from biotac_lab.calibrate.interval import Judged, together

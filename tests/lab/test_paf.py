@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError
-from biotac.features.paf import paf
-from biotac.features.signals import skin
 from biotac.sim.physics import Finger
 from biotac_lab.experiments.scores import score
+from biotac_lab.features.paf import paf
+from biotac_lab.features.signals import skin
 from biotac_lab.learn.smooth import causal, causal_taps, low_pass, lowess
 from biotac_lab.learn.stimulations import stimulate
 

@@ -102,7 +102,7 @@ def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) 
 @pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)
 def test_it_compiles_wherever_a_hands_controller_does(tmp_path: Path, compiler: list[str]) -> None:
     in_c = [] if "c++" in compiler else [CLIENT.parents[1] / "host/docs/guides/examples/grip.c"]
-    for source in (CLIENT / "biotac_client.c", CLIENT / "example_bare.c", *in_c):
+    for source in (CLIENT / "biotac_client.c", EXAMPLES / "example_bare.c", *in_c):
         command = [*compiler, *WARNINGS, f"-I{CLIENT}", "-c", str(source), "-o", str(tmp_path / "x.o")]
         subprocess.run(command, check=True)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from biotac.core import geometry as surface
-from biotac.core.geometry import Floats
+from biotac.kernels.geometry import Floats
 from biotac.sim import physics
 from biotac.sim.physics import ELECTRODES, Profile, States
 from biotac.wire import sensor_gen as _sensor

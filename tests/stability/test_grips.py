@@ -17,7 +17,7 @@ from courses import Course, Script, Sensor, script
 
 from biotac import Finger, FrameFlags, Setting, TareReason, TareState
 from biotac.core import geometry
-from biotac.core.geometry import Floats
+from biotac.kernels.geometry import Floats
 from biotac.sim import sampling
 from biotac.sim.timeline import Pose
 from biotac.wire.frames import StructArray

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from biotac.core.compiled import Results, Settings, default_settings, on_board_q4, reference_q4
+from biotac.kernels.compiled import Results, Settings, default_settings, on_board_q4, reference_q4
 from biotac.wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from paper_finger import PaperFinger
 
 from biotac.core.finger import Finger
-from biotac.core.geometry import Floats
+from biotac.kernels.geometry import Floats
 from biotac.sim import physics, sampling
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biotac.core.compiled import checked_words
 from biotac.core.finger import EVENT_DTYPE
+from biotac.kernels.compiled import checked_words
 from biotac.wire import messages_gen as wire
 from biotac.wire.native import ffi, lib
 

@@ -13,7 +13,7 @@ import numpy as np
 from courses import Sensor
 
 from biotac import Finger, FrameFlags
-from biotac.core.geometry import ELECTRODE_MM, Floats, normals_at, on_surface, tangents_at
+from biotac.kernels.geometry import ELECTRODE_MM, Floats, normals_at, on_surface, tangents_at
 from biotac.sim import physics, sampling
 from biotac.sim.faults import FAULTS, Fault, Faulty, electrode_fault
 from biotac.sim.gains import fit_gains

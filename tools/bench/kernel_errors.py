@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import boards
 from biotac.core import geometry as surface
-from biotac.core.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings
+from biotac.kernels.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings
 from biotac.sim import physics
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.messages_gen import PocWeights

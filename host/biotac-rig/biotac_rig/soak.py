@@ -1,10 +1,10 @@
 """Open and close a board of five fingers again and again, with all that a program may want of it at once.
 
-    biotac-rig soak                      two minutes
-    biotac-rig soak --minutes 60         an hour
-    biotac-rig soak --faults             faults of sensors and of the line every second, and nothing else
-    biotac-rig soak --faults --rig pico  on the emulated Pico (it needs what tests/hil needs)
-    biotac-rig soak --hazards            two minutes of the emulated Pico's own time, with what its page lists
+    biotac-soak                      two minutes
+    biotac-soak --minutes 60         an hour
+    biotac-soak --faults             faults of sensors and of the line every second, and nothing else
+    biotac-soak --faults --rig pico  on the emulated Pico (it needs what tests/hil needs)
+    biotac-soak --hazards            two minutes of the emulated Pico's own time, with what its page lists
 
 Each round of ten seconds: a hand with reading threads, callbacks, a recording and a queue; a hand in an event loop,
 once left by an exception, once cancelled, once forgotten without a close; and the page with a browser's connection.
@@ -38,7 +38,6 @@ import threading
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -65,16 +64,16 @@ BETWEEN |= {"open and close {} times": (1, 100), "two setups {}": (100, 60_000)}
 FAULTS = ("bad_parity", "error_word", "stuck_low", "stuck_high", "unplugged", "swapped")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(
-        prog="biotac-rig soak", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="biotac-soak", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--minutes", type=float, default=2.0, help="how long, roughly (default 2)")
     parser.add_argument("--faults", action="store_true", help="random sensor and line faults, every second")
     parser.add_argument("--rig", choices=("sim", "pico"), default="sim", help="board for --faults (default sim)")
     parser.add_argument("--hazards", action="store_true", help="the emulated Pico, and hazards of chip, bus and flash")
-    args = parser.parse_args(argv)
+    args = parser.parse_args()
     if args.hazards:
         return hazards(60 * args.minutes)
     end_s = time.monotonic() + 60 * args.minutes
@@ -96,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             first = now
         elif now[:2] != first[:2] or now[2] - first[2] > FLAT_KIB:
             print(
-                f"biotac-rig soak: threads, descriptors, KiB: {first} after round {WARM_UP}, now {now}", file=sys.stderr
+                f"biotac-soak: threads, descriptors, KiB: {first} after round {WARM_UP}, now {now}", file=sys.stderr
             )
             return 1
     print(f"no growth over {rounds} rounds, ledger balanced: {summary}")
@@ -135,7 +134,7 @@ def hazards(until_s: float) -> int:
         usb, lost, longest_us = seen["usb"], stats.frames_lost + stats.pac_lost, seen["latency"]["reply_us"]
         upset = seen["boots"] != 1 or usb["resets"] != resets or usb["failed"] or usb["hurried"]["wrong"] or stats.gaps
         if upset or lost != dropped or longest_us > 1e6:
-            print(f"biotac-rig soak: after {verb}: {lost} lost, {dropped} dropped; {stats}, {seen}", file=sys.stderr)
+            print(f"biotac-soak: after {verb}: {lost} lost, {dropped} dropped; {stats}, {seen}", file=sys.stderr)
             return 1
     print(f"{seen['emulated_s']:.0f} s of the board's time, {stats.frames} frames; {dict(commands)}")
     armed = f"{usb['armed_late']} of {usb['armed']} packets armed in a frame's last 200 us"
@@ -171,14 +170,14 @@ def recorded(folder: Path) -> Counter[str]:
     for finger, seqs in called.items():
         recorded_seqs = kept["seq"][kept["finger"] == finger].tolist()
         if seqs != recorded_seqs or recorded_seqs != sorted(set(recorded_seqs)):
-            raise SystemExit(f"biotac-rig soak: finger {finger}: frames called back and recorded differ, or repeat")
+            raise SystemExit(f"biotac-soak: finger {finger}: frames called back and recorded differ, or repeat")
         missing += recorded_seqs[-1] + 1 - len(recorded_seqs)
     received = (stats.frames, queued + stats.frames_skipped)
     if received != (len(kept), len(kept)) or stats.crc_errors:
-        raise SystemExit(f"biotac-rig soak: {len(kept)} recorded; received and queued: {received}; {stats}")
+        raise SystemExit(f"biotac-soak: {len(kept)} recorded; received and queued: {received}; {stats}")
     # A busy computer may stop reading for so long that the board has to drop; nothing may go uncounted.
     if missing != stats.frames_lost or missing > board.messages_dropped:
-        raise SystemExit(f"biotac-rig soak: {missing} missing, {stats.frames_lost} counted as lost; board: {board}")
+        raise SystemExit(f"biotac-soak: {missing} missing, {stats.frames_lost} counted as lost; board: {board}")
     return Counter({"frames recorded": len(kept), "lost": missing})
 
 
@@ -209,7 +208,7 @@ def faulty(folder: Path, rig: str, seed: int) -> Counter[str]:
         came, expected = (np.flatnonzero(rows.wire["finger"] == finger) for rows in (batch, sent))
         at = expected[np.searchsorted(sent.seq[expected], batch.seq[came]).clip(max=len(expected) - 1)]
         if (batch.wire[came] != sent.wire[at]).any() or (batch.t_us[came] != sent.t_us[at]).any():
-            raise SystemExit(f"biotac-rig soak: finger {finger}: frames received differ from frames sent; seed {seed}")
+            raise SystemExit(f"biotac-soak: finger {finger}: frames received differ from frames sent; seed {seed}")
         distinct = len(np.unique(at))
         missing += len(expected) - distinct
         doubled += len(came) - distinct
@@ -217,12 +216,12 @@ def faulty(folder: Path, rig: str, seed: int) -> Counter[str]:
         in_step = times_us == steps * 10_000
         silent = finger in hurt and (times_us[~in_step] % 10_000 == 0).all() and (times_us >= steps * 10_000).all()
         if not (in_step.all() or silent) or (steps != 1).any():
-            raise SystemExit(f"biotac-rig soak: finger {finger}: rounds and device time disagree; seed {seed}")
+            raise SystemExit(f"biotac-soak: finger {finger}: rounds and device time disagree; seed {seed}")
         if (faults.by_index[finger] != 0) != (finger in hurt):
-            raise SystemExit(f"biotac-rig soak: faults given to {sorted(set(hurt))}, latched: {faults}; seed {seed}")
+            raise SystemExit(f"biotac-soak: faults given to {sorted(set(hurt))}, latched: {faults}; seed {seed}")
     # PAC blocks that came twice are counted with the frames.
     if missing != stats.frames_lost or len(batch.wire) != stats.frames or doubled > stats.disordered:
-        raise SystemExit(f"biotac-rig soak: {missing} missing, {doubled} received twice, {stats}; seed {seed}")
+        raise SystemExit(f"biotac-soak: {missing} missing, {doubled} received twice, {stats}; seed {seed}")
     delivered, hurts = len(batch.wire) - doubled, {"sensor faults": len(hurt), "line faults": line.faults}
     return Counter({"frames sent": len(sent.wire), "delivered": delivered, "lost": missing, "twice": doubled, **hurts})
 

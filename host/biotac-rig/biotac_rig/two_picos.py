@@ -1,7 +1,12 @@
-"""Two emulated boards: a gateway running its flash image, and a second Pico that plays a Source as its sensors."""
+"""Two emulated boards: a gateway running its flash image, and a second Pico that plays a Source as its sensors.
+
+biotac-two-boards                    prints both ports, as of two real ones; runs until Ctrl-C
+biotac-two-boards "SS2 to nothing"   with a lead that ends elsewhere; its names are SCK MOSI MISO SS0..SS4
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from typing import Any
@@ -75,3 +80,23 @@ class TwoPicos(EmulatedBoard):
     def close(self) -> None:
         super().close()  # first: the feeding thread may be waiting for it
         self._sensors.close()
+
+
+def main() -> int:
+    """Start them with the leads of the command line, and wait."""
+    boards = TwoPicos(None, pace=1.0, hold=False)
+    try:
+        for lead in sys.argv[1:]:
+            boards.do(f"lead {lead}")
+        print(f"--port {boards.path} --sensor-port {boards.sensor_path}", flush=True)
+        while not boards.over:
+            boards.receive(None)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        boards.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

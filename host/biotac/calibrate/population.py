@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.geometry import ELECTRODE_MM, Floats, normals_at
 from ..documents import parse_document, read_document, sealed
+from ..kernels.geometry import ELECTRODE_MM, Floats, normals_at
 from ..map import columns as map_columns
 from ..map.columns import ELECTRODES, GATED, SIGNAL_COUNTS, Signals, split
 from ..map.fitted import WrenchMap

@@ -1,6 +1,6 @@
 """The compiled firmware core in Python: results, a finger's tare machine, geometry.
 
-Its names are imported on first use: the map's room is below this one, and needs its geometry.
+Its names are imported on first use.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import lazy_loader
 
+from ..kernels import geometry
+
 if TYPE_CHECKING:
-    from . import geometry
     from .bands import BANDS_HZ, SAMPLES, pac_bands
     from .finger import to_frames
 
 __all__ = ["BANDS_HZ", "SAMPLES", "geometry", "pac_bands", "to_frames"]
 
 __getattr__, __dir__, _ = lazy_loader.attach(
-    __name__, ["geometry"], {"bands": ["BANDS_HZ", "SAMPLES", "pac_bands"], "finger": ["to_frames"]}
+    __name__, [], {"bands": ["BANDS_HZ", "SAMPLES", "pac_bands"], "finger": ["to_frames"]}
 )

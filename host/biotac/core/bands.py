@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.compiled import checked_words
 from ..wire import sensor_gen as sensor
 from ..wire.frames import BANDS_DTYPE, StructArray
 from ..wire.messages_gen import INVALID_COUNT
-from .compiled import checked_words
 
 #: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))

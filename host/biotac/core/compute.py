@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.compiled import FORCE_GAINS, TORQUE_GAINS, board_settings, default_settings, formula_settings
 from ..map.board_map import BoardMap, opened
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
 from ..wire.identity import columns_text
 from ..wire.native import ffi, lib
-from .compiled import FORCE_GAINS, TORQUE_GAINS, board_settings, default_settings, formula_settings
 
 _VECTORS = ("poc_mm", "force_n", "torque_nmm")
 _NUMBERS = ("normal_n", "normal_half_n", "shear_n", "shear_half_n")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CommandRefusedError
+from ..kernels.compiled import Settings, board_settings, c_pointers, checked_words, default_settings
 from ..map.board_map import BoardMap, opened
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
@@ -22,7 +23,6 @@ from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, age_ms, frames_from_wire, tare_to_q4
 from ..wire.identity import is_foreign
 from ..wire.native import ffi, lib
-from .compiled import Settings, board_settings, c_pointers, checked_words, default_settings
 from .compute import refuse_foreign_results
 
 ROUND_US = 10_000

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibrate import population
+from ..calibrate.reference.nano17 import Nano17Reader
 from ..calibrate.wrench.crossvalidation import validate
 from ..calibrate.wrench.figures import rmse
 from ..calibrate.wrench.guided import Procedure, walk
 from ..calibrate.wrench.sources import load, read_reference
-from ..core.compiled import FORCE_GAINS, Settings, on_board_q4
 from ..hand.opening import shake_hands
+from ..kernels.compiled import FORCE_GAINS, Settings, on_board_q4
 from ..map.board_map import BoardMap
 from ..map.board_map import on_board_q4 as mapped_q4
 from ..sim.loading import bundled_scenario
-from ..sim.nano17 import Nano17Reader
 from ..sim.play import play
 from ..sim.process import SimBoard, SimLink
 from ..sim.scenario import FingerSpec, parse_scenario

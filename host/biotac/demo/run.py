@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.geometry import ELECTRODE_MM
-from ..core.unroll import unroll
 from ..errors import InputError
 from ..hand.opening import shake_hands
+from ..kernels.geometry import ELECTRODE_MM
+from ..kernels.unroll import unroll
 from ..picture import check_drawable, picture
 from ..recording.crosscheck import CrossCheck
 from ..recording.felt import Felt

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import compiled
-from ..core.compiled import BoardResults, Settings, integers
 from ..errors import InputError
+from ..kernels import compiled
+from ..kernels.compiled import BoardResults, Settings, integers
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import StructArray

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core import geometry as surface
-from ..core.geometry import Floats
 from ..errors import InputError
+from ..kernels import geometry as surface
+from ..kernels.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire.frames import Q4_PER_COUNT, tare_to_q4
 from ..wire.map_gen import Gate, Kind

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..core import geometry as surface
-from ..core.geometry import Floats
+from ..kernels import geometry as surface
+from ..kernels.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as _sensor

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.geometry import Floats
 from ..errors import InputError
+from ..kernels.geometry import Floats
 from ..wire import map_gen as _map
 from ..wire.map_gen import Gate, Kind
 from . import columns

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats, grip_parts
+from ..kernels.geometry import Floats, grip_parts
 from ..wire import messages_gen as wire
 
 #: Edges of the bands of force in N that an interval is judged in, and how many rows a band needs for that.

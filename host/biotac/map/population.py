@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.compiled import FORCE_GAINS
-from ..core.geometry import ELECTRODE_MM, Floats
+from ..kernels.compiled import FORCE_GAINS
+from ..kernels.geometry import ELECTRODE_MM, Floats
 from ..wire import messages_gen as wire
 from ..wire.fields import MN_PER_N
 from ..wire.frames import FORCE_LSB_PER_N

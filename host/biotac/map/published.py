@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from ..wire import messages_gen as wire
 from ..wire.frames import StructArray, tare_to_q4
 from .board_map import BoardMap

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, completed, reference_q4
+from ..kernels.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, completed, reference_q4
 from ..map import population
 from ..map.board_map import BoardMap, opened, pdc_above_rest_q4
 from ..map.bound import error_bound

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import NN_PER_N, Settings
 from ..core.finger import ROUND_US
+from ..kernels.compiled import NN_PER_N, Settings
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 from ..wire.native import lib

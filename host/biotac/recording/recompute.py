@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..board.stream import RESULTS
-from ..core.compiled import completed, grip_mn, pressure_force_100un, trust_of
 from ..core.finger import ROUND_US, Finger
 from ..errors import CommandRefusedError, InputError
 from ..keep.calibration import own_settings
+from ..kernels.compiled import completed, grip_mn, pressure_force_100un, trust_of
 from ..map import board_map
 from ..map.board_map import BoardMap, opened
 from ..version import __version__

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
-from ..core.geometry import ELECTRODE_MM
 from ..errors import InputError, RecordingError, RecordingWarning, imported, printable
+from ..kernels.geometry import ELECTRODE_MM
 from ..wire.fields import AXES, FRAME_FIELDS, Field, dtype_of, values_of
 from ..wire.frames import StructArray
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.geometry import Floats
 from ..errors import InputError
+from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
 from ..wire.slots import ELECTRODE_SLOT, FRAME_S, PDC_SLOT, SLOTS_PER_FRAME, TDC_SLOT

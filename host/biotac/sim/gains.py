@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import geometry as surface
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from ..wire.messages_gen import SETTINGS, Setting
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)

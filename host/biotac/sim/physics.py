@@ -22,8 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import geometry as surface
-from ..core.geometry import Floats
 from ..errors import InputError
+from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 
 Profile = Literal["new", "worn"]

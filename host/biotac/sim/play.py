@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats
 from ..errors import InputError
+from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import geometry as surface
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from ..recording.npz_file import to_lin_frame
 from ..wire import sensor_gen as _sensor
 from . import sampling

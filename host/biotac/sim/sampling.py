@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from ..wire.slots import ELECTRODE_SLOT, FRAME_S, PAC_SLOT, PDC_SLOT, SLOTS_PER_FRAME, TAC_SLOT, TDC_SLOT
 from .physics import REST_CELSIUS, Finger, States

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from ..wire.batches import ROUND_US
 from .physics import Finger
 

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
 
 DRAWN_MM = 0.1

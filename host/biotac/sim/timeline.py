@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core import geometry as surface
-from ..core.geometry import Floats
+from ..kernels.geometry import Floats
 from .physics import REST_CELSIUS, States
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import biotac
 from biotac.calibrate.reference.mounting import Mounting
+from biotac.calibrate.reference.nano17 import MOUNTING, Nano17
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
 from biotac.calibrate.wrench.plate_recording import load_run
@@ -23,7 +24,6 @@ from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.recording.alignment import align
 from biotac.recording.reader import Recording
-from biotac.sim.nano17 import MOUNTING, Nano17
 from biotac.sim.source import Source
 
 FROM_S, TO_S = 105.0, 175.0  # of calibrate.toml: the end of its rest, then a dozen places

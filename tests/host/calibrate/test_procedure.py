@@ -11,6 +11,7 @@ import pytest
 import biotac
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.mounting import LIN
+from biotac.calibrate.reference.nano17 import Nano17, Nano17Reader
 from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.coverage import REGIONS, Coverage
 from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Procedure, Step, walk
@@ -18,7 +19,6 @@ from biotac.calibrate.wrench.sources import load
 from biotac.cli.main import main
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording.reader import Recording
-from biotac.sim.nano17 import Nano17, Nano17Reader
 from biotac.wire.frames import FRAME_DTYPE
 from biotac.wire.messages_gen import FrameFlags
 

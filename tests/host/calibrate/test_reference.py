@@ -12,10 +12,10 @@ from mcap.writer import Writer
 
 from biotac.calibrate.reference.csv_file import CsvWriter, GrowingCsv
 from biotac.calibrate.reference.mounting import LIN, Mounting, read_mounting
+from biotac.calibrate.reference.nano17 import MOUNTING
 from biotac.calibrate.reference.samples import Samples, checked
 from biotac.calibrate.wrench.sources import read_reference
 from biotac.errors import DeviceLostError, InputError, RecordingError, RecordingWarning
-from biotac.sim.nano17 import MOUNTING
 
 N = 2000
 

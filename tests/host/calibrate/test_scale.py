@@ -15,7 +15,7 @@ from biotac.calibrate.press import few_shot
 from biotac.calibrate.press.few_shot import SCALE, Way
 from biotac.calibrate.press.known_force import Held, found
 from biotac.cli.main import main
-from biotac.core.geometry import RADIUS_MM
+from biotac.kernels.geometry import RADIUS_MM
 from biotac.map.file import load_fitted
 from biotac.sim.loading import bundled_scenario
 from biotac.sim.physics import Finger, States

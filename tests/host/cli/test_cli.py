@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import biotac
-import biotac.core.compiled
+import biotac.kernels.compiled
 from biotac.cli.main import VERBS, main, parser
 from biotac.wire import messages_gen as wire
 from biotac.wire.identity import setting_text

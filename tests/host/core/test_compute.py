@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
-from biotac.core.compiled import default_settings
 from biotac.core.compute import per_frame
+from biotac.kernels.compiled import default_settings
 from biotac.map import population, published_parts
 from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.wire import messages_gen as wire

@@ -12,8 +12,8 @@ import pytest
 
 import biotac
 from biotac import EventKind, FrameFlags, Trust
-from biotac.core.compiled import trust_of
 from biotac.documents import tomllib
+from biotac.kernels.compiled import trust_of
 from biotac.sim import physics, sampling
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from biotac.core.unroll import unroll
+from biotac.kernels.unroll import unroll
 from biotac.wire import sensor_gen as sensor
 
 R = 5.08

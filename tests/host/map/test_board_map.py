@@ -15,8 +15,8 @@ import wrench_run
 import biotac
 from biotac.calibrate.wrench import models
 from biotac.calibrate.wrench.plate_recording import Run, load_run
-from biotac.core.compiled import default_settings, on_board_q4, pressure_force_100un
 from biotac.errors import InputError
+from biotac.kernels.compiled import default_settings, on_board_q4, pressure_force_100un
 from biotac.map import board_map, bound, columns, file
 from biotac.map.board_map import BoardBlock, BoardMap, from_blob
 from biotac.map.fitted import WrenchMap

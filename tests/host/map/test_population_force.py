@@ -8,8 +8,8 @@ import numpy as np
 
 import biotac
 from biotac.calibrate import population as population_map
-from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
+from biotac.kernels.compiled import on_board_q4
 from biotac.map import population
 from biotac.map.board_map import BoardMap
 from biotac.map.float64 import replace_gains

@@ -11,7 +11,7 @@ import sensor_faults
 
 import biotac
 from biotac.cli.main import main
-from biotac.core.compiled import FORCE_GAINS, reference_q4
+from biotac.kernels.compiled import FORCE_GAINS, reference_q4
 from biotac.recording.crosscheck import FORCE_BOUND_MN
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots

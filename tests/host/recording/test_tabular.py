@@ -12,7 +12,7 @@ import pytest
 from record_all import record_all
 
 import biotac
-from biotac.core.geometry import ELECTRODE_MM
+from biotac.kernels.geometry import ELECTRODE_MM
 from biotac.wire.fields import FRAME_FIELDS
 
 

@@ -15,11 +15,11 @@ from record_all import record_all
 
 import biotac
 from biotac.documents import tomllib
-from biotac.features.thermal import thermal
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.fields import INVALID_U8
 from biotac.wire.frames import electrode_signals
+from biotac_lab.features.thermal import thermal
 
 ROOT = Path(__file__).parents[3]
 FLAGS = tomllib.loads((ROOT / "protocol" / "link.toml").read_text(encoding="utf-8"))["flags"]["frame"]

@@ -22,7 +22,7 @@ from biotac import ForceModel, InputError, Setting, compute
 from biotac.calibrate.population import Population
 from biotac.calibrate.wrench import Run, load, validate
 from biotac.core import to_frames
-from biotac.core.geometry import grip_parts
+from biotac.kernels.geometry import grip_parts
 from biotac.map import Margin, bands, fit_margin, published_parts
 
 from ..report import Outcome, Show, Table, of_tables

@@ -17,7 +17,7 @@ import numpy as np
 
 from biotac import PocWeights, RecordingError, Setting
 from biotac.core import geometry as surface
-from biotac.core.unroll import unroll
+from biotac.kernels.unroll import unroll
 from biotac.sim import PROFILES, Pose, Profile
 from biotac.wire import messages, sensor
 

@@ -17,8 +17,8 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from biotac import InputError
-from biotac.features.signals import ELECTRODE_DR_MM
 from biotac.wire import sensor
+from biotac_lab.features.signals import ELECTRODE_DR_MM
 
 from . import inputs, nets
 from .nets import Floats

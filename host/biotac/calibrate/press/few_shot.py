@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ...core.geometry import Floats
 from ...errors import InputError
+from ...kernels.geometry import Floats
 from ..population import Population, Sums, normals
 
 # How much fingers differ in the two numbers, and the map's error in one press: from F1 and F2, each by the other's map.

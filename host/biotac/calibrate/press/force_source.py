@@ -10,10 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import ELECTRODES
-from ...core.geometry import Floats
 from ...errors import InputError
 from ...hand.hand import Hand
+from ...kernels.compiled import ELECTRODES
+from ...kernels.geometry import Floats
 from ...recording.pressure_check import usable
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...core.compute import compute
-from ...core.geometry import Floats, normals_at
 from ...errors import InputError
 from ...hand.hand import Hand
+from ...kernels.geometry import Floats, normals_at
 from ...recording.reader import Recording
 from ...wire import messages_gen as wire
 from ..population import Population, columns

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core.compiled import NN_PER_N, pressure_force_100un
-from ...core.geometry import Floats
 from ...documents import DOUBT, Provenance
 from ...errors import InputError
 from ...keep import Calibration
+from ...kernels.compiled import NN_PER_N, pressure_force_100un
+from ...kernels.geometry import Floats
 from ...recording.alignment import Alignment
 from ...version import __version__
 from ...wire import messages_gen as wire

@@ -21,8 +21,8 @@ from typing import TextIO
 
 import numpy as np
 
-from ...core.geometry import Floats
 from ...errors import DeviceLostError, InputError, RecordingError, exists_error
+from ...kernels.geometry import Floats
 from .mounting import Mounting, from_json
 from .samples import Reference, Samples, checked
 

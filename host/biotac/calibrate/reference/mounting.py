@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.geometry import Floats
 from ...documents import TOML_BYTES, parse_json, parse_toml, read_text
 from ...errors import InputError
+from ...kernels.geometry import Floats
 
 READS = ("force on finger", "force on sensor")
 MAX_SKEW = 1e-3  # of R R' - 1: passes a rotation with three decimals, not one with a forgotten minus

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
-from ...core.geometry import Floats
 from ...errors import RecordingError
+from ...kernels.geometry import Floats
 
 MESH_STEP_MM = 0.5
 

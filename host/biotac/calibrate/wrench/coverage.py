@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
-from ...core.geometry import Floats
+from ...kernels.geometry import Floats
 from . import contact
 
 REGIONS = ("tip", "pad", "side of E11", "side of E1")

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from ...core.compute import compute
-from ...core.geometry import Floats, grip_parts
+from ...kernels.geometry import Floats, grip_parts
 from ...map.columns import GATED, PRESSURES, Signals, columns, index, with_one
 from ...map.fitted import WrenchMap
 from ...map.margin import Margin, fit_margin, published_parts

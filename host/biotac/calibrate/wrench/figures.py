@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.geometry import Floats
+from ...kernels.geometry import Floats
 from ...map.columns import Signals, centroid_mm, columns, with_one
 from .crossvalidation import SHIFTS_COUNTS, TRAINING_SHARES, Validation
 from .models import LAMBDAS, LIN, POOL, POOLED

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...core.geometry import Floats
 from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
+from ...kernels.geometry import Floats
 from ...wire import messages_gen as wire
 from ..reference.csv_file import CsvWriter
 from ..reference.mounting import Mounting

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
+from ...kernels.geometry import Floats
 from ...map.board_map import pdc_above_rest_q4
 from ...recording.alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
 from ...wire import messages_gen as wire

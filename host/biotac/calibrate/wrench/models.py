@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import geometry as surface
-from ...core.geometry import Floats
+from ...kernels.geometry import Floats
 from ...map.columns import ELECTRODES, GATED, PRESSURES, SIGNAL_COUNTS, Block, index
 from ...wire.map_gen import Gate, Kind
 from .moments import Sums

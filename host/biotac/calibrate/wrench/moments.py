@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ...core.geometry import Floats
+from ...kernels.geometry import Floats
 from ...map.columns import SIGNAL_COUNTS, Signals, columns, with_one
 from .plate_recording import Run
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.geometry import Floats
 from ...errors import RecordingError
+from ...kernels.geometry import Floats
 from ...map.columns import AXES
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.compiled import default_settings
-from ...core.geometry import Floats
 from ...errors import PortError
 from ...hand.hand import Hand
+from ...kernels.compiled import default_settings
+from ...kernels.geometry import Floats
 from ...map.board_map import on_board_q4
 from ...map.bound import compare
 from ...map.fitted import WrenchMap

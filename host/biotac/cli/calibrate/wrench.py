@@ -18,6 +18,7 @@ import biotac
 from ...calibrate import population
 from ...calibrate.reference.csv_file import GrowingCsv
 from ...calibrate.reference.mounting import Mounting, read_mounting
+from ...calibrate.reference.nano17 import Nano17, Nano17Reader
 from ...calibrate.reference.samples import Reader
 from ...calibrate.wrench import figures, report
 from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
@@ -33,7 +34,6 @@ from ...map.file import dumps_fitted
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
-from ...sim.nano17 import Nano17, Nano17Reader
 from ...sim.source import Source
 from ...wire.identity import ascii_text
 from .. import outputs, values

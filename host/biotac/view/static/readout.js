@@ -61,7 +61,7 @@ export class Results {
     panel.dataset.flags = frame.flags;
     for (const [key, digits] of Object.entries(VECTORS)) frame[key].forEach((v, k) => put(cell(key, "xyz"[k]), v, digits));
     for (const id of ["applied", "applied-key"]) byId(id).hidden = Number.isNaN(frame.appliedN[0]);
-    const { a, b, beta_k, full_scale } = this.thermistor; // biotac.features.thermal has the formula's source
+    const { a, b, beta_k, full_scale } = this.thermistor; // biotac_lab.features.thermal has the formula's source
     const celsius = frame.tdc < 1 ? NaN : beta_k / Math.log((full_scale * a) / frame.tdc - b) - 273.15;
     for (const [key, digits] of Object.entries(SCALARS)) put(cell(key), { ...frame, celsius }[key], digits);
     cell("slipLevel").dataset.kind = frame.slipLevel > 0 ? "warn" : "calm";

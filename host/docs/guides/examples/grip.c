@@ -1,4 +1,4 @@
-// The law of grip.py on a hand's own controller. firmware/client/example_bare.c talks to the gateway for it;
+// The law of grip.py on a hand's own controller. example_bare.c, beside it, talks to the gateway for it;
 // call grip_begin before each grasp, hand_poll often, grip_round every 10 ms, also after grip_end: it opens,
 // and 0.5 s later tells the board.
 #include "biotac_client.h"

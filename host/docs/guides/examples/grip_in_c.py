@@ -40,7 +40,7 @@ def built() -> ctypes.CDLL:
     with tempfile.TemporaryDirectory() as folder:
         chip, made = Path(folder) / "chip.c", str(Path(folder) / "grip.so")
         chip.write_text(CHIP.replace("GRIP", str(HERE / "grip.c")))
-        sources = [str(chip), str(CLIENT / "example_bare.c"), str(CLIENT / "biotac_client.c")]
+        sources = [str(chip), str(Path(__file__).with_name("example_bare.c")), str(CLIENT / "biotac_client.c")]
         subprocess.run(["cc", "-O2", "-shared", "-fPIC", f"-I{CLIENT}", *sources, "-lm", "-o", made], check=True)
         library = ctypes.CDLL(made)
     library.chip_round.restype = ctypes.POINTER(ctypes.c_float)

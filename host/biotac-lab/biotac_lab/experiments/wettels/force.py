@@ -10,9 +10,9 @@ import numpy as np
 
 from biotac import compute
 from biotac.calibrate.wrench import load_run, validate
-from biotac.features.paf import paf
-from biotac.features.signals import skin
 from biotac.sim import Finger
+from biotac_lab.features.paf import paf
+from biotac_lab.features.signals import skin
 
 from ...learn import force, inputs, levenberg, roc
 from ...learn.stimulations import Stimulations, stimulate

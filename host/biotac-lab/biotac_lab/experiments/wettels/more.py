@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from biotac.core import geometry as surface
-from biotac.features import several
-from biotac.features.signals import skin
 from biotac.sim import Finger, States
+from biotac_lab.features import several
+from biotac_lab.features.signals import skin
 
 from ...learn import edge
 from ...learn.probes import PROBES, counts_of, footprints

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from biotac.core import geometry as surface
-from biotac.features.paf import THRESHOLD_N, paf
-from biotac.features.signals import skin
 from biotac.sim import Finger, States
+from biotac_lab.features.paf import THRESHOLD_N, paf
+from biotac_lab.features.signals import skin
 
 from ...learn import inputs
 from ...learn.probes import PROBES, counts_of, footprints

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..calibrate.reference.mounting import Mounting
-from ..calibrate.reference.samples import Samples
-from ..core.geometry import Floats
-from ..errors import InputError
-from ..wire.slots import FRAME_S
-from .source import Source
+from ...errors import InputError
+from ...kernels.geometry import Floats
+from ...sim.source import Source
+from ...wire.slots import FRAME_S
+from .mounting import Mounting
+from .samples import Samples
 
 RESOLUTION: Floats = np.array([1 / 320] * 3 + [1 / 64] * 3)  # N, N mm
 RANGE: Floats = np.array([12.0, 12.0, 17.0, 120.0, 120.0, 120.0])

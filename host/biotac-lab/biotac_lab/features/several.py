@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core import geometry as surface
-from ..core.geometry import Floats
+from biotac.core import geometry as surface
+from biotac.kernels.geometry import Floats
+
 from .paf import electrode_force
 from .signals import ELECTRODE_DR_MM, ELECTRODES
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError
-from biotac.features.grip import GripFilter, GripState, Trained, load_ratio, observations, train
 from biotac.sim.stick_slip import Ringing
 from biotac.wire.fields import FRAME_FIELDS, dtype_of
+from biotac_lab.features.grip import GripFilter, GripState, Trained, load_ratio, observations, train
 
 FRICTION = 0.6
 NORMAL_N = 3.0

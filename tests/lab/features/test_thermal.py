@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError
-from biotac.features.thermal import thermal
 from biotac.sim.sampling import tdc_counts
 from biotac.wire.messages_gen import INVALID_COUNT
+from biotac_lab.features.thermal import thermal
 
 
 def rows(tdc: list[float]) -> np.ndarray:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from biotac.core import geometry as surface
-from biotac.features import several
-from biotac.features.signals import ELECTRODE_DR_MM
+from biotac_lab.features import several
+from biotac_lab.features.signals import ELECTRODE_DR_MM
 
 
 def signals(**electrodes: float) -> np.ndarray:

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats
-from ..wire import sensor_gen as _sensor
+from biotac.kernels.geometry import Floats
+from biotac.wire import sensor as _sensor
+
 from .signals import ELECTRODE_DR_MM, signals
 
 VOLT_PER_COUNT = 3.3 / _sensor.FULL_SCALE_COUNT

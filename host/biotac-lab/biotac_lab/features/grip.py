@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.geometry import Floats, grip_parts
-from ..errors import InputError
-from ..wire.messages_gen import INVALID_COUNT
+from biotac import InputError
+from biotac.kernels.geometry import Floats, grip_parts
+from biotac.wire import messages as wire
 
 LAG = 8  # PAC samples over which a change is taken, as in the board's events
 EDGES = 4  # bin edges for each state
@@ -56,7 +56,7 @@ def observations(rows: npt.NDArray[Any], pac: npt.ArrayLike) -> Floats:
     counts = np.asarray(pac)
     if counts.ndim != 2 or len(counts) != len(rows) or counts.shape[1] <= LAG:
         raise InputError(f"pac has shape {counts.shape} for {len(rows)} frames: expected 22 samples per frame")
-    level = np.where(counts == INVALID_COUNT, np.nan, counts.astype(np.float64))
+    level = np.where(counts == wire.INVALID_COUNT, np.nan, counts.astype(np.float64))
     flat = np.concatenate([np.full(LAG, np.nan), level.ravel()])
     change2 = ((flat[LAG:] - flat[:-LAG]) ** 2).reshape(counts.shape)
     known = np.isfinite(change2)

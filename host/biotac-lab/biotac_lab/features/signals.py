@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core import geometry as surface
-from ..core.geometry import Floats
-from ..core.unroll import unroll
-from ..errors import InputError
-from ..wire import sensor_gen as _sensor
-from ..wire.messages_gen import INVALID_COUNT
+from biotac import InputError
+from biotac.core import geometry as surface
+from biotac.kernels.geometry import Floats
+from biotac.kernels.unroll import unroll
+from biotac.wire import messages as wire
+from biotac.wire import sensor as _sensor
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 
@@ -33,7 +33,7 @@ def signals(rows: npt.NDArray[Any]) -> Floats:
         return rows.astype(np.float64)
     check_fields(rows, "counts", "tare")
     counts = rows["counts"]
-    return np.where(counts == INVALID_COUNT, np.nan, counts - rows["tare"].astype(np.float64))
+    return np.where(counts == wire.INVALID_COUNT, np.nan, counts - rows["tare"].astype(np.float64))
 
 
 def check_fields(rows: npt.NDArray[Any], *names: str) -> None:

@@ -8,9 +8,9 @@ import pytest
 import biotac
 from biotac.core import geometry as surface
 from biotac.errors import InputError
-from biotac.features.paf import electrode_force, paf
-from biotac.features.signals import ELECTRODE_DR_MM, signals, skin
 from biotac.wire.messages_gen import INVALID_COUNT
+from biotac_lab.features.paf import electrode_force, paf
+from biotac_lab.features.signals import ELECTRODE_DR_MM, signals, skin
 
 
 def counts(**electrodes: float) -> np.ndarray:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..wire import sensor_gen as _sensor
-from ..wire.messages_gen import INVALID_COUNT
+from biotac.wire import messages as wire
+from biotac.wire import sensor as _sensor
+
 from .signals import check_fields
 
 KELVIN_AT_0_C = 273.15
@@ -33,11 +34,11 @@ def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
     share = np.clip(rows["tdc"].astype(np.float64), 1.0, _sensor.FULL_SCALE_COUNT) / _sensor.FULL_SCALE_COUNT
     inside = _sensor.TDC_A / share - _sensor.TDC_B
     # a railed reading is no measurement
-    known = (rows["tdc"] != INVALID_COUNT) & (rows["tdc"] < _sensor.FULL_SCALE_COUNT) & (inside > 1.0)
+    known = (rows["tdc"] != wire.INVALID_COUNT) & (rows["tdc"] < _sensor.FULL_SCALE_COUNT) & (inside > 1.0)
     celsius = _sensor.TDC_BETA_K / np.log(np.where(known, inside, np.e)) - KELVIN_AT_0_C
     result["valid"] = known & (celsius >= RANGE_C[0]) & (celsius <= RANGE_C[1])
     result["celsius"] = np.where(result["valid"], celsius, np.nan)
-    known = rows["tac"] != INVALID_COUNT
+    known = rows["tac"] != wire.INVALID_COUNT
     first = float(rows["tac"][known][0]) if known.any() else np.nan
     result["flux_counts"] = np.where(known, rows["tac"] - first, np.nan)
     return result
