@@ -94,9 +94,7 @@ def main() -> int:
         if rounds <= WARM_UP:
             first = now
         elif now[:2] != first[:2] or now[2] - first[2] > FLAT_KIB:
-            print(
-                f"biotac-soak: threads, descriptors, KiB: {first} after round {WARM_UP}, now {now}", file=sys.stderr
-            )
+            print(f"biotac-soak: threads, descriptors, KiB: {first} after round {WARM_UP}, now {now}", file=sys.stderr)
             return 1
     print(f"no growth over {rounds} rounds, ledger balanced: {summary}")
     return 0

@@ -169,14 +169,6 @@ def to_units(raw: Any, per_unit: int) -> NDArray[np.float64]:
     return out
 
 
-def sent_of(field: Field, values: Any, dtype: np.dtype[Any]) -> Any:
-    """Inverse of values_of: integers of the message's ``dtype``, with its invalid mark for NaN."""
-    if field.per_unit is None:
-        return values.astype(dtype, copy=False)
-    scaled = np.rint(values.astype(np.float64) * field.per_unit)
-    return np.where(np.isnan(scaled), WIRE_INVALID[dtype.str[1:]], scaled).astype(dtype)
-
-
 def as_json(row: Any) -> dict[str, Any]:
     """One row, FRAME_DTYPE or an object with its fields as attributes, as JSON types; None where invalid."""
     value_of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)

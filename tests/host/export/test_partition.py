@@ -8,7 +8,6 @@ import json
 import os
 import random
 import re
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -259,34 +258,6 @@ def test_the_pages_programs_find_the_same_largest_presses(sources, trials, tmp_p
         assert hashes(tmp_path / "trials") == hashes(trials)
     largest_n = np.nanmax(np.abs(biotac.Recording(sources[1]).frames["force_n"][:, 2]))
     assert largest_n > 1 and f"{largest_n:.3f}"[:-1] in done.stdout, done.stdout
-
-
-@pytest.mark.nightly
-def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
-    """kill -9 of the command with its workers, at ten moments, then once to the end."""
-    many, out = tmp_path / "many", tmp_path / "out"
-    many.mkdir()
-    made = copies(biotac.Recording(sources[0]), many, 500, 600.0)
-    command = [sys.executable, "-m", "biotac", "export", *map(str, made), str(out), "--partition", "-j", "2"]
-
-    def there() -> int:
-        return len(list(out.glob("pac/*/finger=1/*.parquet")))
-
-    killed = 0
-    for _ in range(10):
-        running = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL)
-        target = there() + 30
-        while running.poll() is None and there() < target:
-            os.sched_yield()
-        if running.poll() is None:
-            os.killpg(running.pid, signal.SIGKILL)
-            killed += 1
-        running.wait()
-    assert killed == 10
-    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
-    assert export(made, tmp_path / "once") == 0
-    left = {name: digest for name, digest in hashes(out).items() if ".part/" not in name}
-    assert left == hashes(tmp_path / "once")
 
 
 @pytest.mark.nightly
