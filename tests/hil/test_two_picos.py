@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.doctor import Facts, PairFacts, leads
+from biotac.doctor import Facts
 from biotac.doctor.listening import listen
 from biotac.hand.opening import shake_hands
 from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
+from biotac_rig.leads import PairFacts, check
 from biotac_rig.two_picos import TwoPicos
 from rig import all_rigs, require
 
@@ -132,7 +133,8 @@ def test_the_doctor_names_the_lead_that_is_wrong(opened: Open, lead: str) -> Non
     hand.read_batch(0.3)  # where no sensor is left, to the tape's end
     after = [hand.sensor_status(finger) for finger in range(5)]
     board_facts = replace(board_facts, sensors_before=states, sensors_after=after)
-    found = list(leads.check(Facts(hand.port, board=board_facts, pair=PairFacts(before, pair.status(), pair.serials))))
+    heard = PairFacts(before, pair.status(), pair.serials)
+    found = list(check(Facts(hand.port, board=board_facts), heard))
     assert [finding.code for finding in found] == [code], found
     assert text in found[0].seen
 

@@ -1,7 +1,7 @@
 """What a release is built from: the files of this commit, with what a package index shows and a clone does not need.
 
-pyproject.toml alone has authors and addresses. biotac-lab and the ROS 2 package get them here, links of the READMEs
-lead to the repository, and the example that biotac-lab tries lies in its package.
+pyproject.toml alone has authors and addresses. biotac-lab, biotac-rig and the ROS 2 package get them here, links of
+the READMEs lead to the repository, and the example that biotac-lab tries lies in its package.
 
     release_tree.py FOLDER       makes it
     release_tree.py --missing    what a person has still to fill in
@@ -38,13 +38,15 @@ def complete(tree: Path, project: dict[str, Any]) -> None:
     ).groups()  # type: ignore[union-attr]
     (lab / inside).write_bytes((lab / example).read_bytes())
     people = ["{ " + ", ".join(f'{key} = "{value}"' for key, value in own.items()) + " }" for own in project["authors"]]
-    text = text.replace("\ndependencies", f"\nauthors = [{', '.join(people)}]\ndependencies", 1)
     links = "".join(f'{name} = "{address}"\n' for name, address in urls.items())
-    (lab / "pyproject.toml").write_text(f"{text}\n[project.urls]\n{links}")
+    rig = tree / "host/biotac-rig"
+    for folder, own in ((lab, text), (rig, (rig / "pyproject.toml").read_text())):
+        own = own.replace("\ndependencies", f"\nauthors = [{', '.join(people)}]\ndependencies", 1)
+        (folder / "pyproject.toml").write_text(f"{own}\n[project.urls]\n{links}")
     package, author = tree / "host/ros2/biotac_ros2/package.xml", project["authors"][0]
     person = f'<maintainer email="{author.get("email", "nobody@example.invalid")}">{author["name"]}<'
     package.write_text(re.sub("<maintainer .*?>.*?<", person, package.read_text()))
-    for folder in ("", "host/biotac-lab") if "Repository" in urls else ():
+    for folder in ("", "host/biotac-lab", "host/biotac-rig") if "Repository" in urls else ():
 
         def link(found: re.Match[str], folder: str = folder) -> str:
             kind = "raw" if found[1] else "blob"
