@@ -21,5 +21,4 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
 int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
                          const uint32_t *t_us, uint8_t *events, int64_t room);
 
-
 #endif

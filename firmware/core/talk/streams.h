@@ -1,4 +1,5 @@
-// The messages of a round that are subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT and PAC. rounds.c says when.
+// The messages of a round that are subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT and PAC. rounds.c says
+// when.
 #ifndef BIOTAC_STREAMS_H
 #define BIOTAC_STREAMS_H
 
