@@ -175,7 +175,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     bt_health_round(&finger->health, &finger->round, &finger->tare.trigger, &finger->tare.noise,
                     may_be_touched(finger));
     if (finger->health.sensor_fault == BT_SENSOR_FAULT_FROZEN) {
-        finger->tare.trigger.without = BT_ALL_ELECTRODES;
+        finger->tare.trigger.without = finger->tare.trigger.odd = BT_ALL_ELECTRODES;
     }
     bt_tare_end(&finger->tare, finger->round.t_us, settings);
     finger->tare_unsent = finger->tare_unsent || finger->tare.changed;

@@ -13,8 +13,7 @@ static double weight(double e, int weights)
     return weights == BT_POC_WEIGHTS_COMPRESS_N1 ? size : size * size;
 }
 
-// Eq 1 and Eq 2.
-static void point_of_contact(const double e[BT_ELECTRODES], int weights, double poc_mm[3])
+void lin2013_point(const double e[BT_ELECTRODES], int weights, double poc_mm[3])
 {
     double total = 0;
     double c[3] = {0, 0, 0};
@@ -32,26 +31,39 @@ static void point_of_contact(const double e[BT_ELECTRODES], int weights, double 
     poc_mm[2] = c[2] * to_surface;
 }
 
-void lin2013(const double e[BT_ELECTRODES], const lin2013_settings *settings, lin2013_result *result)
+void lin2013_force(const double e[BT_ELECTRODES], const double gain[3], double force_n[3])
 {
-    double force[3] = {0, 0, 0};
-    double torque_yz[2] = {0, 0};
-    point_of_contact(e, settings->poc_weights, result->poc_mm);
+    double sum[3] = {0, 0, 0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
         for (int d = 0; d < 3; d++) {
-            force[d] += e[i] * bt_normal_milli[i][d]; // Eq 3
-        }
-        for (int d = 0; d < 2; d++) {
-            torque_yz[d] += e[i] * bt_arm_nm[i][1 + d]; // Eq 4
+            sum[d] += e[i] * bt_normal_milli[i][d];
         }
     }
     for (int d = 0; d < 3; d++) {
-        result->force_n[d] = settings->force_gain[d] / 1e3 * force[d];
+        force_n[d] = gain[d] / 1e3 * sum[d];
     }
+}
+
+void lin2013_torque(const double e[BT_ELECTRODES], const double gain[2], const double poc_mm[3],
+                    const double force_n[3], double torque_nmm[3])
+{
+    double sum[2] = {0, 0};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int d = 0; d < 2; d++) {
+            sum[d] += e[i] * bt_arm_nm[i][1 + d];
+        }
+    }
+    torque_nmm[0] = poc_mm[1] * force_n[2] - poc_mm[2] * force_n[1];
     for (int d = 0; d < 2; d++) {
-        result->torque_nmm[1 + d] = settings->torque_gain[d] / 1e6 * torque_yz[d];
+        torque_nmm[1 + d] = gain[d] / 1e6 * sum[d];
     }
-    result->torque_nmm[0] = result->poc_mm[1] * result->force_n[2] - result->poc_mm[2] * result->force_n[1];
+}
+
+void lin2013(const double e[BT_ELECTRODES], const lin2013_settings *settings, lin2013_result *result)
+{
+    lin2013_point(e, settings->poc_weights, result->poc_mm);
+    lin2013_force(e, settings->force_gain, result->force_n);
+    lin2013_torque(e, settings->torque_gain, result->poc_mm, result->force_n, result->torque_nmm);
 }
 
 void lin2013_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,

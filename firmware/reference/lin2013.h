@@ -34,6 +34,12 @@ typedef struct {
     double torque_nmm[3]; // x: lever, NaN without a PoC; y, z: Eq 4
 } lin2013_result;
 
+// Eq 1 and 2; Eq 3; and Eq 4 with the lever of a point and a force.
+void lin2013_point(const double e[BT_ELECTRODES], int weights, double poc_mm[3]);
+void lin2013_force(const double e[BT_ELECTRODES], const double gain[3], double force_n[3]);
+void lin2013_torque(const double e[BT_ELECTRODES], const double gain[2], const double poc_mm[3],
+                    const double force_n[3], double torque_nmm[3]);
+
 void lin2013(const double e[BT_ELECTRODES], const lin2013_settings *settings, lin2013_result *result);
 
 // For n frames: counts (n, 19) and tare_q4 (n, 19) in 1/16 count; an electrode with BT_INVALID_COUNT in

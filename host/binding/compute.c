@@ -1,7 +1,6 @@
 #include "compute.h"
 
 #include "grip_parts.h"
-#include "map/map_gen.h"
 #include "map/population.h"
 #include "solve/interval.h"
 
@@ -41,52 +40,39 @@ static bool read_signals(const uint8_t *row, const int32_t tare_q4[BT_ELECTRODES
     return seen <= BT_FULL_SCALE_COUNT;
 }
 
-// The compression's centroid over its reaches, along the finger and across. The sums are whole, so that the
-// sign of noise makes no branch, which would take longer than all of them.
-static void compute_gates(const int32_t e_q4[BT_ELECTRODES], double *x, double *y)
+// The map's share of the force is not evaluated where it is 0.
+static void population_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
+                             const double e[BT_ELECTRODES], double force[3], uint32_t guess_mn[2])
 {
-    int64_t weight = 0, along = 0, across = 0;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        int32_t w = BT_MAP_FLOOR_Q4 - (e_q4[i] & -(e_q4[i] < 0));
-        weight += w;
-        along += (int64_t)w * bt_electrode_um[i][0];
-        across += (int64_t)w * bt_electrode_um[i][1];
-    }
-    *x = (double)along / (double)weight / BT_MAP_REACH_X_UM;
-    *y = (double)across / (double)weight / BT_MAP_REACH_Y_UM;
-}
-
-// Lin's force becomes the population map's, and torque x what follows.
-static void replace_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
-                          const double e[BT_ELECTRODES], lin2013_result *result, uint32_t guess_mn[2])
-{
-    double gate_x, gate_y, sum[9] = {0};
+    double sum[12];
     int32_t force_100un[3];
-    bt_likeness likeness = bt_population_force(e_q4, force_100un);
+    bt_likeness likeness = bt_population_force(&bt_population, e_q4, force_100un);
     bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
     uint32_t part_q8 = likeness.share * likeness.gain >> 8;
     double part = part_q8 / (double)BT_POPULATION_ALL,
            rest = (likeness.gain - part_q8) / (double)BT_POPULATION_ALL;
-    double *force = result->force_n;
-    compute_gates(e_q4, &gate_x, &gate_y);
-    for (int i = 0; i < BT_ELECTRODES; i++) {
+    for (int d = 0; d < 3; d++) {
+        force[d] = rest * likeness.otherwise_100un[d] / 1e4;
+    }
+    if (part_q8 == 0) {
+        return;
+    }
+    memcpy(sum, columns[2 * BT_ELECTRODES], sizeof sum);
+    for (int i = 0; i < BT_ELECTRODES; i++) { // without branches on the sign: it is noise's
         const double *column = columns[i + (BT_ELECTRODES & -(e_q4[i] > 0))];
-        for (int k = 0; k < 9; k++) {
+        for (int k = 0; k < 12; k++) {
             sum[k] += e[i] * column[k];
         }
     }
+    const double gate_x = sum[10] / sum[9], gate_y = sum[11] / sum[9];
     for (int d = 0; d < 3; d++) {
-        double by_map = sum[d] + gate_x * sum[3 + d] + gate_y * sum[6 + d];
-        force[d] = part * by_map + rest * likeness.otherwise_100un[d] / 1e4;
+        force[d] += part * (sum[d] + gate_x * sum[3 + d] + gate_y * sum[6 + d]);
     }
-    result->torque_nmm[0] = result->poc_mm[1] * force[2] - result->poc_mm[2] * force[1];
 }
 
-static void drop(const uint32_t wanted, const uint32_t quantity, double result[3])
+static void drop(double result[3])
 {
-    for (int d = 0; d < 3 && !(wanted & quantity); d++) {
-        result[d] = NAN;
-    }
+    result[0] = result[1] = result[2] = NAN;
 }
 
 static void fill_grip(const bt_margin *margin, const uint32_t guess_mn[2], bool whole, bt_computed *result)
@@ -110,6 +96,7 @@ int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, i
     double e[BT_ELECTRODES];
     bt_computed *result = results;
     const uint32_t wanted = formulas->wanted;
+    const bool by_map = formulas->population != NULL;
     if (tare_stride == 0 && !read_tare(tare, tare_q4)) {
         return 0;
     }
@@ -123,18 +110,31 @@ int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, i
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e[i] = e_q4[i] / 16.0;
         }
-        const bt_margin *margin = &bt_lin_margin;
-        lin2013(e, &formulas->lin, &result->lin);
-        // Torque x is made of the map's force.
-        if (formulas->population != NULL && wanted & (BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)) {
-            replace_force(formulas->population, e_q4, e, &result->lin, guess_mn);
-            margin = &bt_population.margin;
+        const bt_margin *margin = by_map ? &bt_population.margin : &bt_lin_margin;
+        lin2013_result *lin = &result->lin;
+        // Torque x is made of point and force.
+        if (wanted & (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_TORQUE)) {
+            lin2013_point(e, formulas->lin.poc_weights, lin->poc_mm);
+        }
+        if (!(wanted & (BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE))) {
+            guess_mn[0] = guess_mn[1] = 0;
+        } else if (by_map) {
+            population_force(formulas->population, e_q4, e, lin->force_n, guess_mn);
         } else {
+            lin2013_force(e, formulas->lin.force_gain, lin->force_n);
             bt_lin_guess(bt_strength_100un(e_q4), guess_mn);
         }
-        drop(wanted, BT_QUANTITY_FLAG_POC, result->lin.poc_mm);
-        drop(wanted, BT_QUANTITY_FLAG_FORCE, result->lin.force_n);
-        drop(wanted, BT_QUANTITY_FLAG_TORQUE, result->lin.torque_nmm);
+        if (wanted & BT_QUANTITY_FLAG_TORQUE) {
+            lin2013_torque(e, formulas->lin.torque_gain, lin->poc_mm, lin->force_n, lin->torque_nmm);
+        } else {
+            drop(lin->torque_nmm);
+        }
+        if (!(wanted & BT_QUANTITY_FLAG_POC)) {
+            drop(lin->poc_mm);
+        }
+        if (!(wanted & BT_QUANTITY_FLAG_FORCE)) {
+            drop(lin->force_n);
+        }
         fill_grip(margin, guess_mn, whole, result); // NaN without a force or a point
     }
     return -1;

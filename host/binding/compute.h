@@ -8,13 +8,15 @@
 
 #include <stdint.h>
 
-// Of an electrode, compressed or bulging: force in N a count, the same a count and gate x, and gate y.
-typedef double bt_population_column[9];
+// Of an electrode, compressed or bulging: force in N a count, the same a count and gate x, and gate y; then
+// the weight of the compression's centroid, and its moments over the gates' reaches.
+typedef double bt_population_column[12];
 
 typedef struct {
     lin2013_settings lin;
-    const bt_population_column *population; // compressed, then bulging electrodes; NULL: force is Lin's
-    uint32_t wanted;                        // BT_QUANTITY_FLAG_POC, FORCE and TORQUE; the others become NaN
+    // Compressed, then bulging electrodes, then what the sums begin with; NULL: force is Lin's.
+    const bt_population_column *population;
+    uint32_t wanted; // BT_QUANTITY_FLAG_POC, FORCE and TORQUE; the others become NaN
 } bt_formulas;
 
 // A row of biotac.RESULT_DTYPE. The half widths are a board's for a tare that is confirmed and a finger

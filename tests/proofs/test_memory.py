@@ -76,5 +76,5 @@ def test_the_head_of_any_map() -> None:
 
 
 def test_sums_of_any_signals() -> None:
-    sources = (f"{MEMORY}/solve.c", f"{CORE}/solve/sums_gen.c")
+    sources = (f"{MEMORY}/solve.c", f"{CORE}/signal/sums_gen.c")
     nothing_is_left_open(analysed("-eva", "-eva-precision", "2", *sources))

@@ -51,7 +51,7 @@ def run_c(text: str, *arguments: str, sources: tuple[Path, ...] = ()) -> str:
 def numbers(include: str, *expressions: str) -> list[float]:
     """What they come to where this file of the core is included; whole numbers up to 2^53 exactly."""
     prints = "".join(f'    printf("%.17g\\n", (double)({expression}));\n' for expression in expressions)
-    rest = tuple(CORE / f"{name}.c" for name in ("solve/rsqrt_gen", "solve/sums_gen", "wire/sensor_gen"))
+    rest = tuple(CORE / f"{name}.c" for name in ("solve/rsqrt_gen", "signal/sums_gen", "wire/sensor_gen"))
     text = f'#include <stdio.h>\n#include "{include}"\nint main(void)\n{{\n{prints}    return 0;\n}}\n'
     return [float(line) for line in run_c(text, sources=rest).split()]
 

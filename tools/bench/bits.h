@@ -42,7 +42,7 @@ static inline uint32_t bits_map_hash(void)
                       (int32_t *)chain + 7);
         int32_t e_q4[BT_ELECTRODES], population_100un[3];
         bt_signals_q4(counts, tare_q4, e_q4);
-        bt_population_force(e_q4, population_100un);
+        bt_population_force(&bt_population, e_q4, population_100un);
         chain[0] = bt_crc32((const uint8_t *)population_100un, sizeof population_100un) ^ chain[0];
         chain[0] = bt_crc32((const uint8_t *)chain, sizeof chain);
     }

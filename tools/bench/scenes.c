@@ -10,10 +10,10 @@
 
 #define LANES BT_LANES // a round's words that the front end looks at: electrodes, then pressure
 
-static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
-static uint16_t rest_lane[LANES], press_lane[LANES];
+static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS], light_count[BT_SLOTS];
+static uint16_t rest_lane[LANES], press_lane[LANES], light_lane[LANES];
 static bt_tare_settings tare_settings;
-static bt_finger rest_front, press_front, rest_whole, press_whole, press_lin;
+static bt_finger rest_front, press_front, rest_whole, press_whole, press_lin, press_light;
 static bt_finger rest_words, rest_events, press_events, shaken_events, slip_events;
 static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, joined;
 static bt_msg_frame message;
@@ -53,10 +53,10 @@ static void untouched(bt_finger *finger)
     sink = bt_finger_idle(finger);
 }
 
-static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32_t quantities)
+static void pressed(bt_finger *finger, const uint16_t count[LANES], const bt_solve_settings *settings)
 {
-    front_end(finger, press_lane);
-    bt_results(&finger->round, &finger->tare, settings, quantities, &message);
+    front_end(finger, count);
+    bt_results(&finger->round, &finger->tare, settings, BT_WANT_ALL, &message);
 }
 
 SCENE(front_at_rest)
@@ -76,14 +76,20 @@ SCENE(whole_at_rest)
 
 SCENE(whole_in_contact)
 {
-    pressed(&press_whole, settings, BT_WANT_ALL);
+    pressed(&press_whole, press_lane, settings);
+}
+
+// So lightly that the population map has no share in the force.
+SCENE(whole_in_light_contact)
+{
+    pressed(&press_light, light_lane, settings);
 }
 
 SCENE(whole_by_lin)
 {
     bt_solve_settings lins = *settings;
     lins.population = false;
-    pressed(&press_lin, &lins, BT_WANT_ALL);
+    pressed(&press_lin, press_lane, &lins);
 }
 
 SCENE(all_words)
@@ -169,7 +175,7 @@ SCENE(population)
 {
     int32_t force_100un[3], e_q4[BT_ELECTRODES];
     bt_signals_q4(press_whole.round.electrode, press_whole.tare.electrode_q4, e_q4);
-    bt_population_force(e_q4, force_100un);
+    bt_population_force(&bt_population, e_q4, force_100un);
     sink = (uint32_t)force_100un[0];
 }
 
@@ -185,6 +191,7 @@ const bench_scene bench_scenes[] = {
     {"front end", "in contact", front_in_contact},
     {"whole frame", "at rest", whole_at_rest},
     {"whole frame", "in contact", whole_in_contact},
+    {"whole frame", "in light contact", whole_in_light_contact},
     {"whole frame", "in contact, Lin's scales", whole_by_lin},
 
     {"wrench map", "signals and offset, 3 axes", map_affine},
@@ -232,20 +239,23 @@ void bench_scenes_init(void)
     tare_settings = bt_tare_settings_from(&all);
     for (int s = 0; s < BT_SLOTS; s++) {
         rest_count[s] = (uint16_t)(2900 + 7 * s);
-        press_count[s] = rest_count[s];
+        press_count[s] = light_count[s] = rest_count[s];
         int channel = bt_slot_channel[s];
         int lane = channel == BT_CHANNEL_PDC ? BT_LANE_PDC : channel - BT_CHANNEL_E1;
         if (lane >= 0 && lane < LANES) {
             press_count[s] = (uint16_t)(rest_count[s] - (lane < BT_ELECTRODES ? 20 * (s % 13) + 40 : -100));
             rest_lane[lane] = rest_count[s];
             press_lane[lane] = press_count[s];
+            light_count[s] = (uint16_t)(rest_count[s] - (rest_count[s] - press_count[s]) / 4);
+            light_lane[lane] = light_count[s];
         }
     }
     bt_finger_reset(&rest_front, 0);
     run(&rest_front, rest_count, 400);
-    rest_whole = rest_words = press_front = rest_front;
+    rest_whole = rest_words = press_front = press_light = rest_front;
     run(&press_front, press_count, 50);
-    press_front.tare.noise.count2 = 400; // exact counts have none
+    run(&press_light, light_count, 50);
+    press_front.tare.noise.count2 = press_light.tare.noise.count2 = 400; // exact counts have none
     press_whole = press_lin = press_front;
     rest_events = rest_front;
     press_events = slip_events = press_front;

@@ -287,7 +287,7 @@ def source(contract: Contract) -> str:
         (f"void bt_sums_force(const int32_t v[{n}], int32_t sum[3])", force(finger)),
         (f"void bt_sums_torque(const int32_t v[{n}], int32_t sum[2])", torque(finger)),
     ]
-    out = [f"// {GENERATED}", '#include "solve/sums_gen.h"', "", '#include "fixed_point.h"', ""]
+    out = [f"// {GENERATED}", '#include "signal/sums_gen.h"', "", '#include "fixed_point.h"', ""]
     out += ["// min(e, 0), without a branch.", "static inline uint32_t compressed(int32_t e)", "{"]
     out += ["    return (uint32_t)(e & bt_shift_down(e, 31));", "}"]
     for signature, body in functions:

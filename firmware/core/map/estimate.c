@@ -5,8 +5,6 @@
 #include "signal/round.h"
 #include "signal/signals.h"
 
-#include <string.h>
-
 // Less what may be noise, and a quarter of what exceeds the knee: no one electrode is to decide alone.
 #define NOISE_Q4 (8 * 16)
 #define KNEE_Q4  (256 * 16)
@@ -43,11 +41,13 @@ void bt_complete(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT
                  uint32_t without, uint16_t completed[BT_ELECTRODES])
 {
     int32_t x[BT_ELECTRODES];
-    memcpy(completed, counts, BT_ELECTRODES * sizeof counts[0]);
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        completed[i] = counts[i] == 0 ? 1 : counts[i];
+    }
     if (!bt_usable_without(without)) {
         return;
     }
-    bt_signals_q4(counts, tare_q4, x);
+    bt_signals_q4(completed, tare_q4, x);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         x[i] = without >> i & 1 ? 0 : bounded(x[i]);
     }

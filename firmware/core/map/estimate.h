@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 // Copy counts to completed, with the estimates of the electrodes in `without`, a bit mask, that have a tare;
-// of more than two nothing is estimated.
+// of more than two nothing is estimated. A count of 0 says that it is below 1, and is completed to that.
 void bt_complete(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                  uint32_t without, uint16_t completed[BT_ELECTRODES]);
 

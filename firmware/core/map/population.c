@@ -2,6 +2,7 @@
 
 #include "fixed_point.h"
 #include "map/population_gen.h"
+#include "signal/sums_gen.h"
 
 // As bt_map_open would fill it in (tests/core/map/test_population.c): the map is checked when it is built.
 #define BLOCKS_AT ((const uint8_t *)bt_population_blob + BT_MAP_HEADER_BYTES)
@@ -21,7 +22,6 @@ _Static_assert((BT_POPULATION_KINDS & ~(1 << BT_MAP_KIND_COMPRESSION | 1 << BT_M
 #define NOISE_Q4 (8 * 16)   // per electrode: not part of the touch
 #define KNEE_Q4  (256 * 16) // above, a signal counts a quarter: one electrode must not be all of the touch
 #define MOST_Q4  (KNEE_Q4 + BT_E_MAX_Q4 / 4)
-#define SUM_BITS 14 // what the sum of signals is shifted to
 
 #define LEAST_Q4      (64 * 16) // in sum: below, nothing touches
 #define LIGHT_Q4      (1500 * 16)
@@ -32,24 +32,22 @@ _Static_assert((BT_POPULATION_KINDS & ~(1 << BT_MAP_KIND_COMPRESSION | 1 << BT_M
 // square.
 #define GAIN(sum)     ((uint32_t)bt_clamp((int32_t)((sum) * 13 >> 11), 102, BT_POPULATION_ALL))
 #define UPRIGHT(sum)  ((sum) * (BT_CORE_RADIUS_UM / 32)) // keeps the direction from being that of noise
+#define TO_BITS       13 // of the longest part of a direction, before its tilt
 #define UNIT_BITS     12
 #define NEAR_8        7  // in eighths of the strength: up to which the map may be off the normals,
 #define FAR_8         11 // and from which on it makes nothing of the force
 #define OUTSIDE       2  // strengths
 #define STRENGTH_MAX  STRENGTH((int64_t)BT_ELECTRODES *MOST_Q4)
 
-_Static_assert((5ll * BT_ELECTRODE_MAX_UM << SUM_BITS) <= INT32_MAX, "a direction must fit int32");
+_Static_assert(MOST_Q4 *(int64_t)BT_SUMS_Z_UM + UPRIGHT((int64_t)BT_ELECTRODES * MOST_Q4) <= INT32_MAX
+                   && BT_SUMS_AHEAD_UM < BT_SUMS_Z_UM && BT_SUMS_Y_UM < BT_SUMS_Z_UM,
+               "a direction must fit int32");
+_Static_assert((3 * 3 + 3 * 3 + 5 * 5ll) << 2 * TO_BITS <= UINT32_MAX, "a direction's square must fit");
 _Static_assert(STRENGTH_MAX << UNIT_BITS <= INT32_MAX, "a force must fit int32");
 _Static_assert(FAR_8 * STRENGTH_MAX * BT_POPULATION_ALL / (FAR_8 - NEAR_8) <= INT32_MAX,
                "a share must fit int32");
 _Static_assert((8 + FAR_8) * STRENGTH_MAX / 8 * BT_POPULATION_ALL <= INT32_MAX, "a mixture must fit int32");
 _Static_assert(BT_MAP_RESULT_MAX + STRENGTH_MAX <= INT32_MAX, "a difference must fit int32");
-
-// A frame's bounded signals, shifted so that their sum has SUM_BITS, all positive; in sum_q4 they are not.
-typedef struct {
-    int32_t x[BT_ELECTRODES];
-    uint32_t sum_q4, pressed_q4, sum;
-} touch;
 
 static inline uint32_t bounded(uint32_t size_q4)
 {
@@ -57,49 +55,22 @@ static inline uint32_t bounded(uint32_t size_q4)
     return size > KNEE_Q4 ? KNEE_Q4 + ((size - KNEE_Q4) >> 2) : size;
 }
 
-static touch touch_of(const int32_t e_q4[BT_ELECTRODES])
+// Along the outward normals of the compressed electrodes, with .6 of their tilt: 3 of 5 parts.
+static void along_normals(const bt_linear_sums *pressed, uint32_t sum_q4, uint32_t strength_100un,
+                          int32_t force_100un[3])
 {
-    touch sums; // whose x is not cleared first
-    sums.sum_q4 = sums.pressed_q4 = sums.sum = 0;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint32_t size = bounded(bt_abs32(e_q4[i]));
-        sums.sum_q4 += size;
-        sums.pressed_q4 += e_q4[i] < 0 ? size : 0;
-        sums.x[i] = bt_with_sign(size, e_q4[i]);
-    }
-    int up = SUM_BITS - bt_bit_length(sums.sum_q4);
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint32_t size = bt_abs32(sums.x[i]);
-        size = up > 0 ? size << up : size >> -up;
-        sums.sum += size;
-        sums.x[i] = bt_with_sign(size, sums.x[i]);
-    }
-    return sums;
-}
-
-// Along the outward normals of the compressed electrodes, with .6 of their tilt.
-static void along_normals(const touch *sums, uint32_t strength_100un, int32_t force_100un[3])
-{
-    int32_t to[3] = {0, 0, 0};
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        int32_t x = sums->x[i] & bt_shift_down(sums->x[i], 31);
-        const int16_t *r = bt_electrode_um[i];
-        to[0] += x * (r[0] > 0 ? r[0] : 0); // on the cylinder a normal has no x
-        to[1] += x * r[1];
-        to[2] += x * r[2];
-    }
-    to[0] *= 3; // of 5
-    to[1] *= 3;
-    to[2] = 5 * to[2] + 5 * (int32_t)UPRIGHT(sums->sum);
-    int down = bt_bit_length(bt_abs32(to[0]) | bt_abs32(to[1]) | bt_abs32(to[2])) - 15;
+    // On the cylinder a normal has no x.
+    const int32_t to[3] = {-(int32_t)pressed->ahead, -pressed->y, (int32_t)(pressed->z + UPRIGHT(sum_q4))};
+    const int down = bt_bit_length(bt_abs32(to[0]) | bt_abs32(to[1]) | bt_abs32(to[2])) - TO_BITS;
     uint32_t size[3], square = 0;
     for (int d = 0; d < 3; d++) {
-        size[d] = bt_abs32(to[d]) >> down;
+        size[d] = down > 0 ? bt_abs32(to[d]) >> down : bt_abs32(to[d]) << -down;
+        size[d] *= d < 2 ? 3 : 5;
         square += size[d] * size[d];
     }
-    uint32_t length = bt_root_u32(square);
+    const uint32_t per_length = (1u << 31) / bt_root_u32(square);
     for (int d = 0; d < 3; d++) {
-        uint32_t unit = (size[d] << UNIT_BITS) / length;
+        const uint32_t unit = size[d] * per_length >> (31 - UNIT_BITS);
         force_100un[d] = bt_with_sign(unit * strength_100un >> UNIT_BITS, to[d]);
     }
 }
@@ -135,33 +106,36 @@ bool bt_population_like(const bt_map *map)
            && map->kinds == BT_POPULATION_KINDS && map->gates == BT_POPULATION_GATES;
 }
 
-bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
+bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
 {
-    bt_map_results(&bt_population, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
-    return bt_population_judge(e_q4, force_100un);
-}
-
-bt_likeness bt_population_judge(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
-{
-    touch sums = touch_of(e_q4);
-    uint32_t firm_100un = STRENGTH(sums.sum_q4);
-    bt_likeness likeness = {.outside = sums.sum_q4 < LEAST_Q4, .gain = GAIN(sums.sum_q4)};
+    int32_t x_q4[BT_ELECTRODES];
+    uint32_t sum_q4 = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        uint32_t size = bounded(bt_abs32(e_q4[i]));
+        sum_q4 += size;
+        x_q4[i] = bt_with_sign(size, e_q4[i]);
+    }
+    uint32_t firm_100un = STRENGTH(sum_q4);
+    bt_likeness likeness = {.outside = sum_q4 < LEAST_Q4, .gain = GAIN(sum_q4)};
     likeness.strength_100un = firm_100un * likeness.gain >> 8;
-    if (sums.sum_q4 == 0) {
+    if (sum_q4 == 0) {
         force_100un[0] = force_100un[1] = force_100un[2] = 0;
         return likeness;
     }
-    along_normals(&sums, firm_100un, likeness.otherwise_100un);
-    uint32_t off = furthest(force_100un, likeness.otherwise_100un), far = FAR_8 * firm_100un;
-    if (off < far / 8) {
-        uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
-        likeness.share = at_most((int32_t)share);
-        uint32_t firm = at_most(bt_shift_down((int32_t)sums.sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
-        likeness.share = likeness.share < firm ? likeness.share : firm;
+    bt_linear_sums pressed;
+    bt_sums_linear(x_q4, &pressed);
+    along_normals(&pressed, sum_q4, firm_100un, likeness.otherwise_100un);
+    uint32_t most = at_most(bt_shift_down((int32_t)sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
+    if (most > 0) { // else whatever the map said, nothing of it would be published
+        bt_map_results(map, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
+        uint32_t off = furthest(force_100un, likeness.otherwise_100un), far = FAR_8 * firm_100un;
+        if (off < far / 8) {
+            uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
+            likeness.share = share < most ? share : most;
+        }
+        likeness.outside = off > OUTSIDE * firm_100un;
     }
-    likeness.outside |=
-        off > OUTSIDE * firm_100un
-        || (likeness.share < BT_POPULATION_ALL && FEW_PRESSED * sums.pressed_q4 < sums.sum_q4);
+    likeness.outside |= likeness.share < BT_POPULATION_ALL && FEW_PRESSED * pressed.total < sum_q4;
     if (likeness.share < BT_POPULATION_ALL || likeness.gain < BT_POPULATION_ALL) {
         mix(&likeness, force_100un);
     }

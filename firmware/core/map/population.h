@@ -22,16 +22,14 @@ typedef struct {
     int32_t otherwise_100un[3]; // along the normals, before the gain
 } bt_likeness;
 
-// Force on the finger in 100 uN, of signals as from bt_signals_q4, and how like the training they are
-// (SPEC.md, Population map). No input overflows.
-bt_likeness bt_population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3]);
+// Force on the finger in 100 uN, of signals as from bt_signals_q4, by the population map or one like it, and
+// how like the training they are (SPEC.md, Population map). A touch so light that the map has no share in its
+// force does not evaluate it. No input overflows.
+bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3]);
 
 // True for a map of the same blocks: this one fitted to presses of a finger. Beyond them it extrapolates as
 // this one does, so it is judged alike.
 bool bt_population_like(const bt_map *map);
-
-// The same as bt_population_force of such a map, whose force is in force_100un.
-bt_likeness bt_population_judge(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3]);
 
 // The strength of a firm touch by the sum of all signals, before the gain, in 100 uN, at most 303 000.
 uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES]);

@@ -246,7 +246,7 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     const bt_lanes *smooth = &trigger->smooth;
     bt_lanes *sum = &health->sum[health->filling];
     bt_lanes *before = &health->sum[!health->filling];
-    uint32_t without = (trigger->unknown | health->out) & BT_ALL_ELECTRODES;
+    const uint32_t without = (trigger->unknown | health->out) & BT_ALL_ELECTRODES;
     uint32_t lone = 0;
     uint8_t leap = bt_leap_round(&health->leap, round, trigger);
     health->exchanged = health->exchanged || leap == BT_SENSOR_FAULT_EXCHANGED;
@@ -262,7 +262,8 @@ void bt_health_round(bt_health *health, const bt_round *round, const bt_trigger 
     }
     switch (++health->rounds) {
     case 1:
-        health->same = bt_window_begin(sum, before, smooth) & ~without;
+        // At the end of its range an electrode repeats its word, and is not stuck.
+        health->same = bt_window_begin(sum, before, smooth) & ~(without | (trigger->odd & ~trigger->without));
         judge_repeats(health, trigger->without & ~health->out, noise->count2 >= NOISY);
         bt_mean_add(&health->mean, before, 0);
         break;

@@ -1,5 +1,7 @@
 #include "signal/trigger.h"
 
+#include "wire/touch_gen.h"
+
 #include <string.h>
 
 _Static_assert(BT_LANES % 2 == 0 && sizeof(bt_lanes) == BT_LANES * sizeof(uint16_t), "lanes go in pairs");
@@ -30,18 +32,40 @@ void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes)
         }
     }
     trigger->out = electrodes;
-    trigger->usable = electrodes == 0 ? BT_RAIL_COUNT - 1 : 0;
+    trigger->usable = electrodes == 0 ? BT_RAIL_COUNT - 2 : 0;
+}
+
+static bool pressed(const bt_trigger *trigger)
+{
+    const uint16_t rest = trigger->rest.lane[BT_LANE_PDC];
+    return rest != 0 && trigger->smooth.lane[BT_LANE_PDC] - rest > BT_PDC_HIT;
 }
 
 int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
+    const uint32_t bit = 1u << electrode;
     const bt_lanes *from = trigger->limit == BT_TRIGGER_NEVER ? &trigger->smooth : &trigger->rest;
-    if (bt_count_usable(count) && !(trigger->out >> electrode & 1)) {
+    uint16_t *smooth = &trigger->smooth.lane[electrode], rest = trigger->rest.lane[electrode];
+    // It was near the end of its range, compressed. A lead that opens leaps there, or nothing presses.
+    const bool near = *smooth <= BT_TRIGGER_FAR && rest - *smooth > BT_TRIGGER_FAR;
+    const bool squeezed = count <= BT_TRIGGER_BOUND && pressed(trigger);
+    if (trigger->out & bit) {
+        trigger->without |= bit;
+    } else if (squeezed && near) {
+        trigger->odd |= bit;
+        *smooth = BT_TRIGGER_BOUND;
+    } else if (bt_count_usable(count)) {
         (void)bt_trigger_filter(trigger, electrode, count, from->lane[electrode]);
     } else {
-        trigger->without |= 1u << electrode;
-        // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten.
+        trigger->without |= bit;
+        // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten. Not one
+        // between others at the end of the range, where a fast press leaves it.
+        trigger->far |= squeezed ? trigger->far_before & bit : 0;
+        if (near && count == 0 && !squeezed) { // it opened when it was a bound: as if it rested
+            *smooth = rest;
+        }
     }
+    trigger->odd |= trigger->without;
     int32_t e = (int32_t)trigger->smooth.lane[electrode] - trigger->rest.lane[electrode];
     return trigger->room -= e * e;
 }

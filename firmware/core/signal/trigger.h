@@ -9,7 +9,8 @@
 // expected, because there is no tare or it is frozen, a jump from word to word must be confirmed instead.
 //
 // A missing or railed word repeats the filter's value, so that it neither looks like motion nor enters
-// a tare; what is repeated is never published.
+// a tare; what is repeated is never published. An electrode that a press brings to the low end of its range
+// is not railed: its word is a bound, which says that it is compressed at least so far as a count of 1.
 //
 // Units: counts; energies in count^2 summed over electrodes. Nothing is rounded except `rest`, which is the
 // tare in whole counts: that changes the energy by at most |e| + 1/4 per electrode.
@@ -46,22 +47,23 @@ static inline void bt_lanes_add(bt_lanes *sum, const bt_lanes *lanes)
 #define BT_TRIGGER_UNREAD 8191
 
 typedef struct {
-    bt_lanes smooth;      // the filter's value
-    bt_lanes rest;        // what it is compared with
-    int32_t room;         // energy left until the trigger fires; negative once it has
-    int32_t limit;        // `room` at the start of the round
-    uint32_t unknown;     // bit mask of lanes without a good word so far
-    uint32_t first_words; // lanes whose first good word has come, until the owner takes note of it
-    uint32_t far;         // lanes whose word of this round was far off, held back or not
+    bt_lanes smooth; // the filter's value
+    bt_lanes rest;   // what it is compared with
+    int32_t room;    // energy left until the trigger fires; negative once it has
+    int32_t limit;   // `room` at the start of the round
+    uint32_t far;    // bit mask of lanes whose word of this round was far off, held back or not
     uint32_t far_before;
     uint32_t up; // lanes whose word of this round jumped by more than BT_TRIGGER_JUMP from the filter's value
     uint32_t down;
     uint32_t leapt; // likewise, by more than BT_TRIGGER_LEAP either way
     uint32_t
-        usable; // counts from 1 on that are used unseen: all but the rails, or none while electrodes are out
-    uint32_t out;      // electrodes whose words are not to be used: those that health.h has condemned
-    uint32_t without;  // electrodes whose word of this round is not used: missing, railed or condemned
-    bool pressure_now; // this round had a good pressure word
+        usable; // so many counts from 2 on are used unseen: all in range, or none while electrodes are out
+    uint32_t without;     // electrodes whose word of this round is not used: missing, railed or condemned
+    uint32_t odd;         // these, and those whose word is a bound
+    uint32_t unknown;     // lanes without a good word so far
+    uint32_t first_words; // lanes whose first good word has come, until the owner takes note of it
+    uint32_t out;         // electrodes whose words are not to be used: those that health.h has condemned
+    bool pressure_now;    // this round had a good pressure word
 } bt_trigger;
 
 // More than any round can use up: a trigger with this limit never fires.
@@ -81,21 +83,22 @@ static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
     trigger->down = 0;
     trigger->leapt = 0;
     trigger->without = 0;
-    trigger->pressure_now = false;
+    trigger->odd = 0;
 }
 #endif
 
-// The rare cases: a word that may not be used, and one that is far off. The first returns the room left,
-// the second the filter's new value.
+// The rare cases: a word at an end of its range or not to be used, and one that is far off. The first returns
+// the room left, the second the filter's new value.
 int32_t bt_trigger_doubt(bt_trigger *trigger, unsigned electrode, uint16_t count);
 uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count);
 
 // Do without these electrodes' words from the next round on.
 void bt_trigger_leave_out(bt_trigger *trigger, uint32_t electrodes);
 
-#define BT_TRIGGER_FAR  24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
-#define BT_TRIGGER_JUMP 48
-#define BT_TRIGGER_LEAP 72 // more than any glitch
+#define BT_TRIGGER_FAR   24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
+#define BT_TRIGGER_JUMP  48
+#define BT_TRIGGER_LEAP  72 // more than any glitch
+#define BT_TRIGGER_BOUND 1  // up to this count a compressed electrode is at the end of its range
 
 #ifndef BT_CDEF // called in every slot, hence inline
 static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uint16_t count, uint16_t from)
@@ -110,7 +113,7 @@ static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uin
 // Take an electrode's word, 0..4095 or BT_INVALID_COUNT, while no touch is expected.
 static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
-    if ((uint32_t)count - 1 < trigger->usable) {
+    if ((uint32_t)count - 2 < trigger->usable) {
         (void)bt_trigger_filter(trigger, electrode, count, trigger->smooth.lane[electrode]);
     } else {
         (void)bt_trigger_doubt(trigger, electrode, count);
@@ -120,7 +123,7 @@ static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, ui
 // The same while a touch is expected. Returns the room left.
 static inline int32_t bt_trigger_electrode(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
-    if ((uint32_t)count - 1 >= trigger->usable) {
+    if ((uint32_t)count - 2 >= trigger->usable) {
         return bt_trigger_doubt(trigger, electrode, count);
     }
     uint16_t smooth = bt_trigger_filter(trigger, electrode, count, trigger->rest.lane[electrode]);

@@ -27,7 +27,7 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     uint32_t flags = 0;
     // One comparison for what hardly ever happens: a missing word is above every count.
     uint32_t counts = (uint32_t)(round->tac | round->tdc);
-    if (counts > BT_FULL_SCALE_COUNT || !bt_count_usable(round->pdc) || tare->trigger.without != 0) {
+    if (counts > BT_FULL_SCALE_COUNT || !bt_count_usable(round->pdc) || tare->trigger.odd != 0) {
         flags |= trouble(round, tare);
     }
     if (!tare->tared) {

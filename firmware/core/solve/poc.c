@@ -1,8 +1,8 @@
 #include "solve/poc.h"
 
 #include "fixed_point.h"
+#include "signal/sums_gen.h"
 #include "solve/rsqrt.h"
-#include "solve/sums_gen.h"
 
 // Every electrode has z < 0, so with a positive weight sum (y, z) cannot be 0: the direction below is never
 // 0/0 (SPEC.md, Degenerate input), and |N_z| is always large enough to normalise by.

@@ -51,7 +51,7 @@ static signal_shape signals(const uint16_t counts[BT_ELECTRODES], const bt_tare 
                             int32_t e_q4[BT_ELECTRODES])
 {
     signal_shape shape = {0, 0};
-    if (tare->trigger.without == 0 && !(tare->trigger.unknown & BT_ALL_ELECTRODES)) {
+    if (tare->trigger.odd == 0 && !(tare->trigger.unknown & BT_ALL_ELECTRODES)) {
         shape = all_signals(counts, tare->electrode_q4, e_q4);
     } else {
         bt_signals_q4(counts, tare->electrode_q4, e_q4);
@@ -150,7 +150,7 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     uncertainty.tare_unconfirmed = tare->unsure;
     uncertainty.guess_mn[0] = uncertainty.guess_mn[1] = 0;
     losses out = {0, 0, 0};
-    if (tare->trigger.without != 0) {
+    if (tare->trigger.odd != 0) {
         bt_complete(counts, tare->electrode_q4, tare->trigger.without, completed);
         counts = completed;
         out = losses_of(&tare->trigger, completed);

@@ -81,17 +81,12 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
     }
 }
 
-static uint32_t outside(const bt_likeness *likeness, uint32_t guess_mn[2])
-{
-    bt_population_guess(likeness->share, likeness->outside, likeness->strength_100un, guess_mn);
-    return likeness->outside ? BT_FRAME_FLAG_OUTSIDE : 0;
-}
-
-static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3],
+static uint32_t population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3],
                                  uint32_t guess_mn[2])
 {
-    bt_likeness likeness = bt_population_force(e_q4, force_100un);
-    return BT_FRAME_FLAG_POPULATION | outside(&likeness, guess_mn);
+    bt_likeness likeness = bt_population_force(map, e_q4, force_100un);
+    bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
+    return likeness.outside ? BT_FRAME_FLAG_OUTSIDE : 0;
 }
 
 uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
@@ -104,9 +99,11 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         if (guess_mn != NULL) {
-            flags = population_force(e_q4, force_100un, guess_mn);
-        } else {
+            flags = BT_FRAME_FLAG_POPULATION | population_force(&bt_population, e_q4, force_100un, guess_mn);
+        } else if (wanted & BT_WANT_FORCE) {
             bt_force(e_q4, &settings->gains, force_100un);
+        } else {
+            bt_force_yz(e_q4, &settings->gains, force_100un);
         }
     }
     if (wanted & BT_WANT_TORQUE) {
@@ -134,11 +131,11 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     *torsion_mnmm = BT_INVALID_I32;
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
-        bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
-                      wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm);
         if (bt_population_like(settings->map)) {
-            bt_likeness likeness = bt_population_judge(e_q4, force_100un);
-            flags = outside(&likeness, guess_mn);
+            flags = population_force(settings->map, e_q4, force_100un, guess_mn);
+        } else {
+            bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
+                          wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm);
         }
     }
     if (derived) {

@@ -2,7 +2,7 @@
 
 #include "fixed_point.h"
 #include "map/map_gen.h"
-#include "solve/sums_gen.h"
+#include "signal/sums_gen.h"
 
 // sum * gain / FORCE_DIVISOR is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / TORQUE_DIVISOR is mN*mm: 1/16
 // count * BT_SUMS_TORQUE_UNIT_NM * nN. Multiplying by 2^bits / divisor and shifting replaces both divisions.
@@ -71,13 +71,24 @@ static int32_t scale(int32_t sum, const bt_gain *gain, int bits)
     return bt_with_sign(bt_scale(bt_abs32(sum), gain->high, gain->low, bits - 32), sum ^ gain->sign);
 }
 
-void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3])
+static inline void force_from(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int first,
+                              int32_t force_100un[3])
 {
     int32_t sum[3];
     bt_sums_force(e_q4, sum);
-    for (int d = 0; d < 3; d++) {
+    for (int d = first; d < 3; d++) {
         force_100un[d] = scale(sum[d], &gains->force[d], FORCE_BITS);
     }
+}
+
+void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3])
+{
+    force_from(e_q4, gains, 0, force_100un);
+}
+
+void bt_force_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3])
+{
+    force_from(e_q4, gains, 1, force_100un);
 }
 
 void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t torque_mnmm[2])

@@ -26,8 +26,9 @@ typedef struct {
 
 bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2]);
 
-// Force in 100 uN.
+// Force in 100 uN; or without x, which no torque needs.
 void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3]);
+void bt_force_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3]);
 
 // Torque y and z in mN*mm.
 void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t torque_mnmm[2]);

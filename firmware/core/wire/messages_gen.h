@@ -141,7 +141,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_POC_INVALID (1u << 2) // all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
 #define BT_FRAME_FLAG_POC_LOW (1u << 3) // the signal energy is below four times the contact threshold: the PoC is noisy
 #define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame
-#define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090
+#define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: it is compressed at least so far
 #define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word

@@ -112,8 +112,8 @@ def c_pointers(*arrays: NDArray[Any]) -> list[Any]:
 
 
 def completed(messages: NDArray[Any]) -> NDArray[Any]:
-    """FRAME messages (n,), with the counts that the board estimates in place of those of electrodes that are out."""
-    without = np.flatnonzero(messages["electrodes_out"])
+    """FRAME messages (n,), with the counts that the board uses in place of bounds and of electrodes that are out."""
+    without = np.flatnonzero((messages["electrodes_out"] != 0) | (messages["counts"] == 0).any(axis=1))
     if len(without):
         messages = messages.copy()
     for k in without.tolist():

@@ -22,11 +22,11 @@ from ..kernels.geometry import ELECTRODE_MM, Floats
 from ..wire import messages_gen as wire
 from ..wire.fields import MN_PER_N
 from ..wire.frames import FORCE_LSB_PER_N
-from ..wire.map_gen import Gate, Kind
+from ..wire.map_gen import FLOOR_COUNTS, Gate, Kind
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
 from .board_map import BoardMap
-from .columns import GATED, SIGNAL_COUNTS, split
+from .columns import GATED, REACH_MM, SIGNAL_COUNTS, split
 from .fitted import quantise
 from .float64 import Unrounded
 from .margin import UNKNOWN, Margin
@@ -37,7 +37,7 @@ Integers = npt.NDArray[np.int64]
 ALL = 256  # the share 1
 _NOISE_Q4 = 8 * 16
 _KNEE_Q4 = 256 * 16
-_SUM_BITS = 14
+_TO_BITS = 13
 _UNIT_BITS = 12
 _LEAST_Q4 = 64 * 16
 _LIGHT_Q4 = 1500 * 16
@@ -130,13 +130,12 @@ def likeness(e: Floats, force_100un: Integers) -> Likeness:
     """How like the training the signals ``e`` (n, 19) in counts are, of which the map makes ``force_100un`` (n, 3)."""
     q4 = _bounded_q4(e)
     total = np.abs(q4).sum(axis=1)
-    up = (_SUM_BITS - np.ceil(np.log2(total + 1.0)).astype(np.int64))[:, None]
-    size = np.abs(q4) << np.maximum(up, 0) >> np.maximum(-up, 0)
     firm = total * 25 >> 5
-    along = _along_normals(np.sign(q4) * size, size.sum(axis=1), firm)
-    off = np.abs(force_100un - along).max(axis=1)
+    along = _along_normals(q4, total, firm)
+    most = total - _LIGHT_Q4 >> 6
+    off = np.where(most > 0, np.abs(force_100un - along).max(axis=1), 0)  # else boards do not evaluate the map
     share = (_FAR_8 * firm - 8 * off) * (ALL // 4) // np.maximum(firm, 1)
-    share = np.clip(np.minimum(share, total - _LIGHT_Q4 >> 6), 0, ALL)
+    share = np.clip(np.minimum(share, most), 0, ALL)
     pressed = -np.minimum(q4, 0).sum(axis=1)
     outside = (total < _LEAST_Q4) | (off > _OUTSIDE * firm) | ((share < ALL) & (8 * pressed < total))
     gain = _gain(total)
@@ -175,14 +174,14 @@ def on_board() -> BoardMap:
 
 
 def _along_normals(x: Integers, total: Integers, strength_100un: Integers) -> Integers:
-    place_um = np.rint(1000 * ELECTRODE_MM).astype(np.int64) * [[3, 3, 5]]  # the tilt is .6
+    place_um = np.rint(1000 * ELECTRODE_MM).astype(np.int64)
     place_um[:, 0] = np.maximum(place_um[:, 0], 0)  # on the cylinder a normal has no x
     to = np.minimum(x, 0) @ place_um
-    to[:, 2] += 5 * (CORE_RADIUS_UM // 32) * total
-    down = np.ceil(np.log2(np.abs(to).max(axis=1) + 1.0)).astype(np.int64) - 15
-    size = np.abs(to) >> np.maximum(down, 0)[:, None]
+    to[:, 2] += (CORE_RADIUS_UM // 32) * total
+    down = (np.ceil(np.log2(np.abs(to).max(axis=1) + 1.0)).astype(np.int64) - _TO_BITS)[:, None]
+    size = (np.abs(to) << np.maximum(-down, 0) >> np.maximum(down, 0)) * [3, 3, 5]  # the tilt is .6
     length = np.floor(np.sqrt((size**2).sum(axis=1).astype(np.float64))).astype(np.int64)
-    unit = (size << _UNIT_BITS) // np.maximum(length, 1)[:, None]
+    unit = size * ((1 << 31) // np.maximum(length, 1))[:, None] >> 31 - _UNIT_BITS
     force: Integers = np.sign(to) * (unit * strength_100un[:, None] >> _UNIT_BITS)
     return force
 
@@ -193,4 +192,8 @@ def compiled_coefficients() -> Any:
     if list(blocks()) != list(GATED):
         raise ValueError(f"{SHIPPED} has different blocks from host/binding/compute.c; retrain it with this version")
     by_gate = np.concatenate(list(blocks().values())).reshape(3, -1, 3) / SIGNAL_COUNTS
-    return ffi.new("bt_population_column[]", by_gate.transpose(1, 0, 2).reshape(-1, 9).tolist())
+    centroid = np.column_stack([np.ones(len(ELECTRODE_MM)), ELECTRODE_MM[:, :2] / REACH_MM])
+    rows = np.zeros((2 * len(centroid) + 1, 12))
+    rows[:-1, :9] = by_gate.transpose(1, 0, 2).reshape(-1, 9)
+    rows[: len(centroid), 9:], rows[-1, 9:] = -centroid, FLOOR_COUNTS * centroid.sum(axis=0)
+    return ffi.new("bt_population_column[]", rows.tolist())

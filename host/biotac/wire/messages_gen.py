@@ -156,7 +156,7 @@ class FrameFlags(NamedFlag):
     POC_INVALID = 1 << 2  # all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
     POC_LOW = 1 << 3  # the signal energy is below four times the contact threshold: the PoC is noisy
     ELECTRODE_MISSING = 1 << 4  # an electrode had no good word in this frame
-    RAIL = 1 << 5  # an electrode reads 0 or at least 4090
+    RAIL = 1 << 5  # an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: it is compressed at least so far
     PDC_MISSING = 1 << 6  # no good static pressure word; contact is judged by the electrodes alone
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
@@ -339,7 +339,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4: "all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it",
     8: "the signal energy is below four times the contact threshold: the PoC is noisy",
     16: "an electrode had no good word in this frame",
-    32: "an electrode reads 0 or at least 4090",
+    32: "an electrode reads 0 or at least 4090; without ELECTRODE_OUT a press brought it to 0, which counts as 1: it is compressed at least so far",
     64: "no good static pressure word; contact is judged by the electrodes alone",
     128: "no good thermal flux word",
     256: "no good temperature word",

@@ -40,7 +40,7 @@ TEST(extremes_do_not_overflow)
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e_q4[i] = 16 * counts[i] - tare_q4;
         }
-        bt_population_force(e_q4, force);
+        bt_population_force(&bt_population, e_q4, force);
         for (int d = 0; d < 3; d++) {
             assert_true(force[d] > -200000000 && force[d] < 200000000);
         }

@@ -1,4 +1,4 @@
-// The generated sums of force and torque (solve/sums_gen.h) are the plain sums over Table 1, and within what
+// The generated sums of force and torque (signal/sums_gen.h) are the plain sums over Table 1, and within what
 // the core asserts of them; those of coordinates are test_moments.c's.
 //
 // The generated code has no branch and does nothing but add, subtract and multiply by constants, so that a
@@ -7,7 +7,7 @@
 // torques last (two divisions), and is tried apart. tests/proofs has the steps in between.
 #include "support.h"
 
-#include "solve/sums_gen.h"
+#include "signal/sums_gen.h"
 #include "wire/sensor_gen.h"
 
 #define FRAMES 20000

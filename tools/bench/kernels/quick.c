@@ -4,8 +4,8 @@
 #include "kernels.h"
 
 #include "fixed_point.h"
+#include "signal/sums_gen.h"
 #include "solve/rsqrt_gen.h"
-#include "solve/sums_gen.h"
 
 #define BITS 16
 
