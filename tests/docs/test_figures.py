@@ -69,6 +69,12 @@ def test_nobody_edited_a_figure_or_drew_its_picture_otherwise(figure: figures.Fi
     assert figure.hashes.split(", ")[1] == figure.hashes_of(figure.text).split(", ")[1]
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("figure", [pytest.param(*kept.values, id=kept.id) for kept in KEPT])
+def test_a_figure_was_made_of_what_its_inputs_are_now(figure: figures.Figures) -> None:
+    assert figure.hashes.split(", ")[0] == figures.inputs_hash(figure.inputs), "run tools/make/figures.py --changed"
+
+
 def test_a_difference_is_named() -> None:
     text = "| PoC | 1,476 | .92 |\n| force | 402 | - |"
     figure = figures.Figures(ROOT / "page.md", "echo", "", "LICENSE", False, 1.0, "?", text)

@@ -54,6 +54,13 @@ def test_lowess_gives_a_spike_no_weight_whatever_its_size(sigmas: float, row: in
     assert np.abs(lowess(curve) - curve).max() < 0.01, "nor does a bend pass for outliers"
 
 
+@pytest.mark.parametrize("rows", [2, 3, 5])
+def test_lowess_keeps_a_short_touch(rows: int) -> None:
+    touched = np.zeros(60)
+    touched[30 : 30 + rows] = 2.0
+    np.testing.assert_allclose(lowess(touched)[30 : 30 + rows], 2.0, atol=0.1)
+
+
 def test_the_low_pass_is_the_paper_s() -> None:
     at = np.arange(1000) / 100.0
     for hz in (0.5, 5.0, 20.0):  # a third-order Butterworth's gain, warped as bilinear filters are

@@ -35,8 +35,11 @@ def test_every_table_figure_and_equation_has_a_row(paper: str, kind: str, last: 
     texts = re.findall(rf"\b{kind} ((?:\d+(?: to |, )?)+)", items, re.IGNORECASE)
     assert set(range(1, last + 1)) <= set().union(*map(numbers, texts))
     for row in seeds.ROWS[paper]:
-        assert row["verdict"].startswith(("right", "differs, because", "differs, but")), row["item"]
-        assert ("experiment" in row) != ("command" in row) and (row["ours"] != "-" or "right:" in row["verdict"])
+        assert ("experiment" in row) != ("command" in row) and (row["ours"] != "-" or "nothing" in row)
+        assert any(key in row for key in ("nothing", "exact", "theirs", "same", "why")), row["item"]
+        assert ("theirs" in row) == ("within" in row) and ("same" in row) == ("kind" in row)
+        assert ("why" in row) == ("shown" in row) and "less" not in row and "verdict" not in row
+        assert "exact" not in row or "command" in row, "an experiment's numbers are compared, not said to be exact"
 
 
 def test_all_figures_are_kept() -> None:
@@ -48,11 +51,17 @@ def test_all_figures_are_kept() -> None:
 
 
 @pytest.mark.parametrize(
-    "row", [r for rows in seeds.ROWS.values() for r in rows if "less" in r], ids=lambda r: r["item"]
-)
-def test_a_verdict_is_what_the_figures_say(row: dict) -> None:
-    less, more = (KEPT[row["experiment"]][name] for name in row["less"])
-    assert (less < more) == row["verdict"].startswith("right"), (less, more)
+    ("figures", "said"),
+    [({"a": 1.1, "b": 3.0}, "within tolerance"), ({"a": 1.3, "b": 3.0}, "same in kind: a is less"),
+     ({"a": 5.0, "b": 3.0}, "differs: c; shown by d")],
+)  # fmt: skip
+def test_a_verdict_follows_from_number_tolerance_and_the_papers_figure(figures: dict, said: str) -> None:
+    row = {"theirs": {"a": 1.0}, "within": [0.2, "N"], "same": [["a", "b"]], "kind": "a is less"}
+    row |= {"why": "c", "shown": "d"}
+    assert seeds.verdict(row, figures) == said
+    del row["theirs"]
+    assert seeds.verdict(row, {"a": 1.0, "b": 3.0}).startswith("same in kind"), "less is not within"
+    assert seeds.verdict({"same": [["a", 0.5]], "kind": "-"}, {"a": 1.0}) == "differs: why is not known"
 
 
 @pytest.mark.parametrize("name", [*CHEAP, *(pytest.param(name, marks=pytest.mark.nightly) for name in SLOW)])
@@ -63,10 +72,14 @@ def test_kept_figures_are_those_that_the_experiment_measures(name: str) -> None:
 
 def test_a_finding_that_turns_round_is_not_met(monkeypatch: pytest.MonkeyPatch) -> None:
     facts = load("shear").run(Options()).facts("shear")
-    (finding,) = seeds.findings("shear", facts)
+    finding = seeds.findings("shear", facts)[0]
     assert finding["met"] and "E1 377 to -276 counts" in finding["what"]
     row = next(row for row in seeds.ROWS["lin2013"] if row.get("experiment") == "shear")
-    monkeypatch.setitem(row, "verdict", "differs, because it is a test")
+    monkeypatch.setitem(row, "same", [pair[::-1] for pair in row["same"]])
+    now = seeds.findings("shear", facts)[0]
+    assert now["met"] and "differs: why is not known" in now["what"], "the figures kept say so, too"
+    turned = {name: -value for name, value in KEPT["shear"].items()}
+    monkeypatch.setattr(seeds, "_kept", lambda: {"shear": turned})
     assert not seeds.findings("shear", facts)[0]["met"]
     with pytest.raises(KeyError, match=r"no figure Electrodes\|X\|E1: found None"):
         seeds.figure(facts, "Electrodes|X|E1")

@@ -2,6 +2,7 @@
 """Measure the pages' figures and the pictures' data again: write them, or compare them with what is committed.
 
 tools/make/figures.py [NAME...]            write those with NAME in their file or command; default all
+tools/make/figures.py --changed [NAME...]  only those whose inputs are others than they were made of
 tools/make/figures.py --check [NAME...]    exit 1, naming them, where one is further off than it states
 
 A page's figures stand between two comments, the second of which is <!-- end of figures -->:
@@ -116,8 +117,9 @@ def found(names: list[str] | None = None) -> list[Figures]:
 
 @cache
 def inputs_hash(inputs: str) -> str:
-    """Of all files under these paths that git knows, by content."""
-    listed = subprocess.run(["git", "ls-files", *inputs.split()], cwd=ROOT, capture_output=True, text=True, check=True)
+    """Of all files under these paths that git knows, by content; figures.json has what was measured, and is no input."""
+    files = [*inputs.split(), ":!*/figures.json"]
+    listed = subprocess.run(["git", "ls-files", *files], cwd=ROOT, capture_output=True, text=True, check=True)
     return _hash(*(part for name in listed.stdout.splitlines() for part in (name.encode(), (ROOT / name).read_bytes())))
 
 
@@ -143,10 +145,13 @@ def _hash(*parts: bytes) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--check", action="store_true", help="only compare")
+    parser.add_argument("--changed", action="store_true", help="only those made of other inputs than there are now")
     parser.add_argument("names", metavar="NAME", nargs="*", help="those with NAME in their file or command")
     args = parser.parse_args()
     off = 0
     for figure in found(args.names):
+        if args.changed and figure.hashes.split(", ")[0] == inputs_hash(figure.inputs):
+            continue
         now = figure.measured(draw=not args.check)
         if not args.check:
             figure.write(now)

@@ -7,7 +7,7 @@ import pytest
 from courses import Sensor
 
 from biotac import Finger, FrameFlags
-from biotac.core.geometry import ELECTRODE_MM, Floats, on_surface
+from biotac.kernels.geometry import ELECTRODE_MM, Floats, on_surface
 from biotac.sim.physics import States
 from biotac.wire import messages_gen as wire
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ PROBE_MM = 2.0
 FLOOR_N = 1.0
 PEAK_N = 2.5  # as in the bundled scenario poke.toml, which is older than this measurement
 SLOW_PEAK_N = 5.0
-BANDS_N = ((1.0, 1.5), (1.5, 2.0), (2.0, 3.0), (3.0, 5.0))
+BANDS_N = ((0.25, 0.5), (0.5, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 3.0), (3.0, 5.0))
 MIN_FRAMES = 5  # fewer give no meaningful standard deviation
 GAP_S = 0.1  # a shorter dip of the force does not end the contact
 # the paper's averages for its two trials are 0.2269 and 0.3580; on a worn finger the worse one counts
@@ -57,6 +58,7 @@ PAPER_MM = (
      0.2669, 0.2760, 0.0965, 3.1193, 0.4673),
 )  # fmt: skip
 
+SIDES, MIDLINE = [0, 3, 5, 10, 13, 15], [6, 9, 16, 17, 18]
 TRUE_MM = surface.project(surface.ELECTRODE_MM)  # where the probe stands: over the electrode, on the core
 
 
@@ -137,12 +139,9 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
             f"{trial.name}: {len(groups)} contacts above {FLOOR_N:g} N: expected {len(sensor.ELECTRODE_NAMES)}, "
             f"one poke per electrode, in order, released in between; record it again"
         )
-    result = []
-    for group in groups:
-        rows = np.zeros(len(trial), dtype=np.bool_)
-        rows[group] = (size[group] > low_n) & (size[group] <= high_n)
-        result.append(rows)
-    return result
+    between = [(before[-1] + after[0]) // 2 for before, after in pairwise(groups)]
+    poke = np.searchsorted(between, np.arange(len(trial)), side="left")  # what is lighter belongs to the nearest
+    return [(poke == k) & (size > low_n) & (size <= high_n) for k in range(len(groups))]
 
 
 def measure(options: Options) -> Result:
@@ -222,8 +221,30 @@ def _tables(result: Result) -> list[Table]:
         Table("Point of contact", head, rows, text),
         Table("By force", ["sensor", "weights", "mm", *bands], banded, "Within each band, means over the electrodes."),
         Table("Table 2, with the board's default weights", head2, each, "In mm.", digits=4),
+        *_by_electrode(shipped),
         poke_wrench.table(result.trials, {name: contacts(trial) for name, trial in result.trials.items()}),
     ]
+
+
+def _by_electrode(shipped: list[Case]) -> list[Table]:
+    """How far the new sensor's rows of table 2 agree with the paper's, one by one."""
+    new = [trial.std_mm for case in shipped if case.profile == PROFILES[0] for trial in case.trials]
+    if len(new) < 2:
+        return []
+    paper = np.array(PAPER_MM[:2])
+    apart = np.abs(paper[0] - paper[1])
+    rows: list[list[Any]] = [
+        [f"trial {k + 1}", int((np.abs(ours - his) <= apart).sum()),
+         float(np.corrcoef(np.log(ours), np.log(his))[0, 1]), float(ours[SIDES].mean()), float(ours[MIDLINE].mean())]
+        for k, (ours, his) in enumerate(zip(new, paper, strict=True))
+    ]  # fmt: skip
+    rows += [[f"paper, {k + 1}", None, None, his[SIDES].mean(), his[MIDLINE].mean()] for k, his in enumerate(paper)]
+    head = ["table 2", "within", "correlation", "sides [mm]", "midline [mm]"]
+    text = (
+        "New sensor: rows off by no more than the paper's two trials differ there; correlation of the logs; means of "
+        "E1, E4, E6, E11, E14, E16 and of E7, E10, E17 to E19."
+    )
+    return [Table("Electrode by electrode", head, rows, text)]
 
 
 def called(weights: PocWeights) -> str:

@@ -43,10 +43,10 @@ def table(trials: dict[str, Trial], contacts: dict[str, Sequence[Bools]]) -> Tab
             good = np.isfinite(t) & np.isfinite(y)
             known = good.sum() > 2 and t[good].std() > 1e-6
             r = float(np.corrcoef(t[good], y[good])[0, 1]) if known else None
-            rms = [float(np.sqrt((v[good] ** 2).mean())) if good.any() else None for v in (t, y - t)]
-            found.append([name, axis, *rms, r])
+            rms = [float(np.sqrt((v[good] ** 2).mean())) if good.any() else np.nan for v in (t, y - t)]
+            found.append([name, axis, *rms, rms[1] / rms[0] if rms[0] > 1e-6 else np.nan, r])
     text = "E11 to E16, every frame above 1 N, board with the paper's scales, fitted to all 19 pokes of the trial."
-    return Table("Figure 8", ["sensor", "axis", "RMS of the truth", "RMSE", "correlation"], found, text)
+    return Table("Figure 8", ["sensor", "axis", "RMS of the truth", "RMSE", "share", "correlation"], found, text)
 
 
 def draw(trial: Trial, contacts: Sequence[Bools], figure: Any) -> None:

@@ -3,9 +3,14 @@
     biotac-lab seeds                   the table, with the figures kept in figures.json
     biotac-lab seeds --measure poke    measure an experiment's anew, and keep them
 
-A row has what is theirs and what is ours, the experiment or the command that shows it, and the verdict. A figure,
-{TABLE|ROW|COLUMN:.2f}, is named by how these begin, or by keys of the experiment's JSON. ``less`` names two figures of
-which the first is the smaller one where the verdict is "right", and is not where it "differs".
+A row has what is theirs and what is ours, the experiment or the command that shows it, and what makes its verdict
+(verdict()). A figure, {TABLE|ROW|COLUMN:.2f}, is named by how these begin, or by keys of the experiment's JSON.
+
+* ``theirs``: the paper's number by each figure of ours, ``within``: a tolerance in the figure's unit, and its source
+* ``exact``: the tolerance that the command asserts, in words: within, or the command fails
+* ``same``: pairs of which the first is less than the second if we find what the paper does, ``kind``: what that is
+* ``why``: why it differs, ``shown``: by what; without both, why is not known
+* ``nothing``: the paper claims nothing here
 """
 
 from __future__ import annotations
@@ -33,7 +38,26 @@ def rows_of(experiment: str) -> list[Facts]:
 
 def names(row: Facts) -> list[str]:
     """The figures that a row needs."""
-    return [name for name, _ in FIGURE.findall(row["ours"])] + list(row.get("less", ()))
+    pairs = [name for pair in row.get("same", ()) for name in pair if isinstance(name, str)]
+    return [name for name, _ in FIGURE.findall(row["ours"])] + list(row.get("theirs", ())) + pairs
+
+
+def verdict(row: Facts, figures: dict[str, float]) -> str:
+    """Within tolerance; same in kind, and in which; or differs, and why: by the row's numbers alone."""
+    theirs, same = row.get("theirs", {}), row.get("same", ())
+    if "nothing" in row:
+        return "-"
+    if "exact" in row or (theirs and all(abs(figures[name] - his) <= row["within"][0] for name, his in theirs.items())):
+        return "within tolerance"
+    if same and all(figures.get(less, less) < figures.get(more, more) for less, more in same):
+        return f"same in kind: {row['kind']}"
+    return f"differs: {row['why']}; shown by {row['shown']}" if "shown" in row else "differs: why is not known"
+
+
+def _tolerance(row: Facts) -> str:
+    if "theirs" in row:
+        return "{:g} {}".format(*row["within"])
+    return row.get("exact", "-" if "same" not in row else "none: the paper has no number")  # type: ignore[no-any-return]
 
 
 def figure(facts: Facts, name: str) -> float:
@@ -61,14 +85,19 @@ def _texts(cells: Any) -> str:
 
 
 def findings(experiment: str, facts: Facts) -> list[Facts]:
-    """A check for each finding of an experiment that can turn round: it is right where that is said, or differs."""
-    found = []
-    for row in (row for row in rows_of(experiment) if "less" in row):
-        less, more = (figure(facts, name) for name in row["less"])
-        ours = _filled(row, {name: figure(facts, name) for name in names(row)})
-        text = f"{row['item']}. Theirs: {row['his']}; ours: {ours}; {row['verdict']}"
-        found.append(claim(text, (less < more) == row["verdict"].startswith("right")))
+    """A check for each finding of an experiment that can turn round: its verdict is the one of the figures kept."""
+    found, kept = [], _kept().get(experiment, {})
+    for row in (row for row in rows_of(experiment) if "same" in row or "theirs" in row):
+        now = {name: figure(facts, name) for name in names(row)}
+        said = verdict(row, now)
+        text = f"{row['item']}. Theirs: {row['his']}; ours: {_filled(row, now)}; {said}"
+        found.append(claim(text, set(names(row)) <= set(kept) and said == verdict(row, kept)))
     return found
+
+
+def _kept() -> dict[str, dict[str, float]]:
+    kept: dict[str, dict[str, float]] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    return kept
 
 
 def _filled(row: Facts, figures: dict[str, float]) -> str:
@@ -80,12 +109,14 @@ def table(kept: dict[str, dict[str, float]]) -> Table:
     rows = []
     for paper, group in ROWS.items():
         for row in group:
-            ours = _filled(row, kept.get(row.get("experiment", ""), {}))
+            figures = kept.get(row.get("experiment", ""), {})
             command = row.get("command") or f"biotac-lab experiment {row['experiment']}"
-            rows.append([NAMES[paper], row["item"], row["his"], ours, command.join("``") if command != "-" else "-",
-                         row["verdict"]])  # fmt: skip
-    head = ["paper", "what", "theirs", "ours", "shown by", "verdict"]
-    return Table("Every method, equation, table and figure", head, rows)
+            said = verdict(row, figures) if set(names(row)) <= set(figures) else "not measured"
+            rows.append([NAMES[paper], row["item"], row["his"], _filled(row, figures), _tolerance(row),
+                         command.join("``") if command != "-" else "-", said])  # fmt: skip
+    head = ["paper", "what", "theirs", "ours", "tolerance, and its source", "shown by", "verdict"]
+    text = 'Ours are an emulated finger\'s, but where a recording is named: "within" says that the methods agree.'
+    return Table("Every method, equation, table and figure", head, rows, text)
 
 
 def measured(experiment: str, show: Show) -> dict[str, float]:
@@ -105,7 +136,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, show: Show) -> Outcome:
     """The table, with what was measured."""
-    kept: dict[str, dict[str, float]] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    kept = _kept()
     for experiment in args.measure:
         kept[experiment] = measured(experiment, show)
     if args.measure:

@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from biotac.core import geometry as surface
+
 from ..report import Facts, Options, Report, Table, claim
-from . import shear, torsion, weight
-from .estimates import Estimate, rmse
+from . import poke, shear, torsion, weight
+from .estimates import Estimate, by_paper, paper_scales, rmse
 from .torsion import TORSION_NMM
 from .trial import Bools, Floats, Trial
 from .weight import E17_MM, WEIGHT_N, Result
@@ -112,6 +114,25 @@ def convolved(result: Result) -> Table:
     return Table("Torsion against shear", head, rows, text)
 
 
+def torque_x(trial: Trial, seed: int) -> Table:
+    """Eq 4's x: the sum as printed, scaled by figure 3's trial, and the lever of the paper's force."""
+    arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)[:, 0]
+    before, pokes = shear.emulated(seed, repeat=1), poke.emulated(seed, "new")
+    learnt = np.nan_to_num(before.signal) @ arms
+    scale = float(learnt @ before.torque_nmm[:, 0] / (learnt @ learnt))
+    rows: list[list[Any]] = [["as printed"], ["lever"], ["truth"]]
+    for each in (trial, pokes):
+        by = by_paper(each, paper_scales([each])).torque_nmm
+        assert by is not None
+        pressed = np.isfinite(by[:, 0]) & (np.linalg.norm(each.force_n, axis=1) > 0.0)
+        truth = each.torque_nmm[pressed, 0]
+        found = np.nan_to_num(each.signal[pressed]) @ arms * scale - truth, by[pressed, 0] - truth, truth
+        for row, off in zip(rows, found, strict=True):
+            row.append(float(np.sqrt((off**2).mean())))
+    text = "RMSE, and the truth's RMS: figure 10's trial, and a poke of each electrode, whose force meets the axis."
+    return Table("Torque x", ["", "figure 10 [N mm]", "pokes [N mm]"], rows, text)
+
+
 def checks(result: Result) -> list[Facts]:
     """Of maps only: the paper's model is known to fail."""
     trial, found = result.trial, []
@@ -132,5 +153,5 @@ def run(options: Options) -> Report:
     axes, title = ("Fy", "Fz", "torsion"), "Torsion with shear (Lin 2013, figure 10)"
     if result.trial.is_recorded:
         return result.report([], [], axes, title, torsion.MARKED)
-    tables = [convolved(result), *weight.means(result, ("Fy", "torsion"))]
+    tables = [convolved(result), torque_x(result.trial, options.seed), *weight.means(result, ("Fy", "torsion"))]
     return result.report(tables, checks(result), axes, title, torsion.MARKED)

@@ -12,7 +12,7 @@ from biotac import InputError
 Floats = npt.NDArray[np.float64]
 
 TAPS = 11
-ROBUST_STEPS = 3  # statsmodels' default; MATLAB's rlowess takes 5
+ROBUST_STEPS = 5  # MATLAB's rlowess
 OUTSIDE_SIGMAS = 6.0  # "zero weight to data points outside six standard deviations in its history"
 SIGMA_PER_MAD = 1.4826
 LOW_PASS_HZ, LOW_PASS_POLES = 5.0, 3  # the paper, II.A
@@ -21,9 +21,9 @@ LOW_PASS_HZ, LOW_PASS_POLES = 5.0, 3  # the paper, II.A
 def lowess(values: npt.ArrayLike) -> Floats:
     """Values (n,) or (n, k) smoothed by local lines over TAPS rows, without outliers.
 
-    Cleveland's robust LOWESS (statsmodels', three robust steps) over the row number, each column by itself. Rows
-    outside six standard deviations of those around them have no weight (outliers()): the robust steps alone would let
-    one outlier of a thousand deviations bend all its neighbours, and reject these with it. NaN rows are skipped and
+    Cleveland's robust LOWESS (statsmodels', as many robust steps as MATLAB's) over the row number, each column by
+    itself. A lone row outside six standard deviations of those around it has no weight (outliers()): the robust steps
+    alone would let one outlier of a thousand deviations bend all its neighbours. NaN rows are skipped and
     stay NaN. It needs the rows after a row, too; causal() does not. Raises InputError where fewer than TAPS rows
     are left.
     """
@@ -43,10 +43,11 @@ def lowess(values: npt.ArrayLike) -> Floats:
 
 
 def outliers(values: Floats) -> npt.NDArray[np.bool_]:
-    """Mask (n,) of the values (n,) outside six deviations from the median of the TAPS around them (Hampel 1974).
+    """Mask (n,) of lone values (n,) outside six deviations from the median of the TAPS around them (Hampel 1974).
 
     The deviation is the median one of the same rows, so that a slope widens it. Where half of them are equal it is 0,
-    and any other value is outside.
+    and any other value is outside. A real sensor's glitches are single rows; two beside each other are a short touch,
+    and stay for the robust steps to judge.
     """
     if len(values) < TAPS:
         return np.zeros(len(values), np.bool_)
@@ -54,7 +55,9 @@ def outliers(values: Floats) -> npt.NDArray[np.bool_]:
     around = values[begin[:, None] + np.arange(TAPS)]
     middle = np.median(around, axis=1)
     deviation = SIGMA_PER_MAD * np.median(np.abs(around - middle[:, None]), axis=1)
-    return np.asarray(np.abs(values - middle) > OUTSIDE_SIGMAS * deviation)
+    outside = np.abs(values - middle) > OUTSIDE_SIGMAS * deviation
+    beside = np.convolve(outside, [1, 0, 1], "same") > 0
+    return np.asarray(outside & ~beside)
 
 
 def low_pass(values: npt.ArrayLike, rate_hz: float) -> Floats:

@@ -12,7 +12,6 @@ from biotac_lab.features.paf import THRESHOLD_N, paf
 from biotac_lab.features.signals import skin
 
 from ...learn import inputs
-from ...learn.probes import PROBES, counts_of, footprints
 from ...learn.smooth import causal, lowess
 from ...learn.stimulations import Stimulations, stimulate
 from ...report import Facts, plain
@@ -74,13 +73,20 @@ def correlations(finger: Finger, places: tuple[int, ...], seed: int) -> list[lis
 
 
 def impedance(finger: Finger) -> list[Facts]:
-    """Figure 4: resistance of E18 over its rest when a 1 mm tip presses with 10 N at these distances along d."""
-    at = np.array([0.0, 1.0, 2.0, 4.0, 6.0])
-    over = surface.ELECTRODE_MM[17]
-    contact = surface.project(np.column_stack([over[0] + at, np.repeat(over[1], 5), np.repeat(over[2], 5)]))
-    none = np.zeros(len(at))
-    states = States(contact, np.full(len(at), 10.0), np.zeros((len(at), 3)), none, none, none)
-    counts = counts_of(finger, [(states, footprints(PROBES[0], contact, states.force_n))])[:, 17]
+    """Figure 4: resistance of E18 over its rest when a 2 mm probe presses with 10 N on a grid of 4 by 5 about it.
+
+    By the distance from the electrode along the unrolled skin, nearest first.
+    """
+    d, r = (grid.ravel() for grid in np.meshgrid([-4.0, -1.5, 1.5, 4.0], [-4.0, -2.0, 0.0, 2.0, 4.0]))
+    over, n = surface.ELECTRODE_MM[17], len(d)
+    roll = np.arctan2(over[1], -over[2]) + r / surface.RADIUS_MM
+    round_mm = surface.RADIUS_MM * np.column_stack([np.sin(roll), -np.cos(roll)])
+    states = States(
+        surface.project(np.column_stack([over[0] + d, round_mm])), np.full(n, 10.0), np.zeros((n, 3)), np.zeros(n),
+        np.full(n, 1.0), np.zeros(n),
+    )  # fmt: skip
+    counts = finger.counts(states)[:, 17]
     rest = finger.rest_counts(np.zeros(1))[0, 17]
     ratio = (4095.0 / counts - 1.0) / (4095.0 / rest - 1.0)
-    return [{"mm": float(mm), "ratio": plain(float(value))} for mm, value in zip(at, ratio, strict=True)]
+    found = sorted(zip(np.hypot(d, r).tolist(), ratio.tolist(), strict=True))
+    return [{"mm": plain(mm), "ratio": plain(value)} for mm, value in found]

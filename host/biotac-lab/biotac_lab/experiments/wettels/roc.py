@@ -47,6 +47,7 @@ def his_rows(
     training, stopping, test = roc.split(rows, seed)
     x = inputs.every(columns[training])(columns)
     targets = np.eye(len(PROBES))[kind]
+    a_press = len(rows) / len(np.unique(pressed.stimulation[rows]))
     given = x[training], targets[training], (x[stopping], targets[stopping])
     found = []
     for name, net in (
@@ -54,7 +55,8 @@ def his_rows(
         (QUICK, nets.train(*given, seed=seed, steps=steps[1])),
     ):
         right = float((roc.decide(net(x[stopping])) == kind[stopping]).mean())
-        found.append(_facts(name, BY_ROW, right, roc.decide(net(x[test])), kind[test], places))
+        named = f"{name}, {a_press:.0f} rows a press"
+        found.append(_facts(named, BY_ROW, right, roc.decide(net(x[test])), kind[test], places))
     return found
 
 
@@ -111,9 +113,14 @@ def chosen(found: list[Facts]) -> Facts:
 def _facts(
     name: str, split: str, validated: float, decided: roc.Integers, truth: roc.Integers, places: tuple[int, ...]
 ) -> Facts:
-    """The figures of one classifier; rows of ``confusion`` are what it decided, ``validated`` is from rows aside."""
+    """The figures of one classifier; rows of ``confusion`` are what it decided, ``validated`` is from rows aside.
+
+    ``by_probe`` is the share of each probe's that it told.
+    """
+    confusion = confusion_matrix(decided, truth, labels=range(len(PROBES)))
     return {
         "what": name, "split": split, "places": list(places), "validated": plain(validated),
         "correct": plain(float((decided == truth).mean())),
-        "confusion": confusion_matrix(decided, truth, labels=range(len(PROBES))).tolist(),
+        "by_probe": [plain(share) for share in np.diag(confusion) / np.maximum(confusion.sum(axis=0), 1)],
+        "confusion": confusion.tolist(),
     }  # fmt: skip
