@@ -117,7 +117,7 @@ def found(names: list[str] | None = None) -> list[Figures]:
 
 @cache
 def inputs_hash(inputs: str) -> str:
-    """Of all files under these paths that git knows, by content; figures.json has what was measured, and is no input."""
+    """Of all files under these paths that git knows, by content; what was measured (figures.json) is no input."""
     files = [*inputs.split(), ":!*/figures.json"]
     listed = subprocess.run(["git", "ls-files", *files], cwd=ROOT, capture_output=True, text=True, check=True)
     return _hash(*(part for name in listed.stdout.splitlines() for part in (name.encode(), (ROOT / name).read_bytes())))

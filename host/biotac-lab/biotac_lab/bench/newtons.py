@@ -27,7 +27,7 @@ from biotac.calibrate.population import Population
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.wrench import Run, Validation, load, rmse, validate
 from biotac.calibrate.wrench.models import MODELS
-from biotac.core.compiled import FORCE_GAINS
+from biotac.kernels.compiled import FORCE_GAINS
 from biotac.map.fitted import quantise
 from biotac.sim import fit_gains
 from biotac.wire.map_gen import Gate, Kind
