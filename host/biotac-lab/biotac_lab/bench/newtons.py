@@ -9,6 +9,7 @@ biotac.compute, stands in the picture alone: it holds for no other.
 from __future__ import annotations
 
 import json
+import math
 import timeit
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,16 +23,12 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 import biotac
-from biotac import InputError
+from biotac import InputError, Setting
 from biotac.calibrate.population import Population
 from biotac.calibrate.population import load as load_population
 from biotac.calibrate.wrench import Run, Validation, load, rmse, validate
-from biotac.calibrate.wrench.models import MODELS
-from biotac.kernels.compiled import FORCE_GAINS
-from biotac.map.fitted import quantise
 from biotac.sim import fit_gains
-from biotac.wire.map_gen import Gate, Kind
-from biotac.wire.messages_gen import SETTINGS
+from biotac.wire import messages
 
 from ..calibrate import held_out_error, training
 from ..report import Show, Table
@@ -57,7 +54,7 @@ NEAREST = 0.05  # share of the rows, those with the most similar counts, that st
 EVERY_ROW = 4  # one row in this many is looked at for that
 GUARD_ROWS = 1000
 HOST_FRAMES = 2000
-_AFFINE = (Kind.SIGNAL, Gate.ONE)
+LINS_GAINS = (Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN)
 
 
 @dataclass(frozen=True)
@@ -143,7 +140,13 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
     listed = [*UNTRAINED, *((model, OWN, called, scene) for model, scene, called in OWN_MODELS)]
     host = _host_ns(run, validation)
     points = [
-        Point(called, knows, {core: about["cycles"][scene] for core, about in CORES.items()}, found[key], host[scene])
+        Point(
+            called,
+            knows,
+            {core: about["cycles"][scene] for core, about in CORES.items()},
+            found[key],
+            host.get(scene, math.nan),
+        )
         for key, knows, called, scene in listed
         if key in found
     ]
@@ -162,18 +165,16 @@ UNTRAINED = (
 def _made_lins(run: Run) -> bool:
     """Whether the default force gains are this recording's least squares, but for how its tare is rounded."""
     own = fit_gains(run.counts - run.tare, run.truth[:, :3], np.zeros((len(run.counts), 3)))
-    return all(abs(own.get(gain.name.lower(), 0) / SETTINGS[gain].default - 1.0) < 0.005 for gain in FORCE_GAINS)
+    return all(
+        abs(own.get(gain.name.lower(), 0) / messages.SETTINGS[gain].default - 1.0) < 0.005 for gain in LINS_GAINS
+    )
 
 
 def _host_ns(run: Run, validation: Validation) -> dict[str, float]:
-    """Time of a frame by biotac.compute for each scene; the time rests on a map's blocks, not on its numbers."""
-    counts = run.counts[:HOST_FRAMES].astype(np.uint16)
-    whole = validation.wrench_map.blocks()
-    known = {**whole, _AFFINE: whole[Kind.CONDUCTANCE, Gate.ONE]}  # which the large map has in its signals by sign
+    """Time of a frame by biotac.compute for Lin's scales, the population map, and the finger's own map that is best."""
+    counts, fitted = run.counts[:HOST_FRAMES].astype(np.uint16), validation.wrench_map
     ways: dict[str, dict[str, Any]] = {OWN_MODELS[0][1]: {"settings": LIN}, POPULATION: {"settings": {}}}
-    for name, scene, _ in OWN_MODELS[1:]:
-        blocks = next((model.blocks for model in MODELS if model.name == name), tuple(whole))
-        ways[scene] = {"wrench_map": quantise({block: known[block] for block in blocks if block in known})}
+    ways |= {scene: {"wrench_map": fitted.on_board()} for name, scene, _ in OWN_MODELS if name == fitted.model}
     calls = {scene: partial(biotac.compute, counts, run.tare, pdc_above_rest=0.0, **how) for scene, how in ways.items()}
     return {scene: min(timeit.repeat(call, number=1, repeat=7)) / len(counts) * 1e9 for scene, call in calls.items()}
 
@@ -248,7 +249,8 @@ def draw(outcome: Outcome, path: Path) -> None:
         for axes, (core, about) in zip(figure.subplots(1, len(CORES), sharey=True), CORES.items(), strict=True):
             for k, point in enumerate(outcome.points):
                 color, at = COLORS.get(point.knows, LITTLE), (point.cycles[core], point.error_n)
-                name = f"{k + 1}: {point.knows}: {point.name}, {point.host_ns:,.0f} ns"
+                name = f"{k + 1}: {point.knows}: {point.name}"
+                name += f", {point.host_ns:,.0f} ns" if math.isfinite(point.host_ns) else ""
                 axes.plot(*at, "o", color=color, ms=8, label=name)
                 axes.vlines(at[0], *np.quantile([np.linalg.norm(three) for three in point.rmse_n.values()], [0, 1]),
                             color=color, linewidth=1)  # fmt: skip
