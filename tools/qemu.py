@@ -14,6 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+MACHINE = "mps2-an386"
 SECONDS = 1800.0  # only an image that hangs takes this long, however busy the computer is
 
 
@@ -21,20 +22,20 @@ class Failed(Exception):
     """One sentence for the user."""
 
 
-def argv(elf: Path) -> list[str]:
+def argv(elf: Path, machine: str = MACHINE) -> list[str]:
     """QEMU's command line."""
-    return ["qemu-system-arm", "-M", "mps2-an386", "-kernel", str(elf), "-display", "none", "-monitor", "none",
+    return ["qemu-system-arm", "-M", machine, "-kernel", str(elf), "-display", "none", "-monitor", "none",
             "-serial", "none", "-semihosting-config", "enable=on,target=native"]  # fmt: skip
 
 
-def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
+def run(elf: Path, seconds: float = SECONDS, machine: str = MACHINE) -> tuple[int, str]:
     """The image's exit code, and its output."""
     if not elf.is_file():
         build = "cmake -S tests/target/m4f -B build/m4f -G Ninja && cmake --build build/m4f"
         raise Failed(f"{elf} is missing; build it: {build}")
     try:
-        done = subprocess.run(argv(elf), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              timeout=seconds, check=False)  # fmt: skip
+        done = subprocess.run(argv(elf, machine), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, timeout=seconds, check=False)  # fmt: skip
     except FileNotFoundError:
         raise Failed("qemu-system-arm is missing; install it: apt-get install qemu-system-arm") from None
     except subprocess.TimeoutExpired as late:

@@ -1,9 +1,10 @@
 # How an image for a microcontroller is built. A board's CMakeLists.txt includes this before project(), and after it calls
 #   gateway_image(NAME PORT CPU LINKER [SOURCES...])   the gateway on that port
 #   board_image(NAME PORT CPU LINKER SOURCES...)       another program on it
-# PORT is a folder of firmware/port, CPU the compiler's options for the core, LINKER a script in the port's folder. Makes
-# NAME.elf, NAME.bin (what is stored from its first byte on) and NAME.hex (all, with addresses), with whatever PORT/image.cmake adds, and holds it to
-# limits.json of the board's folder.
+# PORT is a folder of firmware/port, or two, "rp2 rp2350": what a family of chips has alike, and the chip's own; CPU the
+# compiler's options for the core, LINKER a script in the chip's folder. Makes NAME.elf, NAME.bin (what is stored from its
+# first byte on) and NAME.hex (all, with addresses), with whatever the chip's image.cmake adds, and holds it to limits.json
+# of the board's folder.
 #   emulated_image(NAME PORT CPU LINKER [DEFINITIONS...])   the gateway, with tests/target/semihosted.c for its bus and flash
 if(NOT CMAKE_TOOLCHAIN_FILE)
   set(CMAKE_TOOLCHAIN_FILE ${CMAKE_CURRENT_LIST_DIR}/arm-none-eabi.cmake)
@@ -18,14 +19,23 @@ find_package(Python3 3.10 REQUIRED COMPONENTS Interpreter)
 include(${boards}/compile_options.cmake)
 option(BIOTAC_NO_LIMITS "an image of a first hack, whose flash, RAM, stack, floats and waits nobody checks" OFF)
 
+# ports: a port's folders; port: the chip's own.
+macro(find_port names)
+  string(REPLACE " " ";" ports "${names}")
+  list(TRANSFORM ports PREPEND ${fw}/port/)
+  list(GET ports -1 port)
+endmacro()
+
 macro(leave_out_systick sources) # where the port's timer.c is the alarm
-  if(EXISTS ${port}/timer.c)
-    list(FILTER ${sources} EXCLUDE REGEX "/systick_alarm\\.c$")
-  endif()
+  foreach(folder ${ports})
+    if(EXISTS ${folder}/timer.c)
+      list(FILTER ${sources} EXCLUDE REGEX "/systick_alarm\\.c$")
+    endif()
+  endforeach()
 endmacro()
 
 function(board_image name port_name cpu linker)
-  set(port ${fw}/port/${port_name})
+  find_port("${port_name}")
   separate_arguments(cpu)
   # The same warnings as everywhere (the root's biotac_options), and what a small image wants.
   set(warnings -Wall -Wextra -Wconversion -Wsign-conversion -Werror)
@@ -36,13 +46,13 @@ function(board_image name port_name cpu linker)
   endif()
   leave_out_systick(ARGN)
   if(NOT BIOTAC_NO_LIMITS)
-    set(check COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${port_name}
+    set(check COMMAND ${Python3_EXECUTABLE} ${tools}/image/check.py ${name}.elf --port ${ports}
       --limits ${CMAKE_CURRENT_LIST_DIR}/limits.json --objdump ${CMAKE_OBJDUMP})
   endif()
   add_executable(${name} ${ARGN} ${port_objects})
   set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
   target_include_directories(${name} PRIVATE
-    ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m ${port} ${CMAKE_CURRENT_LIST_DIR})
+    ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m ${ports} ${CMAKE_CURRENT_LIST_DIR})
   target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections
     -Wl,--fatal-warnings -Wl,-Map=${name}.map -T ${port}/${linker})
   board_compile_options(${ARGN})
@@ -54,13 +64,16 @@ function(board_image name port_name cpu linker)
 endfunction()
 
 function(gateway_image name port_name cpu linker)
+  find_port("${port_name}")
+  list(TRANSFORM ports APPEND /*.c OUTPUT_VARIABLE own)
+  list(TRANSFORM ports APPEND /*/*.c OUTPUT_VARIABLE below)
   file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c
-    ${fw}/port/cortex_m/*.c ${fw}/port/${port_name}/*.c ${fw}/port/${port_name}/*/*.c)
-  board_image(${name} ${port_name} ${cpu} ${linker} ${sources} ${ARGN})
+    ${fw}/port/cortex_m/*.c ${own} ${below})
+  board_image(${name} "${port_name}" ${cpu} ${linker} ${sources} ${ARGN})
 endfunction()
 
 function(emulated_image name port_name cpu linker)
-  set(port ${fw}/port/${port_name})
+  find_port("${port_name}")
   file(GLOB sources CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c ${fw}/sensor/*.c ${fw}/app/*.c ${fw}/emu/*.c
     ${fw}/../tests/target/semihosted.c ${port}/*.c)
   list(FILTER sources EXCLUDE REGEX "/port/${port_name}/(spi|flash)\\.c$")
@@ -72,7 +85,7 @@ endfunction()
 
 # Whatever runs in QEMU on a port: its start-up, and no limits.
 function(qemu_executable name port_name cpu linker sources)
-  set(port ${fw}/port/${port_name})
+  find_port("${port_name}")
   file(GLOB shared CONFIGURE_DEPENDS ${fw}/port/cortex_m/*.c)
   leave_out_systick(shared)
   separate_arguments(cpu)

@@ -7,7 +7,7 @@
 #include "keep/storage.h"
 #include "loop.h"
 #include "only_board.h"
-#include "rp2040_regs.h"
+#include "rp2_regs.h"
 #include "shifter.h"
 #include "system.h"
 

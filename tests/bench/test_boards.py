@@ -9,6 +9,7 @@ import pytest
 
 import boards
 import m4f_model
+import m33_model
 
 
 def listing(*instructions: str) -> str:
@@ -77,3 +78,29 @@ def test_runs_are_cut_out_of_the_log_whatever_its_chunks(size) -> None:
 )
 def test_what_counts_as_floating_point(name, is_float) -> None:
     assert bool(boards.FLOAT_SYMBOL.match(name)) is is_float
+
+
+def m33_cycles(start: int, *body: str) -> int:
+    """Of a loop of a hundred turns, MOVS R5,#100 before it and BNE after; 16-bit instructions."""
+    lines = ["movs r5, #100", *body, "bne.n 100", "mov r0, r1"]
+    at = [start + 2 * k for k in range(len(lines))]
+    text = "\n".join(f" {a:x}:\t0000\t{line.replace(' ', chr(9), 1)}" for a, line in zip(at, lines, strict=True))
+    run = [at[0], *(at[1:-1] * 100), at[-1]]
+    fours = Counter(zip([run[0], run[0], *run], [run[0], *run], run, run[1:], strict=False))
+    return m33_model.Model(text).cycles(fours)
+
+
+def test_the_m33_takes_the_cycles_of_the_data_sheets_loops() -> None:
+    assert m33_cycles(0x10000002, "subs r5, r5, #1") == 299  # RP2350 data sheet, 3.7.4.9.7
+    assert m33_cycles(0x10000000, "subs r5, r5, #1") == 300
+    assert m33_cycles(0x10000000, "subs r5, r5, #1", "mov r1, r2") == 300
+    # a result that is late costs one cycle a turn, of a load, a product and a shifted operand
+    alone = m33_cycles(0x10000000, "subs r5, r5, #1", "mov r1, r2", "mov r3, r4")
+    for late in ("ldr r1, [r2]", "mul r1, r2, r1"):
+        assert m33_cycles(0x10000000, "subs r5, r5, #1", late, "add r3, r1") == alone + 100
+    assert m33_cycles(0x10000000, "subs r5, r5, #1", "str r1, [r2]", "add r3, r1") == alone
+
+
+def test_the_m33_model_says_what_it_does_not_know() -> None:
+    with pytest.raises(m4f_model.UnknownInstruction, match=r"no cycles for qadd16 .*m33_model\.py"):
+        m33_cycles(0x10000000, "qadd16 r0, r1")

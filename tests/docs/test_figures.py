@@ -17,7 +17,7 @@ SAFETY, PICO = "host/docs/reference/safety.md", "firmware/boards/pico/README.md"
 MODEL, PHYSICS = "host/docs/reference/sensor_model.md", "host/biotac/sim/physics.py"
 SAMPLING = "host/biotac/sim/sampling.py"
 SPEC, LINK = "protocol/SPEC.md", "protocol/link.toml"
-SYSTEM, CONTROLLER = "firmware/port/rp2040/system.c", "firmware/port/rp2040/usb/controller.c"
+SYSTEM, CONTROLLER = "firmware/port/rp2/system.c", "firmware/port/rp2/usb/controller.c"
 WORDS = {"two": 2.0, "ten": 10.0}
 #: A page and its words, a file of the code and its own, and how many of the code's make one of the page's.
 FIGURES = [

@@ -15,7 +15,9 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 from image import boot2, stack, symbols, uf2, waits  # noqa: E402
 
-PORT = ROOT / "firmware/port/rp2040"
+PORTS = ROOT / "firmware/port"
+PORT = PORTS / "rp2"
+CHIPS = (PORTS / "rp2040", PORTS / "rp2350")
 
 
 def test_the_boot_crc_is_crc32_mpeg2() -> None:
@@ -152,8 +154,8 @@ def test_forbidden_symbols() -> None:
 
 
 def test_the_port_waits_only_with_a_bound() -> None:
-    shared = PORT.parent / "cortex_m"
-    assert waits.unbounded(PORT) == [] and waits.unbounded(shared, PORT) == []
+    folders = (PORT, *CHIPS, PORTS / "cortex_m")
+    assert [wait for folder in folders for wait in waits.unbounded(folder, PORT, *CHIPS)] == []
 
 
 @pytest.mark.parametrize(
@@ -167,7 +169,7 @@ def test_the_port_waits_only_with_a_bound() -> None:
     ],
 )
 def test_waits_are_found(tmp_path: Path, code: str, why: str | None) -> None:
-    (tmp_path / "x_regs.h").write_text((PORT / "rp2040_regs.h").read_text())
+    (tmp_path / "x_regs.h").write_text((PORT / "rp2_regs.h").read_text())
     (tmp_path / "x.c").write_text(code)
     found = waits.unbounded(tmp_path)
     assert (len(found) == 1 and found[0].startswith(why)) if why else found == []

@@ -12,7 +12,7 @@ from biotac.wire.decoder import Decoder
 from bus_picture import BITS_PER_S, draw, read_vcd, record, slots_ns
 
 PRODUCT_MANUAL_SETTLE_NS = 50_000
-PINS_SETUP_NS, PINS_HOLD_NS = 1800, 230  # firmware/boards/pico/pins.h
+PINS_SETUP_NS, PINS_HOLD_NS = 1800, 230  # firmware/boards/pico/pico_pins.h
 
 
 def sigrok(path: Path, *options: str) -> bytes:

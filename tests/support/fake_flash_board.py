@@ -35,9 +35,14 @@ def note(
     return b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, board, *version, major, 0)
 
 
-def program(code: bytes, pages: int = 20) -> bytes:
+#: What an RP2350's boot ROM looks for: a stack, an entry, and behind the vectors IMAGE_DEF.
+RP2350_START = struct.pack("<2I56x5I", 0x20001E00, 0x10000101, 0xFFFFDED3, 0x10210142, 0x1FF, 0, 0xAB123579)
+
+
+def program(code: bytes, pages: int = 20, chip: str = "rp2040") -> bytes:
     """The bytes of a flash that a chip would boot."""
-    return sealed((boot2.block(b"boot") + bytes(64) + code).ljust(pages * 256, b"\x5a"))
+    start = boot2.block(b"boot") if chip == "rp2040" else RP2350_START
+    return sealed((start + bytes(64) + code).ljust(pages * 256, b"\x5a"))
 
 
 def sealed(image: bytes) -> bytes:
@@ -48,9 +53,10 @@ def sealed(image: bytes) -> bytes:
         return image
 
 
-def make_image(folder: Path, code: bytes | None = None, name: str = "new.uf2") -> Path:
+def make_image(folder: Path, code: bytes | None = None, name: str = "new.uf2", chip: str = "rp2040") -> Path:
     path = folder / name
-    path.write_bytes(uf2.uf2(program(note() if code is None else code)))
+    own = note(wire.Board.PICO if chip == "rp2040" else wire.Board.PICO2)
+    path.write_bytes(uf2.uf2(program(own if code is None else code, chip=chip), chip))
     return path
 
 

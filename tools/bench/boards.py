@@ -16,7 +16,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from m4f_model import Model, UnknownInstruction, runs
+import m4f_model
+import m33_model
+from m4f_model import UnknownInstruction, runs
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
@@ -69,6 +71,7 @@ class Board:
     start: tuple[Path, ...]
     script: Path
     options: tuple[str, ...] = ()
+    qemu: str = ""  # its machine; without one, rp2040js runs it
 
 
 M0PLUS = ("-mcpu=cortex-m0plus",)
@@ -77,11 +80,20 @@ RP2040JS = "rp2040js 1.4.1, by the Cortex-M0+ manual without flash wait states o
 M0PLUS_START = (HERE / "m0plus.c",)
 REFERENCE = ROOT / "tests" / "target" / "m4f"  # the M4F's reset code and memory map are those of its board
 QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
+M33 = ("-mcpu=cortex-m33", "-mfloat-abi=soft")  # as boards/pico2 is built
+M33_BY = "instructions counted in QEMU mps2-an505, cycles by a model of the RP2350 data sheet without wait states"
 BOARDS = (
     Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld"),
     Board("m4f", "Cortex-M4F", QEMU, M4F, (REFERENCE / "startup.c", HERE / "m4f.c"), REFERENCE / "m4f.ld",
-          (f"-I{REFERENCE.parent}",)),
+          (f"-I{REFERENCE.parent}",), "mps2-an386"),
+    Board("m33", "Cortex-M33", M33_BY, M33, (REFERENCE / "startup.c", HERE / "m4f.c"), BUILD / "m33.ld",
+          (f"-I{REFERENCE.parent}",), "mps2-an505"),
 )  # fmt: skip
+
+
+# Where mps2-an505 has what mps2-an386 has: its code, and Secure RAM.
+AN505_AT = {"0x00000000": "0x10000000", "0x20000000": "0x38000000", "0x21000000": "0x38100000",
+            "0x21100000": "0x38200000", "15M": "2M"}  # fmt: skip
 
 
 def need() -> None:
@@ -89,6 +101,10 @@ def need() -> None:
         if shutil.which(tool) is None:
             raise Failed(f"{tool} is missing; install it: apt-get install {package}")
     BUILD.mkdir(parents=True, exist_ok=True)
+    script = (REFERENCE / "m4f.ld").read_text(encoding="utf-8")
+    for here, there in AN505_AT.items():
+        script = script.replace(here, there)
+    (BUILD / "m33.ld").write_text(script, encoding="utf-8")
     installed, wanted = HERE.parent / "node_modules" / ".package-lock.json", HERE.parent / "package-lock.json"
     # Only if it is out of date: tools/emulator shares it and may be running.
     if not installed.is_file() or installed.stat().st_mtime < wanted.stat().st_mtime:
@@ -109,7 +125,7 @@ def build(board: Board, name: str, *sources: object) -> Path:
     # As everywhere else: no products fused into sums, and no errno for a square root.
     compiler += ["-ffp-contract=off", "-fno-math-errno", f"-DBENCH_FRAMES={FRAMES}", *INCLUDE, *board.options]
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--gc-sections"]
-    link += ["--specs=rdimon.specs" if board.machine == M4F else "--specs=nosys.specs"]
+    link += ["--specs=rdimon.specs" if board.qemu else "--specs=nosys.specs"]
     apart = []
     for source in APART:
         apart.append(elf.with_suffix(f".{source.parent.name}_{source.stem}.o"))
@@ -135,24 +151,29 @@ def run_rp2040(elf: Path) -> tuple[list[Row], list[int]]:
     return [tuple(row) for row in answer["rows"]], answer["results"]
 
 
-def qemu_output(elf: Path) -> list[str]:
+def qemu_output(board: Board, elf: Path) -> list[str]:
     """The lines that the image printed."""
-    code, output = qemu.run(elf)
+    code, output = qemu.run(elf, machine=board.qemu)
     if code:
         raise Failed(f"{elf.name} exited with code {code} in QEMU: {output.strip()[-200:]}")
     return output.splitlines()
 
 
-def run_m4f(elf: Path) -> list[Row]:
+def cycles_of(code: m4f_model.Model | m33_model.Model, run: list[int]) -> int:
+    # the last instruction is followed by the closing mark, whose address starts no pair
+    if isinstance(code, m4f_model.Model):
+        return code.cycles(Counter(pairwise(run)))
+    return code.cycles(Counter(zip([run[0], run[0], *run], [run[0], *run], run, run[1:], strict=False)))
+
+
+def run_qemu(board: Board, elf: Path) -> list[Row]:
     """Rows. QEMU runs twice: for the names of the runs, and for the instructions in them."""
-    names = [tuple(line.split("\t")) for line in qemu_output(elf)]
-    model = Model(command("arm-none-eabi-objdump", "-d", elf))
+    names = [tuple(line.split("\t")) for line in qemu_output(board, elf)]
+    model = (m33_model if board.machine == M33 else m4f_model).Model(command("arm-none-eabi-objdump", "-d", elf))
     rows: list[Row] = []
     try:
-        for k, run in enumerate(runs(_log(elf), addresses(elf)["bench_mark"])):
-            # the last instruction is followed by the closing mark, whose address starts no pair
-            pairs = Counter(pairwise(run))
-            rows.append((names[k][0], names[k][1], len(run), model.cycles(pairs)))
+        for k, run in enumerate(runs(_log(board, elf), addresses(elf)["bench_mark"])):
+            rows.append((names[k][0], names[k][1], len(run), cycles_of(model, run)))
     except UnknownInstruction as unknown:
         raise Failed(str(unknown)) from None
     if len(rows) != len(names):
@@ -162,10 +183,10 @@ def run_m4f(elf: Path) -> list[Row]:
     return rows
 
 
-def _log(elf: Path) -> Iterator[bytes]:
+def _log(board: Board, elf: Path) -> Iterator[bytes]:
     """QEMU's log, one line per instruction, through a pipe, because it would take a gigabyte on disk."""
     reader, writer = os.pipe()
-    arguments = [*qemu.argv(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
+    arguments = [*qemu.argv(elf, board.qemu), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
     process = subprocess.Popen(arguments, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(writer)
     try:
@@ -179,7 +200,7 @@ def _log(elf: Path) -> Iterator[bytes]:
 
 def count(board: Board) -> list[Row]:
     elf = build(board, "count", HERE / "image.c", HERE / "scenes.c")
-    return run_m4f(elf) if board.machine == M4F else run_rp2040(elf)[0]
+    return run_qemu(board, elf) if board.qemu else run_rp2040(elf)[0]
 
 
 def tally(rows: list[Row]) -> dict[str, dict[str, list[dict[str, int]]]]:
@@ -225,7 +246,7 @@ def counts() -> dict[str, Any]:
 def bits(board: Board) -> int:
     """The hash of the shipped kernels' results on this board."""
     elf = build(board, "bits", HERE / "bits_image.c")
-    return int(qemu_output(elf)[0], 16) if board.machine == M4F else run_rp2040(elf)[1][0]
+    return int(qemu_output(board, elf)[0], 16) if board.qemu else run_rp2040(elf)[1][0]
 
 
 def bits_here() -> int:

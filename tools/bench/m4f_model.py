@@ -45,6 +45,7 @@ class Instruction:
     size: int
     name: str  # without width, type and condition
     operands: str
+    sets_flags: bool = False
 
 
 def decode(disassembly: str) -> dict[int, Instruction]:
@@ -57,7 +58,9 @@ def decode(disassembly: str) -> dict[int, Instruction]:
         address = int(cells[0].strip()[:-1], 16)
         size = len(cells[1].replace(" ", "")) // 2
         operands = cells[3].split(";")[0].split("@")[0].strip() if len(cells) > 3 else ""
-        out[address] = Instruction(address, size, base_name(cells[2].strip()), operands)
+        name, raw = base_name(cells[2].strip()), cells[2].strip().split(".")[0]
+        sets = (raw.endswith("s") and name not in (raw, raw[:-2])) or name in ("cmp", "cmn", "tst", "teq")
+        out[address] = Instruction(address, size, name, operands, sets)
     return out
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a board image takes, and what must not be in it. Runs after each link; exit 1 says what is wrong.
 
-    check.py IMAGE.elf --port NAME --limits BOARD/limits.json [--objdump PROGRAM]
+    check.py IMAGE.elf --port FOLDER... --limits BOARD/limits.json [--objdump PROGRAM]
 
 Prints flash, RAM and the deepest stack. Refuses an image over its board's limits, with a heap, printf or floating point
 in it, with a stack that may outgrow its room, with an unbounded wait in the port, or, where the board runs from RAM,
@@ -111,7 +111,7 @@ def misplaced(program: stack.Program, limits: Limits, interrupts: list[str]) -> 
     )  # fmt: skip
 
 
-def check(elf: Path, objdump: str, limits: Limits, port: Path) -> list[str]:
+def check(elf: Path, objdump: str, limits: Limits, ports: list[Path]) -> list[str]:
     """Print the figures; return what is wrong."""
     parts = sections(elf, objdump, limits)
     flash = sum(part.bytes for part in parts.values() if part.stored)
@@ -132,18 +132,18 @@ def check(elf: Path, objdump: str, limits: Limits, port: Path) -> list[str]:
         if FLOAT_SYMBOL.match(name) or LIBRARY_SYMBOL.match(name):
             wrong.append(f"{name} must not be in the image")
     wrong += misplaced(program, limits, interrupts) if limits.runs_from_ram else []
-    return wrong + waits.unbounded(PORTS / "cortex_m", port) + waits.unbounded(port)
+    return wrong + [wait for port in (PORTS / "cortex_m", *ports) for wait in waits.unbounded(port, *ports)]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("elf", type=Path)
-    parser.add_argument("--port", required=True, help="a folder of firmware/port")
+    parser.add_argument("--port", nargs="+", type=Path, required=True, help="the folders of its port")
     parser.add_argument("--limits", required=True, type=Path)
     parser.add_argument("--objdump", default="arm-none-eabi-objdump")
     args = parser.parse_args()
     try:
-        wrong = check(args.elf, args.objdump, read_limits(args.limits), PORTS / args.port)
+        wrong = check(args.elf, args.objdump, read_limits(args.limits), args.port)
     except stack.Unknown as unknown:
         wrong = [str(unknown)]
     for problem in wrong:

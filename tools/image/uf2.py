@@ -1,47 +1,59 @@
 #!/usr/bin/env python3
-"""Write a flash image as UF2, the format that an RP2040's drive takes (https://github.com/microsoft/uf2).
+"""Write a flash image as UF2, the format that a Pico's drive takes (https://github.com/microsoft/uf2).
 
-    uf2.py IMAGE.bin IMAGE.uf2
+    uf2.py IMAGE.bin IMAGE.uf2 [--chip rp2350]
 
-Refuses an image whose second-stage boot has a wrong CRC: the chip would refuse it too, but without a word.
+Refuses an image that the chip's boot ROM would refuse, but without a word: one whose second-stage boot has a wrong CRC
+(RP2040), or whose IMAGE_DEF is not as it should be (RP2350), by the same code as `biotac flash`.
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib.util
 import struct
 import sys
 from pathlib import Path
+from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from image.boot2 import CODE_BYTES, block
-
-FLASH = 0x10000000
+CODE = Path(__file__).resolve().parents[2] / "host/biotac/flash/families.py"
 PAGE = 256
-FAMILY_RP2040 = 0xE48BFF56
 FLAG_FAMILY = 0x2000
 MAGIC = (0x0A324655, 0x9E5D5157, 0x0AB16F30)
 
 
-def uf2(image: bytes) -> bytes:
+def families() -> Any:
+    spec = importlib.util.spec_from_file_location("biotac_families", CODE)
+    assert spec is not None and spec.loader is not None
+    code = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = code  # dataclasses look up their module here
+    spec.loader.exec_module(code)
+    return code
+
+
+def uf2(image: bytes, chip: str = "rp2040") -> bytes:
     """512-byte blocks, one per flash page."""
-    if image[: CODE_BYTES + 4] != block(image[:CODE_BYTES]):
-        raise ValueError("the image does not begin with a second-stage boot and its CRC")
+    code = families()
+    family = next(family for family in code.FAMILIES if family.chip.lower() == chip)
+    family.check(image)
     pages = [image[at : at + PAGE].ljust(PAGE, b"\0") for at in range(0, len(image), PAGE)]
     out = bytearray()
     for k, page in enumerate(pages):
-        head = struct.pack("<8I", *MAGIC[:2], FLAG_FAMILY, FLASH + k * PAGE, PAGE, k, len(pages), FAMILY_RP2040)
+        head = struct.pack("<8I", *MAGIC[:2], FLAG_FAMILY, code.FLASH_AT + k * PAGE, PAGE, k, len(pages), family.id)
         out += head + page.ljust(476, b"\0") + struct.pack("<I", MAGIC[2])
     return bytes(out)
 
 
 def main() -> int:
-    if len(sys.argv) != 3:
-        sys.exit((__doc__ or "").strip())
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("bin", type=Path)
+    parser.add_argument("uf2", type=Path)
+    parser.add_argument("--chip", choices=("rp2040", "rp2350"), default="rp2040")
+    args = parser.parse_args()
     try:
-        Path(sys.argv[2]).write_bytes(uf2(Path(sys.argv[1]).read_bytes()))
+        args.uf2.write_bytes(uf2(args.bin.read_bytes(), args.chip))
     except ValueError as error:
-        sys.exit(f"uf2.py: {error}")
+        sys.exit(f"uf2.py: {args.bin}: {error}")
     return 0
 
 

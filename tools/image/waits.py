@@ -20,9 +20,9 @@ LOOP = re.compile(r"\b(while|for)\b\s*\(")
 DEFINED = re.compile(r"^#define (\w+)(?:\(\w+\))?\s+(?:REG32|\(\*)", re.M)
 
 
-def unbounded(port: Path, register_folder: Path | None = None) -> list[str]:
+def unbounded(port: Path, *register_folders: Path) -> list[str]:
     """One line for each loop that is not allowed."""
-    headers = (register_folder or port).glob(REGISTERS)
+    headers = [path for folder in register_folders or (port,) for path in folder.glob(REGISTERS)]
     registers = {name for path in headers for name in DEFINED.findall(path.read_text(encoding="utf-8"))}
     wrong = []
     for path in sorted(port.rglob("*.[ch]")):

@@ -22,7 +22,7 @@
 #define PORT_LED 2
 #define PIN_LED  1
 
-// See boards/pico/pins.h.
+// See boards/pico/pico_pins.h.
 #define SELECT_SETUP_NS 1800
 #define SELECT_HOLD_NS  230
 

@@ -115,6 +115,8 @@ enum bt_board {
     BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     BT_BOARD_MESSAGES = 7, // a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
     BT_BOARD_POSIX_LIVE = 8, // a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
+    BT_BOARD_PICO2 = 9, // Raspberry Pi Pico 2 (RP2350)
+    BT_BOARD_PICO2_W = 10, // Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio
     BT_BOARD_PRIVATE = 32768, // the first of the private ids
 };
 

@@ -26,7 +26,7 @@ from .catalogue import Finding
 from .facts import BoardFacts, Facts
 from .listening import has_crystal, listen
 
-FLASH = {"ef4015": "W25Q16JV", "ef7015": "W25Q16JV-IM"}  # of a Raspberry Pi Pico
+FLASH = {"ef4015": "W25Q16JV", "ef7015": "W25Q16JV-IM", "ef4016": "W25Q32JV", "ef7016": "W25Q32JV-IM"}  # a Pico's
 ERASE_MAX_US = 400_000  # of a sector, W25Q16JV data sheet
 SUPPLY_MV = (4100, 5500)  # VSYS: 4.40 V at a device's end of USB (USB 2.0, 7.2.2) less a diode; the board's most
 CLOCK_PPM = 650.0  # USB frames are within 500 ppm (USB 2.0, 7.1.12), a crystal within 100, a ms of reading in 20 s 50
@@ -272,7 +272,7 @@ def measures(seen: Bringup) -> list[Measure]:
     last, ppm, lost = seen.chip[-1], clock_ppm(seen.chip), lost_starts(seen.idle)
     flash, (low, high) = bytes(last.flash_id).hex(), SUPPLY_MV
     found: list[tuple[str, str, str, str, bool]] = [
-        ("chip id", f"0x{last.chip_id:08X}", "revision in the first digit: 1 is B0 or B1, 2 is B2", "", False),
+        ("chip id", f"0x{last.chip_id:08X}", "first digit: revision, 2 is an RP2040 B2 or an RP2350 A2", "", False),
         ("flash", f"{flash} {FLASH.get(flash, '')}".strip(), ", ".join(FLASH), "flash_unknown",
          any(last.flash_id) and flash not in FLASH),
         ("slots lost by late DMA", str(last.slots_dma_late), "none", "dma_late", last.slots_dma_late > 0),

@@ -16,8 +16,9 @@ from ..link.holders import holders
 from ..wire import messages_gen as wire
 from .facts import SystemFacts
 
-#: Where the boot loader's drive is mounted: macOS, then Linux desktops.
-DRIVES = ("Volumes/RPI-RP2", "media/*/RPI-RP2", "run/media/*/RPI-RP2")
+#: Where the boot loader's drive is mounted, an RP2040's or an RP2350's: macOS, then Linux desktops.
+PLACES, LABELS = ("Volumes", "media/*", "run/media/*"), ("RPI-RP2", "RP2350")
+DRIVES = tuple(f"{place}/{label}" for place in PLACES for label in LABELS)
 
 
 def look(port: str | None, *, root: Path = Path("/"), entries: Iterable[Any] | None = None) -> SystemFacts:

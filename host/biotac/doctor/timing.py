@@ -17,6 +17,7 @@ from .facts import BoardFacts, grown
 #: A crystal stays within 100 ppm over age and temperature.
 CRYSTAL_PPM = 100.0
 RP2040, REVISION_B2 = 0x0002927, 2  # SYSINFO_CHIP_ID, data sheet 2.20
+RP2350, REVISION_A2 = 0x0004927, 2  # the same, data sheet 12.15
 #: Slots are timed by the board's own clock: 1 % off cannot be rounding.
 RATE_SHARE = 0.01
 
@@ -29,6 +30,8 @@ def check(board: BoardFacts, *, fed: bool = False) -> Iterator[Finding]:
     chip_id = board.chip.chip_id if board.chip is not None else 0
     if chip_id & 0x0FFFFFFF == RP2040 and chip_id >> 28 < REVISION_B2:
         yield Finding("chip_old", f"chip id 0x{chip_id:08X}; from B2 on its first digit is 2")
+    if chip_id & 0x0FFFFFFF == RP2350 and chip_id >> 28 <= REVISION_A2 and len(board.present) < sensor.MAX_SENSORS:
+        yield Finding("chip_floats", f"chip id 0x{chip_id:08X}: RP2350 A2 or older; later ones begin with more than 2")
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters restarted and tell nothing

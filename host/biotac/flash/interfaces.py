@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from ..hand.hand import Hand
+from .families import Family
 from .image import Image
 
 #: Called with the number of blocks written so far and the total.
@@ -23,6 +24,10 @@ class Loader(Protocol):
 
     def write(self, image: Image, show: Show) -> None:
         """Transfer the image; the board then restarts by itself. Raises FlashError if not all of it was transferred."""
+
+    def family(self) -> Family | None:
+        """The chip of the board in its loader; None when this way does not tell."""
+        return None
 
     def cure(self) -> str:
         """What the user can do when this way is not ready although a board should be there."""

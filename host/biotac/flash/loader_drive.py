@@ -1,4 +1,4 @@
-"""The drive that an RP2040's loader presents: a file written to it goes into the flash, block by block."""
+"""The drive that an RP2040's or RP2350's loader presents: a file written to it goes into the flash, block by block."""
 
 from __future__ import annotations
 
@@ -10,41 +10,46 @@ import sys
 from pathlib import Path
 
 from ..errors import FlashError
+from .families import FAMILIES, Family
 from .image import Image
 from .interfaces import Loader, Show
 
-LABEL = "RPI-RP2"
-OTHER = "RP2350"  # a Pico 2's
-DISK = Path("/dev/disk/by-label") / LABEL  # on Linux, of an attached drive, mounted or not
+DISKS = Path("/dev/disk/by-label")  # on Linux, of an attached drive, mounted or not
 INFO = "INFO_UF2.TXT"
 FILE = "BIOTAC.UF2"
 
 
 class DriveLoader(Loader):
-    name = f"drive {LABEL}"
+    name = "drive"
 
-    def drives(self) -> list[Path]:
-        return [folder for folder in mounted_folders() if is_loader(folder)]
+    def drives(self) -> list[tuple[Path, Family]]:
+        return [(folder, family) for folder in mounted_folders() for family in FAMILIES if is_loader(folder, family)]
 
     def ready(self) -> bool:
         drives = self.drives()
         if len(drives) > 1:
             raise FlashError(
-                f"{len(drives)} boards are in their loader ({', '.join(map(str, drives))}); unplug all but one"
+                f"{len(drives)} boards are in their loader ({', '.join(str(folder) for folder, _ in drives)}); unplug "
+                "all but one"
             )
+        if drives:
+            self.name = f"drive {drives[0][1].drive}"
         return len(drives) == 1
 
+    def family(self) -> Family | None:
+        return self.drives()[0][1] if self.ready() else None
+
     def cure(self) -> str:
-        if DISK.with_name(OTHER).exists() or any(is_loader(folder, OTHER) for folder in mounted_folders()):
-            return (
-                f"a Pico 2 (drive {OTHER}) is in its loader, and no image is for it: plug in a Pico with BOOTSEL held"
-            )
-        if not DISK.exists():
-            return f"no drive {LABEL} found: plug the board in with BOOTSEL held, or check the cable"
-        return f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {DISK}`, or mount it by hand"
+        there = next((DISKS / family.drive for family in FAMILIES if (DISKS / family.drive).exists()), None)
+        if there is None:
+            names = " or ".join(family.drive for family in FAMILIES)
+            return f"no drive {names} found: plug the board in with BOOTSEL held, or check the cable"
+        return f"the drive {there.name} is there but not mounted: `udisksctl mount -b {there}`, or mount it by hand"
 
     def write(self, image: Image, show: Show) -> None:
-        path = self.drives()[0] / FILE
+        folder, family = self.drives()[0]
+        refuse_another_chips(image, family)
+        path = folder / FILE
         *most, last = image.boot_last()
         written = 0
         try:
@@ -68,10 +73,20 @@ class DriveLoader(Loader):
         show(len(image.blocks), len(image.blocks))
 
 
-def is_loader(folder: Path, label: str = LABEL) -> bool:
-    """True if a file on the drive says that it belongs to the loader of an RP2040, or of the chip of that label."""
+def refuse_another_chips(image: Image, family: Family) -> None:
+    """Raise FlashError for an image of which the board's boot ROM would skip every block without a word."""
+    if image.family is not family:
+        raise FlashError(
+            f"{image.path} is for a {image.family.board} ({image.family.chip}), and a {family.board} (drive "
+            f"{family.drive}) is in its loader: use that board's image"
+        )
+
+
+def is_loader(folder: Path, family: Family) -> bool:
+    """True if a file on the drive says that it belongs to the loader of such a chip."""
+    said = f"Board-ID: {family.drive}"
     try:
-        return f"Board-ID: {label}" in (folder / INFO).read_text(encoding="ascii", errors="replace").splitlines()
+        return said in (folder / INFO).read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
         return False
 

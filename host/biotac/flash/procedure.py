@@ -12,7 +12,8 @@ from ..errors import BiotacError, FlashError, InputError, NotAGatewayError, Wire
 from ..wire import messages_gen as wire
 from ..wire.identity import board_name, board_text, serial_text, version_text
 from .backup import Backup, Restored, restore, save
-from .image import Image, note_text
+from .families import RP2040, Family
+from .image import CHIP_OF, Image, note_text
 from .interfaces import Loader, Target
 from .interfaces import Show as ShowBlocks
 from .waiting import wait_for
@@ -94,6 +95,18 @@ def flash(
             check(image, before, hand.info)
             settings = None if backup is None else restore(hand, backup)
             return Outcome(target.port, loader.name, before, hand.info, backup, settings)
+
+
+def family_of(target: Target, loaders: Sequence[Loader]) -> Family:
+    """The chip of the board in its loader, or of the one that answers; an RP2040 where neither says it."""
+    loader = first_ready(loaders)
+    if loader is not None:
+        return loader.family() or RP2040
+    try:
+        with target.open() as hand:
+            return CHIP_OF.get(hand.info.board, RP2040)
+    except BiotacError:
+        return RP2040  # flash says what is wrong with it
 
 
 def first_ready(loaders: Sequence[Loader]) -> Loader | None:

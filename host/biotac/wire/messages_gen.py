@@ -126,6 +126,8 @@ class Board(IntEnum):
     PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     MESSAGES = 7  # a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
     POSIX_LIVE = 8  # a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
+    PICO2 = 9  # Raspberry Pi Pico 2 (RP2350)
+    PICO2_W = 10  # Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio
     PRIVATE = 32768  # the first of the private ids
 
 
@@ -312,6 +314,8 @@ BOARD_DOC: dict[int, str] = {
     6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
     7: "a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so",
     8: "a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads",
+    9: "Raspberry Pi Pico 2 (RP2350)",
+    10: "Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio",
     32768: "the first of the private ids",
 }
 

@@ -194,6 +194,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ("board_restarted", after(uptime_s=0), "up for 0 s"),
     ("board_restarted", link(disordered=2), "up for"),
     ("chip_old", board(chip=message(wire.BoardFacts, chip_id=0x10002927)), "0x10002927"),
+    ("chip_floats", board(chip=message(wire.BoardFacts, chip_id=0x20004927)), "0x20004927: RP2350 A2"),
     ("faults_latched", before(faults=9), "board: STORAGE"),
     (
         "faults_latched",

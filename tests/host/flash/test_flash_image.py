@@ -7,16 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fake_flash_board import make_image, note
+from fake_flash_board import RP2350_START, make_image, note, uf2
 
 from biotac.errors import InputError
 from biotac.flash import read_image
-from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, MAPS_BYTES, SETTINGS_BYTES, note_text
+from biotac.flash.families import FAMILIES, RP2040, RP2350
+from biotac.flash.image import BLOCK_BYTES, MAPS_BYTES, SETTINGS_BYTES, note_text
 from biotac.wire import messages_gen as wire
 
 ROOT = Path(__file__).resolve().parents[3]
 FLASH = 0x10000000
-KEPT = FLASH + FLASH_BYTES - SETTINGS_BYTES - MAPS_BYTES  # from here on
+KEPT = FLASH + RP2040.flash_bytes - SETTINGS_BYTES - MAPS_BYTES  # from here on
 
 
 def changed(at: int, format_: str, value: int, block: int = 3) -> Callable[[bytes], bytes]:
@@ -57,6 +58,7 @@ def test_an_image_says_what_it_is(tmp_path: Path) -> None:
         (changed(100, "<I", 0), "CRC-32"),
         (changed(300, "<B", 1), "block 3 has data after its 256 bytes"),
         (changed(28, "<I", 0xE48BFF59), "family 0xE48BFF59, expected 0xE48BFF56"),
+        (changed(28, "<I", 0xE48BFF59, block=0), "block 1 of 20 has family 0xE48BFF56, expected 0xE48BFF59"),
         (changed(16, "<I", 476), "size 0x1DC, expected 0x100"),
         (dropped(19, 20), "block 0 of 19 has count of blocks 0x14, expected 0x13"),
         (dropped(4, 5), "use the whole .uf2 file"),
@@ -108,11 +110,43 @@ def test_settings_and_maps_are_where_the_firmware_has_them() -> None:
     slots = (ROOT / "firmware/core/map/store.h").read_text()
     assert "#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES" in slots
     assert "#define BT_MAP_SLOTS      BT_MAP_SLOTS_OF(BT_MAX_FINGERS)" in slots
-    port = (ROOT / "firmware/port/rp2040/flash.c").read_text()
-    assert "#define FLASH_BYTES    (2u * 1024 * 1024)" in port
+    port = (ROOT / "firmware/port/rp2/flash.c").read_text()
     assert "#define MAPS_OFFSET    (STORAGE_OFFSET - BT_MAPS_BYTES)" in port
-    assert (FLASH_BYTES, SETTINGS_BYTES, MAPS_BYTES) == (2 * 1024 * 1024, 2 * 4096, 11 * 20480)
-    assert (
-        f"LENGTH = 2M - 256 - {(SETTINGS_BYTES + MAPS_BYTES) // 1024}K"
-        in (ROOT / "firmware/port/rp2040/rp2040.ld").read_text()
-    )
+    assert (SETTINGS_BYTES, MAPS_BYTES) == (2 * 4096, 11 * 20480)
+    for family, boot2 in zip(FAMILIES, (" - 256", ""), strict=True):
+        folder, mib = ROOT / "firmware/port" / family.chip.lower(), family.flash_bytes >> 20
+        assert f"#define FLASH_BYTES    ({mib}u * 1024 * 1024)" in (folder / "chip_flash.h").read_text()
+        length = f"LENGTH = {mib}M{boot2} - {(SETTINGS_BYTES + MAPS_BYTES) // 1024}K"
+        assert length in (folder / f"{folder.name}.ld").read_text()
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "why"),
+    [
+        (64, 0xFFFFDED4, "0 IMAGE_DEF blocks in its first 4 KiB"),
+        (200, 0xFFFFDED3, "2 IMAGE_DEF blocks"),
+        (68, 0x10110142, "IMAGE_DEF is FFFFDED3 10110142"),  # not Secure
+        (68, 0x00210142, "00210142"),  # an RP2040's
+        (72, 0x2FF, "000002FF"),
+        (76, 64, "00000040"),  # a link to another block
+        (80, 0, "00000000; the chip expects"),
+        (0, 0x20082008, "no stack in RAM"),
+        (0, 0x20001E01, "no stack in RAM"),
+        (4, 0x10000100, "code in flash"),  # not Thumb
+        (4, 0x20000101, "code in flash"),
+    ],
+)
+def test_an_image_that_an_rp2350_would_not_start_is_refused(at: int, value: int, why: str) -> None:
+    image = bytearray(RP2350_START.ljust(8192, b"\0"))
+    RP2350.check(bytes(image))
+    struct.pack_into("<I", image, at, value)
+    with pytest.raises(ValueError, match=why):
+        RP2350.check(bytes(image))
+    with pytest.raises(ValueError, match=why):
+        uf2.uf2(bytes(image), "rp2350")  # nor does the build write it
+
+
+def test_an_image_whose_board_has_another_chip_is_refused(tmp_path: Path) -> None:
+    assert read_image(make_image(tmp_path, chip="rp2350")).family is RP2350
+    with pytest.raises(InputError, match="it is for a PICO, and its blocks are an RP2350's"):
+        read_image(make_image(tmp_path, note(), chip="rp2350"))

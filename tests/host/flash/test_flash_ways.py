@@ -10,6 +10,7 @@ from fake_flash_board import FakeBoard, make_drive, make_image, plug_in
 
 from biotac.errors import DeviceLostError, FlashError
 from biotac.flash import loader_drive, read_image
+from biotac.flash.families import FAMILIES, RP2040, Family
 from biotac.flash.image import BLOCK_BYTES
 from biotac.flash.loader_drive import DriveLoader, linux_folders
 from biotac.flash.loader_picotool import PicotoolLoader
@@ -27,7 +28,7 @@ def test_a_drive_is_found_where_desktops_mount_it(tmp_path: Path, place: str) ->
     (tmp_path / "media/me/empty").mkdir()
     assert not DriveLoader().ready()
     drive = make_drive(tmp_path / place)
-    assert DriveLoader().drives() == [drive]
+    assert DriveLoader().drives() == [(drive, RP2040)]
 
 
 def test_a_drive_is_found_where_somebody_mounted_it(tmp_path: Path) -> None:
@@ -35,7 +36,7 @@ def test_a_drive_is_found_where_somebody_mounted_it(tmp_path: Path) -> None:
     mounts = tmp_path / "proc/mounts"
     mounts.parent.mkdir()
     mounts.write_text(f"proc /proc proc rw 0 0\n/dev/sdb1 {str(drive).replace(' ', chr(92) + '040')} vfat rw 0 0\n")
-    assert DriveLoader().drives() == [drive]
+    assert DriveLoader().drives() == [(drive, RP2040)]
 
 
 def test_two_drives_are_one_too_many(tmp_path: Path) -> None:
@@ -45,16 +46,23 @@ def test_two_drives_are_one_too_many(tmp_path: Path) -> None:
         DriveLoader().ready()
 
 
-def test_a_pico_2_is_named(tmp_path: Path) -> None:
-    make_drive(tmp_path / "media/me/RP2350", "RP2350")
-    assert not DriveLoader().ready()
-    assert "a Pico 2 (drive RP2350)" in DriveLoader().cure()
+@pytest.mark.parametrize("family", FAMILIES)
+def test_another_chips_image_is_refused_both_ways(tmp_path: Path, family: Family) -> None:
+    make_drive(tmp_path / "media/me" / family.drive, family.drive)
+    loader = DriveLoader()
+    assert loader.ready() and loader.family() is family and loader.name == f"drive {family.drive}"
+    other = next(one for one in FAMILIES if one is not family)
+    image = read_image(make_image(tmp_path, chip=other.chip.lower()))
+    with pytest.raises(FlashError, match=rf"is for a {other.board} \({other.chip}\), and a {family.board} \(drive"):
+        loader.write(image, lambda done, total: None)
+    assert not (tmp_path / "media/me" / family.drive / loader_drive.FILE).exists()
 
 
 def test_a_drive_that_is_not_mounted_is_told_apart_from_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "BOOTSEL" in DriveLoader().cure()
-    monkeypatch.setattr(loader_drive, "DISK", tmp_path)
-    assert f"udisksctl mount -b {tmp_path}" in DriveLoader().cure()
+    monkeypatch.setattr(loader_drive, "DISKS", tmp_path)
+    (tmp_path / "RP2350").touch()
+    assert f"udisksctl mount -b {tmp_path}/RP2350" in DriveLoader().cure()
 
 
 def test_a_drive_gets_the_whole_file_with_the_boot_block_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

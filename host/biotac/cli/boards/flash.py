@@ -13,7 +13,7 @@ from ... import extra
 from ...errors import FlashError, InputError, PortError
 from ...flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
 from ...flash.image import find_image, note_text
-from ...flash.procedure import flash_every
+from ...flash.procedure import family_of, flash_every
 from ...wire.identity import serial_text, version_text
 from .. import ending, outputs, values
 from ..progress import Progress
@@ -52,10 +52,12 @@ def run(args: argparse.Namespace) -> int:
         values.refuse(args, ("emulated", "backup", "restore"), "is for one board; use only one, it or --all")
     image = read_image(path or find_image())
     kept = None if args.restore is None else read_backup(args.restore)
-    outputs.step(f"{image.path}: {note_text(image.note)}")
     if args.all:
-        return run_all(image, args)
+        return run_all(None if path is None else image, args)
     target, loaders = find_board(EMULATED if args.emulated else port)
+    if path is None and not args.emulated:
+        image = read_image(find_image(family_of(target, loaders)))
+    outputs.step(f"{image.path}: {note_text(image.note)}")
     with closing(target), Progress() as progress, options(args, progress) as given:
         outcome = flash(image, target, loaders, backup_path=args.backup, restore_from=kept, **given)
     outputs.report(args, facts(image, outcome), summary(outcome))
@@ -88,27 +90,28 @@ def options(args: argparse.Namespace, progress: Progress) -> Iterator[dict[str, 
             raise KeyboardInterrupt(again) from None
 
 
-def run_all(image: Image, args: argparse.Namespace) -> int:
-    """Flash every board and print the result of each; return 8 if one of them failed."""
+def run_all(image: Image | None, args: argparse.Namespace) -> int:
+    """Flash every board with the image or its chip's; print the result of each; return 8 if one of them failed."""
     from ...flash.target_serial import SerialTarget, gateway_ports
 
     targets = [SerialTarget(port) for port in sorted(gateway_ports())]
     if not targets:
         raise PortError("no board is plugged in; `biotac list` shows what is there")
-    results = []
+    results, rows = [], []
     with Progress() as progress, options(args, progress) as given:
-        for result in flash_every(image, targets, usb_loaders(), **given):
+        loaders = usb_loaders()
+        for target in targets:
+            its = image or read_image(find_image(family_of(target, loaders)))
+            (result,) = flash_every(its, [target], loaders, **given)
             progress.done()
             results.append(result)
+            done = facts(its, result.outcome) if result.outcome else {"why": result.why}
+            rows.append({"port": result.port, "error": result.error and str(result.error), **done})
             if result.error is not None:
                 outputs.step(f"{result.port}: {result.error}")
             elif not args.json:
                 print(summary(result.outcome) if result.outcome else f"{result.port} {result.why}")
     if args.json:
-        rows = []
-        for result in results:
-            done = facts(image, result.outcome) if result.outcome else {"why": result.why}
-            rows.append({"port": result.port, "error": result.error and str(result.error), **done})
         print(json.dumps(rows))
     failed = [result.port for result in results if result.error is not None]
     if failed:

@@ -1,0 +1,15 @@
+#ifndef BIOTAC_SILICON_RP2_RULES_H
+#define BIOTAC_SILICON_RP2_RULES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+void chip_reset(void);                  // as its boot ROM leaves it
+extern uint32_t gpio_in, gpio_out;      // the pins' levels: driven from outside, and by SIO's outputs
+extern bool host_sends_frames;          // on USB, one a millisecond
+extern uint32_t usb_resets;             // how often the USB's block was put into reset
+extern bool dma_is_late;                // the slot's words have not all come when the core looks
+extern uint32_t heard[64], words_heard; // words on the bus: for each, the pins that were low
+extern char rom_calls[64];              // of an RP2350's flash functions
+
+#endif
