@@ -70,13 +70,17 @@ class Writer:
     def next_file(self, facts: Facts) -> None:
         """Close this file and go on in a new one after a restart of the board.
 
-        ``press.mcap`` is followed by ``press.2.mcap``, ``press.3.mcap`` and so on. Raises InputError when the new file
-        exists and may not be overwritten, or cannot be written; nothing more is recorded then.
+        ``press.mcap`` is followed by ``press.2.mcap``, ``press.3.mcap`` and so on, without those that exist and may not
+        be overwritten. Raises InputError when the new file cannot be written; nothing more is recorded then.
         """
         self.close()
         frames, lost = self.frames, self.frames_lost
         first = self.paths[0]
-        path = first.with_name(f"{first.stem}.{len(self.paths) + 1}{first.suffix}")
+        number = len(self.paths) + 1
+        path = first.with_name(f"{first.stem}.{number}{first.suffix}")
+        while path.exists() and not self._overwrite:  # of another day
+            number += 1
+            path = first.with_name(f"{first.stem}.{number}{first.suffix}")
         metadata = facts.metadata(self._port) | {layout.CONTINUES: printable(self.path.name)}
         self._file = self._begin(path, metadata)
         self._frames_before, self._lost_before = frames, lost

@@ -75,8 +75,8 @@ def report_lost(hand: biotac.Hand) -> None:
 
 def show(hand: biotac.Hand, *, rate: float, seconds: float | None, events: bool, as_json: bool) -> None:
     """Print ``rate`` frames per second and finger, and ``events``, which a recording may have unasked."""
-    due_us: dict[int, int] = {}
-    step_us = int(1e6 / rate) if rate > 0 else 0
+    due_us: dict[int, float] = {}
+    step_us = 1e6 / rate if rate > 0 else 0
     end_us: int | None = None
     for batch in hand.batches():
         for event in batch.messages:
@@ -87,9 +87,10 @@ def show(hand: biotac.Hand, *, rate: float, seconds: float | None, events: bool,
                 end_us = frame.t_us + round(seconds * 1e6)
             if end_us is not None and frame.t_us >= end_us:
                 return
-            if frame.t_us < due_us.get(frame.finger, frame.t_us):
+            due = due_us.get(frame.finger, float(frame.t_us))
+            if frame.t_us < due:
                 continue
-            due_us[frame.finger] = frame.t_us + step_us
+            due_us[frame.finger] = max(due + step_us, frame.t_us)  # in step, so that there are ``rate`` a second
             print(json.dumps(row_as_json(frame)) if as_json else as_line(frame))
         sys.stdout.flush()
 
