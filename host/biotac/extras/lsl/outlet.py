@@ -45,13 +45,14 @@ _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
 class Outlet:
     """Three streams for each finger of ``hand``, also one that is plugged in later; push every batch.
 
-    Use it as a context manager. ``BioTac finger0``: one sample per round, 100 per second, of 37 channels: force (N),
+    Use it as a context manager. Names begin with ``name``, by default "BioTac" and the board's serial, so that two
+    hands are told apart. ``BioTac SERIAL finger0``: one sample per round, 100 per second, of 37 channels: force (N),
     torque (N*mm), point of contact (mm), normal and shear with half their intervals (N), flags, trust, and counts of
-    E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports, and once when the finger has had no frame for
-    0.1 s (with ``hand.batches(every_s=0.05)`` also when no finger has). ``BioTac finger0 PAC``: counts, 2200 per
-    second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind), which come only if the
-    hand is subscribed to events. The first two streams are double64; their descriptions hold labels, units and
-    meanings.
+    E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports, and once when the finger has had no frame
+    for 0.1 s (with ``hand.batches(every_s=0.05)`` also when no finger has). ``BioTac SERIAL finger0 PAC``: counts,
+    2200 per second. ``BioTac SERIAL finger0 events``: for each EVENT a marker, the name of its kind (EventKind),
+    which come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold
+    labels, units and meanings.
 
     Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each
     sample's own time for PAC. If the clock cannot convert (a simulated board has no real clock), a batch is stamped
@@ -60,9 +61,13 @@ class Outlet:
     Raises InputError when pylsl or its liblsl is missing.
     """
 
-    def __init__(self, hand: Hand) -> None:
+    def __init__(self, hand: Hand, name: str | None = None) -> None:
         self._lsl = _pylsl()
         self._hand = hand
+        self._board = serial_text(hand.info)
+        if hand.port.startswith(("sim:", "emu:")):  # all have one serial
+            self._board += f"-{hand.info.boot_id:08x}"
+        self.name = f"BioTac {self._board}" if name is None else name  #: what the streams' names begin with
         self.pushed = 0  #: frames so far
         self._stamps = Stamps(hand, self._lsl.local_clock)
         self.infos: list[Any] = []  #: pylsl.StreamInfo of each stream
@@ -117,8 +122,8 @@ class Outlet:
     def _add(self, finger: int, suffix: str, rate_hz: float, labels: list[tuple[str, Field]]) -> None:
         lsl, is_marker = self._lsl, not labels
         kind, format = ("Markers", lsl.cf_string) if is_marker else (TYPE, lsl.cf_double64)
-        source = f"biotac-{serial_text(self._hand.info)}-{finger}{suffix.replace(' ', '-')}"
-        info = lsl.StreamInfo(f"BioTac finger{finger}{suffix}", kind, len(labels) or 1, rate_hz, format, source)
+        source = f"biotac-{self._board}-{finger}{suffix.replace(' ', '-')}"
+        info = lsl.StreamInfo(f"{self.name} finger{finger}{suffix}", kind, len(labels) or 1, rate_hz, format, source)
         about = info.desc()
         for name, value in describe(self._hand, finger).items():
             about.append_child_value(name, value)
