@@ -40,33 +40,57 @@ static bool read_signals(const uint8_t *row, const int32_t tare_q4[BT_ELECTRODES
     return seen <= BT_FULL_SCALE_COUNT;
 }
 
-// The map's share of the force is not evaluated where it is 0.
-static void population_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
-                             const double e[BT_ELECTRODES], double force[3], uint32_t guess_mn[2])
+double bt_map_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
+                    uint32_t firm_100un, double force_n[3])
 {
-    double sum[12];
+    double sum[12], gated = 0;
+    memcpy(sum, columns[2 * BT_ELECTRODES], sizeof sum);
+    for (int i = 0; i < BT_ELECTRODES; i++) { // without branches on the sign: it is noise's
+        const double *column = columns[i + (BT_ELECTRODES & -(e_q4[i] > 0))];
+        for (int k = 0; k < 12; k++) {
+            sum[k] += e_q4[i] / 16.0 * column[k];
+        }
+    }
+    const double gate_x = sum[10] / sum[9], gate_y = sum[11] / sum[9];
+    for (int d = 0; d < 3; d++) {
+        force_n[d] = sum[d] + gate_x * sum[3 + d] + gate_y * sum[6 + d];
+        gated = fmax(gated, fabs(sum[3 + d]) + fabs(sum[6 + d]));
+    }
+    return 900 + firm_100un / 100 + (2 + 4e4 / sum[9]) * gated; // of signals, coefficients and gates
+}
+
+// A touch as a board judges it. The board's map is evaluated only where its roundings decide.
+static bt_likeness judged(const bt_likeness *touch, const int32_t e_q4[BT_ELECTRODES],
+                          const double by_map_n[3], double rounded_100un)
+{
+    bt_likeness near = *touch, far = *touch;
+    double off = 0;
     int32_t force_100un[3];
-    bt_likeness likeness = bt_population_force(&bt_population, e_q4, force_100un);
+    for (int d = 0; d < 3; d++) {
+        off = fmax(off, fabs(by_map_n[d] * 1e4 - touch->otherwise_100un[d]));
+    }
+    off = fmin(off, BT_MAP_RESULT_MAX);
+    bt_population_judge(&near, (uint32_t)fmax(off - rounded_100un, 0));
+    bt_population_judge(&far, (uint32_t)(off + rounded_100un));
+    bool decided = near.share == far.share && near.outside == far.outside;
+    return decided ? near : bt_population_force(&bt_population, e_q4, force_100un);
+}
+
+static void population_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
+                             double force[3], uint32_t guess_mn[2])
+{
+    bt_likeness likeness = bt_population_touch(e_q4);
+    if (likeness.share > 0) {
+        double rounded_100un = bt_map_force(columns, e_q4, likeness.firm_100un, force);
+        likeness = judged(&likeness, e_q4, force, rounded_100un);
+    }
     bt_population_guess(likeness.share, likeness.outside, likeness.strength_100un, guess_mn);
     uint32_t part_q8 = likeness.share * likeness.gain >> 8;
     double part = part_q8 / (double)BT_POPULATION_ALL,
            rest = (likeness.gain - part_q8) / (double)BT_POPULATION_ALL;
     for (int d = 0; d < 3; d++) {
-        force[d] = rest * likeness.otherwise_100un[d] / 1e4;
-    }
-    if (part_q8 == 0) {
-        return;
-    }
-    memcpy(sum, columns[2 * BT_ELECTRODES], sizeof sum);
-    for (int i = 0; i < BT_ELECTRODES; i++) { // without branches on the sign: it is noise's
-        const double *column = columns[i + (BT_ELECTRODES & -(e_q4[i] > 0))];
-        for (int k = 0; k < 12; k++) {
-            sum[k] += e[i] * column[k];
-        }
-    }
-    const double gate_x = sum[10] / sum[9], gate_y = sum[11] / sum[9];
-    for (int d = 0; d < 3; d++) {
-        force[d] += part * (sum[d] + gate_x * sum[3 + d] + gate_y * sum[6 + d]);
+        double by_map = part_q8 > 0 ? part * force[d] : 0;
+        force[d] = rest * likeness.otherwise_100un[d] / 1e4 + by_map;
     }
 }
 
@@ -119,7 +143,7 @@ int64_t bt_compute(const bt_formulas *formulas, int64_t n, const void *counts, i
         if (!(wanted & (BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE))) {
             guess_mn[0] = guess_mn[1] = 0;
         } else if (by_map) {
-            population_force(formulas->population, e_q4, e, lin->force_n, guess_mn);
+            population_force(formulas->population, e_q4, lin->force_n, guess_mn);
         } else {
             lin2013_force(e, formulas->lin.force_gain, lin->force_n);
             bt_lin_guess(bt_strength_100un(e_q4), guess_mn);

@@ -19,6 +19,11 @@ typedef struct {
     uint32_t wanted; // BT_QUANTITY_FLAG_POC, FORCE and TORQUE; the others become NaN
 } bt_formulas;
 
+// The population map's force of signals as from bt_signals_q4, without a board's roundings. Returns what
+// these change of it at most, in 100 uN (tests/host/map/test_population_force.py).
+double bt_map_force(const bt_population_column *columns, const int32_t e_q4[BT_ELECTRODES],
+                    uint32_t firm_100un, double force_n[3]);
+
 // A row of biotac.RESULT_DTYPE. The half widths are a board's for a tare that is confirmed and a finger
 // without noise (solve/interval.h); NaN where an electrode is missing, which is not estimated here.
 typedef struct {

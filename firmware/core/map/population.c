@@ -106,7 +106,7 @@ bool bt_population_like(const bt_map *map)
            && map->kinds == BT_POPULATION_KINDS && map->gates == BT_POPULATION_GATES;
 }
 
-bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
+bt_likeness bt_population_touch(const int32_t e_q4[BT_ELECTRODES])
 {
     int32_t x_q4[BT_ELECTRODES];
     uint32_t sum_q4 = 0;
@@ -115,31 +115,42 @@ bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRO
         sum_q4 += size;
         x_q4[i] = bt_with_sign(size, e_q4[i]);
     }
-    uint32_t firm_100un = STRENGTH(sum_q4);
-    bt_likeness likeness = {.outside = sum_q4 < LEAST_Q4, .gain = GAIN(sum_q4)};
-    likeness.strength_100un = firm_100un * likeness.gain >> 8;
-    if (sum_q4 == 0) {
-        force_100un[0] = force_100un[1] = force_100un[2] = 0;
-        return likeness;
+    bt_likeness touch = {.outside = sum_q4 < LEAST_Q4, .gain = GAIN(sum_q4), .firm_100un = STRENGTH(sum_q4)};
+    touch.strength_100un = touch.firm_100un * touch.gain >> 8;
+    if (sum_q4 > 0) {
+        bt_linear_sums pressed;
+        bt_sums_linear(x_q4, &pressed);
+        along_normals(&pressed, sum_q4, touch.firm_100un, touch.otherwise_100un);
+        touch.share = at_most(bt_shift_down((int32_t)sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
+        touch.few = FEW_PRESSED * pressed.total < sum_q4;
+        touch.outside |= touch.few;
     }
-    bt_linear_sums pressed;
-    bt_sums_linear(x_q4, &pressed);
-    along_normals(&pressed, sum_q4, firm_100un, likeness.otherwise_100un);
-    uint32_t most = at_most(bt_shift_down((int32_t)sum_q4 - LIGHT_Q4, FIRM_BITS - 8));
-    if (most > 0) { // else whatever the map said, nothing of it would be published
+    return touch;
+}
+
+void bt_population_judge(bt_likeness *touch, uint32_t off_100un)
+{
+    const uint32_t firm_100un = touch->firm_100un, far = FAR_8 * firm_100un;
+    if (off_100un < far / 8) {
+        uint32_t share = (far - 8 * off_100un) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
+        touch->share = share < touch->share ? share : touch->share;
+    } else {
+        touch->share = 0;
+    }
+    touch->outside = off_100un > OUTSIDE * firm_100un || (touch->share < BT_POPULATION_ALL && touch->few);
+}
+
+bt_likeness bt_population_force(const bt_map *map, const int32_t e_q4[BT_ELECTRODES], int32_t force_100un[3])
+{
+    bt_likeness touch = bt_population_touch(e_q4);
+    if (touch.share > 0) { // else whatever the map said, nothing of it would be published
         bt_map_results(map, e_q4, NULL, NULL, 0, BT_MAP_AXES_FORCE, force_100un);
-        uint32_t off = furthest(force_100un, likeness.otherwise_100un), far = FAR_8 * firm_100un;
-        if (off < far / 8) {
-            uint32_t share = (far - 8 * off) * (BT_POPULATION_ALL / (FAR_8 - NEAR_8)) / firm_100un;
-            likeness.share = share < most ? share : most;
-        }
-        likeness.outside = off > OUTSIDE * firm_100un;
+        bt_population_judge(&touch, furthest(force_100un, touch.otherwise_100un));
     }
-    likeness.outside |= likeness.share < BT_POPULATION_ALL && FEW_PRESSED * pressed.total < sum_q4;
-    if (likeness.share < BT_POPULATION_ALL || likeness.gain < BT_POPULATION_ALL) {
-        mix(&likeness, force_100un);
+    if (touch.share < BT_POPULATION_ALL || touch.gain < BT_POPULATION_ALL) {
+        mix(&touch, force_100un);
     }
-    return likeness;
+    return touch;
 }
 
 uint32_t bt_strength_100un(const int32_t e_q4[BT_ELECTRODES])

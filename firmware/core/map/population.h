@@ -20,7 +20,16 @@ typedef struct {
     bool outside;               // nothing touches, or the map and the normals contradict each other
     uint32_t strength_100un;    // from the sum of all signals
     int32_t otherwise_100un[3]; // along the normals, before the gain
+    uint32_t firm_100un;        // the strength before the gain
+    bool few;                   // hardly any electrode is compressed
 } bt_likeness;
+
+// What the signals say without the map: share is the most that it may have; where that is 0, the rest holds.
+bt_likeness bt_population_touch(const int32_t e_q4[BT_ELECTRODES]);
+
+// Else the map's share, and outside, by how far its force is off the normals along the axis where it is most.
+// The further, the smaller is the share, and what is outside stays so.
+void bt_population_judge(bt_likeness *touch, uint32_t off_100un);
 
 // Force on the finger in 100 uN, of signals as from bt_signals_q4, by the population map or one like it, and
 // how like the training they are (SPEC.md, Population map). A touch so light that the map has no share in its

@@ -9,13 +9,15 @@ import numpy as np
 import biotac
 from biotac.calibrate import population as population_map
 from biotac.core.finger import Finger
-from biotac.kernels.compiled import on_board_q4
+from biotac.kernels.compiled import c_pointers, on_board_q4
 from biotac.map import population
 from biotac.map.board_map import BoardMap
+from biotac.map.bound import error_bound
 from biotac.map.float64 import replace_gains
 from biotac.map.published import published
 from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
+from biotac.wire.native import ffi, lib
 
 POPULATION = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.POPULATION)}
 LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}
@@ -63,6 +65,29 @@ def test_it_is_the_trained_map_to_what_16_bits_leave_and_along_the_normals() -> 
     step = np.abs(trained.force(counts, TARE) - judgement.otherwise_n) / population.ALL
     step[(judgement.share == 0) | (judgement.share == population.ALL)] = 0.0
     assert (np.abs(got - trained.published(counts, TARE)) <= step + 1e-9).all()
+
+
+def test_where_no_rounding_decides_the_share_is_a_boards() -> None:
+    """compute() evaluates the board's map only within what its roundings change, which is bounded frame by frame."""
+    rng, columns, force = np.random.default_rng(9), population.compiled_coefficients(), ffi.new("double[3]")
+    counts = np.concatenate([pressed(8000, 8), pressed(8000, 9)])
+    counts[8000:][rng.random((8000, 19)) < 0.3] = 4095
+    counts[8000:][rng.random((8000, 19)) < 0.3] = 0
+    judgement, tare_q4 = judged(counts), np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)
+    rounded = [
+        lib.bt_map_force(columns, *c_pointers(e_q4), strength, force)
+        for e_q4, strength in zip(
+            16 * counts.astype(np.int32) - tare_q4, judgement.strength_100un.tolist(), strict=True
+        )
+    ]
+    nothing, trained = np.zeros(len(counts), np.int32), population.unrounded(population.blocks())
+    bound = 1e4 * error_bound(population.on_board(), trained, counts, tare_q4, nothing).max(axis=1)
+    assert (bound <= rounded)[judgement.share > 0].all()
+    got, margin = biotac.compute(counts, TARE), population.margin()
+    size_n = got["normal_n"] + got["shear_n"]
+    for k, name in enumerate(("normal_half_n", "shear_half_n")):
+        wanted = margin.base_mn[k] / 1e3 + margin.share_q8[k] / 256 * size_n + judgement.guess_n[:, k]
+        np.testing.assert_allclose(got[name], wanted, rtol=1e-12)
 
 
 def test_the_board_keeps_the_bound_and_says_what_it_did() -> None:
