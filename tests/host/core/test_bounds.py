@@ -41,15 +41,18 @@ def jumps(rows: np.ndarray) -> Floats:
 @pytest.mark.parametrize("lin", [False, True], ids=["default", "lin"])
 @pytest.mark.parametrize("profile", ["new", "worn"])
 def test_a_count_that_dithers_at_the_end_of_its_range_moves_nothing(profile: str, lin: bool) -> None:
-    most, mid_range = np.zeros(2), np.zeros(2)
     for at in range(19):
         assert (jumps(held(profile, at, 10.0, at, lin)) < [0.2, 0.1]).all(), at
         rows = held(profile, at, 30.0, at, lin)
         assert not rows["electrodes_out"][HELD].any() and (rows["flags"][HELD] & FrameFlags.RAIL).any()
-        most = np.maximum(most, jumps(rows))
-        for other in np.argsort(np.linalg.norm(ELECTRODE_MM - ELECTRODE_MM[at], axis=1))[[4, 8, 12, 16]].tolist():
-            mid_range = np.maximum(mid_range, jumps(held(profile, at, 30.0, other, lin)))
-    assert (most <= mid_range + np.array([0.002, 0.0005])).all()  # and what whole um and 0.1 mN round
+        # A count of an electrode in mid range moves as much in the same hold, but for what whole um and 0.1 mN round.
+        count = rows["counts"][HELD].mean(axis=0)
+        near_first = np.argsort(np.linalg.norm(ELECTRODE_MM - ELECTRODE_MM[at], axis=1))
+        others = [other for other in near_first.tolist() if 500 < count[other] < 3500]
+        most, reached = jumps(rows) - [0.002, 0.0005], np.zeros(2)
+        while (most > reached).any():
+            assert others, at
+            reached = np.maximum(reached, jumps(held(profile, at, 30.0, others.pop(), lin)))
 
 
 def test_a_lead_that_opens_in_a_press_is_out_in_its_first_round() -> None:
