@@ -164,7 +164,7 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
 #define BT_FRAME_FLAG_POPULATION (1u << 25) // force, and so torque x, comes from the population map, or along the skin's normals where the touch is unlike its training; torque y and z are another model's, Lin's, with the gains that are set
-#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // nothing touches, or the signals are so unlike those that the population map was trained on (by that map, or by one fitted to presses of the finger) that half of its interval is as wide as the touch is strong; of a touch below 1501 counts in sum, for which the map is not evaluated, that hardly any of it is compressed
 #define BT_FRAME_FLAG_TARE_UNSURE (1u << 27) // the tare was taken when the board started, or the host gave or took one that pressure or the electrodes contradict, and no release has confirmed it since
 #define BT_FRAME_FLAG_PDC_FLAT (1u << 28) // a press did not move static pressure as it should: contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_ELECTRODE_OUT (1u << 29) // results do without an electrode that is missing, railed or condemned (electrodes_out): its signal is estimated from the others'
