@@ -19,6 +19,7 @@ def outcome() -> newtons.Outcome:
             newtons.OWN,
             {core: found["cycles"][scene] for core, found in newtons.CORES.items()},
             {"a": [3, 0, 4]},
+            800.0,
         )
         for scene in scenes
     ]
@@ -28,7 +29,7 @@ def outcome() -> newtons.Outcome:
 def test_every_point_has_cycles_on_every_core() -> None:
     """A scene with another name would be missing here; tests/docs/test_figures.py counts the cycles again."""
     found = outcome()
-    assert {"m0plus", "m4f"} == set(newtons.CORES)
+    assert {"m0plus", "m4f", "m33"} == set(newtons.CORES)
     assert all(set(point.cycles) == set(newtons.CORES) for point in found.points)
     assert found.points[0].error_n == pytest.approx(5.0)
 

@@ -9,13 +9,12 @@ biotac.compute, stands in the picture alone: it holds for no other.
 from __future__ import annotations
 
 import json
-import math
-import timeit
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
+from time import process_time_ns
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,8 @@ from biotac.wire import messages
 from ..calibrate import held_out_error, training
 from ..report import Show, Table
 from ..report import picture as drawn
-from .batch import LIN
+from .batch import LIN, ROUNDS
+from .contest import Contestant, timed
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class Point:
     knows: str
     cycles: dict[str, int]
     rmse_n: dict[str, list[float]]
-    host_ns: float = float("nan")  # of a frame on this computer
+    host_ns: float  # of a frame on this computer
 
     @property
     def error_n(self) -> float:
@@ -138,14 +138,14 @@ def points_of(files: Sequence[Path], show: Show) -> Outcome:
             found.setdefault(model, {})[name] = validation.by_model[model][0][:3].tolist()
         noise[name], repeats[name] = _noise(validation), _repeatability(validation)
     listed = [*UNTRAINED, *((model, OWN, called, scene) for model, scene, called in OWN_MODELS)]
-    host = _host_ns(run, validation)
+    host = _host_ns(validation)
     points = [
         Point(
             called,
             knows,
             {core: about["cycles"][scene] for core, about in CORES.items()},
             found[key],
-            host.get(scene, math.nan),
+            host[key],
         )
         for key, knows, called, scene in listed
         if key in found
@@ -170,13 +170,17 @@ def _made_lins(run: Run) -> bool:
     )
 
 
-def _host_ns(run: Run, validation: Validation) -> dict[str, float]:
-    """Time of a frame by biotac.compute for Lin's scales, the population map, and the finger's own map that is best."""
-    counts, fitted = run.counts[:HOST_FRAMES].astype(np.uint16), validation.wrench_map
-    ways: dict[str, dict[str, Any]] = {OWN_MODELS[0][1]: {"settings": LIN}, POPULATION: {"settings": {}}}
-    ways |= {scene: {"wrench_map": fitted.on_board()} for name, scene, _ in OWN_MODELS if name == fitted.model}
-    calls = {scene: partial(biotac.compute, counts, run.tare, pdc_above_rest=0.0, **how) for scene, how in ways.items()}
-    return {scene: min(timeit.repeat(call, number=1, repeat=7)) / len(counts) * 1e9 for scene, call in calls.items()}
+def _host_ns(validation: Validation) -> dict[str, float]:
+    """Time of a frame by biotac.compute for each point."""
+    run, fitted = validation.run, validation.wrench_map
+    counts, like = run.counts[:HOST_FRAMES].astype(np.uint16), load_population(None).population.wrench_map(run.tare)
+    ways: dict[str, dict[str, Any]] = {key: {"settings": LIN} for key in (LINS, OWN_MODELS[0][0])}
+    ways |= {POPULATION: {"settings": {}}} | {key: {"wrench_map": like.on_board()} for key in (PRESSES, MINUTE)}
+    for name, *_ in OWN_MODELS[1:]:
+        ways[name] = {"wrench_map": replace(fitted, coefficients=validation.final.by_model[name]).on_board()}
+    calls = {key: partial(biotac.compute, counts, run.tare, pdc_above_rest=0.0, **how) for key, how in ways.items()}
+    with threadpool_limits(limits=1, user_api="blas"):  # CPU time: other threads would count, and others' programs not
+        return timed([Contestant(key, len(counts), call) for key, call in calls.items()], ROUNDS, process_time_ns)
 
 
 def _from_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Population], list[str]]:
@@ -249,8 +253,7 @@ def draw(outcome: Outcome, path: Path) -> None:
         for axes, (core, about) in zip(figure.subplots(1, len(CORES), sharey=True), CORES.items(), strict=True):
             for k, point in enumerate(outcome.points):
                 color, at = COLORS.get(point.knows, LITTLE), (point.cycles[core], point.error_n)
-                name = f"{k + 1}: {point.knows}: {point.name}"
-                name += f", {point.host_ns:,.0f} ns" if math.isfinite(point.host_ns) else ""
+                name = f"{k + 1}: {point.knows}: {point.name}, {point.host_ns:,.0f} ns"
                 axes.plot(*at, "o", color=color, ms=8, label=name)
                 axes.vlines(at[0], *np.quantile([np.linalg.norm(three) for three in point.rmse_n.values()], [0, 1]),
                             color=color, linewidth=1)  # fmt: skip
@@ -262,5 +265,7 @@ def draw(outcome: Outcome, path: Path) -> None:
             axes.margins(x=0.25)
             axes.grid(alpha=0.25)
         figure.axes[0].set_ylabel("RMS error of the force on data not used to fit it [N]")
-        figure.suptitle("Cycles against newtons; lines: from recording to recording; ns: a frame on one computer")
+        figure.suptitle(
+            "Cycles against newtons; lines: from recording to recording; ns: CPU time of a frame on one computer"
+        )
         figure.legend(*axes.get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=2)
