@@ -33,6 +33,7 @@ class BoardBehindProxy:
         self.path = folder / "ttyBOARD"
         self._source, self.kind = source, kind
         self.passed: list[tuple[int, int]] = []
+        self.passed_s: dict[int, float] = {}  #: this computer's time when the frame of a board's time passed
         self.starts = 0  #: how many START commands came
         self.silent = False  #: rows do not pass; answers do
         self.unplugged = False
@@ -111,6 +112,7 @@ class BoardBehindProxy:
             is_row = message_id in ROWS or (message_id == wire.Status.ID and payload[6] == 0)
             if self.unplugged or (self.silent and is_row):
                 continue
+            now_s = time.monotonic()
             try:
                 data = encode(message_id, payload)
                 whole = os.write(self._near, data) == len(data)
@@ -118,6 +120,7 @@ class BoardBehindProxy:
                 continue  # the pty is full, as a board's ring would be
             if message_id == wire.Frame.ID and whole:
                 t_us = int.from_bytes(payload[2:6], "little")
+                self.passed_s.setdefault(t_us, now_s)
                 self.passed.append((t_us, payload[DTYPES[wire.Frame.ID].fields["finger"][1]]))  # type: ignore[index]
 
     def wait_for(self, condition: Callable[[], bool]) -> None:
