@@ -57,7 +57,9 @@ def verdict(row: Facts, figures: dict[str, float]) -> str:
 def _tolerance(row: Facts) -> str:
     if "theirs" in row:
         return "{:g} {}".format(*row["within"])
-    return row.get("exact", "-" if "same" not in row else "none: the paper has no number")  # type: ignore[no-any-return]
+    other = "the paper has no number" if "same" in row else "not a number"
+    why = "the paper claims nothing" if "nothing" in row else other
+    return row.get("exact", f"none: {why}")  # type: ignore[no-any-return]
 
 
 def figure(facts: Facts, name: str) -> float:
