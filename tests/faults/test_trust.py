@@ -30,22 +30,21 @@ OFF_UNSEEN = {
     ),
     "warmth and skin that creeps do as much, until it has lasted": (
         "all electrodes drift 1 count/s", "all electrodes drift 5 counts/s", "all electrodes drift 20 counts/s",
-        "electrode drifts 10 counts/s", "electrode drifts 200 counts/s",
-        "electrode floating: walks 20 counts a round",
+        "electrode drifts 200 counts/s", "electrode floating: walks 20 counts a round",
     ),
     "the few frames before it is found": (
         "electrode with noise of 200 counts", "noise of 30 counts on all electrodes", "the same words for ever",
-        "electrodes frozen, pressure alive",
+        "electrodes frozen, pressure alive", "electrode stuck",
     ),
 }  # fmt: skip
 
 
 #: Faults of more than one electrode, and by how much of their ACT frames may be off: what is known of it today.
 KNOWN = {
-    "three neighbours stuck": 0.04, "four neighbours stuck": 0.04, "five neighbours stuck": 0.05,
+    "three neighbours stuck": 0.05, "four neighbours stuck": 0.05, "five neighbours stuck": 0.05,
     "all drift 2 counts/s": 0.02, "all drift -5 counts/s": 0.02, "all drift 8 counts/s": 0.3,
     **{f"half drift up by {rate} counts/s, half down": 0.02 for rate in (4, 12, 30)},
-    "all aged by 0.7": 0.02, "one copies another": 0.07, "all inverted": 0.14,
+    "all aged by 0.7": 0.02, "one copies another": 0.08, "all inverted": 0.14,
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ NIGHTLY = bool(os.environ.get("BIOTAC_NIGHTLY"))
 HOLD_S = 600.0 if NIGHTLY else 60.0
 PLACES = [(-2.8, 0, 2.0), (-8, 0, 2.0), (-13, 1, 2.0), (1, 0, 2.0), (3, 0, 2.0),
           (-2, 2.5, 2.0), (-2, -2.5, 2.0), (-6, 3.5, 1.0), (0, -3, 1.8), (-10, -2, 3.5)]  # fmt: skip
-GRASPS = [(3, 0.1), (3, 0.5), (5, 0.25), (8, 0.1), (8, 0.5), (4, 0.15)]  # N, and the share of it that is held
+GRASPS = [(3, 0.15), (3, 0.5), (5, 0.25), (8, 0.1), (8, 0.5), (4, 0.15)]  # N, and the share of it that is held
 CASES = [
     (profile, place, *GRASPS[(place + k) % len(GRASPS)])
     for profile in ("new", "worn")

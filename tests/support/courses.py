@@ -131,7 +131,7 @@ class Script:
             rest=_middle(rest),
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
-            pressure=self.sensor.pdc_rest + _middle(sampling.Pressure()(sampling.spring_load(states))),
+            pressure=self.sensor.pdc_rest + _middle(sampling.Pressure()(sampling.spring_load(self.sensor, states))),
             warm_c=_middle(states.warm_c),
         )
 

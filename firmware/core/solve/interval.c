@@ -9,7 +9,7 @@
 // What each cause adds. Fitted by `biotac-lab interval`, which prints how often left-out frames are within.
 #define LIN_HIDDEN_MN       4000u // of the normal
 #define LIN_SHEAR_Q8        102u  // of what is hidden
-#define AWAY_NORMAL_Q8      102u  // of the strength, away from the population map's training
+#define AWAY_NORMAL_Q8      179u  // of the strength, away from the population map's training
 #define AWAY_SHEAR_Q8       77u
 #define OUT_Q8              16u   // of the force, for each electrode that is out
 #define NOISE_MN_PER_COUNT  16u   // two standard deviations of the force by any source, for one of the counts

@@ -16,3 +16,11 @@ def unroll(points_mm: NDArray[Any]) -> tuple[Floats, Floats]:
     across = RADIUS_MM * np.arctan2(y, -z)
     along = np.where(x > 0, RADIUS_MM * np.arcsin(np.clip(x / RADIUS_MM, 0, 1)), x)
     return across, along
+
+
+def roll_up(across_mm: Floats, along_mm: Floats) -> Floats:
+    """The surface points (n, 3) at such arc lengths (n,) in mm; unroll() takes them back."""
+    cap = np.maximum(along_mm, 0.0) / RADIUS_MM
+    roll, ring = across_mm / RADIUS_MM, RADIUS_MM * np.cos(cap)
+    x = np.where(along_mm > 0.0, RADIUS_MM * np.sin(cap), along_mm)
+    return np.column_stack([x, ring * np.sin(roll), -ring * np.cos(roll)])

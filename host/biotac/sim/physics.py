@@ -3,10 +3,10 @@
 A contact squeezes the fluid gap over the electrodes under it, less with distance; the displaced volume widens the gap
 elsewhere; shear and torsion drag the skin, which narrows the gap ahead of the core and widens it where skin piles up;
 each electrode's resistance follows its gap, and a divider turns it into counts. ``biotac-lab finger`` fits the
-numbers in skin.json to the counts and forces of two real fingers, and never to a map; the file names its source. What
-these recordings cannot say is a free choice that stands here: a probe smaller than a plate squeezes as deep and less
-wide, up to the paper's 10 MOhm at 30 N; and torsion. sampling.py adds what time and noise do.
-host/docs/reference/sensor_model.md has all of it.
+numbers in skin.json to the counts and forces of two real fingers and to a plate of known normal on a third, and never
+to a map; the file names its sources. What these recordings cannot say is a free choice that stands here: a probe
+smaller than a plate squeezes as deep and less wide, up to the paper's 10 MOhm at 30 N; torsion; and the spreads of
+``Finger``. sampling.py adds what time and noise do. host/docs/reference/sensor_model.md has all of it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy.typing as npt
 from ..core import geometry as surface
 from ..errors import InputError
 from ..kernels.geometry import Floats
+from ..kernels.unroll import roll_up, unroll
 from ..wire import sensor_gen as _sensor
 
 Profile = Literal["new", "worn"]
@@ -38,6 +39,12 @@ PLATE_MM = 3.5  # half width of a contact from which on it is as wide as the pla
 PLATE_N, FAINT_N = 4.5, 0.05  # where the footprint is skin.json's, and below which it does not change
 PAD_MM, PAD_REACH_MM = -3.0, 4.0  # x of the pad's middle; towards the tip skin is softer
 SKIN_MM = 2.0  # fluid and skin spread what presses
+# Skin is rounder than the core where cylinder and cap meet: a plate of a given normal touches it nearer to the pad.
+LEAD_AT_MM, LEAD_REACH_MM = 0.5, 2.5  # along the surface
+LEAD_FROM_MM = 1.0  # a flat of that half width touches where it is put
+# Spreads of what no recording fixes: a factor each way (host/docs/reference/sensor_model.md, Fingers).
+PRESSURE_SPREAD, PLACE_SPREAD = 1.5, 1.5
+TIP_FROM, SIDE_FROM, SIDE_TO = 0.4, 0.6, 0.85  # the normal's x and |y|: where the tip begins, and the very side
 SQUEEZE_MAX = 4.2  # log compression: 10 MOhm
 SQUEEZE_MAX_PER_N = 2.0  # of an electrode that faces the contact: E1 of a third finger, 1.5 at about 1 N (trial_15330)
 TORSION_NMM_PER_RAD = 75.0  # as stiff as skin that is dragged 5 mm from the middle
@@ -61,6 +68,8 @@ _BLOCK = 256  # states at a time: keeps the (states x mesh points) arrays inside
 class Skin:
     """What fingers have in common, fitted: see deform() for what each number does.
 
+    ``lead_mm`` is how far, at most, a plate touches nearer to the pad than its normal says.
+
     ``gain`` (4, 19) is each electrode's sensitivity to squeeze, bulge, drag and pile-up, mirror-symmetric, and
     ``r0_ohm`` (19,) are resistances at rest. Fingers differ from them by logs: one sigma of the one difference that is
     known, between two fingers, is ``gain_apart`` (19,) and ``r0_apart`` (19,).
@@ -80,6 +89,7 @@ class Skin:
     drag_max_mm: float
     drag_reach_mm: float
     pile_per_mm2: float
+    lead_mm: float
     gain: Floats
     r0_ohm: Floats
     gain_apart: Floats
@@ -167,12 +177,15 @@ _SMOOTH = np.linalg.cholesky(np.exp(_BETWEEN_MM2 / (-2.0 * SPREAD_REACH_MM**2)) 
 def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
     """Log compression and log bulge (n, 19) for touched states in _pack()'s columns."""
     contact, force, shear, torsion = state[:, 0:3], state[:, 3], state[:, 4:7], state[:, 7]
-    normal = surface.normals_at(contact)
+    normal, middle = surface.normals_at(contact), contact
     to_tip, to_side = surface.tangents_at(normal)
     plate = np.array([skin.along_mm, skin.across_mm])
     if state.shape[1] == 9:
         share = _probe(state[:, 8:9]) * plate
         along = to_tip
+        if skin.lead_mm:
+            middle = _middle(contact, state[:, 8], skin.lead_mm)
+            normal = surface.normals_at(middle)
     else:
         share = _probe(state[:, 9:7:-1]) * math.sqrt(plate.prod())
         along = state[:, 10:13]
@@ -180,8 +193,8 @@ def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
     strength = (force**skin.exponent * firm)[:, None]
     long2, short2 = (share * (np.maximum(force, FAINT_N) / PLATE_N)[:, None] ** skin.growth).T[:, :, None] ** 2
 
-    distance2 = np.maximum((contact**2).sum(axis=1)[:, None] + _POINTS_MM2 - 2.0 * contact @ _POINTS_MM.T, 0.0)
-    part2 = (along @ _POINTS_MM.T - (along * contact).sum(axis=1)[:, None]) ** 2
+    distance2 = np.maximum((middle**2).sum(axis=1)[:, None] + _POINTS_MM2 - 2.0 * middle @ _POINTS_MM.T, 0.0)
+    part2 = (along @ _POINTS_MM.T - (along * middle).sum(axis=1)[:, None]) ** 2
     away2 = part2 / long2 + np.maximum(distance2 - part2, 0.0) / short2  # in footprints
     outside = 1.0 - np.exp(away2 / -skin.hole)
     under = strength * np.exp(-np.sqrt(away2))
@@ -203,10 +216,19 @@ def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
     if torsion.any():
         angle = TORSION_MAX_RAD * np.tanh(torsion / (TORSION_NMM_PER_RAD * TORSION_MAX_RAD))
         arm = surface.ELECTRODE_MM[None, :, :] - contact[:, None, :]
-        outward += np.einsum("nec,ec->ne", np.cross((angle[:, None] * normal)[:, None, :], arm), radial)
+        outward += np.einsum(
+            "nec,ec->ne", np.cross((angle[:, None] * surface.normals_at(contact))[:, None, :], arm), radial
+        )
     ahead_mm = to_tip @ surface.ELECTRODE_MM.T - (to_tip * contact).sum(axis=1)[:, None]
     sideways = outward / GAP_MM * skin.gain[2] + skin.pile_per_mm2 * along_mm * ahead_mm * skin.gain[3]
     return compression, bulge + sideways * np.exp(distance2[_ELECTRODES] / (-2.0 * skin.drag_reach_mm**2))
+
+
+def _middle(contact: Floats, half_mm: Floats, lead_mm: float) -> Floats:
+    """Where the footprint's middle lies (n, 3), of flats of half width ``half_mm`` (n,) at ``contact`` (n, 3)."""
+    flat = np.clip((half_mm - LEAD_FROM_MM) / (PLATE_MM - LEAD_FROM_MM), 0.0, 1.0)
+    across, along = unroll(contact)
+    return roll_up(across, along - lead_mm * flat * np.exp(-(((along - LEAD_AT_MM) / LEAD_REACH_MM) ** 2)))
 
 
 def _probe(half_mm: Floats) -> Floats:
@@ -251,6 +273,10 @@ class Finger:
     noise of F1 and F2 and the glitches of btd_biotacsp. ``r0_ohm`` and ``gap_gain`` are (19,): resistance at rest and
     30 C, and gap sensitivity. ``pdc_rest`` is in counts. ``rattle_per_n_s`` is drawn between half and twice the
     RATTLE_PER_N_S of PAC, log-uniformly; set it to try another.
+
+    What no recording fixes is drawn log-uniformly, too, and may be set: ``pressure_gain``, of the counts of pressure
+    per newton; ``tip_gain`` and ``side_gain``, of all that a newton does at the tip's end and at the very side, so that
+    signals per pressure stay what a real plate showed. ``at_spread`` sets all three.
     """
 
     def __init__(self, seed: int, profile: Profile = "new") -> None:
@@ -273,8 +299,22 @@ class Finger:
         self.pdc_rest = float(np.random.default_rng([seed, 6]).integers(*PDC_REST))
         spread = float(np.random.default_rng([seed, 7]).uniform(-1.0, 1.0))
         self.rattle_per_n_s = RATTLE_PER_N_S * RATTLE_SPREAD**spread
+        self.pressure_gain, self.tip_gain, self.side_gain = 1.0, 1.0, 1.0
+        self.at_spread(*np.random.default_rng([seed, 8]).uniform(-1.0, 1.0, 3).tolist())
         self.noise_counts = 5.0 if worn else 1.5
         self.glitch_share = 0.005 if worn else 0.0
+
+    def at_spread(self, pressure: float = 0.0, tip: float = 0.0, side: float = 0.0) -> None:
+        """Put what no recording fixes at places of its spread, -1 to 1: 0 is the middle."""
+        self.pressure_gain = PRESSURE_SPREAD**pressure
+        self.tip_gain, self.side_gain = PLACE_SPREAD**tip, PLACE_SPREAD**side
+
+    def loudness(self, contact_mm: Floats) -> Floats:
+        """What a newton at ``contact_mm`` (n, 3) does, over what it does in the middle of the spread, (n,)."""
+        normal = surface.normals_at(contact_mm)
+        tip = np.clip((normal[:, 0] - TIP_FROM) / (1.0 - TIP_FROM), 0.0, 1.0)
+        share: Floats = self.tip_gain**tip * self.side_gain ** very_side(normal)
+        return share
 
     def rest_counts(self, warm_c: Floats) -> Floats:
         """Counts (n, 19) without contact at temperatures (n,) above 30 C."""
@@ -282,12 +322,24 @@ class Finger:
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
-        return self.counts_of(*states.deformation, states.warm_c)
+        return self.counts_of(*self.deformation(states), states.warm_c)
+
+    def deformation(self, states: States) -> tuple[Floats, Floats]:
+        """Log compression and log bulge (n, 19) of the gap, as loud as this finger is where ``states`` touch."""
+        loud = self.loudness(states.contact_mm)[:, None]
+        compression, bulge = states.deformation
+        return loud * compression, loud * bulge
 
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
         """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""
         share = resistance_share(compression * self.gap_gain, bulge * self.gap_gain, SKIN.fixed_share)
         return counts_at(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
+
+
+def very_side(normal: Floats) -> Floats:
+    """How far normals (n, 3) point to the very side, where a real plate was loudest, (n,) from 0 to 1."""
+    share: Floats = np.clip((np.abs(normal[:, 1]) - SIDE_FROM) / (SIDE_TO - SIDE_FROM), 0.0, 1.0)
+    return share
 
 
 def resistance_share(compression: Floats, bulge: Floats, fixed_share: float) -> Floats:

@@ -66,7 +66,7 @@ def plate_recording(finger: Finger, loads: States, cell: npt.NDArray[np.int64], 
         "F": to_lin_frame(force),  # the same turn leads back to a recording's axes
         "M": to_lin_frame(torque),
         "torsion": loads.torsion_nmm,
-        "PDC": read(finger.pdc_rest + sampling.spring_load(loads), sampling.PDC_NOISE),
+        "PDC": read(finger.pdc_rest + sampling.spring_load(finger, loads), sampling.PDC_NOISE),
         "E_base": read(np.repeat(at_rest, REST_FRAMES, axis=0), finger.noise_counts),
         "E_idle": read(at_rest + warming * loading, finger.noise_counts),
         "contact": cell,

@@ -20,7 +20,7 @@ from .stick_slip import Ringing
 Words = npt.NDArray[np.uint16]
 
 CREEP_S = 10.0
-PDC_PER_N, PDC_NOISE = 100.0, 1.0
+PDC_PER_N, PDC_NOISE = 100.0, 1.0  # Navarro 2015 has 62 to 111 on one finger's pad; Finger draws more or less
 # What real skin does to the static pressure besides (17 presses of robotic_finger/trial_15330 and 10 of another trial):
 # it is 3 to 9 counts low after a press, whatever the press was, and comes back in 0.3 to 2.9 s; and each press leaves
 # up to 5.6 counts (5 s at 500), which add up, 24 to 30 after 17 presses in 75 s. How it creeps beyond is not measured.
@@ -70,7 +70,8 @@ def effects_of(finger: Finger, states: States, *more: States) -> npt.NDArray[np.
     """EFFECTS_DTYPE (n,) of one contact, or of several at once, whose temperature is the first one's."""
     contacts = (states, *more)
     if more:
-        compression, bulge = (sum(part) for part in zip(*(contact.deformation for contact in contacts), strict=True))
+        parts = [finger.deformation(contact) for contact in contacts]
+        compression, bulge = (sum(part) for part in zip(*parts, strict=True))
         exact = finger.counts_of(compression, bulge, states.warm_c)
     else:
         exact = finger.counts(states)  # which another model may override
@@ -78,7 +79,7 @@ def effects_of(finger: Finger, states: States, *more: States) -> npt.NDArray[np.
     effects["exact"] = exact
     effects["pressed"] = exact - finger.rest_counts(states.warm_c)
     effects["force_n"] = np.sum([contact.force_n for contact in contacts], axis=0)
-    effects["load"] = np.sum([spring_load(contact) for contact in contacts], axis=0)
+    effects["load"] = np.sum([spring_load(finger, contact) for contact in contacts], axis=0)
     effects["tdc"] = tdc_counts(REST_CELSIUS + states.warm_c)
     speeds = [contact.slip_mm_s for contact in contacts if contact.slip_mm_s is not None]
     effects["slip_mm_s"] = np.max(speeds, axis=0) if speeds else 0.0
@@ -192,16 +193,18 @@ def _between(boundary: Floats, share: Floats, pieces: int = 1) -> Floats:
     return between
 
 
-def spring_load(states: States) -> Floats:
+def spring_load(finger: Finger, states: States) -> Floats:
     """Static pressure above rest (n,), in counts, as if skin were a spring: host/docs/reference/sensor_model.md."""
-    return PDC_PER_N * states.force_n * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
+    per_n = PDC_PER_N * finger.pressure_gain * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
+    load: Floats = per_n * finger.loudness(states.contact_mm) * states.force_n
+    return load
 
 
 class Pressure:
     """Static pressure above rest (n,), in counts, without noise: load, undershoot and creep, from rest on.
 
-    p = f - U tanh(lag_0.8s(f) / 200) + 0.15 lag_60s(f), where f = 100 N^-1 F (1 + 0.15 tanh(x / 8 mm)) is
-    the load, U = 9 counts and lag_T a first-order lag. The measured figures stand beside the constants.
+    p = f - U tanh(lag_0.8s(f) / 200) + 0.15 lag_60s(f), where f = spring_load(), U = 9 counts and lag_T a first-order
+    lag. The measured figures stand beside the constants.
     """
 
     def __init__(self) -> None:

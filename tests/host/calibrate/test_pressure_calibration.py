@@ -18,26 +18,27 @@ from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.recording.reader import Recording
 from biotac.sim.loading import load_source
-from biotac.sim.physics import Finger
+from biotac.sim.physics import PRESSURE_SPREAD, Finger
 from biotac_lab.experiments import navarro2015 as navarro
 
 FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
 FINGERS = range(5)
 
-# The emulated pressure is 100 N^-1 F (1 + 0.15 tanh(x / 8 mm)) with two lags that no K can follow
-# (biotac/sim/sampling.py): up to U = 9 counts too low while it is pressed, and 0.15 of a lag of 60 s too high. Least
-# squares over presses of f counts turn the first into at most U sum(f) / sum(f^2) of K, where the place's factor is
-# least, 1 - 0.15; the second, over the 1.8 s of a ramp and a hold since the tare, into 0.15 * 1.8 / 60. A tare that is
-# taken in the 1.5 s of rest may still be low by U exp(-1.1 / 0.8): 0.3 s of 1.5 settle, and 0.8 s is the lag.
-_COUNTS = np.array(CALIBRATION_FORCES_N) * 100 * (1 - 0.15)
+# The emulated pressure is 100 N^-1 F (1 + 0.15 tanh(x / 8 mm)) times the finger's own gain, with two lags that no K can
+# follow (biotac/sim/sampling.py): up to U = 9 counts too low while it is pressed, and 0.15 of a lag of 60 s too high.
+# Least squares over presses of f counts turn the first into at most U sum(f) / sum(f^2) of K, where the factors of
+# place and finger are least, 1 - 0.15 and 1 / 1.5; the second, over the 1.8 s of a ramp and a hold since the tare, into
+# 0.15 * 1.8 / 60. A tare that is taken in the 1.5 s of rest may still be low by U exp(-1.1 / 0.8): 0.3 s of 1.5 settle,
+# and 0.8 s is the lag.
+_COUNTS = np.array(CALIBRATION_FORCES_N) * 100 * (1 - 0.15) / PRESSURE_SPREAD
 _PER_COUNT = _COUNTS.sum() / (_COUNTS**2).sum()
 K_HIGH = 9 * _PER_COUNT
 K_LOW = 0.15 * 1.8 / 60 + 9 * np.exp(-1.1 / 0.8) * _PER_COUNT
 
 
-def gain_at(x_mm: float) -> float:
+def gain_at_e17(seed: int) -> float:
     """N per count of the emulated sensor's law without its lags; E17 is at x = -2.8 mm."""
-    return float(0.01 / (1 + 0.15 * np.tanh(x_mm / 8)))
+    return float(0.01 / Finger(seed).pressure_gain / (1 + 0.15 * np.tanh(-2.8 / 8)))
 
 
 class Silent:
@@ -63,7 +64,7 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     facts = json.loads(output.out)
     assert [finger["finger"] for finger in facts["fingers"]] == [0, 1, 2, 3, 4]
     for finger in facts["fingers"]:
-        assert -K_LOW <= finger["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
+        assert -K_LOW <= finger["gain_n"] / gain_at_e17(finger["finger"] + 1) - 1 <= K_HIGH
         assert finger["rest_counts"] == pytest.approx(Finger(finger["finger"] + 1).pdc_rest, abs=1)
         assert finger["verification"]["board_error"] <= 0.059
         assert finger["verification"]["board_error"] == pytest.approx(finger["verification"]["float_error"], abs=1e-4)
@@ -200,8 +201,8 @@ def run(pressed: Path, *options: str) -> int:
 def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None:
     assert run(pressed, str(pressed / "plate.csv"), "--json", "--out", str(tmp_path)) == 0
     (zero, first) = json.loads(capsys.readouterr().out)["fingers"]
-    for facts in (zero, first):
-        assert -K_LOW <= facts["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
+    for facts, seed in ((zero, 11), (first, 12)):
+        assert -K_LOW <= facts["gain_n"] / gain_at_e17(seed) - 1 <= K_HIGH
         assert facts["verification"]["board_error"] <= 0.059
         assert abs(facts["alignment"]["offset_s"]) <= 0.02 and facts["alignment"]["peak"] > 0.9
     assert file.load(tmp_path / "two-finger1.json").serial == "BTSIM00000000012"
@@ -282,7 +283,8 @@ def test_the_gain_of_a_file_recomputes_a_recording(pressed: Path, tmp_path: Path
             main(["export", "--recompute", str(pressed / "two.mcap"), str(out), "--settings", settings, *options]) == 0
         )
     kept, ran = (Recording(tmp_path / f"{name}.mcap") for name in ("kept", "run"))
-    assert np.nanmax(kept.frames["pressure_force_n"]) == pytest.approx(5.0, rel=0.02)
+    loudest = max(Finger(seed).pressure_gain for seed in (11, 12))
+    assert np.nanmax(kept.frames["pressure_force_n"]) == pytest.approx(5.0 * loudest, rel=0.02)
     np.testing.assert_array_equal(kept.frames["pressure_force_n"], ran.frames["pressure_force_n"])
     np.testing.assert_array_equal(kept.frames["pdc_filtered"], ran.frames["pdc_filtered"])
     assert main(["check", str(tmp_path / "run.mcap")]) == 0

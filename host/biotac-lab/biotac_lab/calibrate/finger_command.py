@@ -1,4 +1,4 @@
-"""biotac-lab finger F1 F2"""
+"""biotac-lab finger F1 F2 --plates TRIAL"""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from biotac.core import geometry as surface
 from biotac.sim import Finger, States, plate_recording
 
 from ..report import Outcome, Show, Table, check_file, of_tables
-from . import training
-from .finger_fit import Fit, Floats, Half, completed, dumps, halves
+from . import off_pad, training
+from .finger_fit import Fit, completed, dumps
+from .plates import Floats, KnownForce, halves, load_normals, plate_states
 
-ABOUT = "The simulated finger: its numbers fitted to two real fingers, and how it compares with them."
-EXAMPLE = "biotac-lab finger F1.npz F2.npz --check"
+ABOUT = "The simulated finger: its numbers fitted to real fingers, and how it compares with them."
+EXAMPLE = "biotac-lab finger F1.npz F2.npz --plates trial_15330.npz --check"
 FINGERS = 20
 UNSEEN_N = np.array([0.54, 0.37, 0.44])  # F2 by the map of F1, before light touches had a gain
 LEAST_SHARE, MOST_SHARE, MOST_OUTSIDE = 0.5, 1.2, 0.1
@@ -38,6 +39,8 @@ HEAD = ["", "x", "y", "z", "outside"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the two recordings and where the numbers go."""
     parser.add_argument("files", metavar="REC", nargs=2, type=Path, help="a finger on a plate, as for calibrate wrench")
+    known = "fingers under a plate of known normal: E, PDC and z_dir; every second press is fitted to, the others judge"
+    parser.add_argument("--plates", metavar="TRIAL", nargs="+", type=Path, default=[], help=known)
     parser.add_argument("--out", metavar="FILE", type=Path, help="the numbers go here (skin.json)")
     parser.add_argument("--source", metavar="TEXT", default="not stated", help="origin and licence, stored in the file")
     parser.add_argument("--force", action="store_true", help="overwrite the file")
@@ -55,12 +58,14 @@ class Touched:
     truth: Floats
 
     @classmethod
-    def by(cls, seed: int, states: Sequence[States]) -> Touched:
-        """Finger ``seed`` under ``states``, with its noise."""
+    def by(cls, seed: int, states: Sequence[States], truth: Floats | None = None) -> Touched:
+        """Finger ``seed`` under ``states``, with its noise; ``truth`` as recorded, if not in the finger's axes."""
         finger, rng = Finger(seed), np.random.default_rng([seed, 41])
         counts = np.concatenate([finger.counts(part) for part in states])
         noisy = np.clip(np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape)), 0.0, 4095.0)
-        return cls(noisy, finger.rest_counts(np.zeros(1))[0], np.concatenate([part.wrench()[0] for part in states]))
+        if truth is None:
+            truth = np.concatenate([part.wrench()[0] for part in states])
+        return cls(noisy, finger.rest_counts(np.zeros(1))[0], truth)
 
     def run(self, like: Run) -> Run:
         """As a recording, with the drift of ``like``."""
@@ -76,20 +81,29 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
     with threadpool_limits(limits=2, user_api="blas"):
         show("fitting")
         runs = [training.aligned(load(path).run) for path in args.files]
-        fit = Fit([half for recording in runs for half in halves(recording)])
+        pressed = [half for recording in runs for half in halves(recording)]
+        known = [load_normals(path) for path in args.plates]
+        fit = Fit(pressed, [plate.of(plate.fitted) for plate in known])
         skin = completed(fit, runs)
         if args.out is not None:
             args.out.write_text(dumps(skin, args.source), encoding="utf-8")
         names = [f"{path.stem}, {which} half" for path in args.files for which in ("first", "second")]
-        rows: list[list[Any]] = [list(row) for row in zip(names, fit.rms_counts, fit.explained, strict=True)]
-        tables = [Table("Fit", ["recording", "RMS counts left", "share explained"], rows)]
-        plate = [half.states(place) for half, place in zip(fit.parts, fit.places, strict=True)]
-        seeds = range(args.seed, args.seed + FINGERS)
-        touched = [Touched.by(seed, plate) for seed in seeds]
+        names += [f"{path.stem}, every second press" for path in args.plates]
+        rows: list[list[Any]] = [
+            list(row) for row in zip(names, fit.rms_counts, fit.explained, fit.stale_counts, strict=True)
+        ]
+        tables = [Table("Fit", ["recording", "RMS counts left", "share explained", "tare is stale by [count]"], rows)]
+        plate = [half.states(row) for half, row in zip(pressed, fit.rows, strict=False)]
+        seeds, truth = range(args.seed, args.seed + FINGERS), np.concatenate([half.force_n for half in pressed])
+        touched = [Touched.by(seed, plate, truth) for seed in seeds]
         default, passed = _default(touched, seeds)
         back = _back(touched, runs, [path.stem for path in args.files])
-        own, exact = _calibrated(fit, list(seeds)[:CALIBRATED])
-        tables += [default, own, back, _alike(fit.parts, touched, runs, [path.stem for path in args.files])]
+        own, exact = _calibrated(pressed, fit.rows, list(seeds)[:CALIBRATED])
+        stems = [path.stem for path in args.files]
+        tables += [default, own, back, _alike(pressed, touched, runs, stems)]
+        tables += [off_pad.by_place(pressed, touched, stems)]
+        for path, normals in zip(args.plates, known, strict=True):
+            tables += off_pad.tables(path.stem, normals, [Finger(seed) for seed in seeds])
     return of_tables(tables, [table.facts() for table in tables], met=passed and exact)
 
 
@@ -136,28 +150,29 @@ def _pressed(population: Population, finger: Touched, seed: int) -> Floats:
     return rmse(scale_of(felt[chosen], pressed).applied(felt), finger.truth)
 
 
-def _calibrated(fit: Fit, seeds: Sequence[int]) -> tuple[Table, bool]:
+def _calibrated(pressed: Sequence[KnownForce], rows: Sequence[Floats], seeds: Sequence[int]) -> tuple[Table, bool]:
     """`biotac calibrate wrench` on simulated fingers pressed where and as the real ones were: its bias, held out."""
     rng = np.random.default_rng(43)
-    drawn = rng.integers(0, sum(map(len, fit.places)), LOADS)
-    place, force_n = np.concatenate(fit.places)[drawn], np.concatenate([half.force_n for half in fit.parts])[drawn]
+    places = np.concatenate(rows[: len(pressed)])
+    drawn = rng.integers(0, len(places), LOADS)
+    place, force_n = places[drawn], np.concatenate([half.force_n for half in pressed])[drawn]
     size_n = BANDS_N[0] * (BANDS_N[-1] / BANDS_N[0]) ** rng.random(LOADS)
     force_n *= (size_n / np.linalg.norm(force_n, axis=1))[:, None]
-    states = replace(fit.parts[0], force_n=force_n).states(place)
+    states = plate_states(place, force_n)
     x, roll = np.floor(place / CELL).T
-    rows: list[list[Any]] = []
+    table: list[list[Any]] = []
     passed = True
     for seed in seeds:
         arrays = plate_recording(Finger(seed), states, (100 * x + roll).astype(np.int64), seed)
         run = run_of(Path("plate"), {name: arrays[name] for name in ("E", "F", "E_base", "E_idle", "contact")})
         held_out = validate(run).predicted[0]
-        rows.append([f"finger {seed}, RMSE", *rmse(held_out, run.truth), None])
+        table.append([f"finger {seed}, RMSE", *rmse(held_out, run.truth), None])
         off = np.linalg.norm(held_out, axis=1) - size_n
         for low, high in pairwise(BANDS_N):
             bias = float(off[(size_n >= low) & (size_n < high)].mean())
-            rows.append([f"finger {seed}, bias of the strength, {low:g} to {high:g} N", None, None, None, bias])
+            table.append([f"finger {seed}, bias of the strength, {low:g} to {high:g} N", None, None, None, bias])
             passed &= abs(bias) <= max(MOST_BIAS_N, MOST_BIAS_SHARE * low)
-    return Table("After `calibrate wrench`, held out [N]", [*HEAD[:4], "strength"], rows, digits=3), passed
+    return Table("After `calibrate wrench`, held out [N]", [*HEAD[:4], "strength"], table, digits=3), passed
 
 
 def _back(touched: Sequence[Touched], runs: Sequence[Run], names: Sequence[str]) -> Table:
@@ -180,7 +195,7 @@ def _memory(signal: Floats, size_n: Floats) -> float:
     return float(np.median((signal / size_n)[rate < -quick]) / np.median((signal / size_n)[rate > quick]))
 
 
-def _alike(parts: Sequence[Half], touched: Sequence[Touched], runs: Sequence[Run], names: Sequence[str]) -> Table:
+def _alike(parts: Sequence[KnownForce], touched: Sequence[Touched], runs: Sequence[Run], names: Sequence[str]) -> Table:
     """What real and simulated fingers have in common under the same loads, the real ones' first."""
     real = [np.concatenate([half.counts - half.tare for half in parts[k : k + 2]]) for k in (0, 2)]
     force = [np.concatenate([half.force_n for half in parts[k : k + 2]]) for k in (0, 2)]

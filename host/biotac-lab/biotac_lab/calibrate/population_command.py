@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from biotac import InputError
-from biotac.calibrate.population import COLUMNS, Trained, dumps, provenance_of
-from biotac.calibrate.wrench import load
+from biotac.calibrate.population import COLUMNS, Population, Trained, dumps, provenance_of
+from biotac.calibrate.wrench import Run, load
+from biotac.core import geometry as surface
 
 from ..report import Outcome, Show, Table, check_file, of_tables
-from . import held_out_error, training
+from . import held_out_error, off_pad, training
 from .direction_command import of_population
 from .held_out_error import Worth
 from .interval import Finger, population_margin
@@ -50,7 +53,7 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
         fingers = [Finger.of_run(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)
         sums, runs, judged = [finger.sums for finger in fingers], [finger.aligned for finger in fingers], {}
-        population = training.train(sums, symmetric=args.symmetric)
+        population, maps = training.train(sums, symmetric=args.symmetric), []
         if len(fingers) > 1:
             maps = training.of_others(sums, symmetric=args.symmetric)
             population = replace(population, margin=population_margin(fingers, maps)[0])
@@ -68,6 +71,9 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
             facts |= {"test": args.test.name} | held_out_error.facts(worth, sigma)
         tables = [_errors(facts, judged), _bands(judged)]
         facts["bands"] = tables[-1].facts()
+        if maps:
+            tables.append(_places([path.name for path in args.files], maps, runs))
+            facts["places"] = tables[-1].facts()
         if tested is not None:
             tables.append(of_population(args.test.name, trained.population, tested))
             facts["direction"] = tables[-1].facts()
@@ -104,3 +110,17 @@ def _bands(judged: dict[str, Worth]) -> Table:
     rows = [[name, *band] for name, worth in judged.items() for band in held_out_error.by_band(worth)]
     head = ["finger", "true force [N]", "rows", "bias along it [N]", "bias [%]", "RMS error [N]"]
     return Table("In bands of the true force", head, rows, digits=2)
+
+
+def _places(names: Sequence[str], maps: Sequence[Population], runs: Sequence[Run]) -> Table:
+    rows: list[list[Any]] = []
+    for name, other, run in zip(names, maps, runs, strict=True):
+        share = np.linalg.norm(other.published(run.counts, run.tare), axis=1) / np.linalg.norm(run.truth, axis=1)
+        point = surface.point_of_contact(run.counts - run.tare, 1.0, compressed=True) / surface.RADIUS_MM
+        places = off_pad.places_of_points(np.abs(point[:, 1]), np.maximum(point[:, 0], 0.0))
+        for place, there in places.items():
+            if there.sum() >= off_pad.LEAST_ROWS:
+                low, median, high = np.percentile(share[there], (10, 50, 90))
+                rows.append([f"{name} by the others", place, int(there.sum()), median, low, high])
+    head = ["finger", "point of contact", "rows", "felt over true", "10 %", "90 %"]
+    return Table("Felt over true by place of the point of contact", head, rows, digits=2)
