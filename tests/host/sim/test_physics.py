@@ -83,20 +83,28 @@ def written_out(finger: Finger, c: np.ndarray, force_n: float, shear: np.ndarray
     """Counts of one contact: the model line by line, one electrode at a time."""
     k = SKIN
     radial = lambda p: np.array([max(p[0], 0.0), p[1], p[2]]) / np.linalg.norm([max(p[0], 0.0), p[1], p[2]])  # noqa: E731
-    n_c = radial(c)
+    n_c, r = radial(c), surface.RADIUS_MM
+    s = r * np.arcsin(c[0] / r) if c[0] > 0 else c[0]
+    s -= k.lead_mm * np.exp(-(((s - 0.5) / 2.5) ** 2)) * np.clip((half - 1) / 2.5, 0, 1)
+    roll, tilt = np.arctan2(c[1], -c[2]), max(s, 0.0) / r
+    m = np.array([r * np.sin(tilt) if s > 0 else s, r * np.cos(tilt) * np.sin(roll), -r * np.cos(tilt) * np.cos(roll)])
+    n_m = radial(m)
+    loud = finger.tip_gain ** np.clip((n_c[0] - 0.4) / 0.6, 0, 1) * finger.side_gain ** np.clip(
+        (abs(n_c[1]) - 0.6) / 0.25, 0, 1
+    )
     to_tip, to_side = (axis[0] for axis in surface.tangents_at(n_c[None]))
     grown = (min(half, 3.5) + 2.0) / 5.5 * (force_n / 4.5) ** k.growth
     strength = force_n**k.exponent * np.exp(k.taper * np.tanh((c[0] + 3.0) / 4.0))
 
     def away2(point: np.ndarray) -> float:
-        along = (point - c) @ to_tip
-        across2 = max(np.sum((point - c) ** 2) - along**2, 0.0)
+        along = (point - m) @ to_tip
+        across2 = max(np.sum((point - m) ** 2) - along**2, 0.0)
         return float((along / (k.along_mm * grown)) ** 2 + across2 / (k.across_mm * grown) ** 2)
 
     volume = room = 0.0
     mesh_mm, _, areas_mm2 = surface.ventral_mesh(1.2)
     for point, area in zip(mesh_mm, areas_mm2, strict=True):
-        depth = k.squeeze * strength * np.exp(-np.sqrt(away2(point))) * max(radial(point) @ n_c, 0.0)
+        depth = k.squeeze * strength * np.exp(-np.sqrt(away2(point))) * max(radial(point) @ n_m, 0.0)
         volume += (1 - np.exp(-depth)) * area
         room += (1 - np.exp(-away2(point) / k.hole)) * area
     x, y = shear @ to_tip / k.drag_along_n_mm, shear @ to_side / k.drag_across_n_mm
@@ -105,15 +113,15 @@ def written_out(finger: Finger, c: np.ndarray, force_n: float, shear: np.ndarray
     phi = 0.2 * np.tanh(tau / (75 * 0.2))
     counts = []
     for e, point in enumerate(surface.ELECTRODE_MM):
-        facing = k.squeeze * k.gain[0][e] * max(radial(point) @ n_c, 0.0)
+        facing = k.squeeze * k.gain[0][e] * max(radial(point) @ n_m, 0.0)
         squeeze = 2.0 * np.tanh(facing / 2.0) * strength * np.exp(-np.sqrt(away2(point)))
         bulge = k.bulge_share * volume / room * (1 - np.exp(-away2(point) / k.hole)) * k.gain[1][e]
         moved = x * to_tip + y * to_side + phi * np.cross(n_c, point - c)
         dragged = (
             moved @ radial(point) / 2.0 * k.gain[2][e] + k.pile_per_mm2 * x * ((point - c) @ to_tip) * k.gain[3][e]
         )
-        bulge += dragged * np.exp(-np.sum((point - c) ** 2) / (2 * k.drag_reach_mm**2))
-        gain = finger.gap_gain[e]
+        bulge += dragged * np.exp(-np.sum((point - m) ** 2) / (2 * k.drag_reach_mm**2))
+        gain = loud * finger.gap_gain[e]
         gap = np.exp(gain * bulge - 4.2 * np.tanh(gain * squeeze / 4.2))
         counts.append(4095 * 10e3 / (finger.r0_ohm[e] * (k.fixed_share + (1 - k.fixed_share) * gap**-2) + 10e3))
     return counts
@@ -282,7 +290,8 @@ def test_pressure_temperature_and_flux_channels() -> None:
     words = sampling.sample(Finger(1), pressed)
     pdc, tac, tdc = (words[:, _sensor.SLOTS.index(name)] for name in ("PDC", "TAC", "TDC"))
     # The model's law for a load that is there from the first round on, in closed form: undershoot and creep.
-    t_s, load = 0.01 * np.arange(1, 2002), 500 * (1 + 0.15 * np.tanh(-2.8 / 8))
+    t_s = 0.01 * np.arange(1, 2002)
+    load = 500 * Finger(1).pressure_gain * (1 + 0.15 * np.tanh(-2.8 / 8))
     low = 9.0 * np.tanh(load * (1 - np.exp(-t_s / 0.8)) / 200)
     creep = 0.15 * load * (1 - np.exp(-t_s / 60.0))
     assert pdc.mean() == pytest.approx(Finger(1).pdc_rest + (load - low + creep).mean(), abs=0.1)

@@ -74,7 +74,7 @@ def test_several_contacts_add_as_in_the_model() -> None:
     both = (Touch(2.0, at="E17"), Touch(1.0, at="E1"))
     parts = [touch.states(touched)[0] for touched in both]
     finger = SimFinger(4)
-    deformed = [part.deformation for part in parts]
+    deformed = [finger.deformation(part) for part in parts]
     expected = finger.counts_of(deformed[0][0] + deformed[1][0], deformed[0][1] + deformed[1][1], np.zeros(1))[0]
     sampler = Sampler(finger)
     mean = np.mean([sampler.step(*touch.states(both)) for _ in range(100)], axis=0)[slots.ELECTRODE_SLOT]
