@@ -50,11 +50,13 @@ function(board_image name port_name cpu linker)
       --limits ${CMAKE_CURRENT_LIST_DIR}/limits.json --objdump ${CMAKE_OBJDUMP})
   endif()
   add_executable(${name} ${ARGN} ${port_objects})
-  set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${port}/${linker})
+  file(GLOB scripts ${fw}/port/*/*.ld) # a script may include another one
+  list(TRANSFORM ports PREPEND -L OUTPUT_VARIABLE folders)
+  set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS "${scripts}")
   target_include_directories(${name} PRIVATE
     ${fw}/core ${fw}/app ${fw}/sensor ${fw}/emu ${fw}/port ${fw}/port/cortex_m ${ports} ${CMAKE_CURRENT_LIST_DIR})
   target_link_options(${name} PRIVATE ${cpu} -nostartfiles --specs=nano.specs -Wl,--gc-sections
-    -Wl,--fatal-warnings -Wl,-Map=${name}.map -T ${port}/${linker})
+    -Wl,--fatal-warnings -Wl,-Map=${name}.map -T ${port}/${linker} ${folders})
   board_compile_options(${ARGN})
   add_custom_command(TARGET ${name} POST_BUILD
     COMMAND ${CMAKE_OBJCOPY} -O binary -R .boot_vectors ${name}.elf ${name}.bin
