@@ -14,6 +14,7 @@ TIMER = """
 const { RP2040 } = await import(process.argv[1])
 const { correctDma } = await import(process.argv[2])
 const mcu = new RP2040()
+mcu.dmaTimers = 0x420
 const time = { held: false, onHold: [], onRelease: [] }
 correctDma(mcu, time, (what) => { throw new Error(what) })
 const at = []

@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PORT = "firmware/port"
 START, REGS, FLASH = (f"{PORT}/rp2350/chip_{part}.h" for part in ("start", "regs", "flash"))
+ROM = f"{PORT}/rp2350/rom.c"
 SYSTEM, SLOT, SPI, USB = (f"{PORT}/rp2/{part}.c" for part in ("system", "slot", "spi", "usb/controller"))
 HEARS = "each_finger_hears_its_word"
 #: A file, its words, the fault in their place, and the rule or the test that must be red.
@@ -63,6 +64,22 @@ PLANTS = {
         "",
         "direct mode",
     ),
+    "direct mode left on": (FLASH, "    REG_CLR(QMI_DIRECT_CSR) = QMI_DIRECT_CSR_EN;\n", "", "turns over"),
+    "an answer that has not come": (
+        FLASH,
+        "come < sent && !(status & QMI_DIRECT_CSR_RXEMPTY)",
+        "come < sent",
+        "not come",
+    ),
+    "bytes to a full FIFO": (FLASH, "sent < bytes && !(status & QMI_DIRECT_CSR_TXFULL)", "sent < bytes", "no room"),
+    "a Pico's flash size": (FLASH, "(4u * 1024 * 1024)", "(2u * 1024 * 1024)", "beside what is kept"),
+    "ROM functions of RISC-V": (ROM, "FOR_ARM_SECURE    4u", "FOR_ARM_SECURE    1u", "Arm Secure"),
+    "the loader by the RP2040's name": (ROM, "rom_function('R', 'B')", "rom_function('U', 'B')", "the_rom_restarts"),
+    "no reboot into BOOTSEL": (ROM, "REBOOT_TO_BOOTSEL 2u", "REBOOT_TO_BOOTSEL 0u", "into the loader's"),
+    "clk_sys at 150 MHz": (SYSTEM, "125, 6, 2)", "125, 5, 2)", "125 MHz"),
+    "clk_usb at 60 MHz": (SYSTEM, "100, 5, 5)", "100, 5, 4)", "48 MHz"),
+    "MISO pulled up": (SPI, "PADS_SCHMITT | PADS_PDE", "PADS_SCHMITT | PADS_PUE", "pull-down"),
+    "USB by the RP2040's interrupt": (USB, "use_interrupt(USBCTRL_IRQ,", "use_interrupt(5,", "none of ours"),
     "the flash not made readable": (FLASH, "    rom_read_again();", "", "the_flash_tells"),
 }
 

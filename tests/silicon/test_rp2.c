@@ -3,6 +3,7 @@
 #include "support.h"
 
 #include "dma.h"
+#include "map/store.h"
 #include "only_board.h"
 #include "pins.h"
 #include "registers.h"
@@ -35,6 +36,10 @@ TEST(it_starts_by_the_rules)
     port_link_uart(ONLY_BOARD, 921600);
     port_idle(ONLY_BOARD);
     port_measure(ONLY_BOARD, &facts);
+    assert_in_range(facts.die_centi_c, 2600, 2800);
+    assert_in_range(facts.supply_mv, 4740, 4760);
+    registers_settle();
+    assert_in_range(uart_bits_per_s(), 921600 * 99 / 100, 921600 * 101 / 100);
     assert_true(broke(""));
 }
 
@@ -55,7 +60,10 @@ TEST(words_and_bytes_at_every_rate)
         }
         port_spi_select(ONLY_BOARD, 1);
         (void)port_spi_transfer16(ONLY_BOARD, 0x8000);
+        assert_int_equal(word_bits, 16);
         (void)port_spi_transfer8(ONLY_BOARD, 0);
+        assert_int_equal(word_bits, 8);
+        assert_int_equal(sck_khz, is_khz[k]);
         port_spi_select(ONLY_BOARD, 0);
     }
     assert_true(broke(""));
@@ -106,7 +114,24 @@ TEST(the_flash_tells_who_it_is_and_is_readable_after)
     const port_identity identity = port_identify(ONLY_BOARD);
     assert_memory_equal(identity.hello.board_serial,
                         ((uint8_t[]){0x25, 0x26, 0x27, 0x28, 0x29, 0x2A, 0x2B, 0x2C}), 8);
-    assert_true(port_flash_erase(ONLY_BOARD, 0));
+    rom_calls[0] = '\0';
+    static const uint8_t page[BT_FLASH_PAGE_BYTES];
+    assert_true(port_flash_erase(ONLY_BOARD, 0) && port_flash_program(ONLY_BOARD, BT_STORAGE_BYTES, page));
+    assert_string_equal(rom_calls, "IERFCIEPFC");
+    assert_true(broke(""));
+}
+
+TEST(the_rom_restarts_it_into_its_loader)
+{
+    start();
+    assert_true(rom_has_loader());
+    registers_reset_at = (uint32_t)(uintptr_t)&WATCHDOG_CTRL;
+    volatile int left = setjmp(registers_left);
+    if (left == 0) {
+        rom_enter_loader();
+    }
+    registers_reset_at = 0;
+    assert_int_equal(left, 2);
     assert_true(broke(""));
 }
 #endif
@@ -179,6 +204,10 @@ TEST(each_rule_can_be_broken)
     BREAKS("without a pull", PADS_BANK0_GPIO(PIN_VBUS_SENSE) = PADS_IE | PADS_SCHMITT, (void)SIO_GPIO_IN);
     BREAKS("input enable", PADS_BANK0_GPIO(PIN_VBUS_SENSE) = 0, (void)SIO_GPIO_IN);
     BREAKS("DBGPAUSE", TIMER_DBGPAUSE = 7, port_alarm_at(ONLY_BOARD, 0));
+    BREAKS("125 MHz", REG_SET(PLL_PWR(PLL_SYS_BASE)) = PLL_PWR_POSTDIVPD, CLK_SYS_CTRL = CLK_SYS_SRC_AUX);
+    BREAKS("48 MHz", PLL_PRIM(PLL_USB_BASE) = 5u << 16 | 4u << 12, USB_SIE_CTRL = USB_SIE_PULLUP_EN);
+    BREAKS("MISO's pull-down", PADS_BANK0_GPIO(PIN_MISO) = PADS_IE, SPI0_SSPDR = 0);
+    BREAKS("an interrupt", interrupt_used(9));
     BREAKS("fed late", now_ns += 2100000000u, watchdog_feed());
     BREAKS("24 bits", WATCHDOG_LOAD = 1u << 24);
     BREAKS("two seconds", WATCHDOG_LOAD = 1000);
@@ -200,6 +229,11 @@ TEST(each_rule_can_be_broken)
     BREAKS("watchdog that resets", PSM_WDSEL = 0x0001FFFC, XOSC_CTRL = XOSC_CTRL_ENABLE);
     BREAKS("debugger", WATCHDOG_CTRL = WATCHDOG_ENABLE);
     BREAKS("direct mode", QMI_DIRECT_CSR = 0, QMI_DIRECT_TX = 0x9F);
+    BREAKS("not come", (void)QMI_DIRECT_RX);
+    BREAKS("has no room", QMI_DIRECT_CSR = 5, QMI_DIRECT_TX = 1, QMI_DIRECT_TX = 1, QMI_DIRECT_TX = 1,
+           QMI_DIRECT_TX = 1, QMI_DIRECT_TX = 1);
+    BREAKS("turns over", flash_start(), (void)port_flash_erase(ONLY_BOARD, 0));
+    BREAKS("Arm Secure", (void)rom_function('U', 'B'));
 #endif
 }
 

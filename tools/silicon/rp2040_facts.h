@@ -26,6 +26,7 @@
         {PLL_USB, 0x4000, 13}, {UART, 0x4000, 22}, {SPI0, 0x4000, 16}, {ADC, 0x4000, 0},                     \
         {TIMER, 0x4000, 21}, {0x50000000u, 0x4000, 2}, {0x50100000u, 0x20000, 24}
 #define RESETS_LEFT   (0x01FFFFFFu & ~(1u << 6 | 1u << 9 | 1u << 21))
+#define INTERRUPTS    (1ull << 0 | 1ull << 5 | 1ull << 20) // TIMER, USBCTRL, UART0
 #define USBCTRL_RESET 24
 #define LOADS_OF_A_US 2u
 // CTRL of a DMA channel: the lowest bit of each field.

@@ -30,6 +30,7 @@
         {PLL_USB, 0x4000, 15}, {UART, 0x4000, 26}, {SPI0, 0x4000, 18}, {ADC, 0x4000, 0},                     \
         {TIMER, 0x4000, 23}, {0x50000000u, 0x4000, 2}, {0x50100000u, 0x20000, 28}
 #define RESETS_LEFT   (0x1FFFFFFFu & ~(1u << 7 | 1u << 10))
+#define INTERRUPTS    (1ull << 0 | 1ull << 14 | 1ull << 33) // TIMER, USBCTRL, UART0
 #define USBCTRL_RESET 28
 #define LOADS_OF_A_US 1u
 enum { BUSY_LSB = 26, QUIET_LSB = 23, TREQ_LSB = 17, CHAIN_LSB = 13, RING_LSB = 8, INCR_WRITE_LSB = 6 };

@@ -10,41 +10,9 @@
 bool host_sends_frames;
 
 #ifdef ON_rp2350
-// The ROM's flash calls, in their order: a letter each.
-char rom_calls[64];
-
-static void called(char which)
-{
-    const size_t used = strlen(rom_calls);
-    if (used + 1 < sizeof rom_calls) {
-        rom_calls[used] = which;
-        rom_calls[used + 1] = '\0';
-    }
-}
-
-#define CALL(letter)                                                                                         \
-    static void call_##letter(void)                                                                          \
-    {                                                                                                        \
-        called(#letter[0]);                                                                                  \
-    }
-CALL(I)
-CALL(E)
-CALL(F)
-CALL(C)
-CALL(R)
-CALL(P)
-
-void *rom_function(char first, char second)
-{
-    static void (*const call[])(void) = {call_I, call_E, call_F, call_C, call_R, call_P};
-    static const char name[] = "IFEXFCCXRERP";
-    for (int k = 0; k < 6; k++) {
-        if (name[2 * k] == first && name[2 * k + 1] == second) {
-            return (void *)(uintptr_t)call[k];
-        }
-    }
-    return NULL;
-}
+#define uint16_t uintptr_t // the ROM's pointers have 16 bits, this computer's more
+#include "rom.c"
+#undef uint16_t
 #else
 uint8_t flash_jedec_id[3];
 uint32_t flash_erase_us;
@@ -63,7 +31,6 @@ const uint8_t *flash_maps(void)
 {
     return NULL;
 }
-#endif
 
 bool rom_has_loader(void)
 {
@@ -74,6 +41,7 @@ void rom_enter_loader(void)
 {
     abort();
 }
+#endif
 
 uint32_t image_crc32(void)
 {
@@ -87,7 +55,8 @@ bool bt_port_alarm(void)
 
 void use_interrupt(int number, uint32_t priority, void (*handler)(void))
 {
-    (void)number, (void)priority, (void)handler;
+    (void)priority, (void)handler;
+    interrupt_used(number);
 }
 
 void wake(void)

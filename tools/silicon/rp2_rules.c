@@ -22,7 +22,7 @@ static const struct {
 
 uint32_t gpio_in, gpio_out, usb_resets;
 bool dma_is_late;
-uint32_t heard[64], words_heard;
+uint32_t heard[64], words_heard, sck_khz, word_bits;
 static uint32_t outputs, sio_out, pads_set; // bit masks of pins
 static uint64_t fed_ns;
 
@@ -94,8 +94,36 @@ static uint32_t pins_that_are(int level)
     return pins;
 }
 
+// What a PLL gives, by its registers; 0 while a part of it is off.
+static uint32_t pll_mhz(uint32_t pll)
+{
+    const uint32_t by = (peek(pll + 12) >> 16 & 7) * (peek(pll + 12) >> 12 & 7);
+    return peek(pll + 4) & 0x29 || by == 0 ? 0 : 12 * peek(pll + 8) / by;
+}
+
+uint32_t uart_bits_per_s(void)
+{
+    bool own = (peek(UART + 0x30) & 0x301) == 0x301 && peek(UART + 0x2C) & 1u << 4;
+    for (uint32_t pin = 0; pin < 2; pin++) {
+        own = own && (peek(IO + 4 + 8 * pin) & 31) == 2 && !(peek(PADS + 4 * pin) & (PAD_ISO | 1u << 7));
+    }
+    return own ? 125000000u / 16 * 64 / (peek(UART + 0x24) * 64 + peek(UART + 0x28)) : 0;
+}
+
+void interrupt_used(int number)
+{
+    if (!(INTERRUPTS >> number & 1)) {
+        break_rule("an interrupt of a block that is none of ours (2.3.2)");
+    }
+}
+
 static void spi_word(void)
 {
+    sck_khz = 125000u / (peek(SPI0 + 0x10) * ((peek(SPI0) >> 8) + 1));
+    word_bits = (peek(SPI0) & 15) + 1;
+    if ((peek(PADS + 4 * 16) & 0xCC) != 0x44) {
+        break_rule("a word on the bus without MISO's pull-down: an absent sensor reads as anything");
+    }
     if (words_heard < 64) {
         heard[words_heard++] = pins_that_are(0);
     }
@@ -185,6 +213,9 @@ void on_read(uint32_t at)
         poke(at, (peek(at) & ~(1u << BUSY_LSB)) | (uint32_t)(dma_is_late && at == DMA + 0x0C) << BUSY_LSB);
     } else if (at == ADC) {
         poke(at, peek(at) | 1u << 8);
+    } else if (at == ADC + 4) { // 27 degrees, and a third of 4.75 V
+        const uint32_t input = peek(ADC) >> 12 & 7;
+        poke(at, input == 4 && (peek(ADC) & 3) == 3 ? 876 : input == 3 && peek(ADC) & 1 ? 1965 : 0);
     } else if (at == SIO + 4) {
         for (uint32_t pin = 0; pin < 30; pin++) {
             const uint32_t pad = peek(PADS + 4 * pin), input = pads_set & ~outputs & ~(pad >> 7 << pin);
@@ -206,6 +237,10 @@ static void clocks(uint32_t at, uint32_t value)
             "the crystal is given less than 6 ms (pico-sdk #2234: a Pico's takes that long from cold)");
     } else if (at == CLK_SYS && value & 1 && !locked(PLL_SYS)) {
         break_rule("clk_sys switched to a PLL that is not locked (2.18)");
+    } else if (at == CLK_SYS && value & 1 && pll_mhz(PLL_SYS) != 125) {
+        break_rule("clk_sys is not the 125 MHz that the port counts by (2.18)");
+    } else if (at == 0x5011004Cu && value & 1u << 16 && pll_mhz(PLL_USB) != 48) {
+        break_rule("clk_usb is not 48 MHz (2.15.1)");
     } else if ((at == PLL_SYS + 8 || at == PLL_USB + 8) && (value < 63 || value > 133)) {
         break_rule("a PLL's oscillator outside of 750 to 1600 MHz (2.18.2)");
     } else if (at == PLL_SYS + 8 && peek(CLK_SYS) & 1) {
