@@ -3,6 +3,7 @@ boards. --rig NAME picks one."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -15,7 +16,10 @@ READY: dict[str, str | None] = {}
 
 
 def missing_port(rig_name: str, config: pytest.Config) -> str | None:
-    """The option that would name a board of this rig, when it was not given."""
+    """What would name a board of this rig, an option or a variable, when it was not given."""
+    fetched = RIGS[rig_name].get("fetched")
+    if fetched is not None and fetched not in os.environ:
+        return str(fetched)
     options = {"{port}": "--port", "{sensor_port}": "--sensor-port", "{image_command}": "--image-command"}
     named = f"{RIGS[rig_name]['port']} {RIGS[rig_name].get('command', '')}"
     return next((option for field, option in options.items() if field in named and not config.getoption(option)), None)

@@ -37,6 +37,12 @@ class Rig:
     sensor_port: str | None
     opened: list[Any] = field(default_factory=list)
 
+    @property
+    def image(self) -> Path:
+        """The UF2 of the image that an emulated board runs."""
+        board = self.facts["board"]
+        return ROOT / f"build/{board}/biotac-{board}.uf2"
+
     def need(self, ability: str) -> None:
         """Skip the test when this rig has not got the ability."""
         why = self.facts.get("cannot", {}).get(ability)

@@ -26,7 +26,6 @@ from biotac.wire import messages_gen as wire
 from biotac_rig.flashing import EmulatedLoader, EmulatedTarget
 from rig import ROOT, Rig
 
-BUILT = ROOT / "build/pico/biotac-pico.uf2"
 PAGE = 256
 SECTOR = 4096
 WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 600\n"
@@ -43,6 +42,7 @@ class Bench:
         self.target = EmulatedTarget(self.port)
         self.loader = EmulatedLoader(self.target.board)
         self.flashed = 0
+        self.built = rig.image
 
     def flash(self, image: Image, **options: Any) -> Outcome:
         self.flashed += 1
@@ -76,38 +76,38 @@ def bench(rig: Rig, tmp_path: Path) -> Iterator[Bench]:
     assert wrong == []
 
 
-_built: list[Image] = []
+_built: dict[Path, Image] = {}
 
 
 @pytest.fixture
 def next_release(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Image:
     """The same sources with another patch number, built as the image is: once, and only where there is a bench."""
-    if not _built:
-        _built.append(build_next_release(tmp_path_factory.mktemp("next")))
-    return _built[0]
+    if bench.built not in _built:
+        _built[bench.built] = build_next_release(tmp_path_factory.mktemp("next"), bench.built)
+    return _built[bench.built]
 
 
-def build_next_release(folder: Path) -> Image:
+def build_next_release(folder: Path, built: Path) -> Image:
     shutil.copytree(ROOT / "firmware", folder / "firmware")
     (folder / "tools").symlink_to(ROOT / "tools")
     version = folder / "firmware/app/version.h"
-    patch = (read_image(BUILT).note.firmware[2] + 1) % 10
+    patch = (read_image(built).note.firmware[2] + 1) % 10
     text, changes = re.subn(r"(BT_VERSION_PATCH) \d+", rf"\g<1> {patch}", version.read_text())
     assert changes == 1
     version.write_text(text)
     build = folder / "build"
-    configure = ["cmake", "-S", str(folder / "firmware/boards/pico"), "-B", str(build), "-G", "Ninja"]
+    configure = ["cmake", "-S", str(folder / "firmware/boards" / built.parent.name), "-B", str(build), "-G", "Ninja"]
     for command in (configure, ["cmake", "--build", str(build)]):
         done = subprocess.run(command, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
-    return read_image(build / "biotac-pico.uf2")
+    return read_image(build / built.name)
 
 
 def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
     bench.set(Setting.FORCE_GAIN_X_NN, -7, save=False)  # in force, and lost with the reboot
     before = bench.counters()
-    outcome = bench.flash(read_image(BUILT))
+    outcome = bench.flash(read_image(bench.built))
     assert outcome.before is not None
     assert outcome.before.boot_id != outcome.after.boot_id
     assert outcome.before.board_serial == outcome.after.board_serial
@@ -117,7 +117,7 @@ def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
     assert bench.setting_after_a_power_cut(Setting.FORCE_GAIN_X_NN) == -7
     after = bench.counters()
     assert after["loaders"] == before["loaders"] + 1
-    blocks = len(read_image(BUILT).blocks)
+    blocks = len(read_image(bench.built).blocks)
     assert after["flash"]["programs"] - before["flash"]["programs"] == blocks + 1  # and one record of settings
     assert after["flash"]["erases"] - before["flash"]["erases"] == -(-blocks * PAGE // SECTOR)
 
@@ -160,7 +160,7 @@ def test_what_was_in_force_and_not_saved_is_put_back_and_saved(
         give(hand, 1, kept)
         hand.board.save_settings()
         give(hand, 0, new)
-    outcome = bench.flash(read_image(BUILT))
+    outcome = bench.flash(read_image(bench.built))
     assert outcome.settings is not None and outcome.backup is not None
     assert outcome.settings.changed == (f"{name} of finger 0",)
     assert getattr(read_backup(outcome.backup.path), what) == {0: new, 1: kept}
@@ -178,31 +178,33 @@ def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_releas
     assert outcome.settings is not None
     assert outcome.settings.changed == ()
     with pytest.raises(InputError, match=r"runs .*; --downgrade if you mean it"):
-        bench.flash(read_image(BUILT))
-    back = bench.flash(read_image(BUILT), downgrade=True)
+        bench.flash(read_image(bench.built))
+    back = bench.flash(read_image(bench.built), downgrade=True)
     assert back.after.firmware_patch == outcome.before.firmware_patch
     assert bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS) == 250
 
 
-def changed(folder: Path, at: int, value: int, *, sealed: bool = False) -> Path:
+def changed(bench: Bench, at: int, value: int, *, sealed: bool = False) -> Path:
     """The built image with one byte of its flash changed; sealed: and a note that knows of it."""
-    flash = bytearray((ROOT / "build/pico/biotac-pico.bin").read_bytes())
+    flash = bytearray(bench.built.with_suffix(".bin").read_bytes())
     assert flash[at] != value
     flash[at] = value
-    path = folder / "changed.uf2"
-    path.write_bytes(uf2.uf2(seal(bytes(flash)) if sealed else bytes(flash)))
+    path = bench.folder / "changed.uf2"
+    path.write_bytes(
+        uf2.uf2(seal(bytes(flash)) if sealed else bytes(flash), read_image(bench.built).family.chip.lower())
+    )
     return path
 
 
-def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> None:
+def test_a_wrong_image_leaves_the_board_alone(bench: Bench) -> None:
     before = bench.counters()
     with bench.target.open() as hand:
         boot_id = hand.info.boot_id
     with pytest.raises(InputError, match="CRC-32"):
-        read_image(changed(tmp_path, 5000, 0xEE))
-    board_at = (ROOT / "build/pico/biotac-pico.bin").read_bytes().index(b"BIOTAC image") + 14
-    other = read_image(changed(tmp_path, board_at, wire.Board.LINUX_SBC, sealed=True))
-    with pytest.raises(InputError, match="is for LINUX_SBC, but Pico answers"):
+        read_image(changed(bench, 5000, 0xEE))
+    board_at = bench.built.with_suffix(".bin").read_bytes().index(b"BIOTAC image") + 14
+    other = read_image(changed(bench, board_at, wire.Board.LINUX_SBC, sealed=True))
+    with pytest.raises(InputError, match=r"is for LINUX_SBC, but Pico.* answers"):
         bench.flash(other)
     with bench.target.open() as hand:
         assert hand.info.boot_id == boot_id
@@ -218,7 +220,7 @@ BY_DAY = (SECTOR + 100, -1)
 @pytest.mark.parametrize("cut", [pytest.param(cut, marks=() if cut in BY_DAY else pytest.mark.long) for cut in CUTS])
 def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
     """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
-    image = read_image(BUILT)
+    image = read_image(bench.built)
     blocks = len(image.blocks)
     total = -(-blocks * PAGE // SECTOR) * SECTOR + blocks * PAGE
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
@@ -241,7 +243,7 @@ def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench,
         bench.flash(next_release)
     outcome = bench.flash(next_release)
     assert outcome.before is not None
-    assert outcome.before.firmware_patch == read_image(BUILT).note.firmware[2]
+    assert outcome.before.firmware_patch == read_image(bench.built).note.firmware[2]
     assert outcome.after.firmware_patch == next_release.note.firmware[2]
 
 
@@ -252,7 +254,7 @@ def test_firmware_that_does_not_answer_is_left_by_touch(bench: Bench, monkeypatc
     opening = bench.target.open
     monkeypatch.setattr(bench.target, "open", mute)
     monkeypatch.setattr(bench.target, "reopen", lambda: (came_back(bench), opening())[1])
-    outcome = bench.flash(read_image(BUILT), keep=False)
+    outcome = bench.flash(read_image(bench.built), keep=False)
     assert (outcome.before, outcome.backup) == (None, None)
     assert bench.counters()["loaders"] == 1
 
@@ -263,10 +265,10 @@ def came_back(bench: Bench) -> None:
 
 def test_blocks_of_other_families_are_skipped_by_the_loader(bench: Bench, tmp_path: Path) -> None:
     """As UF2 files for several chips have them; the host would refuse such a file, the boot ROM does not."""
-    foreign = bytearray(BUILT.read_bytes()[:512])
+    foreign = bytearray(bench.built.read_bytes()[:512])
     foreign[28:32] = (0xADA52840).to_bytes(4, "little")
     foreign[32:288] = bytes(256)  # would leave nothing to boot
-    image = read_image(BUILT)
+    image = read_image(bench.built)
     mixed = Image(image.path, (*image.blocks[:1], bytes(foreign), bytes(512), *image.blocks[1:]), image.note)
     outcome = bench.flash(mixed)
     assert outcome.settings is not None
@@ -279,7 +281,8 @@ def test_the_command_on_an_emulated_board(
     monkeypatch.chdir(tmp_path)  # where the backup goes
     monkeypatch.setenv("BIOTAC_EMULATOR", str(ROOT / "tools/emulator"))
     assert (
-        main(["flash", rig.facts["port"].format(source="press.toml", options="fingers=1"), str(BUILT), "--json"]) == 0
+        main(["flash", rig.facts["port"].format(source="press.toml", options="fingers=1"), str(rig.image), "--json"])
+        == 0
     )
     facts = json.loads(capsys.readouterr().out)
     assert facts["firmware"] == facts["firmware_before"]

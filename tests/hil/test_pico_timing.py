@@ -32,6 +32,19 @@ def test_slots_are_on_time_and_the_bus_rules_kept_while_five_fingers_stream(rig:
 
 
 @pytest.mark.nightly
+def test_ten_minutes_of_five_fingers_lose_no_slot(rig: Rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=5&seconds=601&pace=fast")
+    hand.read(600)
+    seen = hand.link.board.counters()["timing"]  # type: ignore[attr-defined]
+    print(f"{seen['slots']} slots, deviation {seen['slot_deviation_us']} us, interrupt {seen['interrupt_us']} us")
+    assert seen["hz"] == pytest.approx(4400, rel=1e-6)
+    earliest, latest = seen["slot_deviation_us"]
+    assert latest - earliest <= 2
+    assert (hand.status().slots_late, hand.stats.frames_lost) == (0, 0)
+
+
+@pytest.mark.nightly
 def test_an_event_is_with_the_host_a_millisecond_after_its_slot_or_in_the_next_usb_frame(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=3")
@@ -61,7 +74,9 @@ def test_the_core_clocks_the_same_words_as_the_dma(rig: Rig) -> None:
     rig.need("counters")
     runs = []
     for by_core in (0, 1):
-        board = EmulatedBoard("pico", load_source("press.toml", fingers=5, seconds=1.0), pace=0.0, hold=True)
+        board = EmulatedBoard(
+            rig.facts["board"], load_source("press.toml", fingers=5, seconds=1.0), pace=0.0, hold=True
+        )
         rig.opened.append(board)
         with biotac.open(board.path) as hand:
             hand.board.set_setting(biotac.Setting.SLOTS_BY_CORE, by_core)

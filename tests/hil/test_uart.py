@@ -39,7 +39,7 @@ def a_pico(rig: Rig, *, fingers: int, pace: float) -> EmulatedBoard:
     """Emulated, with its UART on a pty."""
     rig.need("uart")
     board = EmulatedBoard(
-        "pico", load_source("press.toml", fingers=fingers, seconds=900.0), pace=pace, hold=True, uart=True
+        rig.facts["board"], load_source("press.toml", fingers=fingers, seconds=900.0), pace=pace, hold=True, uart=True
     )
     rig.opened.append(board)
     board.release()

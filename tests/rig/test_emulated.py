@@ -55,6 +55,15 @@ def test_without_an_image(clone: Path) -> None:
     assert "cmake -S" in refusal()
 
 
+def test_a_pico_2_wants_what_is_fetched_by_hand(clone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    image = clone / "build/pico/biotac-pico.bin"
+    port = f"emu:pico2?source=press.toml&image={image}"
+    monkeypatch.delenv("BIOTAC_RP2350JS", raising=False)
+    assert "pico2.md), and BIOTAC_RP2350JS is not set" in refusal(port)
+    monkeypatch.setenv("BIOTAC_RP2350JS", str(image))
+    assert emulated.find_tools("pico2", str(image)).chip == ["--chip", "rp2350", "--emulator", str(image)]
+
+
 def test_outside_a_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("BIOTAC_EMULATOR", str(tmp_path))
     assert "BIOTAC_EMULATOR" in refusal()

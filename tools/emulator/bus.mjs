@@ -29,7 +29,6 @@ const LINE_J = 1 << 2 // of SIE_STATUS: what the lines show, D+ up
 const LINE_K = 2 << 2
 const AT_REST_FRAMES = 3 // on hold, without a transaction: nothing more comes of them
 const E15_NS = 800_000 // RP2040-E15: a bulk IN that is armed this late in a frame
-const RESET_USBCTRL = 1 << 24
 const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
 const BITS_PER_S = 12e6
 
@@ -257,7 +256,7 @@ export class UsbBus {
 
   #correctRegisters() {
     const { usb } = this
-    onReset(this.mcu, RESET_USBCTRL, () => this.#resetBlock())
+    onReset(this.mcu, 'usb', () => this.#resetBlock())
     const write = usb.writeUint32.bind(usb)
     const read = usb.readUint32.bind(usb)
     usb.writeUint32 = (offset, value) => {

@@ -3,7 +3,6 @@
 const UNPACED = 0x3f
 const TIMER0 = 0x3b
 const TIMER3 = 0x3e
-const TIMERS = 0x420
 const POLYNOMIAL = 0x04c11db7
 
 /** One byte into a CRC that is not reflected. */
@@ -45,7 +44,7 @@ export function correctDma(mcu, time, wrong, board = { dmaSlowness: 1 }) {
   /** At the timer's next tick: it runs whether or not somebody waits for it. */
   function tick(channel) {
     if (time.held) return waiting.add(channel)
-    const ratio = read(TIMERS + 4 * (channel.treqValue - TIMER0))
+    const ratio = read(mcu.dmaTimers + 4 * (channel.treqValue - TIMER0))
     const period = ((ratio & 0xffff) / (ratio >>> 16)) * (1e9 / mcu.clkSys) * board.dmaSlowness
     const now = mcu.clock.nanos
     if (!(period > 0) || !Number.isFinite(period)) return wrong('a DMA channel paced by a timer that stands')

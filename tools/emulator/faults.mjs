@@ -4,24 +4,17 @@
 const ENTRY_CYCLES = 15 // Cortex-M0+ manual, zero wait states
 const RETURN_CYCLES = 13
 
-const RESETS = 0x4000c
 const RESET = 0
 
-/** Call then() whenever the program puts this block into reset: as published it keeps its state. */
-export function onReset(mcu, bit, then) {
-  const resets = mcu.peripherals[RESETS]
+/** Call then() whenever the program puts this block into reset, one of mcu.resetBits: as published it keeps its state. */
+export function onReset(mcu, block, then) {
+  const { resets } = mcu.blocks
+  const bit = mcu.resetBits[block]
   const write = resets.writeUint32.bind(resets)
   resets.writeUint32 = (offset, value) => {
     write(offset, value)
     if (offset === RESET && value & bit) then()
   }
-}
-
-/** Something would end a WFI; PRIMASK has no say in that. */
-export function wakes(core) {
-  return !!(
-    core.pendingInterrupts & core.enabledInterrupts || core.pendingSystick || core.pendingPendSV || core.pendingNMI
-  )
 }
 
 /**
@@ -30,10 +23,14 @@ export function wakes(core) {
  * Methods are replaced, never properties redefined: an object with accessors of its own runs three times slower.
  */
 export function correctCore(core) {
+  // Something would end a WFI; PRIMASK has no say in that.
+  core.wakes = () =>
+    !!(core.pendingInterrupts & core.enabledInterrupts || core.pendingSystick || core.pendingPendSV || core.pendingNMI)
+
   // WFI with PRIMASK set must end without entering the handler, and must not begin when an interrupt is pending.
   // Published: it enters the handler, or sleeps on. Here a wait only ends; the next instruction decides the rest.
   const check = core.checkForInterrupts.bind(core)
-  core.checkForInterrupts = () => (core.waiting ? wakes(core) : check())
+  core.checkForInterrupts = () => (core.waiting ? core.wakes() : check())
 
   // Exceptions are free as published. The cycles are owed and paid with the next instruction: ticking the clock
   // in the middle of an entry would let alarms nest into it.
@@ -85,8 +82,8 @@ export class DeviceTime {
     this.heldAt = null
     this.onHold = [] // what else is to stand still
     this.onRelease = []
-    this.timer = mcu.peripherals[0x40054]
-    this.watchdog = mcu.peripherals[0x40058]
+    this.timer = mcu.blocks.timer
+    this.watchdog = mcu.blocks.watchdog
     this.#correctAlarms()
     this.#holdWatchdogToo()
   }

@@ -41,7 +41,7 @@ const ENTER_QPI = 0x35
 const READ_UNIQUE_ID = 0x4b
 const READ_JEDEC_ID = 0x9f
 const UNIQUE_ID_DUMMIES = 4
-const ISSI = 0x9d
+export const ISSI = 0x9d
 const NOTHING = 0xff // a line that nobody drives
 
 /** Two ways of 1024 lines of two words, the less recently used way replaced. */
@@ -195,10 +195,7 @@ export class Flash {
     const at = this.sent.length - 2
     if (at < 0) return NOTHING
     const command = this.sent[0] & 0xff
-    if (command === READ_UNIQUE_ID && at >= UNIQUE_ID_DUMMIES) {
-      const { flashId, uniqueId } = this.board // ISSI's has 16 bytes, of which the first may be all boards' (pico-sdk #1641)
-      return (flashId[0] === ISSI ? [...Array(8).fill(0x11), ...uniqueId] : uniqueId)[at - UNIQUE_ID_DUMMIES] ?? NOTHING
-    }
+    if (command === READ_UNIQUE_ID && at >= UNIQUE_ID_DUMMIES) return this.board.numberSent(at - UNIQUE_ID_DUMMIES) ?? NOTHING
     if (command === READ_JEDEC_ID) return this.board.flashId[at] ?? NOTHING
     return NOTHING
   }

@@ -6,13 +6,13 @@ const BLOCK = 512
 const MAGIC = [0x0a324655, 0x9e5d5157, 0x0ab16f30]
 const FLAG_FAMILY = 0x2000
 const FLAG_NOT_FLASH = 1
-const FAMILY_RP2040 = 0xe48bff56
 
 export class Loader {
   /** flash: the chip's bytes, changed through board, which counts them and cuts power. onDone(): the chip restarts. */
-  constructor({ clock, flash, flashBytes, board, onDone, onCut }) {
+  constructor({ clock, flash, chip, board, onDone, onCut }) {
     this.flash = flash
-    this.flashEnd = XIP + flashBytes
+    this.family = chip.family
+    this.flashEnd = XIP + chip.flashBytes
     this.board = board
     this.onDone = onDone
     this.onCut = onCut
@@ -53,7 +53,7 @@ export class Loader {
       bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + 32),
     )
     const whole = first === MAGIC[0] && second === MAGIC[1] && bytes.readUInt32LE(BLOCK - 4) === MAGIC[2]
-    const ours = !!(flags & FLAG_FAMILY) && family === FAMILY_RP2040 && !(flags & FLAG_NOT_FLASH) && size === PAGE
+    const ours = !!(flags & FLAG_FAMILY) && family === this.family && !(flags & FLAG_NOT_FLASH) && size === PAGE
     if (!whole || !ours) {
       this.ignored++
       return 0

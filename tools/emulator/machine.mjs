@@ -1,39 +1,17 @@
 // One emulated Pico: the chip with an image in its flash, run instruction by instruction in emulated time.
-import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
+import { DeviceTime, execute } from './faults.mjs'
+import { rp2040 } from './rp2040.mjs'
 
-import { crcStep } from './dma.mjs'
-import { correctCore, DeviceTime, execute, wakes } from './faults.mjs'
-import { speedUp } from './speed.mjs'
-
-export const FLASH_BYTES = 2 * 1024 * 1024 // of a Pico
-const BOOT2_BYTES = 0x100
-const BOOT2_AT = 0x20041f00 // where the boot ROM copies the first 256 bytes of flash, and jumps to
-const SRAM = 0x20000000
 const REASON_TIMER = 1
 const LOADER_DONE = Symbol('the boot ROM has a whole image')
 
-/** The boot ROM would run this second-stage boot, and not go to its loader: its CRC-32 is right, with no final inversion. */
-function bootable(flash) {
-  const stored = Buffer.from(flash.subarray(BOOT2_BYTES - 4, BOOT2_BYTES)).readUInt32LE(0)
-  return flash.subarray(0, BOOT2_BYTES - 4).reduce(crcStep, 0xffffffff) === stored
-}
-
-/** Throws an Error that says why the boot ROM would not start this image. */
-function checkImage(image) {
-  if (image.length <= BOOT2_BYTES || image.length > FLASH_BYTES) {
-    throw new Error(`has ${image.length} bytes: expected a flash image of 257 bytes to 2 MiB`)
-  }
-  if (!bootable(image)) {
-    throw new Error('does not begin with a second-stage boot and its CRC: expected the .bin of a Pico image')
-  }
-}
-
 export class Machine {
   /** attach(machine) wires up what surrounds the chip; it is called again after each reset. */
-  constructor(image, attach) {
-    checkImage(image)
+  constructor(image, attach, chip = rp2040) {
+    chip.checkImage(image)
+    this.chip = chip
     this.attach = attach
-    this.flash = new Uint8Array(FLASH_BYTES).fill(0xff)
+    this.flash = new Uint8Array(chip.flashBytes).fill(0xff)
     this.flash.set(image)
     this.boots = 0
     this.watchdogResets = 0
@@ -56,7 +34,7 @@ export class Machine {
   /** Nothing will happen any more unless somebody outside does something. */
   get quiet() {
     const { core, clock } = this.mcu
-    return core.waiting && !wakes(core) && clock.nextAlarm === null && this.resetAsked === null
+    return core.waiting && !core.wakes() && clock.nextAlarm === null && this.resetAsked === null
   }
 
   /** Run until the emulated time, or until nothing more will happen while time is held. */
@@ -84,7 +62,7 @@ export class Machine {
   /** Sleep until something wakes the core; false when nothing ever will. */
   #sleep(nanos) {
     const { core, clock } = this.mcu
-    while (!wakes(core)) {
+    while (!core.wakes()) {
       if (clock.nextAlarm === null && this.time.held) return false
       const left = nanos - clock.nanos
       if (left <= 0 || this.resetAsked !== null) return true
@@ -109,26 +87,15 @@ export class Machine {
 
   #reset() {
     if (this.resetAsked === LOADER_DONE) return this.powerCycle() // the ROM has used RAM for itself
-    const scratch = this.mcu.peripherals[0x40058].scratchData
-    const reason = this.resetAsked
-    const { sram } = this.mcu
-    this.watchdogResets++
-    this.#start(this.nanos, this.worldNanos)
-    // A watchdog reset keeps RAM, its scratch registers and its reason.
-    this.mcu.sram.set(sram)
-    this.#enterBoot2()
-    this.mcu.peripherals[0x40058].scratchData.set(scratch)
-    this.mcu.peripherals[0x40058].reason = reason
+    const { sram, blocks } = this.mcu
+    this.#start(this.nanos, this.worldNanos, { sram, scratch: blocks.watchdog.scratchData, reason: this.resetAsked })
+    if (!this.inLoader) this.watchdogResets++
   }
 
-  #start(nanos, worldNanos) {
-    if (this.mcu) this.flash.set(this.mcu.flash.subarray(0, FLASH_BYTES))
-    const mcu = new RP2040()
-    mcu.clock.nanosCounter = nanos
-    mcu.logger = new ConsoleLogger(LogLevel.Error, true)
+  #start(nanos, worldNanos, kept = null) {
+    if (this.mcu) this.flash.set(this.mcu.flash.subarray(0, this.flash.length))
+    const mcu = this.chip.make(nanos)
     mcu.flash.set(this.flash)
-    correctCore(mcu.core)
-    speedUp(mcu)
     this.mcu = mcu
     this.time = new DeviceTime(mcu)
     this.worldBefore = worldNanos
@@ -136,26 +103,19 @@ export class Machine {
     this.resetAsked = null
     this.nanosPerCycle = 1e9 / mcu.clkSys
     mcu.addClockListener((hz) => (this.nanosPerCycle = 1e9 / hz))
-    const watchdog = mcu.peripherals[0x40058]
+    const { watchdog } = mcu.blocks
     watchdog.onWatchdogTrigger = () => {
       this.resetAsked = watchdog.reason || REASON_TIMER
       watchdog.timer.enable = false // published: it fires again and again at this instant, and time stops
     }
-    this.#enterBoot2()
-    this.attach(this)
-  }
-
-  /** What the boot ROM does: the first 256 bytes run from SRAM and find their own way to the image. */
-  #enterBoot2() {
-    const { core, sram, flash } = this.mcu
-    this.inLoader = !bootable(flash)
-    if (this.inLoader) {
-      core.PM = core.waiting = true // the ROM's own code, which is not here
-      return
+    if (kept !== null) {
+      // A watchdog reset keeps RAM, its scratch registers and its reason.
+      mcu.sram.set(kept.sram)
+      watchdog.scratchData.set(kept.scratch)
+      watchdog.reason = kept.reason
     }
-    sram.set(flash.subarray(0, BOOT2_BYTES), BOOT2_AT - SRAM)
-    core.SP = BOOT2_AT
-    core.LR = 0
-    core.PC = BOOT2_AT
+    this.inLoader = !this.chip.boot(mcu)
+    if (this.inLoader) mcu.core.PM = mcu.core.waiting = true // the ROM's own code, which is not here
+    this.attach(this)
   }
 }

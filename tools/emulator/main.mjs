@@ -5,6 +5,8 @@
 //   node main.mjs --image BIN --sensor BIN --sensor-pty PATH --sensor-master FD --tape FILE --pty PATH --master FD
 //                 [--endless] ...
 //
+// --chip rp2350 --emulator FILE: a Pico 2, by rp2350js, which is not fetched with the rest (host/docs/develop/pico2.md).
+//
 // The second form has a second Pico in place of the sensors (sensor_board.mjs). It writes "sensor PATH" once that board's
 // port can be opened, and gives the first one power when stdin says "power". --endless: however long the tape is, what the
 // sensors play is somebody else's business, and time does not end with it.
@@ -29,6 +31,8 @@ import { parseArgs } from 'node:util'
 import { Control } from './control.mjs'
 import { Pty } from './pty.mjs'
 import { Rig } from './rig.mjs'
+import { rp2040 } from './rp2040.mjs'
+import { rp2350 } from './rp2350.mjs'
 import { SensorBoard } from './sensor_board.mjs'
 import { Sensors } from './sensors.mjs'
 
@@ -39,6 +43,8 @@ const text = { type: 'string' }
 const { values: options } = parseArgs({
   options: {
     image: text,
+    chip: { type: 'string', default: 'rp2040' },
+    emulator: text,
     wasm: text,
     sensor: text,
     'sensor-pty': text,
@@ -67,6 +73,7 @@ const sensorPty = options.sensor === undefined ? null : new Pty(Number(options['
 const uartPty = options['uart-master'] === undefined ? null : new Pty(Number(options['uart-master']))
 const ports = uartPty === null ? [pty] : [pty, uartPty]
 const tape = options.live === undefined ? read(options.tape) : null
+const chip = await chipOf(options)
 let sensors = null
 let rig = null // once the gateway has power
 
@@ -75,6 +82,16 @@ function read(path) {
     return fs.readFileSync(path)
   } catch (error) {
     return die(path, error.message)
+  }
+}
+
+async function chipOf({ chip, emulator }) {
+  if (chip === 'rp2040') return rp2040
+  if (chip !== 'rp2350') return die(chip, 'no such chip: expected --chip rp2040 or rp2350')
+  try {
+    return await rp2350(emulator)
+  } catch (error) {
+    return die(emulator ?? '--emulator', `${error.message}: expected rp2350js as host/docs/develop/pico2.md builds it`)
   }
 }
 
@@ -89,7 +106,7 @@ function plugIn() {
 
 function power() {
   try {
-    rig = new Rig({ image: read(options.image), sensors, hold: options.hold, port: pty, uartPort: uartPty, lossless: pace === 0 })
+    rig = new Rig({ image: read(options.image), chip, sensors, hold: options.hold, port: pty, uartPort: uartPty, lossless: pace === 0 })
     for (const verb of options.do) rig.act(verb)
   } catch (error) {
     die(options.image, error.message)

@@ -3,8 +3,8 @@ import fs from 'node:fs'
 
 import { Latency } from './latency.mjs'
 import { Loader } from './loader.mjs'
-import { FLASH_BYTES, Machine } from './machine.mjs'
-import { Board, BootRom } from './rom.mjs'
+import { Machine } from './machine.mjs'
+import { Board } from './rom.mjs'
 import { SlotTiming } from './timing.mjs'
 import { Uart } from './uart.mjs'
 import { UsbHost } from './usb.mjs'
@@ -13,7 +13,7 @@ import { Vcd } from './vcd.mjs'
 export class Rig {
   /** port, uartPort: a Pty or something like it; no uartPort: nothing on either UART's pins. hold: device time stands
    * still from the first sample on until release(). */
-  constructor({ image, sensors, port, uartPort, hold, lossless }) {
+  constructor({ image, chip, sensors, port, uartPort, hold, lossless }) {
     this.port = port
     this.uartPort = uartPort
     this.readsFrom = 0 // world ns: the host reads what comes
@@ -24,12 +24,12 @@ export class Rig {
     this.events = [] // [world ns, verb], sorted
     this.sensors = sensors
     this.lossless = lossless
-    this.board = new Board()
+    this.board = new Board(chip)
     this.loaders = 0 // how often the chip went to its UF2 loader
     this.loader = null // while it is there
     this.images = 0 // that the loader has taken whole
     this.vcd = null // what a logic analyser records, once somebody wants to know
-    this.machine = new Machine(image, (machine) => this.#attach(machine))
+    this.machine = new Machine(image, (machine) => this.#attach(machine), chip)
   }
 
   /** Device time stands still, and the board has done all that can be done meanwhile. */
@@ -172,7 +172,7 @@ export class Rig {
     this.loader = new Loader({
       clock: machine.mcu.clock,
       flash: machine.mcu.flash,
-      flashBytes: FLASH_BYTES,
+      chip: machine.chip,
       board: this.board,
       onDone: () => {
         this.images++
@@ -194,7 +194,7 @@ export class Rig {
   /** After each power-up and reset of the chip. */
   #attach(machine) {
     this.loader = null
-    this.rom = new BootRom(machine, this.board, {
+    this.rom = new machine.chip.Rom(machine, this.board, {
       onLoader: () => this.#enterLoader(machine),
       onCut: () => this.#failPower(machine),
     })

@@ -4,7 +4,7 @@
 import { randomInt } from 'node:crypto'
 
 import { correctDma } from './dma.mjs'
-import { ERASE_NS, Flash, PAGE, PROGRAM_NS, SECTOR } from './flash.mjs'
+import { ERASE_NS, Flash, ISSI, PAGE, PROGRAM_NS, SECTOR } from './flash.mjs'
 
 const FUNC_TABLE = 0x40
 const LOOKUP = 0x20
@@ -24,13 +24,13 @@ const ROSC_RANDOMBIT = 0x1c
 
 /** What outlives a power cycle, for the rig to keep. */
 export class Board {
-  constructor({ uniqueId = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x2c] } = {}) {
+  constructor({ uniqueId = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x2c], flashId = [0xef, 0x40, 0x15] } = {}) {
     this.uniqueId = uniqueId
     this.random = randomInt(1, 2 ** 31) // no two programs boot alike
     this.cutAfter = null // bytes erased or programmed until power fails
     this.eraseNanos = ERASE_NS // of its flash, a sector
     this.programNanos = PROGRAM_NS // a page
-    this.flashId = [0xef, 0x40, 0x15] // W25Q16JV
+    this.flashId = flashId // W25Q16JV
     this.frameNanos = 1e6 // of the host's USB, by this board's clock
     this.lostFrames = Infinity // one start of frame in so many does not come
     this.supplyMv = 4750 // VBUS less a diode
@@ -43,6 +43,11 @@ export class Board {
     this.faultyStarts = 0 // starts that an exception ends before the program runs
     this.writtenAt = null // where it was programmed last
     this.counters = { erases: 0, programs: 0, bytes: 0, misses: 0, wrong: [] }
+  }
+
+  /** A byte of what the flash says of itself. ISSI's has 16, of which the first may be all boards' (pico-sdk #1641). */
+  numberSent(at) {
+    return (this.flashId[0] === ISSI ? [...Array(8).fill(0x11), ...this.uniqueId] : this.uniqueId)[at]
   }
 
   randomBit() {
@@ -72,19 +77,76 @@ export class Board {
   }
 }
 
-export class BootRom {
+/** What both chips' programs find around them. */
+export class Surroundings {
   /** onLoader(): the program asked for the UF2 loader. onCut(): power fails in the middle of a flash write. */
   constructor({ mcu, time }, board, { onLoader, onCut }) {
     this.mcu = mcu
     this.board = board
     this.onLoader = onLoader
     this.onCut = onCut
-    this.flash = new Flash(mcu, board, (what) => this.#wrong(what))
-    correctDma(mcu, time, (what) => this.#wrong(what), board)
-    this.#install()
-    this.#randomBit()
+    correctDma(mcu, time, (what) => this.wrong(what), board)
     this.#measures()
     mcu.clock.createAlarm(() => board.faultyStarts-- > 0 && mcu.core.exceptionEntry(HARD_FAULT)).schedule(FAULT_AFTER_NS)
+  }
+
+  wrong(what) {
+    const { wrong } = this.board.counters
+    if (wrong.length < 10) wrong.push(`${what} at ${(this.mcu.core.PC >>> 0).toString(16)}`)
+  }
+
+  #change(at, bytes, value) {
+    if (!this.board.change(this.mcu.flash, at, bytes, value)) this.onCut()
+  }
+
+  #allowed(at, bytes, unit, what) {
+    if (this.flash.readable) this.wrong(`${what} without leaving XIP`)
+    else if (!this.mcu.core.PM) this.wrong(`${what} with interrupts on`)
+    else if (at % unit !== 0 || bytes % unit !== 0) this.wrong(`${what} of ${bytes} bytes at ${at}`)
+    else return true
+    return false
+  }
+
+  erase(at, bytes) {
+    if (!this.#allowed(at, bytes, SECTOR, 'erase')) return
+    this.board.atErase?.()
+    this.board.atErase = null
+    this.board.counters.erases++
+    this.#spend((this.board.eraseNanos * bytes) / SECTOR)
+    this.#change(at, bytes, () => 0xff)
+  }
+
+  /** byte(k): what goes to at + k. */
+  program(at, bytes, byte) {
+    if (!this.#allowed(at, bytes, PAGE, 'program')) return
+    this.board.counters.programs++
+    this.#spend((this.board.programNanos * bytes) / PAGE)
+    this.board.writtenAt = at
+    this.#change(at, bytes, (k) => this.mcu.flash[at + k] & byte(k))
+  }
+
+  #spend(nanos) {
+    this.mcu.core.owedCycles += Math.round(nanos / CYCLE_NS)
+  }
+
+  /** GPIO 29 has a third of the supply on a Pico; channel 4 is the chip's own temperature (4.9.5). */
+  #measures() {
+    const adc = this.mcu.adc
+    adc.onADCRead = (channel) => {
+      const millivolts = channel === 3 ? this.board.supplyMv / 3 : channel === 4 ? 706 - 1.721 * (this.board.celsius - 27) : 0
+      adc.channelValues[channel] = Math.round((millivolts * 4096) / 3300)
+      adc.currentChannel = channel
+      adc.sampleAlarm.schedule(adc.sampleTime * 1000)
+    }
+  }
+}
+
+export class BootRom extends Surroundings {
+  constructor(machine, board, then) {
+    super(machine, board, then)
+    this.flash = new Flash(this.mcu, board, (what) => this.wrong(what))
+    this.#install()
+    this.#randomBit()
   }
 
   #install() {
@@ -92,8 +154,11 @@ export class BootRom {
       IF: () => {},
       EX: () => this.flash.leaveXip(),
       FC: () => this.flash.cache.flush(),
-      RE: () => this.#erase(),
-      RP: () => this.#program(),
+      RE: () => this.erase(...this.#r),
+      RP: () => {
+        const [at, from, bytes] = this.#r
+        this.program(at, bytes, (k) => this.mcu.readUint8(from + k))
+      },
       UB: () => this.#loader(),
     }
     const actions = [() => this.#lookup(), ...Object.values(functions)]
@@ -114,11 +179,6 @@ export class BootRom {
     return this.mcu.core.registers
   }
 
-  #wrong(what) {
-    const { wrong } = this.board.counters
-    if (wrong.length < 10) wrong.push(`${what} at ${(this.mcu.core.PC >>> 0).toString(16)}`)
-  }
-
   #lookup() {
     const code = this.#r[1] & 0xffff
     let at = this.#r[0]
@@ -126,62 +186,12 @@ export class BootRom {
     this.#r[0] = this.mcu.readUint16(at) === 0 ? 0 : this.mcu.readUint16(at + 2)
   }
 
-  // ---- flash ---------------------------------------------------------------------------------------
-
-  #change(at, bytes, value) {
-    if (!this.board.change(this.mcu.flash, at, bytes, value)) this.onCut()
-  }
-
-  #allowed(at, bytes, unit, what) {
-    if (this.flash.readable) this.#wrong(`${what} without leaving XIP`)
-    else if (!this.mcu.core.PM) this.#wrong(`${what} with interrupts on`)
-    else if (at % unit !== 0 || bytes % unit !== 0) this.#wrong(`${what} of ${bytes} bytes at ${at}`)
-    else return true
-    return false
-  }
-
-  #erase() {
-    const [at, bytes] = this.#r
-    if (!this.#allowed(at, bytes, SECTOR, 'erase')) return
-    this.board.atErase?.()
-    this.board.atErase = null
-    this.board.counters.erases++
-    this.#spend((this.board.eraseNanos * bytes) / SECTOR)
-    this.#change(at, bytes, () => 0xff)
-  }
-
-  #program() {
-    const [at, from, bytes] = this.#r
-    if (!this.#allowed(at, bytes, PAGE, 'program')) return
-    this.board.counters.programs++
-    this.#spend((this.board.programNanos * bytes) / PAGE)
-    this.board.writtenAt = at
-    this.#change(at, bytes, (k) => this.mcu.flash[at + k] & this.mcu.readUint8(from + k))
-  }
-
-  #spend(nanos) {
-    this.mcu.core.owedCycles += Math.round(nanos / CYCLE_NS)
-  }
-
-  // ---- the rest ----------------------------------------------------------------------------------------
-
   #randomBit() {
     const sysinfo = this.mcu.peripherals[SYSINFO]
     const read = sysinfo.readUint32.bind(sysinfo)
     sysinfo.readUint32 = (offset) => (offset === 0 ? ((this.board.revision << 28) | 0x2927) >>> 0 : read(offset))
     const rosc = this.mcu.peripherals[ROSC]
     rosc.readUint32 = (offset) => (offset === ROSC_RANDOMBIT ? this.board.randomBit() : 0)
-  }
-
-  /** GPIO 29 has a third of the supply on a Pico; channel 4 is the chip's own temperature (4.9.5). */
-  #measures() {
-    const adc = this.mcu.adc
-    adc.onADCRead = (channel) => {
-      const millivolts = channel === 3 ? this.board.supplyMv / 3 : channel === 4 ? 706 - 1.721 * (this.board.celsius - 27) : 0
-      adc.channelValues[channel] = Math.round((millivolts * 4096) / 3300)
-      adc.currentChannel = channel
-      adc.sampleAlarm.schedule(adc.sampleTime * 1000)
-    }
   }
 
   /** The program is gone: its interrupts and its watchdog are off. What the loader then does: loader.mjs. */

@@ -19,7 +19,6 @@ const COMMANDS = new Map(SENSOR.channel.map(({ name, command }) => [name, comman
 const SLOTS = SENSOR.frame.slots.length
 const LIVE_ROUNDS = 64 // that a program may be ahead, as in the posix port
 const LEAD_NS = 20e3 // before a slot: the words of the one before have been read
-const RESET_SPI0 = 1 << 16
 const SAMPLE_COMMAND = 0x80 // and above
 
 /** A byte with an odd number of ones, as all of a sample have. */
@@ -113,7 +112,7 @@ export class Sensors {
     })
     let word = 0
     const done = mcu.clock.createAlarm(() => spi.completeTransmit(word))
-    onReset(mcu, RESET_SPI0, () => {
+    onReset(mcu, 'spi0', () => {
       done.cancel()
       spi.busy = false
       spi.rxFIFO.reset()

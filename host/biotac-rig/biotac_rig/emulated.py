@@ -25,12 +25,17 @@ from biotac.sim.source import Source
 LISTEN_S = 0.005
 
 
+PAGE = "host/docs/develop/pico2.md"  # how to fetch the Pico 2's
+BOARDS = ("pico", "pico2")
+
+
 @dataclass(frozen=True)
 class Tools:
     node: str
     program: Path
     sensors: Path
     image: Path
+    chip: list[str]
 
 
 class EmulatedBoard(SimBoard):
@@ -62,7 +67,8 @@ class EmulatedBoard(SimBoard):
 
     def _start(self, options: list[str]) -> Any:
         tools = self._tools
-        command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors), *options]
+        command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors)]
+        command += [*tools.chip, *options]
         command += [f"--do={verb}" for verb in self._verbs]
         with ExitStack() as ptys:
             master, path = ptys.enter_context(new_pty())
@@ -140,8 +146,8 @@ def new_pty() -> Iterator[tuple[int, str]]:
 
 def find_tools(board: str, image: str | None) -> Tools:
     """The files that the emulator needs. Raises PortError, with a remedy, if one is missing."""
-    if board != "pico":
-        raise PortError(f"no emulated board {board!r}: expected emu:pico")
+    if board not in BOARDS:
+        raise PortError(f"no emulated board {board!r}: expected emu:pico or emu:pico2")
     if os.name != "posix":
         raise PortError("emulated boards need a pty, which this system lacks; use Linux or macOS")
     folder = find_folder()
@@ -152,12 +158,23 @@ def find_tools(board: str, image: str | None) -> Tools:
     sensors = root / "build" / "emulator" / "sensors.wasm"
     if not sensors.is_file() or not (root / "tools" / "node_modules" / "rp2040js").is_dir():
         raise PortError(f"the emulator is not ready; run {folder / 'prepare'} once")
-    path = Path(image) if image else root / "build" / "pico" / "biotac-pico.bin"
+    path = Path(image) if image else root / "build" / board / f"biotac-{board}.bin"
     if not path.is_file():
         build = f"cmake -S {root / 'firmware'} --preset {board} && cmake --build {path.parent}"
         cure = "check the path" if image else f"build it: {build}"
         raise PortError(f"no image at {path}; {cure}")
-    return Tools(node, folder / "main.mjs", sensors, path)
+    return Tools(node, folder / "main.mjs", sensors, path, chip_of(board))
+
+
+def chip_of(board: str) -> list[str]:
+    """Options of the emulator. Only the Pico's chip comes with the repository."""
+    if board == "pico":
+        return []
+    fetched = os.environ.get("BIOTAC_RP2350JS", "")
+    if not Path(fetched).is_file():
+        seen = f"nothing at {fetched}" if fetched else "BIOTAC_RP2350JS is not set"
+        raise PortError(f"the Pico 2's emulator is fetched by hand ({PAGE}), and {seen}: expected the file made there")
+    return ["--chip", "rp2350", "--emulator", fetched]
 
 
 def find_folder() -> Path:

@@ -46,10 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--board",
-        choices=("posix", "pico"),
-        help="posix (default): the firmware as a process; pico: the Pico's flash image in an emulator",
+        choices=("posix", "pico", "pico2"),
+        help="posix (default): the firmware as a process; pico, pico2: a flash image in an emulator, for pico2 fetched",
     )
-    parser.add_argument("--image", help="flash image for --board pico (default: build/pico/biotac-pico.bin)")
+    parser.add_argument("--image", help="flash image for --board pico or pico2 (default: that in build/)")
     parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
     parser.add_argument(
         "--fault",
@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
     if args.source.lower().endswith(".mcap"):
         values.refuse(args, ("fingers", "seconds", "board", "image", "fault"), "is for a simulated board; drop it")
         return play_recording(args)
-    if args.image is not None and args.board != "pico":
+    if args.image is not None and args.board not in ("pico", "pico2"):
         raise InputError("--image needs a board that has a flash image; add --board pico")
     name = args.source.removeprefix("sim:")
     source = load_source(name, fingers=args.fingers, seconds=seconds)
