@@ -2,7 +2,7 @@
 // device time that passes only as the firmware spends it.
 //
 //   biotac-sim --tape FILE | --live FINGERS
-//              [--socket] [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
+//              [--socket] [--pace X] [--hold] [--boot-id N] [--clock-us N] [--serials A,B,...] [--flash FILE]
 //
 // Writes "pty PATH" or "socket PORT" to stdout, and "end" once the tape is played and all of it handed over.
 // --live: a program feeds the sensors round by round (control.h), and device time stands still until it has
@@ -11,6 +11,7 @@
 // --socket: a TCP port in place of a pty. Who connects there, or to the control port, says the token of
 // door.h first.
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
+// --clock-us: what its clock shows at first, as of a board that has been on for so long.
 // --flash: where saved settings and maps are kept; without it they are gone with the process.
 // --hold: device time stands still until "run" comes on stdin. "restart" on stdin resets the board, as a
 // host's command does; then it writes "restarted". End of stdin ends the process.
@@ -55,6 +56,7 @@ static bool restart_due;
 static bool link_due = true;
 static uint64_t link_ns;
 static uint32_t boot_id;
+static uint32_t clock_us; // what it shows as the process begins; 0 after a reset, as on any board
 static bool paced;
 static int tape = -1; // kept open for the board after a reset: its name may be gone by then
 
@@ -162,6 +164,8 @@ bt_port *port_init(int argc, char **argv)
             pace = atof(argv[++k]);
         } else if (strcmp(argv[k], "--boot-id") == 0) {
             boot_id = (uint32_t)strtoul(argv[++k], NULL, 0);
+        } else if (strcmp(argv[k], "--clock-us") == 0) {
+            clock_us = (uint32_t)strtoul(argv[++k], NULL, 0) * (restarted() == NULL);
         } else if (strcmp(argv[k], "--serials") == 0) {
             serials = argv[++k];
         } else if (strcmp(argv[k], "--flash") == 0) {
@@ -200,7 +204,7 @@ bt_port *port_init(int argc, char **argv)
 
 uint32_t port_now_us(bt_port *port)
 {
-    return (uint32_t)(clock_now_ns() / 1000);
+    return (uint32_t)(clock_now_ns() / 1000) + clock_us;
 }
 
 void port_delay_us(bt_port *port, uint32_t us)
@@ -217,7 +221,7 @@ void port_alarm_at(bt_port *port, uint32_t at_us)
 static uint64_t alarm_ns(void)
 {
     uint64_t now_ns = clock_now_ns();
-    int32_t ahead_us = (int32_t)(alarm_us - (uint32_t)(now_ns / 1000));
+    int32_t ahead_us = (int32_t)(alarm_us - clock_us - (uint32_t)(now_ns / 1000));
     return ahead_us <= 0 ? now_ns : (now_ns / 1000 + (uint64_t)ahead_us) * 1000;
 }
 

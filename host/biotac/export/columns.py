@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recording.labels import of_rows
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
 from ..wire.fields import AXES, BANDS_FIELDS, FRAME_FIELDS, PAC_FIELDS, Field
@@ -22,7 +21,7 @@ STAMP = Field(
     "stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), corrected for the drift seen in the recording"
 )
 
-GAP = Field("gap_s", "<f4", "s", "how long the board was away just before this row; 0 where it was there")
+GAP = Field("gap_s", "<f4", "s", "how long the board or this finger was away just before this row; 0 where it was there")
 
 APPLIED = Field("applied_n", "<f8", "N", "force on a simulated finger; NaN where it is not known", AXES)
 
@@ -110,16 +109,8 @@ def tables(recording: Recording, *, applied: bool = True) -> list[Table]:
 def _arrays(recording: Recording, columns: Sequence[Field], rows: StructArray) -> dict[str, NDArray[Any]]:
     made: dict[str, Callable[[], NDArray[Any]]] = {
         STAMP.name: lambda: recording.stamp_ns(rows["t_us"]),
-        GAP.name: lambda: _gap_s(recording, rows["t_us"]),
+        GAP.name: lambda: recording.gap_s_at(rows),
         APPLIED.name: lambda: recording.applied_at(rows["finger"], rows["t_us"]),
-        LABEL.name: lambda: of_rows(recording.labels, rows["t_us"], rows["finger"]),
+        LABEL.name: lambda: recording.labels_at(rows),
     }
     return {column.name: made[column.name]() if column.name in made else rows[column.name] for column in columns}
-
-
-def _gap_s(recording: Recording, t_us: NDArray[np.int64]) -> NDArray[np.float32]:
-    out = np.zeros(len(t_us), np.float32)
-    for gap in recording.gaps:
-        if gap.next_t_us is not None and (t_us >= gap.next_t_us).any():
-            out[np.argmax(t_us >= gap.next_t_us)] += (gap.back_at_ns - gap.lost_at_ns) / 1e9
-    return out

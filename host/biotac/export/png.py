@@ -35,12 +35,16 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
             rest = np.nanmedian(table.arrays["pdc_tare"]) if np.isfinite(table.arrays["pdc_tare"]).any() else 0.0
             pdc = np.where(table.arrays["pdc"] == 65535, np.nan, table.arrays["pdc"] - rest)
             pressure.plot(t_s, pdc, _COLOURS[finger], lw=0.8)
-        for gap in (gap for gap in recording.gaps if gap.last_t_us is not None and gap.next_t_us is not None):
-            for axis in axes:
-                axis.axvspan((gap.last_t_us - begin_us) / 1e6, (gap.next_t_us - begin_us) / 1e6, color="0.85")  # type: ignore[operator]
+        for gap in recording.gaps:  # after a restart, the rows before it are of another clock and in another file
+            last_us = None if gap.reason == "rebooted" else gap.last_t_us
+            if last_us is not None:
+                until_us = gap.next_t_us if gap.next_t_us is not None else last_us + gap.seconds * 1e6
+                for axis in axes:
+                    axis.axvspan((last_us - begin_us) / 1e6, (until_us - begin_us) / 1e6, color="0.85")
         free_s = [-np.inf, -np.inf]  # of two rows of texts
         for label in (label for label in recording.labels if label.t_us is not None):
-            at_s, until_s = ((t_us - begin_us) / 1e6 for t_us in (label.t_us or 0, label.end_us or label.t_us or 0))
+            times_us = (label.t_us or 0, label.end_us or label.t_us or 0)
+            at_s, until_s = (max(0, t_us - begin_us) / 1e6 for t_us in times_us)
             for axis in axes:
                 axis.axvspan(at_s, until_s, color="C5", alpha=0.25)
             row = 0 if at_s >= free_s[0] else 1

@@ -69,9 +69,11 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
                     show(done / total)
                 done += 1
         begin_us = recording.begin_us
-        at_ns = recording.stamp_ns(np.array([label.t_us or begin_us for label in recording.labels], np.int64)).tolist()
+        at_ns = recording.stamp_ns(np.array([max(label.t_us or begin_us, begin_us) for label in recording.labels], np.int64)).tolist()
         logged = [(ns, INFO, label.line()) for ns, label in zip(at_ns, recording.labels, strict=True)]
-        logged += [(gap.back_at_ns, WARN, gap.line()) for gap in recording.gaps]
+        ends_us = [gap.next_t_us or gap.last_t_us or begin_us for gap in recording.gaps]
+        ends_ns = recording.stamp_ns(np.array(ends_us, np.int64)).tolist()
+        logged += [(ns, WARN, gap.line()) for ns, gap in zip(ends_ns, recording.gaps, strict=True)]
         log = topic("log", log_kind) if logged else lambda stamp_ns, message: None
         for stamp_ns, level, text in logged:
             if ros1:

@@ -64,6 +64,10 @@ class Recorder(Tap):
         self._put_bytes = self._written_bytes = 0  # each counted by one thread
         self._chunk = b""  # the latest: a Gap that ends with it is written first
         self._dropped: Gap | None = None
+        self._last_us = board.reader.last_t_us
+        self._rows_us: dict[int, int] = {}  # time of the latest row, by boot id
+        self._whole: list[Label] = []  # about all files
+        self._spans: list[Mark] = []  # that have not ended
         self._over = False
         self._due = threading.Event()
         self._thread = board.reader.thread(self._run, "recorder")
@@ -78,14 +82,24 @@ class Recorder(Tap):
 
         if self.closed:
             raise InputError(f"the recording {self.path} is closed: mark it with biotac.Recording(...).mark")
-        now_us = self._board.reader.last_t_us
-        label = Label(text, (now_us or 0) if timed else None, None, finger, facts)
+        label = Label(text, self._now_us() if timed else None, None, finger, facts)
+        self._whole += [] if timed else [label]
         self._append(label)
-        return Mark(self, label)
+        return Mark(self, label, self._board.info.boot_id)
 
-    def _end(self, label: Label) -> None:
-        """Write ``label`` again, with now as its end."""
-        self._append(replace(label, end_us=max(self._board.reader.last_t_us or 0, label.t_us or 0)))
+    def _end(self, mark: Mark) -> None:
+        """Write its label again, with now as its end."""
+        from ..recording.labels import NEXT_ROW_US
+
+        self._spans.remove(mark)
+        begin_us = mark.label.t_us if mark.boot_id == self._board.info.boot_id else NEXT_ROW_US
+        self._append(replace(mark.label, t_us=begin_us, end_us=max(self._now_us(), begin_us or 0)))
+
+    def _now_us(self) -> int:
+        """Time of the latest row; before the first one, also after a restart of the board, a time of none."""
+        from ..recording.labels import NEXT_ROW_US
+
+        return self._rows_us.get(self._board.info.boot_id, NEXT_ROW_US)
 
     def close(self) -> None:
         """Write what has arrived and the file's index. Safe to call twice. Raises OSError when that fails."""
@@ -97,6 +111,7 @@ class Recorder(Tap):
             self._note()
         self._append(self._chunk)
         self._chunk = b""
+        self._end_gap()
         self._over = True
         self._due.set()
         self._thread.join()
@@ -117,16 +132,41 @@ class Recorder(Tap):
 
     def put_raw(self, chunk: bytes) -> None:
         if self._put_bytes - self._written_bytes > LIMIT_BYTES:
-            reader = self._board.reader
-            self._dropped = self._dropped or Gap("slow", reader.last_t_us, None, time.time_ns(), 0, self._boot_id)
+            if self._dropped is None:
+                self._dropped = Gap("slow", None, None, time.time_ns(), 0, self._boot_id)
+                self._append(self._chunk)
+                self._chunk = b""
+                self._take_back()
             return
         if self._dropped is not None:
-            self._append(self._dropped)
-            self._dropped = None
+            _, delimiter, chunk = chunk.partition(b"\0")
+            if not delimiter:
+                return
+            self._end_gap()
         self._append(self._chunk)
         self._chunk = chunk
 
+    def _end_gap(self) -> None:
+        """Tell of what was dropped; the file knows which rows are around it (mcap_file.py)."""
+        if self._dropped is not None:
+            self._append(replace(self._dropped, back_at_ns=time.time_ns()))
+            self._dropped = None
+
+    def _take_back(self) -> None:
+        """Take back a packet of which the rest is dropped: it would come as a damaged one."""
+        with suppress(IndexError):  # the disk is back already
+            while isinstance(item := self._waiting[-1][1], bytes):
+                self._waiting.pop()
+                kept = item[: item.rfind(b"\0") + 1]
+                self._put_bytes -= len(item)
+                if kept:
+                    self._append(kept)
+                    return
+
     def put(self, batch: Batch) -> None:
+        last_us = self._board.reader.last_t_us
+        if last_us is not None and last_us != self._last_us:
+            self._last_us = self._rows_us[self._board.info.boot_id] = last_us
         for message in batch.messages:
             if isinstance(message, Gap):
                 self._append(message)
@@ -162,10 +202,13 @@ class Recorder(Tap):
         while self._waiting:
             boot_id, item = self._waiting.popleft()
             if boot_id != self._boot_id:
+                self._end_spans(self._boot_id)
                 self._boot_id = boot_id
                 with suppress(DeviceLostError):  # it is gone again, or closed: what was known before has to do
                     self._known = self._facts()
                 self._writer.next_file(replace(self._known, info=self._board.info))
+                for label in (*self._whole, *(mark.label for mark in self._spans)):
+                    self._writer.write_label(label)
             if isinstance(item, Gap):
                 self._writer.write_gap(item)
             elif not isinstance(item, bytes):
@@ -175,6 +218,16 @@ class Recorder(Tap):
                 self._written_bytes += len(item)
         self._writer.write(b"")  # so that a block is closed in time
         self._board.reader.notify_space()
+
+    def _end_spans(self, boot_id: int) -> None:
+        """Let open spans end with this file, and begin with the next one's first row."""
+        from ..recording.labels import NEXT_ROW_US
+
+        for mark in self._spans:
+            begin_us = mark.label.t_us or 0
+            end_us = max(self._rows_us.get(boot_id, begin_us), begin_us)
+            self._writer.write_label(replace(mark.label, end_us=end_us))
+            mark.label, mark.boot_id = replace(mark.label, t_us=NEXT_ROW_US), self._board.info.boot_id
 
     def _facts(self) -> Facts:
         """What a recording says about the board."""
@@ -198,11 +251,11 @@ class Recorder(Tap):
 class Mark:
     """A label that was just made. Used in a ``with`` block, it becomes a span that ends with the block."""
 
-    def __init__(self, recorder: Recorder, label: Label) -> None:
-        self._recorder, self._label = recorder, label
+    def __init__(self, recorder: Recorder, label: Label, boot_id: int) -> None:
+        self._recorder, self.label, self.boot_id = recorder, label, boot_id
 
     def __enter__(self) -> None:
-        """It has begun already."""
+        self._recorder._spans.append(self)  # it has begun already
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        self._recorder._end(self._label)
+        self._recorder._end(self)

@@ -157,6 +157,14 @@ class Blocks:
         return rows
 
 
+def gap_of(facts: dict[str, Any]) -> Gap | None:
+    """A gap in a block's rest; None for a damaged one."""
+    try:
+        return Gap(**facts)
+    except TypeError:
+        return None
+
+
 class Contents:
     """What ``Recording`` documents, by the same names; ``sent`` are its FRAMEs before they are in user units.
 
@@ -206,13 +214,12 @@ class Contents:
         return np.concatenate([np.empty(0, ROWS[kind]), *(block.rows[kind] for block in self.blocks)])
 
     def _gap(self, facts: dict[str, Any]) -> Gap | None:
-        try:
-            gap = Gap(**facts)
+        gap = gap_of(facts)
+        if gap is None:
+            self.damage.append(f"a gap is marked in {self._path.name}, but its entry is damaged ({facts})")
+        else:
             self.problems.append(gap.line())
-            return gap
-        except TypeError as error:
-            self.damage.append(f"a gap is marked in {self._path.name}, but its entry is damaged ({error})")
-            return None
+        return gap
 
     def _without_metadata(self, damaged: bool) -> str:
         if damaged:

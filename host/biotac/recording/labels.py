@@ -17,9 +17,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..board.gap import Gap
 from ..errors import InputError, RecordingError, printable
+from ..wire.frames import StructArray
 
 MAX_BYTES = 16 << 20  # of the file beside a recording: a hundred thousand labels
+NEXT_ROW_US = -1  # made before the first row that a board gives: it holds at that one
 AROUND_US = 500_000  # that a point reaches to both sides, where rows are selected by it
 
 
@@ -108,28 +111,11 @@ def _in_order(labels: Iterable[Label]) -> list[Label]:
     return sorted(labels, key=lambda label: -1 if label.t_us is None else label.t_us)
 
 
-def of_rows(labels: list[Label], t_us: NDArray[np.int64], finger: NDArray[np.uint8]) -> NDArray[np.str_]:
-    """What holds at each row (n,), texts with their facts, joined by "; ". A point holds at each finger's next row."""
-    texts = [""]
-    code = np.zeros(len(t_us), np.int64)
-    for label in labels:
-        covered = np.ones(len(t_us), np.bool_) if label.finger is None else finger == label.finger
-        if label.t_us is not None:
-            covered &= t_us >= label.t_us
-            covered &= t_us <= (label.end_us if label.end_us is not None else label.t_us + 1_000_000)
-        at = np.flatnonzero(covered)
-        if label.t_us is not None and label.end_us is None:
-            at = at[np.unique(finger[at], return_index=True)[1]]
-        for before in np.unique(code[at]).tolist():
-            code[at[code[at] == before]] = len(texts)
-            texts.append("; ".join(filter(None, (texts[before], label.line()))))
-    return np.array(texts)[code]
-
-
-def spans_us(labels: list[Label], wanted: str | Iterable[str]) -> list[tuple[int, int]]:
+def spans_us(labels: list[Label], wanted: str | Iterable[str], begin_us: int) -> list[tuple[int, int]]:
     """Times in us from the first to the last row of labels of these texts, joined where they meet.
 
-    A point reaches half a second to both sides. Raises InputError for a text that no timed label has.
+    A point reaches half a second to both sides; none is before ``begin_us``, the first row's. Raises InputError for a
+    text that no timed label has.
     """
     names = {wanted} if isinstance(wanted, str) else set(wanted)
     timed = [label for label in labels if label.t_us is not None]
@@ -139,10 +125,93 @@ def spans_us(labels: list[Label], wanted: str | Iterable[str]) -> list[tuple[int
     spans: list[tuple[int, int]] = []
     for label in timed:
         if label.text in names and label.t_us is not None:
-            reach = AROUND_US if label.end_us is None else 0
-            begin, end = label.t_us - reach, (label.t_us if label.end_us is None else label.end_us) + reach
+            reach, at_us = AROUND_US if label.end_us is None else 0, max(label.t_us, begin_us)
+            begin, end = at_us - reach, max(at_us, label.end_us or at_us) + reach
             if spans and begin <= spans[-1][1]:
                 before = spans.pop()
                 begin, end = before[0], max(end, before[1])
             spans.append((begin, end))
     return spans
+
+
+# ---- the rows of a table at which labels and gaps hold: none is lost for want of a row at its time --------
+
+_NEXT_US = 1_000_000  # A point holds at each finger's next row, if it comes within this.
+
+#: Times of each finger's rows in a whole recording, in order.
+Times = Mapping[int, NDArray[np.int64]]
+
+
+def times_of(rows: StructArray) -> Times:
+    """Times of a recording's ``rows``, by finger."""
+    return {f: np.sort(rows["t_us"][rows["finger"] == f]) for f in np.unique(rows["finger"]).tolist()}
+
+
+class _Rows:
+    """Some of a recording's rows, which may have its labels and gaps."""
+
+    def __init__(self, rows: StructArray) -> None:
+        self._order = {}
+        for finger in np.unique(rows["finger"]).tolist():
+            own = np.flatnonzero(rows["finger"] == finger)
+            own = own[np.argsort(rows["t_us"][own], kind="stable")]
+            self._order[finger] = own, rows["t_us"][own]
+
+    def between(self, finger: int, begin_us: float, end_us: float) -> NDArray[np.intp]:
+        rows, t_us = self._order.get(finger, (np.empty(0, np.intp), np.empty(0)))
+        return rows[np.searchsorted(t_us, begin_us) : np.searchsorted(t_us, end_us, "right")]
+
+
+def labels_at(labels: Iterable[Label], rows: StructArray, times: Times) -> NDArray[np.str_]:
+    """What holds at each of ``rows`` (n,) of a recording with rows at ``times``: texts and facts, joined by "; ".
+
+    A point holds at each finger's next row, within a second, or else at the next row of any; after the last, at that.
+    A span without a row is a point.
+    """
+    there = _Rows(rows)
+    texts = [""]
+    code = np.zeros(len(rows), np.int64)
+    for label in labels:
+        own = {f: t_us for f, t_us in times.items() if label.finger in (None, f)}
+        parts = [np.arange(0)]
+        for finger, begin_us, end_us in _reach(label, own):
+            parts.append(there.between(finger, begin_us, end_us))
+        at = np.concatenate(parts)
+        for before in np.unique(code[at]).tolist():
+            code[at[code[at] == before]] = len(texts)
+            texts.append("; ".join(filter(None, (texts[before], label.line()))))
+    return np.array(texts)[code]
+
+
+def _reach(label: Label, own: Times) -> list[tuple[int, float, float]]:
+    """The fingers at which a label holds, each from and until when, where their rows are at times ``own``."""
+    if label.t_us is None:
+        return [(finger, -np.inf, np.inf) for finger in own]
+    if label.end_us is not None and any(_next(t_us, label.t_us) <= label.end_us for t_us in own.values()):
+        return [(finger, label.t_us, label.end_us) for finger in own]
+    next_us = {finger: _next(t_us, label.t_us) for finger, t_us in own.items()}
+    first_us = min(next_us.values(), default=np.inf)
+    if first_us == np.inf:
+        next_us = {finger: float(t_us[-1]) for finger, t_us in own.items()}
+        last_us = max(next_us.values(), default=np.inf)
+        return [(finger, at_us, at_us) for finger, at_us in next_us.items() if at_us >= last_us - _NEXT_US]
+    until_us = _NEXT_US + (first_us if first_us > label.t_us + _NEXT_US else label.t_us)
+    return [(finger, at_us, at_us) for finger, at_us in next_us.items() if at_us <= until_us]
+
+
+def _next(t_us: NDArray[np.int64], at_us: int) -> float:
+    k = int(np.searchsorted(t_us, at_us))
+    return float(t_us[k]) if k < len(t_us) else np.inf
+
+
+def gap_s_at(gaps: Iterable[Gap], rows: StructArray, times: Times) -> NDArray[np.float32]:
+    """How long the finger was away just before each of ``rows`` (n,), in s; 0 where it was there."""
+    there = _Rows(rows)
+    out = np.zeros(len(rows), np.float32)
+    for gap in gaps:
+        for finger, t_us in times.items() if gap.next_t_us is not None else ():
+            if not gap.fingers or gap.fingers >> finger & 1:
+                next_us = _next(t_us, gap.next_t_us or 0)
+                at = there.between(finger, next_us, next_us)[:1]
+                out[at] = np.maximum(out[at], gap.seconds)  # of two that end here, one has the other in it
+    return out

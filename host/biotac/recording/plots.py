@@ -69,6 +69,7 @@ class Plots:
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
         self._stamps: Stamps | None = None
+        self._begin_us = 0
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._due: dict[tuple[str, int], int] = {}
@@ -81,7 +82,7 @@ class Plots:
         """
         begin_us, end_us = batch.first_t_us(), batch.last_t_us()
         if self._stamps is None and begin_us is not None:
-            self._stamps = Stamps(begin_us, arrived_ns)
+            self._begin_us, self._stamps = begin_us, Stamps(begin_us, arrived_ns)
         if self._stamps is None:
             return
         if end_us is not None and all_here_ns is not None:
@@ -94,18 +95,17 @@ class Plots:
             data = message.data if isinstance(message.data, bytes) else message.data(stamp_ns)
             self._writer.add_message(channel, stamp_ns, data, stamp_ns, message.seq)
 
-    def gap(self, gap: Gap) -> None:
-        """Write a log of a time without the board."""
-        text = plot_ros.log("biotac", gap.line(), gap.back_at_ns, plot_ros.WARN)
-        self._writer.add_message(self._channel("log", "/biotac/log"), gap.back_at_ns, text, gap.back_at_ns, 0)
-
-    def label(self, label: Label, t_us: int | None) -> None:
-        """Write a log of a label; one about the whole recording comes first, at 0."""
-        known = self._stamps is not None and t_us is not None
-        stamp_ns = max(0, int(self._stamps(np.array([t_us]))[0])) if self._stamps and known else 0
-        name = "label" if label.finger is None else f"label of finger{label.finger}"
-        text = plot_ros.log(name, label.line(), stamp_ns)
-        self._writer.add_message(self._channel("log", "/biotac/log"), stamp_ns, text, stamp_ns, 0)
+    def log(self, gaps: Iterable[Gap], labels: Iterable[Label], arrived_ns: int) -> None:
+        """Write logs: of gaps at the row after them, of labels where they begin; without any row, at ``arrived_ns``."""
+        entries = [("biotac", gap.line(), gap.next_t_us or gap.last_t_us, plot_ros.WARN) for gap in gaps]
+        for label in labels:
+            name = "label" if label.finger is None else f"label of finger{label.finger}"
+            entries.append((name, label.line(), label.t_us, plot_ros.INFO))
+        for name, line, t_us, level in entries:
+            at_us = np.array([self._begin_us if t_us is None else t_us])
+            stamp_ns = max(0, int(self._stamps(at_us)[0])) if self._stamps else arrived_ns
+            text = plot_ros.log(name, line, stamp_ns, level)
+            self._writer.add_message(self._channel("log", "/biotac/log"), stamp_ns, text, stamp_ns, 0)
 
     def _row_messages(self, batch: Batch) -> Iterator[_Message]:
         frames = batch.frames

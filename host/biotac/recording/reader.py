@@ -24,10 +24,10 @@ from ..wire.messages_gen import Setting
 from . import labels as labels_module
 from . import layout
 from .block import APPLIED, FRAME, as_sent
-from .blocks import Block, Blocks, Contents
+from .blocks import Block, Blocks, Contents, gap_of
 from .events import events_of
 from .facts import Facts
-from .labels import Label
+from .labels import Label, Times, gap_s_at, labels_at, times_of
 from .layout import finger_of
 from .scan import Index
 from .selection import Selection, fields_named, part_of
@@ -167,7 +167,7 @@ class Recording:
         chosen = fields_named(names)
         spans = [(start_s, stop_s)]
         if labels is not None:
-            found = labels_module.spans_us(self.labels, labels)
+            found = labels_module.spans_us(self.labels, labels, self.begin_us)
             times_s = [((begin - self.begin_us) / 1e6, (end + 1 - self.begin_us) / 1e6) for begin, end in found]
             spans = [(max(start_s, a), b if stop_s is None else min(stop_s, b)) for a, b in times_s]
         rows = np.concatenate([part_of(self.path, self._index, chosen, fingers, *span)[0] for span in spans])
@@ -175,10 +175,21 @@ class Recording:
             wanted = {fingers} if isinstance(fingers, (int, str)) else set(fingers)
             self._check_present({finger_of(finger, self.names) for finger in wanted})
         by_number = {finger: name for name, finger in self.names.items()}
-        return Selection(rows, tuple(chosen), by_number, self._label_of, self.stamp_ns)
+        return Selection(rows, tuple(chosen), by_number, self.labels_at, self.gap_s_at, self.stamp_ns)
 
-    def _label_of(self, rows: StructArray) -> NDArray[np.str_]:
-        return labels_module.of_rows(self.labels, rows["t_us"], rows["finger"])
+    def labels_at(self, rows: StructArray) -> NDArray[np.str_]:
+        """Which labels hold at each of ``rows`` (n,) of this recording."""
+        return labels_at(self.labels, rows, self._times if self.labels else {})
+
+    def gap_s_at(self, rows: StructArray) -> NDArray[np.float32]:
+        """How long the board, or the row's finger, was away just before each of ``rows`` (n,), in s."""
+        gaps = [gap for head in self.heads() for facts in head.rest.gaps if (gap := gap_of(facts)) is not None]
+        return gap_s_at(gaps, rows, self._times if gaps else {})
+
+    @cached_property
+    def _times(self) -> Times:
+        has_all = "_contents" in vars(self) or self._index is None
+        return times_of(self._contents.sent if has_all else self.select(fields=()).rows)
 
     @cached_property
     def labels(self) -> list[Label]:

@@ -28,11 +28,14 @@ def rewrite(
     heads = [recording.heads()[k].rest for k in numbers]
     begin_us = next((head.first_us for head in heads if head.first_us is not None), 0)
     labels = [
-        label for label in recording.labels if label.t_us is None or begin_us <= (label.end_us or label.t_us)
-    ]  # in order of time
+        label
+        for label in recording.labels  # in order of time
+        if label.t_us is None or begin_us <= max(label.end_us or label.t_us, recording.begin_us)
+    ]
     at_us = begin_us
     with out.open("xb") as stream:
         file = RecordingFile(stream, dict(metadata))
+        file.shift_us = (begin_us & 0xFFFFFFFF) - begin_us
         for done, (k, head) in enumerate(zip(numbers, heads, strict=True), 1):
             for gap in recording.gaps_before(k):
                 file.add_gap(gap)

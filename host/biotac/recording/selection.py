@@ -8,7 +8,7 @@ import warnings
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +151,7 @@ class Selection:
     fields: tuple[Field, ...]
     names: dict[int, str]
     label_of: Callable[[StructArray], NDArray[np.str_]]
+    gap_s_of: Callable[[StructArray], NDArray[np.float32]]
     stamp_ns: Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
     def __len__(self) -> int:
@@ -166,6 +167,11 @@ class Selection:
         """Which labels hold at each row (n,); the first use looks for them in the whole recording."""
         return self.label_of(self.rows)
 
+    @property
+    def gap_s(self) -> NDArray[np.float32]:
+        """How long the board or the finger was away just before each row (n,), in s; 0 where it was there."""
+        return self.gap_s_of(self.rows)
+
     def to_numpy(self) -> StructArray:
         """The rows."""
         return self.rows
@@ -173,8 +179,8 @@ class Selection:
     def to_pandas(self) -> Any:
         """A DataFrame with the flat names of host/docs/reference/rows.md: a row per frame, indexed by ``stamp`` (UTC).
 
-        Integer fields that can be missing are nullable (UInt16); all others have NumPy types. ``label`` is the last
-        column. ``attrs["units"]`` has each column's unit. Needs the extra ``export``.
+        Integer fields that can be missing are nullable (UInt16); all others have NumPy types. ``gap_s``
+        and ``label`` are the last columns. ``attrs["units"]`` has each column's unit. Needs the extra ``export``.
         """
         pandas: Any = imported("pandas", "a DataFrame", "export")
         columns: dict[str, Any] = {}
@@ -186,6 +192,7 @@ class Selection:
                 if field.invalid is not None:
                     column = pandas.arrays.IntegerArray(column, column == field.invalid)
                 columns[name], units[name] = column, field.unit
+        columns["gap_s"], units["gap_s"] = self.gap_s, "s"
         columns["label"] = pandas.Categorical(self.label)
         index = pandas.DatetimeIndex(pandas.to_datetime(self.stamp_ns(self.rows["t_us"]), utc=True), name="stamp")
         table = pandas.DataFrame(columns, index=index)
@@ -207,11 +214,14 @@ class Selection:
         texts = self.label
         label = np.full(shape, "", texts.dtype)
         label[round_of, finger_of] = texts
+        gap_s = np.zeros(shape, np.float32)
+        gap_s[round_of, finger_of] = self.gap_s
         coordinates: dict[str, Any] = {
             "time": self.stamp_ns(t_us).astype("datetime64[ns]"),
             "finger": [self.names.get(finger, str(finger)) for finger in numbers.tolist()],
             "t_us": ("time", t_us),
             "label": (("time", "finger"), label),
+            "gap_s": (("time", "finger"), gap_s, {"units": "s"}),
         }
         data: dict[str, Any] = {}
         for field in self.fields:
@@ -235,8 +245,8 @@ class Selection:
         """The means of each finger's rows over steps of 1 / ``rate_hz``, above 0 and at most the board's 100.
 
         ``t_us`` is the middle of a step. All means are float64, NaN where no row has a value; ``flags`` are those that
-        any of the rows has, ``trust`` is the lowest, other integers those of the first row. Steps without a row are
-        left out.
+        any of the rows has, ``trust`` is the lowest, other integers those of the first row; labels are all that hold in
+        the step, ``gap_s`` the longest. Steps without a row are left out.
         """
         if not 0 < rate_hz <= FRAME_HZ:
             raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ}")
@@ -264,7 +274,11 @@ class Selection:
                 total = np.add.reduceat(np.where(known, values, 0.0), first)
                 out[field.name] = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
         out["t_us"] = np.round((step[first] + 0.5) * step_us)
-        return replace(self, rows=out, fields=fields)
+        label, gap_s = _joined(self.label[order], first), self.gap_s[order]
+        longest_s = np.maximum.reduceat(gap_s, first) if len(first) else gap_s
+        return replace(
+            self, rows=out, fields=fields, label_of=partial(_given, label), gap_s_of=partial(_given, longest_s)
+        )
 
     def align(self, signal: npt.ArrayLike, t_s: npt.ArrayLike) -> tuple[NDArray[np.float64], Alignment]:
         """Another sensor's ``signal``, (m,) or (m, k) at ``t_s`` (m,) in s of its own clock, at this selection's rows.
@@ -289,6 +303,22 @@ class Selection:
         found = align_best("the selection and the signal", loads, times, _distance(values))
         at_s = found.to_reference_s(board_s + ELECTRODES_S)  # most of a row, and all results, come from the electrodes
         return means(times, values, at_s).reshape(-1, *other.shape[1:]), found
+
+
+def _given(values: NDArray[Any], rows: StructArray) -> NDArray[Any]:
+    return values  # of those rows
+
+
+def _joined(label: NDArray[np.str_], first: NDArray[np.intp]) -> NDArray[np.str_]:
+    """All labels of the rows from each of ``first`` to the next, each once."""
+    texts, code = np.unique(label, return_inverse=True)
+    joined = texts[code[first]].tolist() if len(first) else []
+    changing = np.flatnonzero(np.diff(code))
+    for k in np.unique(np.searchsorted(first, changing, "right") - 1).tolist():
+        own = code[first[k] : first[k + 1] if k + 1 < len(first) else None]
+        joined[k] = "; ".join(dict.fromkeys(part for c in dict.fromkeys(own.tolist()) for part in texts[c].split("; ")))
+        joined[k] = joined[k].strip("; ")
+    return np.array(joined, np.str_)
 
 
 def _distance(values: NDArray[np.float64]) -> NDArray[np.float64]:

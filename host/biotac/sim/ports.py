@@ -23,17 +23,28 @@ class SimPort:
     pace: float
     fingers: int | None = None
     seconds: float | None = None
+    clock_s: float = 0.0
     image: str | None = None
     verbs: tuple[str, ...] = ()  # done to an emulated board before it boots
 
 
 FORMS = {
-    "sim": "sim:SOURCE?pace=X&fingers=N&seconds=S",
+    "sim": "sim:SOURCE?pace=X&fingers=N&seconds=S&clock_s=T",
     "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S&do=VERB;VERB",
 }
 
-_READ: dict[str, Callable[[str], object]] = {"pace": parse_pace, "fingers": int, "seconds": float}
-_OPTIONS = {"sim": {"pace", "fingers", "seconds"}, "emu": {"pace", "fingers", "seconds", "source", "image", "do"}}
+
+def _clock_s(text: str) -> float:
+    if not 0 <= float(text) < 2**32 / 1e6:
+        raise ValueError(f"clock_s is {text}, expected seconds from 0 to below 4294.967296, where the clock wraps")
+    return float(text)
+
+
+_READ: dict[str, Callable[[str], object]] = {"pace": parse_pace, "fingers": int, "seconds": float, "clock_s": _clock_s}
+_OPTIONS = {
+    "sim": {"pace", "fingers", "seconds", "clock_s"},
+    "emu": {"pace", "fingers", "seconds", "source", "image", "do"},
+}
 
 
 def parse_sim(port: str, pace: float) -> SimPort:
@@ -55,7 +66,12 @@ def open_sim(port: str, pace: float) -> SimLink:
     """Open a sim: or emu: port. Raises PortError, or InputError for a source that cannot be played."""
     sim = parse_sim(port, pace)
     source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
-    return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image, verbs=sim.verbs))
+    board = (
+        SimBoard(source, pace=sim.pace, hold=True, clock_s=sim.clock_s)
+        if sim.board == "posix"
+        else start_board(sim.board, source, pace=sim.pace, image=sim.image, verbs=sim.verbs)
+    )
+    return SimLink(port, board)
 
 
 def start_board(

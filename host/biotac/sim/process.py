@@ -34,11 +34,19 @@ class SimBoard:
     """A running simulator process; ``path`` is a pty that any serial program can open, or a PORT of a socket."""
 
     def __init__(
-        self, source: Source, *, pace: float, hold: bool, live: bool = False, flash: Path | None = None
+        self,
+        source: Source,
+        *,
+        pace: float,
+        hold: bool,
+        live: bool = False,
+        flash: Path | None = None,
+        clock_s: float = 0.0,
     ) -> None:
         """Start it: it plays ``source``; ``live``: those are only the first rounds, and ``sensors`` is fed.
 
-        ``flash`` is the file in which it keeps settings and maps. Raises PortError when it does not start.
+        ``flash`` is the file in which it keeps settings and maps; ``clock_s``: what its clock shows at first. Raises
+        PortError when it does not start.
         """
         self.source = source
         self.pace = pace
@@ -51,7 +59,7 @@ class SimBoard:
         self._stdout_socket: socket.socket | None = None
         # Windows removes no file that is open; the second time the board is gone.
         self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-", ignore_cleanup_errors=True)
-        options = ["--pace", str(pace)]
+        options = ["--pace", str(pace), *(["--clock-us", str(round(clock_s * 1e6))] if clock_s else [])]
         if live:
             options += ["--live", str(source.samples.shape[1])]
         else:

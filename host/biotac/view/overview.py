@@ -20,7 +20,7 @@ def overview(recording: Recording) -> dict[str, Any]:
     at = np.clip((recording.frames["t_us"] - begin_us) * BINS // length_us, 0, BINS - 1)
     np.maximum.at(peaks, at, force_n)
     marks: list[dict[str, Any]] = [
-        {"at_s": ((label.t_us or begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.line()}
+        {"at_s": (max(label.t_us or begin_us, begin_us) - begin_us) / 1e6, "finger": label.finger, "name": label.line()}
         for label in recording.labels
     ]
     fingers: dict[tuple[int, str], list[int]] = {}  # one mark for what a whole hand feels within a tenth of a second
@@ -30,6 +30,12 @@ def overview(recording: Recording) -> dict[str, Any]:
         touched = " ".join(str(finger) for finger in sorted({*felt}))
         marks.append({"at_s": tenth / 10, "finger": None, "name": f"{name}, finger {touched}"})
     for gap in recording.gaps:
-        marks.append({"at_s": ((gap.next_t_us or begin_us) - begin_us) / 1e6, "finger": None, "name": gap.line()})
+        marks.append(
+            {
+                "at_s": ((gap.next_t_us or gap.last_t_us or begin_us) - begin_us) / 1e6,
+                "finger": None,
+                "name": gap.line(),
+            }
+        )
     marks.sort(key=lambda mark: mark["at_s"])
     return {"length_s": length_us / 1e6, "peaks_n": np.round(peaks, 2).tolist(), "marks": marks}

@@ -31,7 +31,7 @@ def long(tmp_path_factory) -> Path:
 
 def test_a_data_frame_has_every_number(recording) -> None:
     table = recording.to_pandas()
-    assert list(table.columns) == [*(name for field in FRAME_FIELDS for name in field.flat_names()), "label"]
+    assert list(table.columns) == [*(name for field in FRAME_FIELDS for name in field.flat_names()), "gap_s", "label"]
     for field in FRAME_FIELDS:
         rows = recording.frames[field.name].reshape(len(table), -1)
         for k, name in enumerate(field.flat_names()):
