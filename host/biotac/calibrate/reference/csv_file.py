@@ -11,7 +11,6 @@ is refused: a calibration would not notice a factor such as millimetres for metr
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import time
@@ -21,6 +20,7 @@ from typing import TextIO
 
 import numpy as np
 
+from ...cells import numbers
 from ...errors import DeviceLostError, InputError, RecordingError, exists_error
 from ...kernels.geometry import Floats
 from .mounting import Mounting, from_json
@@ -85,10 +85,10 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[..., Flo
         if not rows.strip():
             return np.empty((0, len(indices)))
         try:
-            return np.loadtxt(io.StringIO(rows), delimiter=separator, usecols=indices, ndmin=2, dtype=np.float64)
+            return numbers(rows.splitlines(), separator, indices)
         except ValueError as error:
             raise RecordingError(
-                f"{path}: {error}: expected a number in every column; save it with decimal points"
+                f"{path}: {error}: expected a number in every column, with a decimal point, or nothing, NA or null"
             ) from None
 
     return own, [name.strip().strip('"') for name in head.split(separator)], read

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...cells import numbers
 from ...documents import parse_toml, read_text
 from ...errors import InputError
 from ...wire.identity import SENSOR_SERIAL_BYTES
@@ -86,7 +87,7 @@ class Table:
     def _numbers(self, rows: list[str], columns: list[int]) -> Floats:
         """Of ``columns``. Raises ValueError with the line's number in the file."""
         try:
-            numbers: Floats = np.loadtxt(rows, delimiter=self._delimiter, usecols=columns, ndmin=2, quotechar='"')
+            return numbers(rows, self._delimiter, columns)
         except ValueError as error:
             numbered = re.sub(
                 r"row (\d+)( with)?",  # numpy counts from 1 in this one
@@ -94,7 +95,6 @@ class Table:
                 str(error),
             )
             raise ValueError(numbered) from error
-        return numbers
 
     def _place(self, name: Any) -> int:
         if name not in self._head:

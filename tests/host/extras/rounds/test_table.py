@@ -117,3 +117,15 @@ def test_a_table_that_is_wrong_is_refused_by_name_or_line(
 ) -> None:
     with pytest.raises(InputError, match=words):
         changed(write(tmp_path, f'time = "t"\n{columns}'), change)
+
+
+@pytest.mark.parametrize("missing", ["", "NA", "null", '"NA"', '""', "NaN", "#N/A"])
+def test_missing_words_are_missing_as_other_programs_write_them(tmp_path: Path, missing: str) -> None:
+    def change(lines: list[str]) -> list[str]:
+        cells = lines[150].split(",")
+        quoted = [",".join(f'"{cell}"' for cell in line.split(",") if cell) for line in lines[151:]]
+        return [*lines[:150], ",".join([*cells[:6], missing, *cells[7:]]), *quoted]
+
+    with changed(write(tmp_path, f'time = "t"\n{ONE}'), change) as hand:
+        counts = hand.read(100.0)["counts"]
+    assert np.argwhere(counts == 65535).tolist() == [[149, 4]]
