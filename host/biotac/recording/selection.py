@@ -23,12 +23,13 @@ from ..wire.frames import StructArray
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.slots import FRAME_HZ
 from . import layout
-from .alignment import ELECTRODES_S, PDC_S, Alignment, align_best, means
+from .alignment import ELECTRODES_S, PDC_S, Alignment, align_best, increasing, looks_like, means, seconds
 from .block import FRAME
-from .blocks import Blocks
+from .blocks import Blocks, Contents
 from .scan import Index
 
 _BY_NAME = {field.name: field for field in FRAME_FIELDS}
+_LONG = 100.0  # times as long as the selection, a signal is not of it, or not in s
 _OF_ROW = ("finger", "seq", "t_us")
 #: What says of a row that is not there that none of its values may be used.
 _ABSENT = (
@@ -129,6 +130,7 @@ def fields_named(names: Iterable[str] | None) -> list[Field]:
 
 def _check(blocks: Blocks, path: Path, gaps: int) -> None:
     if blocks.metadata is None:
+        Contents(path)  # raises RecordingError, which says what has become of it
         raise RecordingError(f"{path} holds no readable biotac recording; expected a file written by `biotac record`")
     layout.check_version(path, blocks.metadata)
     problems = list(blocks.scan.problems)
@@ -293,8 +295,17 @@ class Selection:
         sources = [name for name in after_s if name in (self.rows.dtype.names or ())]
         if not sources or len(np.unique(self.rows["finger"])) != 1:
             raise InputError("align needs the counts or pdc of one finger: select(fingers=..., fields=['counts', ...])")
-        other = np.asarray(signal, np.float64)
-        values, times, board_s = other.reshape(len(other), -1), np.asarray(t_s, np.float64), self.rows["t_us"] / 1e6
+        other = np.atleast_1d(np.asarray(signal, np.float64))
+        times = seconds("the signal", t_s, len(other))
+        kept = increasing("the signal", times)
+        other, times = other[kept], times[kept]
+        values, board_s = other.reshape(len(other), -1), self.rows["t_us"] / 1e6
+        if times[-1] - times[0] > _LONG * (board_s[-1] - board_s[0]):
+            usual_s, span_s = float(np.median(np.diff(times))), float(times[-1] - times[0])
+            raise RecordingError(
+                f"the signal: times span {span_s:.6g} s, the selection {board_s[-1] - board_s[0]:.6g}; "
+                f"{looks_like(1.0 / usual_s, 0.5, 50_000.0)}, or give the part that is of the same run"
+            )
         loads = []
         for name in sources:
             own = self.rows[name].reshape(len(self), -1).astype(np.float64)

@@ -145,7 +145,7 @@ GOOD = "t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm"
         ("t_s,Fx_gf,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "is in 'gf'"),
         ("t_s,Fx_N,Fy_N,a,Mx_Nmm,My_Nmm,Mz_Nmm", "", "no column Fz_N"),
         ("t_s,Fx_N,Fx_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "is there twice"),
-        (GOOD, "milliseconds", "0.5 samples per second: expected 20 to 20000; is t in ms"),
+        (GOOD, "milliseconds", "0.5 samples per second: expected 20 to 20000; t looks like ms"),
         (GOOD, "backward", r"time goes from 2\.000000 to 1\.990000 s after sample 1000"),
         (GOOD, "millinewton", r"force changes by \d+ N .* is it in mN"),
         (GOOD, "kilonewton", r"force changes by 0\.00\d+ N .* kN"),
@@ -317,3 +317,16 @@ def test_a_file_that_grows_is_read_row_by_row(tmp_path: Path) -> None:
     reader.close()
     with pytest.raises(RecordingError, match="expected --mounting"):
         GrowingCsv(path)
+
+
+@pytest.mark.parametrize("missing", ["", "NA", "null", '"NA"', "NaN", "#N/A", "None"])
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_a_csv_may_have_missing_words_and_quoted_numbers(tmp_path: Path, missing: str, quote: str) -> None:
+    """As pandas, R, DuckDB and spreadsheets write them: such a reading is one that the sensor marks as bad."""
+    path = written(tmp_path, "t_s,Fx_N,Fy_N,Fz_N", np.column_stack([np.arange(N) / 100.0, wrench()[:, :3]]))
+    head, *rows = path.read_text().splitlines()
+    rows = [",".join(f"{quote}{cell}{quote}" for cell in row.split(",")) for row in rows]
+    rows[700] = ",".join([*rows[700].split(",")[:3], missing])
+    path.write_text("\n".join([head, *rows]) + "\n")
+    samples = read_reference(str(path), LIN).samples
+    assert np.flatnonzero(np.isnan(samples.wrench).any(axis=1)).tolist() == [700] and len(samples) == N

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ...errors import RecordingError, RecordingWarning, printable
 from ...kernels.geometry import Floats
+from ...recording.alignment import increasing, looks_like
 from .mounting import Mounting
 
 RATE_HZ = (20.0, 20_000.0)  # below 20 Hz a press has only a few points; ATI's fastest boxes give 7 to 8 kHz
@@ -55,20 +56,13 @@ def checked(where: str, samples: Samples) -> Samples:
 
     Raises RecordingError, with the number that shows why, for samples that cannot be a finger's reference.
     """
-    if len(samples) < 2:
-        raise RecordingError(f"{where}: {len(samples)} samples: expected a recording of several minutes; record again")
-    step = np.diff(samples.t_s)
-    if not (step > 0.0).all():
-        k = int(np.argmin(step > 0.0))  # a NaN is not above 0 either
-        raise RecordingError(
-            f"{where}: time goes from {samples.t_s[k]:.6f} to {samples.t_s[k + 1]:.6f} s after sample {k}: expected "
-            "increasing times; sort the samples, or use one run at a time"
-        )
-    rate_hz = 1.0 / float(np.median(step))
+    kept = increasing(where, samples.t_s)
+    samples = Samples(samples.t_s[kept], samples.wrench[kept])
+    rate_hz = 1.0 / float(np.median(np.diff(samples.t_s)))
     if not RATE_HZ[0] <= rate_hz <= RATE_HZ[1]:
-        guess = "is t in ms or us?" if rate_hz < RATE_HZ[0] else "is t in s?"
         raise RecordingError(
-            f"{where}: {rate_hz:.4g} samples per second: expected {RATE_HZ[0]:g} to {RATE_HZ[1]:g}; {guess}"
+            f"{where}: {rate_hz:.4g} samples per second: expected {RATE_HZ[0]:g} to {RATE_HZ[1]:g}; "
+            f"{looks_like(rate_hz, *RATE_HZ)}"
         )
     bad: npt.NDArray[np.bool_] = ~np.isfinite(samples.wrench.sum(axis=1))
     # a few readings that the sensor marks as bad are left out later; a tenth of all is too many
