@@ -70,18 +70,22 @@ class Blocks:
     def __iter__(self) -> Iterator[Block]:
         tables: dict[int, bytes] = {}
         number = 0
+        numbers: set[int] = set()
         for record in self.scan:
             if isinstance(record, Metadata):
                 self._add_metadata(record)
                 continue
             topic, message = record
             if message.sequence != number:
-                if tables or message.sequence < number:
+                if message.sequence in numbers:
+                    self._report_misplaced("holds two recordings that were merged; read the files that it was made of")
+                elif tables or message.sequence < number:
                     self._report_misplaced()
                 tables, number = {}, message.sequence
             if topic != layout.REST:
                 tables[int(topic.removeprefix(layout.TABLE))] = message.data
                 continue
+            numbers.add(number)
             block = self._block(message, tables)
             if block is not None:
                 yield block
@@ -122,11 +126,12 @@ class Blocks:
         if record.name in (layout.METADATA_NAME, layout.METADATA_AGAIN) and self.metadata is None:
             self.metadata = facts
 
-    def _report_misplaced(self) -> None:
+    def _report_misplaced(
+        self, how: str = "is damaged: parts of it are missing or out of order, and were skipped"
+    ) -> None:
         """Report tables that are missing or misplaced, unless an earlier problem already explains it."""
         if not self.scan.problems:
-            name = self.scan.path.name
-            self.scan.problems.append(f"{name} is damaged: parts of it are missing or out of order, and were skipped")
+            self.scan.problems.append(f"{self.scan.path.name} {how}")
 
     def _block(self, message: Message, tables: dict[int, bytes]) -> Block | None:
         try:
@@ -183,7 +188,7 @@ class Contents:
         self.cut_off = scanned.scan.cut_off
         self.damaged_chunks = scanned.scan.damaged_chunks
         if scanned.metadata is None:
-            raise RecordingError(self._without_metadata(scanned.damaged_metadata > 0))
+            raise RecordingError(self._without_metadata(scanned.damaged_metadata > 0, bool(self.blocks)))
         self.metadata = scanned.metadata
         self.arrived_ns = [block.arrived_ns for block in self.blocks]
         # Imported recordings store the first time for both.
@@ -203,7 +208,7 @@ class Contents:
         self.pac_lost, self.disordered = last.pac_lost, last.disordered
         self.gaps_before = [[gap for facts in rest.gaps if (gap := self._gap(facts)) is not None] for rest in rests]
         self.gaps = [gap for before_block in self.gaps_before for gap in before_block]
-        in_damaged = last.frames - len(self.sent)
+        in_damaged = max(0, last.frames - len(self.sent))  # more where two were merged
         self.frames_lost = last.frames_lost + in_damaged
         if self.cut_off and not len(self.seq):
             raise RecordingError(f"{path} was cut off before its first second was complete; record it again")
@@ -221,13 +226,16 @@ class Contents:
             self.problems.append(gap.line())
         return gap
 
-    def _without_metadata(self, damaged: bool) -> str:
+    def _without_metadata(self, damaged: bool, has_blocks: bool) -> str:
         if damaged:
             return f"{self._path} has damaged metadata (wrong checksum) and cannot be used; try another copy"
         if self.damage:
             return (
                 f"{self._path} is cut off or damaged and has no readable metadata; try another copy or record it again"
             )
+        if has_blocks:
+            how = "as `mcap filter` and `recover` drop it; give them --include-metadata"
+            return f"{self._path} has a recording's messages but not its metadata, {how}"
         return f"{self._path} is an MCAP file but not a biotac recording; expected a file written by `biotac record`"
 
     def _describe_losses(self, losses: list[tuple[int, int, int]], in_damaged: int) -> None:

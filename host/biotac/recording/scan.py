@@ -40,6 +40,7 @@ _HEAD = struct.Struct("<BQ")  # of a record: opcode, length
 _START = struct.Struct("<BQH")  # a record's head, and the channel that a message index begins with
 # Of a chunk index: first and last time, where the chunk begins, its length, bytes of its channels' list, one channel.
 _CHUNK_INDEX = struct.Struct("<QQQQIH")
+_CHANNEL, _OF_CHANNEL = struct.Struct("<H"), 10  # of a chunk, in its index; bytes of each
 _METADATA_INDEX = struct.Struct("<QQ")
 _FOOTER_RECORD = struct.Struct("<BQQQI")
 # As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
@@ -93,10 +94,11 @@ class Index:
             raise RecordingError(f"{path} has changed or gone since it was opened; open it again")
 
     @classmethod
-    def _parsed(cls, state: tuple[int, int], data: bytes) -> Index:
+    def _parsed(cls, state: tuple[int, int], data: bytes) -> Index | None:
         records: list[Schema | Channel] = []
         chunks: list[tuple[int, int, int]] = []
         metadata: list[Place] = []
+        shared: set[int] = set()  # channels that share a chunk
         at = 0
         while at < len(data):
             opcode, length = _HEAD.unpack_from(data, at)
@@ -106,10 +108,14 @@ class Index:
             elif opcode == Opcode.CHUNK_INDEX:
                 _, _, begin, size, channels, channel = _CHUNK_INDEX.unpack_from(data, at)
                 chunks += [(begin, size, channel)] if channels else []
+                ids = range(at + _CHUNK_INDEX.size - 2, at + _CHUNK_INDEX.size - 2 + channels, _OF_CHANNEL)
+                shared.update(_CHANNEL.unpack_from(data, k)[0] for k in (ids if len(ids) > 1 else ()))
             elif opcode == Opcode.METADATA_INDEX:
                 metadata.append(_METADATA_INDEX.unpack_from(data, at))
             at += length
         topics = {record.id: record.topic for record in records if isinstance(record, Channel)}
+        if any(topics[k] == layout.REST or topics[k].startswith(layout.TABLE) for k in shared):
+            return None  # another program has written the file again
         blocks: list[dict[str, Place]] = [{}]
         for begin, size, channel in chunks:  # a block's rest comes after its tables
             topic = topics[channel]
