@@ -75,8 +75,26 @@ class AsyncHand:
         return self.hand[finger]
 
     async def ask(self, command: Callable[[Hand], Answer]) -> Answer:
-        """Run a command in another thread: ``await hand.ask(lambda h: h.status())``."""
-        return await asyncio.to_thread(command, self.hand)
+        """Run a command in another thread: ``await hand.ask(lambda h: h.status())``.
+
+        One that is cancelled, as by ``asyncio.timeout``, and still reads ends at once: what it has taken is read next.
+        """
+        hand = self.hand
+        threads: list[threading.Thread] = []
+
+        def run() -> Answer:
+            threads.append(threading.current_thread())
+            try:
+                return command(hand)
+            finally:
+                hand._reading.may_read(threads.pop())
+
+        try:
+            return await asyncio.to_thread(run)
+        except asyncio.CancelledError:
+            for thread in [*threads]:  # it has begun, and not ended
+                hand._reading.give_up(thread)
+            raise
 
     async def batches(self) -> AsyncIterator[Batch]:
         """Batches as they arrive, starting the stream if need be. Each iteration gets all batches from its start on.

@@ -8,6 +8,7 @@ import warnings
 import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn, SupportsIndex, cast
 
@@ -241,10 +242,17 @@ class Hand(Commands, Subscriptions):
         yield from self._reading.batches(every_s)  # in a generator of the hand's, so that it is not collected meanwhile
 
     def frames(self) -> Iterator[Frame]:
-        """Yield typed frames as they arrive; starts and ends like ``batches``."""
+        """Yield typed frames as they arrive; starts and ends like ``batches``. Who leaves it gets the others next."""
         for batch in self.batches():
-            for row in batch.frames:
-                yield Frame.from_row(row)
+            k = 0
+            try:
+                for k, row in enumerate(batch.frames, 1):  # noqa: B007 (used below)
+                    yield Frame.from_row(row)
+            except GeneratorExit:
+                if k < len(batch.wire):
+                    rest = replace(batch, wire=batch.wire[k:], seq=batch.seq[k:], t_us=batch.t_us[k:])
+                    self._reading.put_back(rest)
+                raise
 
     def _start(self) -> None:
         self._reading.start()

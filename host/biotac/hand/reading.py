@@ -25,8 +25,10 @@ class Reading:
         self._stream = stream
         self._latest = latest
         self._queue = Queue(self._reader, is_read=False)
-        self._thread: threading.Thread | None = None  # that takes
-        self._turn = threading.Lock()
+        self._thread: threading.Thread | None = None  # that takes, in so many iterations that have not ended
+        self._iterations = 0
+        self._turn = threading.Condition()
+        self._given_up: set[threading.Thread] = set()  # whoever waited for what they read does not any more
         self._reader.add(self._queue)
 
     def stop_buffering(self) -> None:
@@ -55,6 +57,8 @@ class Reading:
             self.start()
             while True:
                 self._latest.report()
+                if self._given_up and threading.current_thread() in self._given_up:
+                    raise InputError("this read was given up, by a timeout or a cancelled task; read again")
                 over = not stream.on  # before the queue is emptied, so that nothing is left in it
                 batch = self._queue.get(wait=not (over or closing.is_set()), timeout_s=every_s)
                 if batch is not None:
@@ -76,17 +80,48 @@ class Reading:
     def _by_one_thread(self) -> Iterator[None]:
         here = threading.current_thread()
         with self._turn:
+            self._turn.wait_for(lambda: self._thread not in self._given_up or not self._iterations)
             before = self._thread
-            if before is not None and before is not here and before.is_alive():
+            if self._iterations and before is not None and before is not here and before.is_alive():
                 raise InputError(
                     f"thread {before.name!r} is reading this hand, and {here.name!r} would take part of its data; "
-                    "read in one thread, or give each an on_batch callback"
+                    "read in one thread, end its loop or close its generator, or give each an on_batch callback"
                 )
+            self._iterations = self._iterations + 1 if before is here else 1
             self._thread = here
         try:
             yield
-        finally:
-            self._thread = before
+        finally:  # in whichever order generators are closed, and by whom
+            with self._turn:
+                self._iterations -= self._thread is here
+                self._turn.notify_all()
+
+    def give_up(self, thread: threading.Thread) -> None:
+        """End what ``thread`` reads: nobody waits for it any more. What it has taken is read next."""
+        with self._turn:
+            self._given_up.add(thread)
+        self._queue.wake()
+
+    def may_read(self, thread: threading.Thread) -> None:
+        """Take back ``give_up``: that has ended."""
+        with self._turn:
+            self._given_up.discard(thread)
+            self._turn.notify_all()
+
+    def put_back(self, batch: Batch) -> None:
+        """Let the next read begin with a batch that was taken and not used."""
+        self._queue.put_back(batch)
+
+    def _or_put_back(self, found: list[Batch]) -> Iterator[Batch]:
+        """``batches``; where waiting for one ends in an error, what was ``found`` before is read next."""
+        try:
+            yield from self.batches()
+        except GeneratorExit:
+            raise
+        except BaseException:
+            if found:
+                self.put_back(join(found))
+            raise
 
     def read_batch(self, seconds: float, fresh: bool) -> Batch:
         """See Hand.read_batch."""
@@ -98,7 +133,7 @@ class Reading:
         found: list[Batch] = []
         end_us: int | None = None
         first_status_us: int | None = None
-        for batch in self.batches():
+        for batch in self._or_put_back(found):
             for status in (m for m in batch.messages if isinstance(m, wire.Status)):
                 first_status_us = status.t_us if first_status_us is None else first_status_us
                 if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:

@@ -228,7 +228,7 @@ class LockStep(World):
         link.away = False
         while time.monotonic() < until_s:
             self.hand.check()
-            if self.hand.connected and wanted is not None and self.hand.status().streams == wanted.streams:
+            if self.hand.connected and (wanted is None or self.hand.status().streams == wanted.streams):
                 break
             time.sleep(0.001)
         self._count()

@@ -1,0 +1,72 @@
+"""Who leaves a loop or a read, in whatever way, loses nothing, and the hand is free afterwards."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.sim import SimFinger, world
+
+
+def follows(before: int, rows: np.ndarray) -> bool:
+    return rows["seq"].tolist() == list(range(before + 1, before + 1 + len(rows)))
+
+
+def in_thread(hand: biotac.Hand) -> np.ndarray:
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(hand.read, 0.2).result()
+
+
+@pytest.mark.parametrize("pace", [0, 20])
+def test_what_follows_a_loop_that_was_left_is_read_next(pace: float) -> None:
+    with biotac.open("sim:press.toml?seconds=1000", pace=pace) as hand:
+        for leave in (29, 60, 95):
+            for frame in hand.frames():
+                if frame.seq >= leave:
+                    break
+            rows = hand.read(seconds=0.2)
+            assert follows(frame.seq, rows), (frame.seq, rows["seq"])
+        assert (hand.stats.frames_lost, hand.stats.frames_skipped) == (0, 0)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_generators_are_closed_in_any_order(order: tuple[int, ...]) -> None:
+    with biotac.open("sim:press.toml?seconds=1000") as hand:
+        made = [hand.batches(), hand.frames(), hand.batches()]
+        for generator in made:
+            next(generator)
+        with pytest.raises(biotac.InputError, match=r"'MainThread' is reading.*close its generator"):
+            in_thread(hand)
+        for k in order:
+            made[k].close()
+        assert len(in_thread(hand))
+
+
+def test_an_ask_that_timed_out_ends_and_loses_nothing() -> None:
+    async def main() -> None:
+        async with biotac.aio.open("sim:press.toml?seconds=1000", pace=1) as hand:
+            first = await hand.ask(lambda h: h.read(0.1))
+            begun_s = time.monotonic()
+            with pytest.raises(asyncio.TimeoutError):
+                await asyncio.wait_for(hand.ask(lambda h: h.read(30)), 0.3)
+            rows = await hand.ask(lambda h: h.read(0.1))
+            assert time.monotonic() - begun_s < 15
+            assert follows(int(first["seq"][-1]), rows)
+
+    asyncio.run(main())
+
+
+def test_an_unplug_after_stop_stands_still_for_nobody() -> None:
+    with world({"index": SimFinger(1)}) as hands:
+        hands.run(0.5)
+        hands.hand.stop()
+        begun_s = time.monotonic()
+        hands.unplug(0.2)
+        hands.run(0.5)
+        assert time.monotonic() - begun_s < 30
+        assert not hands.hand.streaming
