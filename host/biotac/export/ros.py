@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from ..errors import InputError
+from ..errors import BiotacError, InputError
 from ..recording.plot_ros import INFO, LOG, WARN, time
 from ..recording.reader import Recording
 from .bags import is_ros1, opened
@@ -54,7 +54,10 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
     done = 0
     with Writer1(path) if ros1 else Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         if beside is not None:
-            _copy(beside, bag, ros1)
+            try:
+                _copy(beside, bag, ros1, store)
+            except _WriterError as error:
+                raise error.__cause__ or error from None
 
         def topic(name: str, kind: str) -> Callable[[int, Any], None]:
             connection = bag.add_connection(f"/biotac/{name}", kind, typestore=store)
@@ -69,7 +72,9 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
                     show(done / total)
                 done += 1
         begin_us = recording.begin_us
-        at_ns = recording.stamp_ns(np.array([max(label.t_us or begin_us, begin_us) for label in recording.labels], np.int64)).tolist()
+        at_ns = recording.stamp_ns(
+            np.array([max(label.t_us or begin_us, begin_us) for label in recording.labels], np.int64)
+        ).tolist()
         logged = [(ns, INFO, label.line()) for ns, label in zip(at_ns, recording.labels, strict=True)]
         ends_us = [gap.next_t_us or gap.last_t_us or begin_us for gap in recording.gaps]
         ends_ns = recording.stamp_ns(np.array(ends_us, np.int64)).tolist()
@@ -83,20 +88,49 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show, *, be
             log(stamp_ns, store.types[log_kind](*entry))
 
 
-def _copy(source: Path, bag: Any, ros1: bool) -> None:
+def _copy(source: Path, bag: Any, ros1: bool, store: Any) -> None:
     """All messages of the bag ``source``. Raises InputError for one that cannot be read, or of the other ROS."""
     if is_ros1(source) != ros1:
         raise InputError(f"{source} is no bag of ROS {1 if ros1 else 2}: name the output {'.ros2' if ros1 else '.bag'}")
     with opened(source) as reader:
         if results := [c.topic for c in reader.connections if re.match("/biotac/(finger|log)", c.topic)]:
             raise InputError(f"{source} has results already ({results[0]}); expected the bag that the robot recorded")
-        digest = "md5sum" if ros1 else "rihs01"
-        to = {
-            c.id: bag.add_connection(c.topic, c.msgtype, msgdef=c.msgdef.data, **{digest: c.digest})
-            for c in reader.connections
-        }
+        made = {c.id: (c.topic, c.msgtype, _as_there(source, c, ros1, store)) for c in reader.connections}
+        try:
+            to = {k: bag.add_connection(topic, kind, **how) for k, (topic, kind, how) in made.items()}
+        except Exception as error:
+            raise _WriterError from error
         for connection, logged_ns, raw in reader.messages():
-            bag.write(to[connection.id], logged_ns, raw)
+            try:
+                bag.write(to[connection.id], logged_ns, raw)
+            except Exception as error:
+                raise _WriterError from error
+
+
+class _WriterError(BiotacError):
+    """Its cause is the writer's own error, which is no word on the bag that is read."""
+
+
+def _as_there(source: Path, connection: Any, ros1: bool, store: Any) -> dict[str, Any]:
+    """How a topic was recorded: its type's definition and hash, and latching and caller, or QoS.
+
+    What the bag lacks (ROS 2 Humble writes no hashes, and sqlite3 storage no definitions) comes from the definition, or
+    from ROS's own types. Raises InputError for a type of which there is none.
+    """
+    kind, text, digest, own = connection.msgtype, connection.msgdef.data, connection.digest, store
+    if not text:
+        if kind not in store.fielddefs:
+            raise InputError(f"{source} has no definition of {kind} ({connection.topic}); record it with mcap storage")
+        text = store.generate_msgdef(kind, ros_version=1 if ros1 else 2)[0]
+    if not digest and not ros1:
+        own = get_typestore(Stores.ROS2_HUMBLE)
+        is_idl = connection.msgdef.format.name == "IDL"
+        own.register(get_types_from_idl(text) if is_idl else get_types_from_msg(text, kind))
+        digest = own.hash_rihs01(kind)
+    ext = connection.ext
+    if ros1:
+        return {"msgdef": text, "md5sum": digest, "callerid": ext.callerid, "latching": ext.latching}
+    return {"msgdef": text, "rihs01": digest, "offered_qos_profiles": ext.offered_qos_profiles}
 
 
 def _header(types: Any, stamp_ns: int, frame_id: str | None) -> Any:
