@@ -62,7 +62,8 @@ export class Vcd {
       text += `${level}${this.marks.get(line)}\n`
     }
     this.changes.splice(0, count)
-    if (text !== '') fs.writeSync(this.file, text)
+    // Sigrok sees no change at a file's last time, so one without a change follows.
+    if (text !== '') fs.writeSync(this.file, `${text}#${++this.written}\n`)
   }
 
   #set(at, line, level) {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,9 @@ STAMP = Field(
     "stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), corrected for the drift seen in the recording"
 )
 
-GAP = Field("gap_s", "<f4", "s", "how long the board or this finger was away just before this row; 0 where it was there")
+GAP = Field(
+    "gap_s", "<f4", "s", "how long the board or this finger was away just before this row; 0 where it was there"
+)
 
 APPLIED = Field("applied_n", "<f8", "N", "force on a simulated finger; NaN where it is not known", AXES)
 
@@ -104,6 +106,13 @@ def tables(recording: Recording, *, applied: bool = True) -> list[Table]:
             if len(of_finger):
                 made.append(Table(kind, finger, columns, _arrays(recording, columns, of_finger)))
     return made
+
+
+def turned(table: Table, turn: NDArray[np.float64] | None) -> Table:
+    """The table with its vectors turned by (3, 3)."""
+    vectors = [column for column in table.columns if column.parts == AXES and turn is not None]
+    made = {c.name: (table.arrays[c.name] @ np.transpose(turn)).astype(c.dtype) for c in vectors}  # type: ignore[arg-type]
+    return replace(table, arrays=table.arrays | made)
 
 
 def _arrays(recording: Recording, columns: Sequence[Field], rows: StructArray) -> dict[str, NDArray[Any]]:

@@ -8,10 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import InputError, imported
 from ..partial_file import whole
 from ..recording.reader import Recording
-from .columns import Show, Table, tables
+from .columns import Show, Table, tables, turned
 from .trace import trace_tables
 
 
@@ -42,13 +45,15 @@ def export(
     *,
     overwrite: bool = False,
     frames: Mapping[int, str] | None = None,
+    turns: Mapping[int, NDArray[np.float64]] | None = None,
     beside: Path | None = None,
     trace: bool = False,
     show: Show = lambda share: None,
 ) -> list[Path]:
     """Write ``recording`` in the format given by ``out``'s suffix; return the paths written.
 
-    ``frames``: names of fingers' coordinate frames. ``beside``: a bag whose messages are in the written one, too.
+    ``frames``: names of fingers' coordinate frames; ``turns``: rotations (3, 3) into them, of vectors alone, as their
+    origin stays. ``beside``: a bag whose messages are in the written one, too.
     ``trace``: the tare machine's course as well, in a flat format.
 
     An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an extra that is
@@ -56,6 +61,7 @@ def export(
     """
     module = writer_for(out)
     made = [replace(table, frame=(frames or {}).get(table.finger or 0)) for table in tables(recording)]
+    made = [turned(table, (turns or {}).get(table.finger or 0)) for table in made]
     if beside is not None and not hasattr(module, "BESIDE"):
         raise InputError(f"{out}: only a bag can have another bag's messages; name it .bag or .ros2")
     if trace and not module.KINDS_APART:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from ..recording.reader import Recording
 from .columns import Show, Table
@@ -26,7 +27,8 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
             for column in table.columns:
                 values = table.arrays[column.name]
                 if values.dtype.kind == "U":
-                    values = values.astype(h5py.string_dtype())
+                    texts = np.char.encode(values, "utf-8")  # of one length: Octave's load ends at any other text
+                    values = texts.astype(h5py.string_dtype("utf-8", max(1, texts.dtype.itemsize)))
                 data = group.create_dataset(column.name, data=values, compression="gzip", shuffle=True)
                 data.attrs["unit"] = column.unit
                 data.attrs["what"] = column.what

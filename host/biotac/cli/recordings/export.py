@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...documents import read_json
 from ...errors import InputError, printable
@@ -59,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FINGER=ID",
         action="append",
         default=[],
-        help="a finger's frame: index=rh_ffdistal, for rviz",
+        help="a finger's frame, for rviz: index=rh_ffdistal names it and turns nothing; index=rh_ffdistal@90,0,0 turns "
+        "vectors by the roll, pitch and yaw, in degrees, of the BioTac's axes in it",
     )
     parser.add_argument("--beside", metavar="BAG", type=Path, help="with all messages of this bag, in .bag or .ros2")
     text = "write every REC into the folder OUT, as Parquet by day and finger"
@@ -122,7 +127,10 @@ def run(args: argparse.Namespace) -> int:
             text = f"{made['frames']} frames, {changed},"
         else:
             recording = load(source)
-            how = {"frames": frames_of(args.frame, recording.names), "beside": args.beside, "trace": args.trace}
+            frames = frames_of(args.frame, recording.names)
+            turns = {finger: turn_of(text) for finger, text in frames.items() if "@" in text}
+            frames = {finger: text.partition("@")[0] for finger, text in frames.items()}
+            how = {"frames": frames, "turns": turns, "beside": args.beside, "trace": args.trace}
             written += export(recording, out, overwrite=args.force, show=show, **how)
             made = {"frames": len(recording.frames), "pac": len(recording.pac)}
             text = f"{made['frames']} frames"
@@ -167,6 +175,20 @@ def frames_of(given: list[str], names: Mapping[str, int]) -> dict[int, str]:
         return {finger_of(int(finger) if finger.isdecimal() else finger, names): name for finger, _, name in parts}
     except KeyError as error:
         raise InputError(f"--frame: {error.args[0]}") from error
+
+
+def turn_of(text: str) -> NDArray[np.float64]:
+    """The rotation (3, 3) in ID@ROLL,PITCH,YAW, about the fixed axes x, y, z in turn, as in a URDF."""
+    try:
+        roll, pitch, yaw = (math.radians(float(part)) for part in text.partition("@")[2].split(","))
+        if not all(map(math.isfinite, (roll, pitch, yaw))):
+            raise ValueError
+    except ValueError:
+        raise InputError(f"--frame: {text!r}, expected ID or ID@ROLL,PITCH,YAW in degrees") from None
+    (sx, sy, sz), (cx, cy, cz) = ([f(a) for a in (roll, pitch, yaw)] for f in (math.sin, math.cos))
+    about_x, about_y = [[1, 0, 0], [0, cx, -sx], [0, sx, cx]], [[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]
+    turn: NDArray[np.float64] = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]]) @ about_y @ about_x
+    return turn
 
 
 def read_settings(path: Path) -> dict[wire.Setting, int]:
