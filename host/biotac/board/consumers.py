@@ -89,6 +89,7 @@ class Queue(Consumer):
     def put_back(self, batch: Batch) -> None:
         """Return a batch that was taken and not used."""
         self._back.append(batch)
+        self._back.sort(key=lambda batch: -(batch.first_t_us() or 0))  # loops end in any order, also one within another
 
     def clear(self) -> None:
         """Discard what waits without counting it: the consumer does not want it."""

@@ -15,6 +15,8 @@ from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join, split
 from .views import Latest
 
+GIVEN_UP_S = 2.0  # for a read that was given up to end, if the program's own loop lets it
+
 
 class Reading:
     """``Hand.batches``, ``frames`` and ``read``, which share one queue."""
@@ -80,7 +82,7 @@ class Reading:
     def _by_one_thread(self) -> Iterator[None]:
         here = threading.current_thread()
         with self._turn:
-            self._turn.wait_for(lambda: self._thread not in self._given_up or not self._iterations)
+            self._turn.wait_for(lambda: self._thread not in self._given_up or not self._iterations, GIVEN_UP_S)
             before = self._thread
             if self._iterations and before is not None and before is not here and before.is_alive():
                 raise InputError(
@@ -112,17 +114,6 @@ class Reading:
         """Let the next read begin with a batch that was taken and not used."""
         self._queue.put_back(batch)
 
-    def _or_put_back(self, found: list[Batch]) -> Iterator[Batch]:
-        """``batches``; where waiting for one ends in an error, what was ``found`` before is read next."""
-        try:
-            yield from self.batches()
-        except GeneratorExit:
-            raise
-        except BaseException:
-            if found:
-                self.put_back(join(found))
-            raise
-
     def read_batch(self, seconds: float, fresh: bool) -> Batch:
         """See Hand.read_batch."""
         if not 0 < seconds < float("inf"):
@@ -131,16 +122,24 @@ class Reading:
             self._board.command(wire.Ping(0))  # a barrier: its reply comes after everything made before
             self._queue.clear()
         found: list[Batch] = []
+        try:
+            return self._read_batch(seconds, found)
+        except BaseException:
+            if found:
+                self.put_back(join(found))  # so that it is read next
+            raise
+
+    def _read_batch(self, seconds: float, found: list[Batch]) -> Batch:
         end_us: int | None = None
         first_status_us: int | None = None
-        for batch in self._or_put_back(found):
-            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
-                first_status_us = status.t_us if first_status_us is None else first_status_us
-                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
-                    return join(found)  # the board is there, its sensors are not
+        for batch in self.batches():
             first_us, last_us = batch.first_t_us(), batch.last_t_us()
             if end_us is None and first_us is not None:
                 end_us = first_us + round(seconds * 1e6)
+            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
+                first_status_us = status.t_us if first_status_us is None else first_status_us
+                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
+                    return join([*found, batch])  # the board is there, its sensors are not
             if end_us is None or last_us is None or last_us < end_us:
                 found.append(batch)
                 continue

@@ -131,18 +131,17 @@ class Recorder(Tap):
     # ---- on the reading thread -----------------------------------------------------------------
 
     def put_raw(self, chunk: bytes) -> None:
-        if self._put_bytes - self._written_bytes > LIMIT_BYTES:
+        is_late = self._put_bytes - self._written_bytes > LIMIT_BYTES
+        if is_late or self._dropped is not None:
+            rest, delimiter, following = chunk.partition(b"\0")  # whole packets alone are written, and dropped
             if self._dropped is None:
-                self._dropped = Gap("slow", None, None, time.time_ns(), 0, self._boot_id)
-                self._append(self._chunk)
-                self._chunk = b""
-                self._take_back()
-            return
-        if self._dropped is not None:
-            _, delimiter, chunk = chunk.partition(b"\0")
-            if not delimiter:
+                chunk = rest + delimiter
+                self._dropped = Gap("slow", None, None, time.time_ns(), 0, self._boot_id) if delimiter else None
+            elif is_late or not delimiter:
                 return
-            self._end_gap()
+            else:
+                chunk = following
+                self._end_gap()
         self._append(self._chunk)
         self._chunk = chunk
 
@@ -151,17 +150,6 @@ class Recorder(Tap):
         if self._dropped is not None:
             self._append(replace(self._dropped, back_at_ns=time.time_ns()))
             self._dropped = None
-
-    def _take_back(self) -> None:
-        """Take back a packet of which the rest is dropped: it would come as a damaged one."""
-        with suppress(IndexError):  # the disk is back already
-            while isinstance(item := self._waiting[-1][1], bytes):
-                self._waiting.pop()
-                kept = item[: item.rfind(b"\0") + 1]
-                self._put_bytes -= len(item)
-                if kept:
-                    self._append(kept)
-                    return
 
     def put(self, batch: Batch) -> None:
         last_us = self._board.reader.last_t_us
@@ -174,6 +162,8 @@ class Recorder(Tap):
         self._chunk = b""
 
     def _append(self, item: bytes | Gap | Label) -> None:
+        if item == b"":
+            return
         self._waiting.append((self._board.info.boot_id, item))
         if isinstance(item, bytes):
             self._put_bytes += len(item)

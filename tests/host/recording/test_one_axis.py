@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import threading
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from scipy.io import loadmat
 import biotac
 from biotac.cli.main import main
 from biotac.export import png
+from biotac.hand.record import Recorder
 from biotac.picture import picture
 from biotac.recording import writer
 
@@ -37,6 +39,7 @@ WRAP_S = 2**32 / 1e6
 
 def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_s: float) -> list[Path]:
     """A mark before the first row, a finger that falls silent, a disk that stalls, a restart, a mark after it."""
+    monkeypatch.setattr(Recorder, "is_full", lambda self: False)  # a board that waits for its reader has no stall
     free, full = threading.Event(), threading.Event()
     write = writer._File.write
 
@@ -55,7 +58,7 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
             hand.mark("start", subject="S07")
             hand.read_batch(2.0)
             with hand.mark("span"):
-                hand.read_batch(5.0)
+                hand.read_batch(15.0)
             monkeypatch.setattr("biotac.hand.record.LIMIT_BYTES", 50_000)
             full.set()
             while recorder._dropped is None:
@@ -63,8 +66,8 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, before_
             hand.read_batch(3.0)
             full.clear()
             free.set()
-            while not [gap for gap in biotac.Recording(recorder.path).gaps if gap.reason == "slow"]:
-                hand.read_batch(0.5)
+            while recorder._written_bytes < recorder._put_bytes:
+                time.sleep(0.01)
             monkeypatch.setattr("biotac.hand.record.LIMIT_BYTES", 8 << 20)
             with hand.mark("over it"):
                 hand.read_batch(0.5)
@@ -91,7 +94,7 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
     assert not recording.damage, recording.damage
     begin_us, end_us = recording.begin_us, recording.end_us
     t_us = recording.frames["t_us"]
-    assert reasons <= {gap.reason for gap in recording.gaps} <= {"finger", "lost", *reasons}
+    assert {gap.reason for gap in recording.gaps} - {"finger"} == reasons - {"finger"}
     ends_us = {gap.next_t_us for gap in recording.gaps}
     assert ends_us <= set(t_us.tolist())
     for gap in recording.gaps:
@@ -108,7 +111,7 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
 
     table = recording.to_pandas()
     holds(list(table["label"]), table["gap_s"], "pandas")
-    holds(list(recording.select().resample(0.2).label), recording.select().resample(0.2).gap_s, "resampled")
+    holds(list(recording.select().resample(5.0).label), recording.select().resample(5.0).gap_s, "resampled")
     cube = recording.to_xarray()
     holds([*cube["label"].values.ravel()], cube["gap_s"].values.ravel(), "xarray")
     for suffix in (".csv", ".parquet", ".mat", ".ros2", ".png"):
@@ -148,7 +151,7 @@ def check(path: Path, reasons: set[str], marks: set[str], tmp_path: Path, monkey
 def test_by_day_a_board_whose_clock_wraps(tmp_path, monkeypatch, clock_s: float) -> None:
     """Before, within and after the wrap: the board has been on for so long when it is opened."""
     (tmp_path / "rest.toml").write_text(SCENARIO)
-    port = f"sim:{tmp_path / 'rest.toml'}?fingers=2&seconds=300&pace=10&clock_s={clock_s}"
+    port = f"sim:{tmp_path / 'rest.toml'}?fingers=2&seconds=300&clock_s={clock_s}"
     first, second = recorded(tmp_path, monkeypatch, port, 0.0)
     check(first, {"finger", "slow"}, {"start", "span", "over"}, tmp_path, monkeypatch)
     check(second, {"rebooted"}, {"again", "over"}, tmp_path, monkeypatch)
@@ -158,7 +161,7 @@ def test_by_day_a_board_whose_clock_wraps(tmp_path, monkeypatch, clock_s: float)
 @pytest.mark.filterwarnings("ignore::biotac.ReadWarning")
 def test_by_night_forty_minutes_beyond_the_wrap(tmp_path, monkeypatch) -> None:
     (tmp_path / "rest.toml").write_text(SCENARIO)
-    port = f"sim:{tmp_path / 'rest.toml'}?fingers=5&seconds=7200&pace=200"
+    port = f"sim:{tmp_path / 'rest.toml'}?fingers=5&seconds=7200"
     first, second = recorded(tmp_path, monkeypatch, port, WRAP_S + 2400.0)
     check(first, {"finger", "slow"}, {"start", "span", "over"}, tmp_path, monkeypatch)
     check(second, {"rebooted"}, {"again", "over"}, tmp_path, monkeypatch)
