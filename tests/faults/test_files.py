@@ -206,6 +206,7 @@ def binaries() -> Iterator[tuple[str, str, Callable[[Path], Any], bytes]]:
     yield "mounting", ".toml", lambda path: read_mounting(str(path)), mounting
 
 
+@pytest.mark.filterwarnings("ignore:.*have the time of the one before:biotac.RecordingWarning")
 @pytest.mark.parametrize(("suffix", "read", "good"), [pytest.param(*parts, id=name) for name, *parts in binaries()])
 def test_a_damaged_file_is_refused_in_a_line_or_read(
     tmp_path: Path, suffix: str, read: Callable[[Path], Any], good: bytes

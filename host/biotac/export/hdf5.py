@@ -1,4 +1,7 @@
-"""HDF5: ``/finger0/frames/force_n`` and so on, one dataset per column; opens in h5py, MATLAB and Octave."""
+"""HDF5: ``/finger0/frames/force_n`` and so on, one dataset per column; opens in h5py and MATLAB.
+
+Octave opens it, too, unless a label is beyond ASCII.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,9 @@ def write(path: Path, made: list[Table], recording: Recording, show: Show) -> No
             for column in table.columns:
                 values = table.arrays[column.name]
                 if values.dtype.kind == "U":
-                    texts = np.char.encode(values, "utf-8")  # of one length: Octave's load ends at any other text
-                    values = texts.astype(h5py.string_dtype("utf-8", max(1, texts.dtype.itemsize)))
+                    texts = np.char.encode(values, "utf-8")  # Octave's load ends at text of other kinds
+                    kind = "ascii" if all(map(str.isascii, np.unique(values).tolist())) else "utf-8"
+                    values = texts.astype(h5py.string_dtype(kind, max(1, texts.dtype.itemsize)))
                 data = group.create_dataset(column.name, data=values, compression="gzip", shuffle=True)
                 data.attrs["unit"] = column.unit
                 data.attrs["what"] = column.what

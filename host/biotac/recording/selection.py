@@ -207,7 +207,8 @@ class Selection:
         ``time`` is the stamp (UTC) of a round, ``finger`` the name or else the number as text. Electrodes have their
         positions on the core as coordinates ``electrode_x_mm``, ``_y_mm`` and ``_z_mm``; variables have ``units`` and
         ``long_name``. Where a finger has no row in a round, and for missing counts, floats are NaN (float32 holds 0 to
-        4095 exactly), and ``flags`` say so. Needs the extra ``export``.
+        4095 exactly), and ``flags`` say so. Needs the extra ``export``, whose SciPy also does for ``to_netcdf``; read
+        again, ``flags`` and ``t_us`` are float64.
         """
         xarray: Any = imported("xarray", "a Dataset", "export")
         t_us, round_of = np.unique(self.rows["t_us"], return_inverse=True)
@@ -241,7 +242,12 @@ class Selection:
         if "electrode" in coordinates:
             places = zip(AXES, ELECTRODE_MM.T, strict=True)
             coordinates |= {f"electrode_{axis}_mm": ("electrode", at, {"units": "mm"}) for axis, at in places}
-        return xarray.Dataset(data, coordinates)
+        dataset = xarray.Dataset(data, coordinates)
+        for name in {"flags", "t_us", "time"} & {*dataset.variables}:
+            dataset[name].encoding["dtype"] = "float64"  # NetCDF 3 has no wider integer than int32
+        if len(t_us):
+            dataset["time"].encoding["units"] = f"nanoseconds since {dataset['time'].values[0]}"
+        return dataset
 
     def resample(self, rate_hz: float) -> Selection:
         """The means of each finger's rows over steps of 1 / ``rate_hz``, above 0 and at most the board's 100.
@@ -299,6 +305,10 @@ class Selection:
         times = seconds("the signal", t_s, len(other))
         kept = increasing("the signal", times)
         other, times = other[kept], times[kept]
+        step_s = np.diff(times)
+        if step_s.max() > max(1.0, 100.0 * np.median(step_s)):
+            seen = f"the signal: no sample for {step_s.max():.3g} s after sample {np.argmax(step_s)}"
+            warnings.warn(f"{seen}: if its clock jumped there, use one side of it", RecordingWarning, stacklevel=2)
         values, board_s = other.reshape(len(other), -1), self.rows["t_us"] / 1e6
         if times[-1] - times[0] > _LONG * (board_s[-1] - board_s[0]):
             usual_s, span_s = float(np.median(np.diff(times))), float(times[-1] - times[0])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from record_all import record_all
 
 import biotac
@@ -18,7 +19,7 @@ from biotac.wire.fields import FRAME_FIELDS
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory) -> biotac.Recording:
-    path = record_all("sim:faults.toml?fingers=2", tmp_path_factory.mktemp("tabular") / "a.mcap")
+    path = record_all("sim:faults.toml?fingers=2&clock_s=3000", tmp_path_factory.mktemp("tabular") / "a.mcap")
     recording = biotac.Recording(path)
     assert np.isnan(recording.frames["poc_mm"]).any() and (recording.frames["counts"] == 65535).any()
     return recording
@@ -44,8 +45,14 @@ def test_a_data_frame_has_every_number(recording) -> None:
     assert table.attrs["units"]["force_x_n"] == "N" and table.attrs["units"]["counts_E7"] == "count"
 
 
-def test_a_dataset_has_every_number_by_time_and_finger(recording) -> None:
+def test_a_dataset_has_every_number_by_time_and_finger(recording, tmp_path) -> None:
     data = recording.to_xarray()
+    data.to_netcdf(tmp_path / "a.nc", engine="scipy")  # what the extra brings
+    with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as read:
+        assert all(
+            (data[name].values == read[name].values).all() for name in ("time", "t_us", "flags", "finger", "seq")
+        )
+        assert recording.end_us > 2**31 and data["flags"].values.max() >= 2**31
     assert data.sizes["finger"] == 2 and data["force_n"].dims == ("time", "finger", "axis")
     for name, finger in (("index", 0), ("middle", 1)):
         rows = recording[name]
