@@ -29,6 +29,8 @@ from ..wire.frames import FORCE_LSB_PER_N, StructArray, to_units
 
 LOADS = "calibrate.toml"
 OWN, POPULATION, LIN = "own wrench map", "population map", "Lin's scales"
+#: What people call them.
+NAMES = {OWN: "calibrated", POPULATION: "not calibrated", LIN: "Lin 2013"}
 
 
 def answers_to(sent: StructArray, settings: Settings, own: BoardMap | None) -> dict[str, NDArray[np.float64]]:

@@ -28,11 +28,14 @@ from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch, join
 from ..wire.frames import electrode_signals
 from ..wire.slots import FRAME_HZ, PAC_SLOT
-from .answers import OWN, POPULATION, answers_to, own_map
+from .answers import NAMES, OWN, POPULATION, answers_to, own_map
 
 Show = Callable[[str], None]
 #: The answers in the picture: color and label.
-DRAWN = {OWN: ("#2563eb", "felt, calibrated"), POPULATION: ("#dc2626", "felt, not calibrated (the default)")}
+DRAWN = {
+    OWN: ("#2563eb", f"felt, {NAMES[OWN]}"),
+    POPULATION: ("#dc2626", f"felt, {NAMES[POPULATION]} (the default): demo.mcap"),
+}
 
 
 @dataclass(frozen=True)
@@ -72,9 +75,7 @@ def run_demo(
     wall = time.monotonic()
     # The board's counts are ready; from here on this process is a host with a board, and its cost is measured.
     with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
-        # The check is on the board's arithmetic with Lin's formulas, to a twentieth of a millinewton. What a calibrated
-        # board would publish is computed below and drawn beside it.
-        hand.board.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
+        # The board has no calibration. What a calibrated one would publish is computed below and drawn beside it.
         settings = hand.board.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)
@@ -105,7 +106,8 @@ def run_demo(
     rows, played_fingers = source.samples.shape[:2]
     device_s = rows / FRAME_HZ
     recorded = Recording(recording_path)
-    never_came = max(0, expected_frames(source) - len(joined.frames) - stats.frames_lost)
+    never_came = at_the_ends(source, joined)
+    unsampled = max(0, expected_frames(source) - len(joined.frames) - stats.frames_lost - never_came)
     same = np.array_equal(recorded.wire, joined.wire) and np.array_equal(recorded.pac, joined.pac)
     facts: dict[str, Any] = {
         "source": source.name,
@@ -114,6 +116,7 @@ def run_demo(
         "rows_skipped": source.skipped_frames,
         "frames": len(joined.frames),
         "frames_lost": stats.frames_lost + never_came,
+        "rounds_unsampled": unsampled,  # a sensor was asked for its serial number meanwhile
         "pac_blocks": len(joined.pac),
         "crc_errors": stats.crc_errors,
         "other_errors": stats.other_errors,
@@ -142,6 +145,17 @@ def run_demo(
 def expected_frames(source: Source) -> int:
     """Frames that the board must send: one for each round of a finger with at least one good word."""
     return int(np.count_nonzero(np.any((source.samples <= 4095), axis=2)))
+
+
+def at_the_ends(source: Source, came: Batch) -> int:
+    """Those of ``expected_frames`` before each finger's first frame and after its last: no sequence number tells."""
+    good, missing = np.any(source.samples <= 4095, axis=2), 0
+    for finger in range(good.shape[1]):
+        own = came.frames[came.frames["finger"] == finger]
+        first = int(own["seq"][0]) if len(own) else 0
+        since = first + round((own["t_us"][-1] - own["t_us"][0]) * FRAME_HZ / 1e6) + 1 if len(own) else 0
+        missing += first + int(np.count_nonzero(good[since:, finger]))
+    return missing
 
 
 def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
@@ -192,14 +206,14 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
 
 
 def draw_force(axes: Any, frames: Any, applied_n: Any, answers: dict[str, Any]) -> None:
-    """The force's strength over device time, by each of ``DRAWN`` that is known, with what was applied behind them."""
+    """The force's size over device time, by each of ``DRAWN`` that is known, with what was applied behind them."""
     t_s = frames["t_us"] / 1e6
     if applied_n is not None:
         axes.plot(t_s, np.linalg.norm(applied_n, axis=1), color="#999999", linewidth=6, alpha=0.5, label="applied")
     for name, (color, label) in DRAWN.items():
         if name in answers:
             axes.plot(t_s, np.linalg.norm(answers[name], axis=1), color=color, linewidth=1.5, label=label)
-    axes.set(xlabel="device time [s]", ylabel="strength of the force on the finger [N]")
-    axes.set_title("the force that was applied, and what the board makes of it", fontsize=10)
+    axes.set(xlabel="device time [s]", ylabel="size of the force on the finger, |F| [N]")
+    axes.set_title("size of the force (not its direction): applied, and what the board makes of it", fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=9, loc="upper left")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,16 @@ class Felt:
             for low, n, (size, along, *squares) in each
         ]
 
-    def __str__(self) -> str:
-        means = ((b["felt_n"], np.linalg.norm(b["rmse_n"]), b["applied_n"]) for b in self.bands)
-        parts = ["{:.2f} ± {:.2f} of {:.2f} N".format(*mean) for mean in means]
-        return ", ".join([*parts, *([f"nothing in {self.unfelt} frames without a force"] if self.unfelt else [])])
+
+def table(felt: Mapping[str, Felt]) -> list[str]:
+    """Lines of a table in N by the names of who felt: what was applied, read along it, and the vector's RMS error."""
+    bands = [{band["from_n"]: band for band in one.bands} for one in felt.values()]
+    rows = []
+    for low in BANDS_N:
+        found = [band.get(low) for band in bands]
+        means = [f"{b['felt_n']:8.2f}{np.linalg.norm(b['rmse_n']):8.2f}" if b else " " * 16 for b in found]
+        rows += [f"{b['applied_n']:10.2f}  {'  '.join(means)}" for b in found if b][:1]
+    unfelt = [f"{name}: no force in {one.unfelt} more frames" for name, one in felt.items() if one.unfelt]
+    head = [" " * 12 + "  ".join(f"{name:>16}" for name in felt)] if len(felt) > 1 else []
+    head += ["applied, N" + "      read   error" * len(felt)]
+    return [*(head if rows else []), *rows, *unfelt]

@@ -7,15 +7,18 @@ from datetime import datetime, timezone
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..wire.frames import StructArray
 from ..wire.identity import ascii_text
-from ..wire.messages_gen import FrameFlags
+from ..wire.messages_gen import LATCHED_FLAGS, FrameFlags
 from .block import FRAME
 
 
 def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
-    """Facts of a Recording, for JSON. ``flags`` (finger, flags) of all frames, where each flag's share is wanted."""
+    """Facts of a Recording, for JSON. ``flags`` (finger, flags) of all frames adds shares of them: CONTACT and faults
+    of all, the others of those in contact.
+    """
     heads = recording.heads()
     frames: Counter[int] = Counter()
     for block in heads:
@@ -30,8 +33,9 @@ def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
     if flags is not None:
         for finger, about in fingers.items():
             own = flags["flags"][flags["finger"] == int(finger)]
-            shares = {flag.name: float(np.mean((own & int(flag)) != 0)) for flag in FrameFlags if len(own)}
-            about["flags"] = {flag: share for flag, share in shares.items() if share}
+            touched = own[(own & FrameFlags.CONTACT) != 0]  # at rest there is no point of contact, and that is no fault
+            about["flags"] = _shares(own, FrameFlags.CONTACT) | _shares(touched, ~FrameFlags.CONTACT)
+            about["faults"] = _shares(own, LATCHED_FLAGS)
     return {
         "recording": str(recording.path),
         "begin": datetime.fromtimestamp(recording.begin_ns / 1e9, timezone.utc).isoformat(timespec="seconds"),
@@ -43,6 +47,15 @@ def summary(recording: Any, flags: StructArray | None = None) -> dict[str, Any]:
         "gaps": sum(len(block.rest.gaps) for block in heads),
         "labels": labels(recording),
     }
+
+
+def _shares(flags: NDArray[np.uint32], of: FrameFlags) -> dict[str, float]:
+    shares = {flag.name or "": float(np.mean((flags & flag) != 0)) for flag in FrameFlags if flag in of and len(flags)}
+    return {flag: share for flag, share in shares.items() if share}
+
+
+def _percent(shares: dict[str, float]) -> str:
+    return ", ".join(f"{flag} {share:.1%}" for flag, share in shares.items())
 
 
 def labels(recording: Any) -> list[dict[str, Any]]:
@@ -67,10 +80,14 @@ def lines(facts: dict[str, Any]) -> list[str]:
         f"port {facts['port']}, firmware {facts['firmware']}",
     ]
     for finger, about in facts["fingers"].items():
-        shares = ", ".join(f"{flag} {share:.1%}" for flag, share in about.get("flags", {}).items())
+        shares = dict(about.get("flags", {}))
+        within, faults = f"{shares.pop('CONTACT', 0.0):.1%} in contact", about.get("faults", {})
+        within += f", of these {_percent(shares)}" if shares else ""
         out.append(
             f"finger {finger}: {about['name'] or 'no name'}, sensor {about['serial'] or 'unknown'}, "
-            f"{about['frames']} frames" + (f"; {shares}" if shares else "")
+            f"{about['frames']} frames"
+            + (f"; {within}" if "flags" in about else "")
+            + (f"; of all {_percent(faults)}" if faults else "")
         )
     return [*out, *map(label_line, facts["labels"])]
 

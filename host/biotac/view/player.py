@@ -18,6 +18,7 @@ from ..recording.replay.playback import Playback
 from ..recording.rewrite import cut
 from ..wire.batches import Batch, LinkStats
 from ..wire.identity import board_name, version_text
+from ..wire.messages_gen import Board
 
 
 class Player:
@@ -39,6 +40,8 @@ class Player:
         self.board = f"{board_name(hand.info)}, firmware {version_text(hand.info)}"
         if self._replay is not None:
             self.board += f", recorded from {self._replay.recording.metadata['port']}"
+        elif hand.info.board == Board.POSIX_SIM:
+            self.board += "; a simulated board loses frames when this computer is busy"
         try:
             hand.stream("results", "events")
         except BaseException:

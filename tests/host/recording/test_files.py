@@ -28,8 +28,11 @@ def test_info_of_a_recording_says_what_is_in_it(recorded: Path, capsys) -> None:
     facts = json.loads(capsys.readouterr().out)
     rows = biotac.load(recorded, fields=["finger", "flags", "t_us"])
     assert facts["duration_s"] == (rows["t_us"].max() - rows["t_us"].min()) / 1e6
-    touched = (rows["flags"][rows["finger"] == 1] & int(biotac.FrameFlags.CONTACT)) != 0
-    assert facts["fingers"]["1"]["flags"]["CONTACT"] == np.mean(touched) and facts["fingers"]["1"]["name"] == "middle"
+    flags = rows["flags"][rows["finger"] == 1]
+    touched, low = ((flags & int(flag)) != 0 for flag in (biotac.FrameFlags.CONTACT, biotac.FrameFlags.POC_LOW))
+    middle = facts["fingers"]["1"]
+    assert middle["flags"]["CONTACT"] == np.mean(touched) and middle["name"] == "middle"
+    assert middle["flags"]["POC_LOW"] == np.mean(low[touched]) < np.mean(low)  # at rest it is no fault
     assert facts["fingers"]["0"]["frames"] == (rows["finger"] == 0).sum()
     assert facts["labels"] == [{"text": "slip trial=3", "at_s": 5.5, "until_s": 6.0, "finger": 1}]
     assert main(["info", str(recorded)]) == 0

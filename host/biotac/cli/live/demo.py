@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...demo.answers import NAMES, POPULATION
 from ...demo.run import run_demo
+from ...recording.felt import table
 from .. import values
 from ..outputs import report
 from ..progress import Progress
@@ -31,19 +33,20 @@ def run(args: argparse.Namespace) -> int:
         demo = run_demo(source, args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show)
     facts, check = demo.facts, demo.facts["crosscheck"]
     own_n = np.linalg.norm(facts["calibration_rmse_n"] or [])
-    made = f"; own map as by `biotac calibrate wrench --live`, off by {own_n:.2f} N held out" if own_n else ""
-    felt = [f"  {name:14} {force}" for name, force in demo.felt.items() if str(force)]
+    made = [f"calibrated as by `biotac calibrate wrench --live`, off by {own_n:.2f} N held out"] if own_n else []
     skipped = f"{facts['rows_skipped']} incomplete row(s) of the recording skipped"
+    asked = f"{facts['rounds_unsampled']} round(s) without a frame: the board asked a sensor for its serial number"
     lines = [
         f"{facts['source']}: {facts['frames']} frames, fingers: {facts['fingers']}, {facts['frames_lost']} lost, "
         f"{facts['crc_errors']} CRC errors; host CPU {facts['host_cpu_percent']} % of one core",
         f"on-board against float64: PoC {check['poc_um_max']:.3f} um, force {check['force_mn_max']:.4f} mN, "
         f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)",
-        f"recording {facts['recording']}, of a board with Lin's scales; report {facts['report']}",
-        *([skipped] if facts["rows_skipped"] else []),
-        *([f"felt (mean ± RMS length of the error) of what was applied to finger 0, in bands{made}:"] if felt else []),
-        *felt,
+        f"recording {facts['recording']}, of the board, {NAMES[POPULATION]}; report {facts['report']}",
         f"picture {facts['picture']}",
+        *([skipped] if facts["rows_skipped"] else []),
+        *([asked] if facts["rounds_unsampled"] else []),
+        *made,
+        *table({NAMES[name]: felt for name, felt in demo.felt.items()}),
     ]
     report(args, facts, "\n".join(lines))
     return 0 if demo.good else 1

@@ -9,7 +9,7 @@ from typing import Any
 
 import biotac
 
-from ...recording.felt import Felt
+from ...recording.felt import Felt, table
 from .. import ending, values
 from ..outputs import note, report
 from ..progress import Progress
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     }
     held = f"{args.out}: {recorder.frames} frames, {recorder.frames_lost} lost, {stats.gaps} gap(s)"
     lines = [f"{held}; `biotac check {args.out}` verifies them", *(f"fault during the recording: {f}" for f in faults)]
-    lines += [f"felt (mean ± RMS length of the error) of what was applied, in bands: {felt}"] if str(felt) else []
+    lines += table({"felt": felt})
     report(args, facts, "\n".join(lines))
     if stopped and args.port.startswith(FILES):
         note(f"{args.port} was stopped at {recorded_s:.1f} s of it: the recording has not the rest")

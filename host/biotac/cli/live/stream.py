@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Iterator
 
@@ -13,12 +14,13 @@ from ...wire.events import event_age_s, kind_name
 from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
-from ...wire.messages_gen import INVALID_COUNT, Event, EventKind, Trust
+from ...wire.messages_gen import INVALID_COUNT, Board, Event, EventKind, FrameFlags, Trust
 from ...wire.slots import FRAME_HZ
 from .. import values
 from ..outputs import note
 
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
+COLUMNS = 100  # of a line
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +72,8 @@ def batches(
 def report_lost(hand: biotac.Hand) -> None:
     """Say on stderr how many frames were lost, if any."""
     if hand.stats.frames_lost:
-        note(f"{hand.stats.frames_lost} frame(s) lost; close other programs, or use a faster computer")
+        simulated = ", as this computer is too busy for a simulated board" if hand.info.board == Board.POSIX_SIM else ""
+        note(f"{hand.stats.frames_lost} frame(s) lost{simulated}; close other programs, or use a faster computer")
 
 
 def show(hand: biotac.Hand, *, rate: float, seconds: float | None, events: bool, as_json: bool) -> None:
@@ -119,10 +122,10 @@ def event_as_line(event: Event) -> str:
 
 
 def as_line(frame: Frame) -> str:
-    poc = " ".join(f"{v:7.2f}" for v in frame.poc_mm)
-    force = " ".join(f"{v:7.3f}" for v in frame.force_n)
-    torque = " ".join(f"{v:8.2f}" for v in frame.torque_nmm)
-    return (
-        f"{frame.t_us / 1e6:9.3f} s finger {frame.finger}  poc {poc} mm  force {force} N  torque {torque} N*mm  "
-        f"{frame.trust.name:8}  {frame.flags}"
-    )
+    """Where a finger is touched, if it is, its force, and what that is worth and why; --json has all there is."""
+    touched = FrameFlags.CONTACT in frame.flags and not math.isnan(frame.poc_mm[0])
+    poc = "poc " + " ".join(f"{v:5.1f}" for v in frame.poc_mm) + " mm" if touched else " " * 24
+    force = " ".join(f"{v:6.2f}" for v in frame.force_n)
+    why = " ".join([frame.trust.name, *(str(frame.reasons).split("|") if frame.reasons else [])])
+    line = f"{frame.t_us / 1e6:9.3f} s finger {frame.finger}  {poc}  force {force} N  {why}"
+    return line if len(line) <= COLUMNS else line[: COLUMNS - 1].rsplit(" ", 1)[0] + " …"

@@ -18,11 +18,11 @@ void act_on_event(const bt_msg_event *event);
 
 #define KEEPALIVE_MS 500 // the board stops its streams when it has heard nothing for so long
 #define PING_MS      150
-#define FINGERS      5
+#define MAX_FINGERS  5
 #define NONCE        7
 
 static bt_client board;
-static bt_client_rounds rounds[FINGERS];
+static bt_client_rounds rounds[MAX_FINGERS];
 static uint32_t lost;    // rounds, on the link
 static uint32_t ping_ms; // when the board last heard from here
 static uint32_t rx_ms;   // and when it last told of a finger
@@ -49,7 +49,7 @@ static void dispatch(int id)
     if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello) && hello.wire_major == BT_WIRE_MAJOR
         && hello.nonce == NONCE) {
         bt_msg_start start = {2, BT_STREAM_FLAG_FRAMES, 0, KEEPALIVE_MS};
-        start.fingers = (uint8_t)((1u << (hello.fingers < FINGERS ? hello.fingers : FINGERS)) - 1u);
+        start.fingers = (uint8_t)((1u << (hello.fingers < MAX_FINGERS ? hello.fingers : MAX_FINGERS)) - 1u);
         wanted.fingers = start.fingers;
         board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
         memset(rounds, 0, sizeof rounds); // a board that restarted counts anew
@@ -57,9 +57,10 @@ static void dispatch(int id)
         hand_send(BT_START_ID, &start);
         rx_ms = now_ms();
         streaming = 1;
-    } else if (id == BT_IDLE_ID && bt_client_read(&board, BT_IDLE_ID, &idle) && idle.finger < FINGERS) {
+    } else if (id == BT_IDLE_ID && bt_client_read(&board, BT_IDLE_ID, &idle) && idle.finger < MAX_FINGERS) {
         lost += bt_client_lost(&rounds[idle.finger], idle.seq, idle.frames);
-    } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame) && frame.finger < FINGERS) {
+    } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame)
+               && frame.finger < MAX_FINGERS) {
         lost += bt_client_lost(&rounds[frame.finger], frame.seq, 1);
         unsubscribed = frame.slip_level == 255;
         act_on(&frame);
