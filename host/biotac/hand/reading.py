@@ -82,7 +82,7 @@ class Reading:
     def _by_one_thread(self) -> Iterator[None]:
         here = threading.current_thread()
         with self._turn:
-            self._turn.wait_for(lambda: self._thread not in self._given_up or not self._iterations, GIVEN_UP_S)
+            self._turn.wait_for(lambda: self._thread not in self._given_up, GIVEN_UP_S)  # it has put back what it had
             before = self._thread
             if self._iterations and before is not None and before is not here and before.is_alive():
                 raise InputError(
