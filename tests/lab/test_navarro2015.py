@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.calibrate.press import CALIBRATION_FORCES_N
+from biotac.calibrate.press import CALIBRATION_FORCES_N, drive
 from biotac.core import geometry
 from biotac.errors import InputError
 from biotac.sim import SimFinger, world
 from biotac.sim.physics import PRESSURE_SPREAD
 from biotac.wire import sensor
-from biotac_lab.calibrate.drive import drive
 from biotac_lab.experiments import navarro2015 as navarro
 from biotac_lab.experiments import navarro_active
 from biotac_lab.report import Options, write

@@ -11,7 +11,7 @@ from biotac.wire import messages_gen as wire
 
 LEAD_S, HELD_S = 3.0, 6.0
 SETTLED = 5  # rounds, 50 ms
-NEAR = 0.07
+NEAR = 0.1
 LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}  # which the emulated finger's physics follow
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .faults import EVERY_FAULT, FAULTS
+from .gains import fit_gains
 from .loading import bundled_scenarios, load_source
 from .physics import (
     GAP_MM,
@@ -32,6 +33,6 @@ SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 __all__ = [
     "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Finger", "Footprints",
     "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track",
-    "Truth", "World", "bundled_scenarios", "counts_at", "deform", "load_source", "plate_recording",
+    "Truth", "World", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source", "plate_recording",
     "random_loads", "resistance_at", "resistance_share", "sample", "tdc_counts", "world",
 ]  # fmt: skip

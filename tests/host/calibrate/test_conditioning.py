@@ -14,7 +14,7 @@ from biotac.calibrate.press import few_shot, pressure
 from biotac.calibrate.wrench import models, moments
 from biotac.calibrate.wrench.plate_recording import MAX_CONDITION, NOTED_CONDITION, check_loads, load_run
 from biotac.errors import InputError
-from biotac_lab.calibrate.gains import fit_gains
+from biotac.sim.gains import fit_gains
 
 ROWS = np.random.default_rng(5).normal(size=(500, 3))
 

@@ -26,7 +26,7 @@ GUIDES = Path(__file__).resolve().parents[3] / "host/docs/guides"
 PROGRAMS = re.findall(r"```python\n(.*?)```", (GUIDES / "live_reading.md").read_text(encoding="utf-8"), flags=re.DOTALL)
 PROGRAMS.append((GUIDES / "examples/grip.py").read_text(encoding="utf-8"))
 SAY = (
-    "the thumb was at rest",
+    "at the end left was at rest",
     "300 frames",
     " ms old, CONTACT|",
     "finger 0: possible touch at ",

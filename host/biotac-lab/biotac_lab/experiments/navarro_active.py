@@ -1,6 +1,6 @@
 """Navarro et al. 2015, the active part: an emulated hand presses its own fingers on a plate, driven by the procedure.
 
-The hand is in the loop (biotac.sim.world): calibrate.drive says which finger is to go where, joints take
+The hand is in the loop (biotac.sim.world): biotac.calibrate.press.drive says which finger is to go where, joints take
 time to get there, the plate gives way like a spring, and what the board makes of each round decides what comes next.
 The paper's joint angles are 18, 20 and 22 degrees and 0 to let go; the fourth touch is not printed, here 21.
 """
@@ -11,10 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from biotac.calibrate.press import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Fit, Verification
+from biotac.calibrate.press import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Fit, Verification, drive
 from biotac.sim import Profile, SimFinger, Touch, World, world
-
-from ..calibrate.drive import drive
 
 TOUCHES_DEG = (18.0, 20.0, 22.0, 21.0)
 TOUCHES_N = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)

@@ -11,17 +11,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from biotac.calibrate.press.detector import Phase, Procedure
-from biotac.calibrate.press.force_source import ROW_DTYPE
-from biotac.calibrate.press.pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Calibrated, fit, verify
-from biotac.calibrate.press.pressure_procedure import put, with_gain
-from biotac.errors import InputError
-from biotac.hand.hand import Hand
-from biotac.hand.rounds import Round
-from biotac.keep import Calibration
-from biotac.recording.pressure_check import usable
-from biotac.wire.frames import StructArray
-from biotac.wire.messages_gen import INVALID_COUNT, FrameFlags
+from ...errors import InputError
+from ...hand.hand import Hand
+from ...hand.rounds import Round
+from ...keep import Calibration
+from ...recording.pressure_check import usable
+from ...wire.frames import StructArray
+from ...wire.messages_gen import INVALID_COUNT, FrameFlags
+from .detector import Phase, Procedure
+from .force_source import ROW_DTYPE
+from .pressure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Calibrated, fit, verify
+from .pressure_procedure import put, with_gain
 
 #: Sends a finger, by its name, to a touch, or with None back to where it touches nothing. It returns at once: the
 #: finger moves while rounds come.

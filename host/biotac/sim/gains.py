@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from biotac.kernels import geometry as surface
-from biotac.kernels.geometry import Floats
-from biotac.wire.messages_gen import SETTINGS, Setting
+from ..core import geometry as surface
+from ..kernels.geometry import Floats
+from ..wire.messages_gen import SETTINGS, Setting
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
 _SETTINGS = (
