@@ -10,7 +10,7 @@ import pytest
 from biotac.sim import Finger
 from biotac_lab.calibrate import off_pad
 from biotac_lab.calibrate.finger_command import Touched, _memory, _pressed
-from biotac_lab.calibrate.plates import KnownNormal
+from biotac_lab.calibrate.plates import TENTHS, KnownNormal
 
 FINGERS = [Finger(seed) for seed in range(20)]
 # Medians of trial_15330 (`biotac-lab finger F1 F2 --plates trial_15330`): where the point of contact lies over the
@@ -38,7 +38,7 @@ LOUD, FLAT = {("flank .2-.4", 200), ("flank .4-.6", 200)}, {"tip > .7"}
 def test_the_point_of_contact_follows_a_plate_as_a_real_fingers_does() -> None:
     off = set()
     for k, axis in ((1, "ny"), (0, "nx")):
-        for low, real in zip(off_pad.TENTHS, POINTS[axis], strict=False):
+        for low, real in zip(TENTHS, POINTS[axis], strict=False):
             seen = np.array(off_pad.points_seen(FINGERS, k, low + 0.05))
             if np.abs(seen - real).max() > 0.12:
                 off.add(f"{axis} {low:.1f}")

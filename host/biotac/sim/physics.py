@@ -299,7 +299,6 @@ class Finger:
         self.pdc_rest = float(np.random.default_rng([seed, 6]).integers(*PDC_REST))
         spread = float(np.random.default_rng([seed, 7]).uniform(-1.0, 1.0))
         self.rattle_per_n_s = RATTLE_PER_N_S * RATTLE_SPREAD**spread
-        self.pressure_gain, self.tip_gain, self.side_gain = 1.0, 1.0, 1.0
         self.at_spread(*np.random.default_rng([seed, 8]).uniform(-1.0, 1.0, 3).tolist())
         self.noise_counts = 5.0 if worn else 1.5
         self.glitch_share = 0.005 if worn else 0.0
@@ -313,7 +312,8 @@ class Finger:
         """What a newton at ``contact_mm`` (n, 3) does, over what it does in the middle of the spread, (n,)."""
         normal = surface.normals_at(contact_mm)
         tip = np.clip((normal[:, 0] - TIP_FROM) / (1.0 - TIP_FROM), 0.0, 1.0)
-        share: Floats = self.tip_gain**tip * self.side_gain ** very_side(normal)
+        side = np.clip((np.abs(normal[:, 1]) - SIDE_FROM) / (SIDE_TO - SIDE_FROM), 0.0, 1.0)
+        share: Floats = self.tip_gain**tip * self.side_gain**side
         return share
 
     def rest_counts(self, warm_c: Floats) -> Floats:
@@ -334,12 +334,6 @@ class Finger:
         """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""
         share = resistance_share(compression * self.gap_gain, bulge * self.gap_gain, SKIN.fixed_share)
         return counts_at(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
-
-
-def very_side(normal: Floats) -> Floats:
-    """How far normals (n, 3) point to the very side, where a real plate was loudest, (n,) from 0 to 1."""
-    share: Floats = np.clip((np.abs(normal[:, 1]) - SIDE_FROM) / (SIDE_TO - SIDE_FROM), 0.0, 1.0)
-    return share
 
 
 def resistance_share(compression: Floats, bulge: Floats, fixed_share: float) -> Floats:

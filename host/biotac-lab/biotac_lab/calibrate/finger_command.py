@@ -97,13 +97,14 @@ def run(args: argparse.Namespace, show: Show) -> Outcome:
         seeds, truth = range(args.seed, args.seed + FINGERS), np.concatenate([half.force_n for half in pressed])
         touched = [Touched.by(seed, plate, truth) for seed in seeds]
         default, passed = _default(touched, seeds)
-        back = _back(touched, runs, [path.stem for path in args.files])
-        own, exact = _calibrated(pressed, fit.rows, list(seeds)[:CALIBRATED])
         stems = [path.stem for path in args.files]
+        back = _back(touched, runs, stems)
+        own, exact = _calibrated(pressed, fit.rows, list(seeds)[:CALIBRATED])
         tables += [default, own, back, _alike(pressed, touched, runs, stems)]
         tables += [off_pad.by_place(pressed, touched, stems)]
+        fingers = [Finger(seed) for seed in seeds]
         for path, normals in zip(args.plates, known, strict=True):
-            tables += off_pad.tables(path.stem, normals, [Finger(seed) for seed in seeds])
+            tables += off_pad.tables(path.stem, normals, fingers)
     return of_tables(tables, [table.facts() for table in tables], met=passed and exact)
 
 

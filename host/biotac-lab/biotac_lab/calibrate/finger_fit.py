@@ -20,7 +20,18 @@ from biotac.calibrate.wrench import Run
 from biotac.core import geometry as surface
 from biotac.sim import SKIN, Skin, counts_at, deform, resistance_at, resistance_share
 
-from .plates import Floats, KnownForce, KnownNormal, Part, plate_states
+from .plates import (
+    LOOK_COUNTS,
+    LOOK_FORCES_N,
+    LOOK_ROWS,
+    TENTHS,
+    Floats,
+    KnownForce,
+    KnownNormal,
+    Part,
+    place_under,
+    pressing,
+)  # fmt: skip
 from .training import MIRROR
 
 #: Where the fit of each number begins, and within which limits it stays. F1 and F2 are fitted alike with a squeeze of
@@ -41,7 +52,6 @@ SELDOM, SELDOM_SIGMA = (17, 18), 0.1  # E18 and E19: few rows press there
 # press, shows none. Where the stale part of the tare begins, its sigma, and that of its drift.
 STALE_COUNTS, STALE_SIGMA_COUNTS, DRIFT_SIGMA_COUNTS = 100.0, 300.0, 100.0
 LOOK_SIGMA = 0.005  # of medians of the point of contact over the radius: a dozen against thousands of rows
-LOOK_FORCES_N, LOOK_ALONG_MM = (2.0, 4.0, 6.0), -4.0
 SIGMA_COUNTS, SWING_COUNTS = 30.0, 160.0  # one sigma of an electrode that swings so far; it grows with the root
 OUTLIER_SIGMA = 3.0
 STEPS, LEAST_GAIN = 60, 1e-4
@@ -63,7 +73,7 @@ class Look:
         """By how many sigmas a finger with ``rest`` (19,) counts at rest and this skin sees them elsewhere, (n, 2)."""
         rows = []
         for force_n in LOOK_FORCES_N:
-            states = plate_states(self.place, np.tile([0.0, 0.0, force_n], (len(self.place), 1)))
+            states = pressing(self.place, np.full(len(self.place), force_n))
             share = resistance_share(*deform(states, skin=skin), skin.fixed_share)
             signal = counts_at(resistance_at(rest) * share) - rest
             point = surface.point_of_contact(np.where(signal < -0.5, signal, -1e-3), 1.0, compressed=True)
@@ -76,15 +86,14 @@ def look_of(plate: KnownNormal) -> Look:
     point = surface.point_of_contact(plate.signal, 1.0, compressed=True) / surface.RADIUS_MM
     x, y = plate.normal[:, 0], np.abs(plate.normal[:, 1])
     place, seen = [], []
-    for at, other, least in ((y, np.abs(x), 0.0), (x, y, -1.0)):
-        for low in np.arange(0.0, 0.7, 0.1):
-            rows = (at >= low) & (at < low + 0.1) & (other < 0.35) & (plate.pressure > 150.0)
-            if rows.sum() < 20:
+    for sideways, normal, other in ((True, y, np.abs(x)), (False, x, y)):
+        for low in TENTHS:
+            rows = (normal >= low) & (normal < low + 0.1) & (other < 0.35) & (plate.pressure > LOOK_COUNTS)
+            if rows.sum() < LOOK_ROWS:
                 continue
-            angle = float(np.arcsin(low + 0.05))
-            place.append([LOOK_ALONG_MM, angle] if least == 0.0 else [surface.RADIUS_MM * angle, 0.0])
+            place.append(place_under(low + 0.05, sideways=sideways))
             across, along = np.nanmedian(np.abs(point[rows, 1])), np.nanmedian(point[rows, 0])
-            seen.append([across, np.nan] if least == 0.0 else [np.nan, along])
+            seen.append([across, np.nan] if sideways else [np.nan, along])
     return Look(np.array(place), np.array(seen))
 
 
@@ -190,8 +199,8 @@ class Fit:
             width, own = part.unknown.first.shape[1], self._own(k).start
             each = [np.full(len(frame), column) for column in (*range(_N), own + 19, own + 20)]
             each += [_N + kind * len(_FREE) + _SHARED[electrode] for kind in range(_KINDS)]
-            mine = {own, *(self._own(j).start for j, other in enumerate(self.parts) if isinstance(other, KnownForce))}
-            each += [start + mirror for start in sorted(mine) for mirror in (electrode, MIRROR[electrode])]
+            owners = {own, *(self._own(j).start for j, other in enumerate(self.parts) if isinstance(other, KnownForce))}
+            each += [start + mirror for start in sorted(owners) for mirror in (electrode, MIRROR[electrode])]
             each += [*(self._ends[k] + width * frame + column for column in range(width))]
             columns += each
             rows += [at + np.arange(len(frame))] * len(each)

@@ -13,22 +13,33 @@ import numpy as np
 
 import biotac
 from biotac.core import geometry as surface
-from biotac.sim import PLATE_MM, Finger, States
+from biotac.sim import Finger
 
 from ..report import Table
-from .plates import PER_N, Bools, Floats, KnownForce, KnownNormal
+from .plates import (
+    LOOK_COUNTS,
+    LOOK_FORCES_N,
+    LOOK_ROWS,
+    PER_N,
+    TENTHS,
+    Bools,
+    Floats,
+    KnownForce,
+    KnownNormal,
+    place_under,
+    pressing,
+)  # fmt: skip
 
 BANDS_N = ((1.5, 2.5), (3.5, 4.5), (5.5, 6.5))
 BANDS_COUNTS = ((80, 200), (200, 400), (400, 800))
 LEAST_ROWS = 40
-TENTHS = np.arange(0.0, 0.7, 0.1)
-LOOKED_COUNTS, LOOKED_ASIDE = 150.0, 0.2  # of pressure; of the normal's other part
+LOOK_ASIDE = 0.2  # of the normal's other part
 NEAREST = 6  # electrodes that count as the same place
 NEIGHBOURS = np.argsort(np.linalg.norm(surface.ELECTRODE_MM[:, None] - surface.ELECTRODE_MM[None], axis=2), axis=1)
 
 
 class Pressed(Protocol):
-    """Counts (n, 19) with their tare (19,) and the force that was measured, (n, 3) in N."""
+    """Counts (n, 19) of a simulated finger, and its tare (19,)."""
 
     @property
     def counts(self) -> Floats: ...
@@ -49,11 +60,10 @@ def by_place(pressed: Sequence[KnownForce], touched: Sequence[Pressed], names: S
         )
         model = [_felt(finger.counts[part], finger.tare, size_n[k]) for finger in touched]
         for key, (squeezed, share, n) in real.items():
-            same = np.array([finger[key][:2] for finger in model if key in finger])
-            if n >= LEAST_ROWS // 4 and len(same):  # the rows here are a tenth of the recording's
-                rows.append(
-                    [name, *key, n, squeezed, *np.median(same, axis=0)[:1], share, *np.median(same, axis=0)[1:]]
-                )
+            fingers = [finger[key][:2] for finger in model if key in finger]
+            if fingers:
+                median_squeezed, median_share = np.median(fingers, axis=0)
+                rows.append([name, *key, n, squeezed, median_squeezed, share, median_share])
     head = ["finger", "point of contact", "N", "rows", "squeezed", "simulated", "felt over true", "simulated "]
     text = "Simulated: the median finger, pressed where the fit says. Squeezed are counts below the tare, summed."
     return Table("By place of the point of contact", head, rows, text, digits=2)
@@ -64,10 +74,10 @@ def _felt(counts: Floats, tare: Floats, size_n: Floats) -> dict[tuple[str, str],
     point, felt_n = found["poc_mm"] / surface.RADIUS_MM, np.linalg.norm(found["force_n"], axis=1)
     squeezed = np.maximum(tare - counts, 0.0).sum(axis=1)
     table = {}
-    for place, there in places_of_points(np.abs(point[:, 1]), np.maximum(point[:, 0], 0.0)).items():
+    for place, placed in places_of_points(np.abs(point[:, 1]), np.maximum(point[:, 0], 0.0)).items():
         for low, high in BANDS_N:
-            rows = there & (size_n >= low) & (size_n < high) & np.isfinite(felt_n)
-            if rows.sum() >= LEAST_ROWS // 4:
+            rows = placed & (size_n >= low) & (size_n < high) & np.isfinite(felt_n)
+            if rows.sum() >= LEAST_ROWS // 4:  # the rows here are a tenth of the recording's
                 share = float(np.median(felt_n[rows] / size_n[rows]))
                 table[place, f"{low:g} to {high:g}"] = float(np.median(squeezed[rows])), share, int(rows.sum())
     return table
@@ -107,15 +117,9 @@ def tables(name: str, plate: KnownNormal, fingers: Sequence[Finger]) -> list[Tab
     return [_points(name, plate, fingers), _cells(name, plate, signals), _deepest(name, plate, signals)]
 
 
-def _states(plate: KnownNormal) -> States:
-    n = len(plate.counts)
-    still = np.zeros(n)
-    return States(plate.contact_mm, plate.force_n, np.zeros((n, 3)), still, np.full(n, PLATE_MM), still)
-
-
 def signal_under(finger: Finger, plate: KnownNormal) -> Floats:
     """Counts (n, 19) above rest of a finger under the plates, pressed as plates.py takes the pressure."""
-    signal: Floats = finger.counts(_states(plate)) - finger.rest_counts(np.zeros(1))
+    signal: Floats = finger.counts(pressing(plate.place, plate.force_n)) - finger.rest_counts(np.zeros(1))
     return signal
 
 
@@ -124,14 +128,14 @@ def _points(name: str, plate: KnownNormal, fingers: Sequence[Finger]) -> Table:
     real = surface.point_of_contact(plate.signal, 1.0, compressed=True) / surface.RADIUS_MM
     rows: list[list[Any]] = []
     for axis, k, other in (("ny", 1, 0), ("nx", 0, 1)):
-        at, seen = np.abs(plate.normal[:, 1]) if k else plate.normal[:, 0], real[:, k]
+        normal, seen = np.abs(plate.normal[:, 1]) if k else plate.normal[:, 0], real[:, k]
         for low in TENTHS:
-            there = (at >= low) & (at < low + 0.1) & (np.abs(plate.normal[:, other]) < LOOKED_ASIDE)
-            there &= plate.pressure > LOOKED_COUNTS
-            if there.sum() < LEAST_ROWS // 2:
+            tenth = (normal >= low) & (normal < low + 0.1) & (np.abs(plate.normal[:, other]) < LOOK_ASIDE)
+            tenth &= plate.pressure > LOOK_COUNTS
+            if tenth.sum() < LOOK_ROWS:
                 continue
-            found = np.nanmedian(np.abs(seen[there]) if k else np.maximum(seen[there], 0.0))
-            rows.append([f"{axis} {low:.1f}", int(there.sum()), found, *points_seen(fingers, k, low + 0.05)])
+            median = np.nanmedian(np.abs(seen[tenth]) if k else np.maximum(seen[tenth], 0.0))
+            rows.append([f"{axis} {low:.1f}", int(tenth.sum()), median, *points_seen(fingers, k, low + 0.05)])
     text = (
         "The plate's normal to a side (ny) and to the tip (nx); simulated: the median finger in the mid of the tenth."
     )
@@ -145,11 +149,9 @@ def _points(name: str, plate: KnownNormal, fingers: Sequence[Finger]) -> Table:
 
 
 def points_seen(fingers: Sequence[Finger], k: int, at: float) -> list[float]:
-    """The median point of contact of fingers under a plate of that normal, 2, 4 and 6 N."""
-    normal = np.array([[0.0, at, -np.sqrt(1.0 - at * at)] if k else [at, 0.0, -np.sqrt(1.0 - at * at)]])
-    contact = surface.RADIUS_MM * normal + ([[-4.0, 0.0, 0.0]] if k else [[0.0, 0.0, 0.0]])
-    still, force_n = np.zeros(3), np.array([2.0, 4.0, 6.0])
-    states = States(np.repeat(contact, 3, axis=0), force_n, np.zeros((3, 3)), still, np.full(3, PLATE_MM), still)
+    """The median point of contact of fingers under a plate of that normal, by LOOK_FORCES_N."""
+    place = np.tile(place_under(at, sideways=k == 1), (len(LOOK_FORCES_N), 1))
+    states = pressing(place, np.array(LOOK_FORCES_N))
     signals = [finger.counts(states) - finger.rest_counts(np.zeros(1)) for finger in fingers]
     points = (
         np.array([surface.point_of_contact(signal, 1.0, compressed=True)[:, k] for signal in signals])
@@ -162,9 +164,9 @@ def points_seen(fingers: Sequence[Finger], k: int, at: float) -> list[float]:
 def _cells(name: str, plate: KnownNormal, signals: Sequence[Floats]) -> Table:
     """Squeezed counts for each count of pressure, and bulged over squeezed, by place and pressure."""
     rows: list[list[Any]] = []
-    for place, there in places_of_normals(plate.normal).items():
+    for place, placed in places_of_normals(plate.normal).items():
         for low, high in BANDS_COUNTS:
-            cell = there & (plate.pressure >= low) & (plate.pressure < high)
+            cell = placed & (plate.pressure >= low) & (plate.pressure < high)
             if cell.sum() < LEAST_ROWS:
                 continue
             real = squeezed_and_bulged(plate.signal[cell], plate.pressure[cell])

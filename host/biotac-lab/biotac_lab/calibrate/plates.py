@@ -40,6 +40,14 @@ CYLINDER = 0.1  # a normal with less of x is the cylinder's, whose place along t
 # how many times as many at the tip, and at the very side, where its signals for a count are ten times the pad's.
 # Navarro 2015 measured 62 to 111 on another pad, so that finger may as well be less than half as loud.
 PER_N, PER_N_TIP, PER_N_SIDE, SIDES = 240.0, 3.3, 0.4, (0.6, 0.85)
+# Points of contact are looked at in tenths of the normal, from so much pressure on, where there are so many rows.
+TENTHS, LOOK_COUNTS, LOOK_ROWS, LOOK_FORCES_N, LOOK_ALONG_MM = (
+    np.arange(0.0, 0.7, 0.1),
+    150.0,
+    20,
+    (2.0, 4.0, 6.0),
+    -4.0,
+)
 QUIET_COUNTS, QUIET_ROWS, REST_PERCENTILE = 15.0, 60, 5.0
 PRESSED_COUNTS = 60.0
 
@@ -64,6 +72,18 @@ def plate_states(place: Floats, force_n: Floats) -> States:
     still = np.zeros(len(contact))
     shear = force_n[:, :1] * along + force_n[:, 1:2] * across
     return States(contact, np.maximum(force_n[:, 2], LEAST_N), shear, still, np.full(len(still), PLATE_MM), still)
+
+
+def pressing(place: Floats, force_n: Floats) -> States:
+    """A plate that presses straight at ``place`` (n, 2), with ``force_n`` (n,)."""
+    none = np.zeros(len(place))
+    return plate_states(place, np.column_stack([none, none, force_n]))
+
+
+def place_under(normal: float, *, sideways: bool) -> list[float]:
+    """Where a plate touches whose unit normal has so much to a side of the pad, or to the tip: a place."""
+    angle = float(np.arcsin(normal))
+    return [LOOK_ALONG_MM, angle] if sideways else [surface.RADIUS_MM * angle, 0.0]
 
 
 @dataclass(frozen=True)
@@ -135,13 +155,9 @@ class KnownNormal:
         force_n: Floats = self.pressure / (PER_N * PER_N_TIP**tip * PER_N_SIDE**side)
         return force_n
 
-    @property
-    def contact_mm(self) -> Floats:
-        """Where the plate touched (n, 3): on the cylinder its place along the finger is the point of contact's."""
-        return roll_up(surface.RADIUS_MM * self._place[:, 1], self._place[:, 0])
-
     @cached_property
-    def _place(self) -> Floats:
+    def place(self) -> Floats:
+        """Where the plate touched (n, 2): on the cylinder its place along the finger is the point of contact's."""
         place = place_of(surface.RADIUS_MM * self.normal)
         felt = np.minimum(felt_place(self.signal)[:, 0], 0.0)
         place[:, 0] = np.where(self.normal[:, 0] < CYLINDER, felt, place[:, 0])
@@ -170,7 +186,7 @@ class KnownNormal:
     def unknown(self) -> Unknown:
         """Place, roll, log of the force, and shear along and across as shares of it."""
         n, cylinder = len(self.counts), self.normal[:, 0] < CYLINDER
-        place = self._place
+        place = self.place
         strength, none = np.log(self.force_n), np.zeros(n)
         first = np.column_stack([place, strength, none, none])
         mean = np.column_stack([np.where(cylinder, ALONG_MM, place[:, 0]), place[:, 1], strength, none, none])

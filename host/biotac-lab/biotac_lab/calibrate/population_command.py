@@ -118,9 +118,9 @@ def _places(names: Sequence[str], maps: Sequence[Population], runs: Sequence[Run
         share = np.linalg.norm(other.published(run.counts, run.tare), axis=1) / np.linalg.norm(run.truth, axis=1)
         point = surface.point_of_contact(run.counts - run.tare, 1.0, compressed=True) / surface.RADIUS_MM
         places = off_pad.places_of_points(np.abs(point[:, 1]), np.maximum(point[:, 0], 0.0))
-        for place, there in places.items():
-            if there.sum() >= off_pad.LEAST_ROWS:
-                low, median, high = np.percentile(share[there], (10, 50, 90))
-                rows.append([f"{name} by the others", place, int(there.sum()), median, low, high])
+        for place, placed in places.items():
+            if placed.sum() >= off_pad.LEAST_ROWS:
+                low, median, high = np.percentile(share[placed], (10, 50, 90))
+                rows.append([f"{name} by the others", place, int(placed.sum()), median, low, high])
     head = ["finger", "point of contact", "rows", "felt over true", "10 %", "90 %"]
     return Table("Felt over true by place of the point of contact", head, rows, digits=2)
