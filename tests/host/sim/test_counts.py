@@ -1,0 +1,91 @@
+"""Counts of simulated fingers, to the bit: those of before, by their hashes."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biotac.sim import Course, SimFinger, Touch, bundled_scenarios, load_source
+from biotac.sim.live import LiveFingers
+from biotac.sim.touch import Load
+from biotac.wire import sensor_gen as sensor
+
+SCENARIOS = {
+    "calibrate.toml": "33d99a1757f4e853",
+    "calibrate_gaps.toml": "33d99a1757f4e853",
+    "drift.toml": "16a1c2fd206c950b",
+    "faults.toml": "6445aa3309ddd8cc",
+    "fingers.toml": "b5e373be7117b2a3",
+    "grasp.toml": "9d2b8db3c016e539",
+    "poke.toml": "c40a5fcba09eaa2a",
+    "press.toml": "f7cbb822e683e8a4",
+    "scale.toml": "016eb4b186812e56",
+    "shear.toml": "70125c3ef1d3463b",
+    "verbs.toml": "eeb7aaf80176f2e4",
+    "weights.toml": "c7c37608b1b1c1bf",
+}
+COURSES = {
+    "0 new": "963778ba95b1e17b",
+    "0 worn": "5a55aba31522d9b9",
+    "1 new": "2fa700f69b44524a",
+    "1 worn": "c7dd3a226609a4b2",
+    "2 new": "9c06cf6110ba3823",
+    "2 worn": "77384fdf4fd8532d",
+}
+
+
+def digest(words: np.ndarray) -> str:
+    return hashlib.sha256(words.astype("<u2").tobytes()).hexdigest()[:16]
+
+
+def contact(rng: np.random.Generator, celsius: float) -> Touch:
+    """A touch of any kind: from faint to firm, dragged, turned, sliding, on an electrode or beside it."""
+    some = rng.random(6)
+    place = str(rng.choice(sensor.ELECTRODE_NAMES)) if some[0] < 0.4 else (rng.uniform(-14, 3), rng.uniform(-4, 4))
+    shear_n = tuple(rng.normal(size=2) * (some[1] < 0.6))
+    return Touch(
+        rng.choice([0.0, rng.uniform(0, 0.1), rng.uniform(0.1, 8), rng.uniform(0, 50)], p=[0.1, 0.15, 0.7, 0.05]),
+        shear_n, at=place, torsion_nmm=8 * rng.normal() * (some[2] < 0.5), tip_mm=rng.choice([0.5, 1, 2, 3, 7, 10]),
+        slip_mm_s=40 * some[3] * (some[4] < 0.3), celsius=celsius,
+    )  # fmt: skip
+
+
+def load(rng: np.random.Generator, k: int) -> Load:
+    """A load of round ``k``: none, a contact, several at once, or a course of either."""
+    celsius = 30.0 + 3.0 * np.sin(k / 90) * (k % 400 > 200)
+    kind = rng.integers(7)
+    if kind == 0:
+        return None
+    if kind < 4:
+        return contact(rng, celsius)
+    if kind == 4:
+        return [contact(rng, celsius) for _ in range(rng.integers(1, 4))]
+    if kind == 5:
+        return Course(contact(rng, celsius) for _ in range(rng.integers(7)))
+    return Course([contact(rng, celsius) for _ in range(rng.integers(1, 4))] for _ in range(rng.integers(1, 5)))
+
+
+def course(seed: int, profile: Any) -> np.ndarray:
+    """The words of two fingers, at both ends of their spread, under 600 loads some of which stay for more rounds."""
+    fingers = {"a": SimFinger(seed, profile), "b": SimFinger(seed + 100, profile)}
+    for spread, finger in zip((-1.0, 1.0), fingers.values(), strict=True):
+        finger.at_spread(*np.roll([spread, 0.3 * spread, -0.7 * spread], seed))
+    live, rng, held, words = LiveFingers(fingers), np.random.default_rng([seed, 99]), {}, []
+    for k in range(600):
+        if rng.random() < 0.7:
+            held = {name: load(rng, k) for name in fingers if rng.random() < 0.9}
+        words.append(live.read(held, int(rng.choice([1, 1, 1, 5]))))
+    return np.concatenate(words)
+
+
+@pytest.mark.parametrize("name", bundled_scenarios())
+def test_a_scenario_s_counts_are_those_of_before(name: str) -> None:
+    assert digest(load_source(name, fingers=5, seconds=60).samples) == SCENARIOS[name]
+
+
+@pytest.mark.parametrize(("seed", "profile"), [(seed, profile) for seed in range(3) for profile in ("new", "worn")])
+def test_counts_under_loads_of_all_kinds_are_those_of_before(seed: int, profile: str) -> None:
+    assert digest(course(seed, profile)) == COURSES[f"{seed} {profile}"]
