@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from paper_finger import PaperFinger
+from scipy.signal import lfilter
 
 from biotac.core.finger import Finger
 from biotac.kernels.geometry import Floats
@@ -117,7 +118,7 @@ class Script:
         still = self.sensor.rest_counts(states.warm_c)
         loaded = self.sensor.counts(states)
         rest = still + drift
-        creep = self.sensor.creep_share * sampling.Lag(sampling.CREEP_S)(loaded - still)
+        creep = self.sensor.creep_share * lag(loaded - still, sampling.CREEP_S)
         return Course(
             sensor=self.sensor,
             words={
@@ -131,7 +132,7 @@ class Script:
             rest=_middle(rest),
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
-            pressure=self.sensor.pdc_rest + _middle(sampling.Pressure()(sampling.spring_load(self.sensor, states))),
+            pressure=self.sensor.pdc_rest + _middle(pressure(sampling.effects_of(self.sensor, states)["pressure"])),
             warm_c=_middle(states.warm_c),
         )
 
@@ -155,6 +156,19 @@ def resting(sensor: physics.Finger, seconds: float, seed: int, start_s: float = 
     counts -= hit * rng.uniform(30.0, 66.0, (frames, 19))
     pdc = sensor.pdc_rest + rng.standard_normal(frames) * sampling.PDC_NOISE
     return {"counts": np.rint(counts).astype(np.uint16), "pdc": np.rint(pdc).astype(np.uint16)}
+
+
+def lag(signal: Floats, seconds: float) -> Floats:
+    """A lag of the first order of values (n, ...) at the boundaries of rounds, from 0 on."""
+    keep = np.exp(-slots.FRAME_S / seconds)
+    lagged: Floats = lfilter([1.0 - keep], [1.0, -keep], signal, axis=0)
+    return lagged
+
+
+def pressure(load: Floats) -> Floats:
+    """Static pressure above rest (n,), in counts: a spring's load, undershoot and creep."""
+    low = sampling.PDC_UNDERSHOOT * np.tanh(lag(load, sampling.PDC_UNDERSHOOT_S) / sampling.PDC_UNDERSHOOT_AT)
+    return load - low + sampling.PDC_CREEP_SHARE * lag(load, sampling.PDC_CREEP_S)
 
 
 def _middle(boundary: Floats) -> Floats:

@@ -15,10 +15,9 @@ from .physics import (
     Profile,
     Skin,
     States,
-    counts_at,
+    counts_of,
     deform,
     resistance_at,
-    resistance_share,
 )  # fmt: skip
 from .random_loads import plate_recording, random_loads
 from .sampling import Sampler, sample, tdc_counts
@@ -33,6 +32,6 @@ SimFinger = Finger  #: by the name that programs use beside biotac.Finger
 __all__ = [
     "EVERY_FAULT", "FAULTS", "FLAT_MM", "GAP_MM", "PLATE_MM", "PROFILES", "SKIN", "Course", "Finger", "Footprints",
     "Load", "LockStep", "Pose", "Profile", "Sampler", "SimFinger", "Skin", "Source", "States", "Touch", "Track",
-    "Truth", "World", "bundled_scenarios", "counts_at", "deform", "fit_gains", "load_source", "plate_recording",
-    "random_loads", "resistance_at", "resistance_share", "sample", "tdc_counts", "world",
+    "Truth", "World", "bundled_scenarios", "counts_of", "deform", "fit_gains", "load_source", "plate_recording",
+    "random_loads", "resistance_at", "sample", "tdc_counts", "world",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import DeviceLostError, InputError, PortError
 from ..link.serial_port import SerialLink
 from ..wire.sensor_gen import MAX_SENSORS
+from ..wire.slots import SLOTS_PER_FRAME
 from . import touch
 from .emu_gen import EmuStatus
 from .faults import BETWEEN_FINGERS, EXCHANGED, begin
@@ -50,12 +51,13 @@ class LiveFingers:
         for name in loads:
             self.number(name)
         states = [touch.states(loads.get(name)) for name in self.names]
-        read = [sampler.steps(rounds, *state) for sampler, state in zip(self._samplers, states, strict=True)]
-        words = np.stack(read, axis=1)
-        spoilt: Words = words.copy()
+        words = np.empty((len(states), rounds, SLOTS_PER_FRAME), np.uint16)
+        for number, felt in enumerate(states):
+            words[number] = self._samplers[number].steps(rounds, *felt)
+        spoilt = words.copy() if self._faults else words
         for number, beside, lay in chain(*self._faults.values()):
-            spoilt[:, number] = lay(spoilt[:, number], words[:, beside])
-        return spoilt
+            spoilt[number] = lay(spoilt[number], words[beside])
+        return np.ascontiguousarray(spoilt.swapaxes(0, 1))
 
     def number(self, name: str) -> int:
         """The chip select of a finger. Raises KeyError for an unknown name."""

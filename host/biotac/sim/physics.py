@@ -1,5 +1,7 @@
 """Contact to electrode counts: a model of skin, fluid and electrodes whose numbers are fitted to real fingers.
 
+The formulas are computed in C (host/binding/skin); their numbers stand here.
+
 A contact squeezes the fluid gap over the electrodes under it, less with distance; the displaced volume widens the gap
 elsewhere; shear and torsion drag the skin, which narrows the gap ahead of the core and widens it where skin piles up;
 each electrode's resistance follows its gap, and a divider turns it into counts. ``biotac-lab finger`` fits the
@@ -12,7 +14,7 @@ smaller than a plate squeezes as deep and less wide, up to the paper's 10 MOhm a
 from __future__ import annotations
 
 import json
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -24,8 +26,8 @@ import numpy.typing as npt
 from ..core import geometry as surface
 from ..errors import InputError
 from ..kernels.geometry import Floats
-from ..kernels.unroll import roll_up, unroll
 from ..wire import sensor_gen as _sensor
+from ..wire.native import ffi, lib
 
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")
@@ -61,11 +63,30 @@ OTHERWISE = 0.03  # of log sensitivity, as alike in neighbours; the prior of the
 SPREAD_REACH_MM = 6.0  # F1 and F2 differ alike in electrodes 5 mm apart, and by chance in those 7 mm apart
 WORN_LEVEL = -0.53  # of log resistance: trial_15330's finger against F1 and F2
 
-_BLOCK = 256  # states at a time: keeps the (states x mesh points) arrays inside the cache
+
+_DOUBLES = ffi.typeof("double[]")
+
+
+def doubles(numbers: npt.ArrayLike) -> Any:
+    """An array as C has it; it lives as long as this."""
+    return ffi.from_buffer(_DOUBLES, np.ascontiguousarray(numbers, np.float64))
+
+
+def c_struct(kind: str, constants: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
+    """A struct of C, whose fields are ``given`` or constants of the same name in capitals."""
+    names = [name for name, _ in ffi.typeof(kind).fields]
+    return ffi.new(f"{kind} *", {name: given[name] if name in given else constants[name.upper()] for name in names})
+
+
+class _InC:
+    """What is kept of itself as C has it. A copy makes its own: what C has can be neither copied nor pickled."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("in_c", "touched")}
 
 
 @dataclass(frozen=True)
-class Skin:
+class Skin(_InC):
     """What fingers have in common, fitted: see deform() for what each number does.
 
     ``lead_mm`` is how far, at most, a plate touches nearer to the pad than its normal says.
@@ -95,6 +116,14 @@ class Skin:
     gain_apart: Floats
     r0_apart: Floats
 
+    @cached_property
+    def in_c(self) -> Any:
+        """This skin and the model's constants as C has them."""
+        own = {name: value.tolist() if name == "gain" else value for name, value in vars(self).items()}
+        sensor = {name.lower(): getattr(_sensor, name) for name in ("LOAD_OHM", "TDC_A", "TDC_B", "TDC_BETA_K")}
+        points = {"points": len(_POINTS), "point": ffi.from_buffer("bt_skin_point[]", _POINTS)}
+        return c_struct("bt_skin", globals(), own | sensor | points)
+
 
 def shipped_skin() -> Skin:
     """The package's fit, skin.json."""
@@ -108,7 +137,7 @@ SKIN = shipped_skin()
 
 
 @dataclass(frozen=True)
-class States:
+class States(_InC):
     """What touches one finger at n instants; all arrays float64.
 
     ``contact_mm`` (n, 3) lies on the core surface; ``force_n`` (n,) >= 0 is the normal force, 0 for
@@ -132,6 +161,34 @@ class States:
     def deformation(self) -> tuple[Floats, Floats]:
         """Result of deform() for these states, the same for every finger."""
         return deform(self)
+
+    @classmethod
+    def of_poses(cls, poses: Floats) -> States:
+        """The states of poses (n, 9), whose columns are the fields of timeline.Pose in order."""
+        n, contact = len(poses), ffi.new("bt_contact *")
+        numbers = np.empty(lib.BT_CONTACT_NUMBERS * n)
+        lib.bt_contact_of_poses(n, doubles(poses), REST_CELSIUS, doubles(numbers), contact)
+        numbers.flags.writeable = False  # what is computed of them once would not follow
+        states = cls(
+            numbers[: 3 * n].reshape(n, 3), numbers[3 * n : 4 * n], numbers[4 * n : 7 * n].reshape(n, 3),
+            *numbers[7 * n :].reshape(4, n),
+        )  # fmt: skip
+        states.__dict__["in_c"] = contact, numbers
+        return states
+
+    @cached_property
+    def in_c(self) -> tuple[Any, ...]:
+        """These states as C has them, and what must be kept with them."""
+        load = self.contact_mm, self.force_n, self.shear_n, self.torsion_nmm, self.tip_radius_mm, self.warm_c
+        kept = [doubles(numbers) for numbers in load]
+        kept.append(ffi.NULL if self.slip_mm_s is None else doubles(self.slip_mm_s))  # a pointer keeps nothing alive
+        return ffi.new("bt_contact *", kept), kept
+
+    @cached_property
+    def touched(self) -> tuple[Any, ...]:
+        """These states with their deformation as C has them, and what must be kept with them."""
+        kept = self.in_c[0], *map(doubles, self.deformation)
+        return ffi.new("bt_touched *", kept), kept
 
     def of(self, rows: npt.NDArray[Any]) -> States:
         """The states at the instants ``rows``, a NumPy index."""
@@ -167,102 +224,43 @@ class Footprints:
 
 _MESH_MM, _, _MESH_AREA_MM2 = surface.ventral_mesh(MESH_MM)
 _POINTS_MM = np.concatenate([surface.ELECTRODE_MM, _MESH_MM])  # electrodes first
-_POINTS_MM2 = (_POINTS_MM**2).sum(axis=1)
-_RADIAL = surface.normals_at(_POINTS_MM)  # Table 1's normals at the tip are one flat facet
-_ELECTRODES, _MESH = np.s_[:, :ELECTRODES], np.s_[:, ELECTRODES:]
+_POINTS = np.column_stack([
+    _POINTS_MM, (_POINTS_MM**2).sum(axis=1),
+    surface.normals_at(_POINTS_MM),  # Table 1's normals at the tip are one flat facet
+    np.append(np.zeros(ELECTRODES), _MESH_AREA_MM2),
+])  # fmt: skip
 _BETWEEN_MM2 = ((surface.ELECTRODE_MM[:, None] - surface.ELECTRODE_MM[None]) ** 2).sum(axis=2)
 _SMOOTH = np.linalg.cholesky(np.exp(_BETWEEN_MM2 / (-2.0 * SPREAD_REACH_MM**2)) + 1e-9 * np.eye(ELECTRODES))
-
-
-def _squeeze_and_bulge(state: Floats, skin: Skin) -> tuple[Floats, Floats]:
-    """Log compression and log bulge (n, 19) for touched states in _pack()'s columns."""
-    contact, force, shear, torsion = state[:, 0:3], state[:, 3], state[:, 4:7], state[:, 7]
-    normal, middle = surface.normals_at(contact), contact
-    to_tip, to_side = surface.tangents_at(normal)
-    plate = np.array([skin.along_mm, skin.across_mm])
-    if state.shape[1] == 9:
-        share = _probe(state[:, 8:9]) * plate
-        along = to_tip
-        if skin.lead_mm:
-            middle = _middle(contact, state[:, 8], skin.lead_mm)
-            normal = surface.normals_at(middle)
-    else:
-        share = _probe(state[:, 9:7:-1]) * math.sqrt(plate.prod())
-        along = state[:, 10:13]
-    firm = np.exp(skin.taper * np.tanh((contact[:, 0] - PAD_MM) / PAD_REACH_MM))
-    strength = (force**skin.exponent * firm)[:, None]
-    long2, short2 = (share * (np.maximum(force, FAINT_N) / PLATE_N)[:, None] ** skin.growth).T[:, :, None] ** 2
-
-    distance2 = np.maximum((middle**2).sum(axis=1)[:, None] + _POINTS_MM2 - 2.0 * middle @ _POINTS_MM.T, 0.0)
-    part2 = (along @ _POINTS_MM.T - (along * middle).sum(axis=1)[:, None]) ** 2
-    away2 = part2 / long2 + np.maximum(distance2 - part2, 0.0) / short2  # in footprints
-    outside = 1.0 - np.exp(away2 / -skin.hole)
-    under = strength * np.exp(-np.sqrt(away2))
-    facing = skin.squeeze * np.maximum(normal @ _RADIAL.T, 0.0)
-
-    volume_mm3 = (1.0 - np.exp(-under[_MESH] * facing[_MESH])) @ _MESH_AREA_MM2
-    widened = skin.bulge_share * volume_mm3 / (outside[_MESH] @ _MESH_AREA_MM2)
-    limited = SQUEEZE_MAX_PER_N * np.tanh(facing[_ELECTRODES] * (skin.gain[0] / SQUEEZE_MAX_PER_N))
-    compression = under[_ELECTRODES] * limited
-    bulge = widened[:, None] * outside[_ELECTRODES] * skin.gain[1]
-
-    along_mm = (shear * to_tip).sum(axis=1)[:, None] / skin.drag_along_n_mm
-    across_mm = (shear * to_side).sum(axis=1)[:, None] / skin.drag_across_n_mm
-    length = np.maximum(np.hypot(along_mm, across_mm), 1e-12)
-    limited = skin.drag_max_mm * np.tanh(length / skin.drag_max_mm) / length
-    along_mm, across_mm = limited * along_mm, limited * across_mm
-    radial = _RADIAL[:ELECTRODES]
-    outward = (along_mm * to_tip + across_mm * to_side) @ radial.T
-    if torsion.any():
-        angle = TORSION_MAX_RAD * np.tanh(torsion / (TORSION_NMM_PER_RAD * TORSION_MAX_RAD))
-        arm = surface.ELECTRODE_MM[None, :, :] - contact[:, None, :]
-        outward += np.einsum(
-            "nec,ec->ne", np.cross((angle[:, None] * surface.normals_at(contact))[:, None, :], arm), radial
-        )
-    ahead_mm = to_tip @ surface.ELECTRODE_MM.T - (to_tip * contact).sum(axis=1)[:, None]
-    sideways = outward / GAP_MM * skin.gain[2] + skin.pile_per_mm2 * along_mm * ahead_mm * skin.gain[3]
-    return compression, bulge + sideways * np.exp(distance2[_ELECTRODES] / (-2.0 * skin.drag_reach_mm**2))
-
-
-def _middle(contact: Floats, half_mm: Floats, lead_mm: float) -> Floats:
-    """Where the footprint's middle lies (n, 3), of flats of half width ``half_mm`` (n,) at ``contact`` (n, 3)."""
-    flat = np.clip((half_mm - LEAD_FROM_MM) / (PLATE_MM - LEAD_FROM_MM), 0.0, 1.0)
-    across, along = unroll(contact)
-    return roll_up(across, along - lead_mm * flat * np.exp(-(((along - LEAD_AT_MM) / LEAD_REACH_MM) ** 2)))
-
-
-def _probe(half_mm: Floats) -> Floats:
-    """How wide a probe presses, as a share of a plate."""
-    return (np.minimum(half_mm, PLATE_MM) + SKIN_MM) / (PLATE_MM + SKIN_MM)
-
-
-def _pack(states: States, footprints: Footprints | None) -> Floats:
-    """The mechanical part of touched states as rows (n, 9), or (n, 13) with footprints in place of the tip."""
-    load = [states.contact_mm, states.force_n, states.shear_n, states.torsion_nmm]
-    if footprints is None:
-        return np.column_stack([*load, states.tip_radius_mm])
-    return np.column_stack([*load, footprints.short_mm, footprints.long_mm, footprints.along])
 
 
 def deform(states: States, footprints: Footprints | None = None, skin: Skin = SKIN) -> tuple[Floats, Floats]:
     """Log compression and log bulge of the gap over the electrodes, each (n, 19).
 
     Both are 0 without contact, and those of several contacts add: the logs of what each leaves of the gap, and the
-    volumes each displaces. ``footprints`` take the place of ``tip_radius_mm``. Equal states are computed once: a
-    scenario mostly holds still.
+    volumes each displaces. ``footprints`` take the place of ``tip_radius_mm``. A state like the one before is not
+    computed again: a scenario mostly holds still.
     """
-    compression = np.zeros((len(states), ELECTRODES))
-    bulge = np.zeros((len(states), ELECTRODES))
-    touched = np.flatnonzero(states.force_n > 0.0)
-    if len(touched):
-        unique, inverse = _pack(states, footprints)[touched], np.arange(len(touched))
-        if len(touched) > 1:
-            unique, inverse = np.unique(unique, axis=0, return_inverse=True)
-        parts = [_squeeze_and_bulge(unique[k : k + _BLOCK], skin) for k in range(0, len(unique), _BLOCK)]
-        rows = inverse.reshape(-1)  # NumPy 2.0 alone returns it as a column
-        compression[touched] = np.concatenate([part[0] for part in parts])[rows]
-        bulge[touched] = np.concatenate([part[1] for part in parts])[rows]
-    return compression, bulge
+    both = np.empty((2, len(states), ELECTRODES))
+    shape, kept = ffi.NULL, [] if footprints is None else [doubles(numbers) for numbers in vars(footprints).values()]
+    if kept:
+        shape = ffi.new("bt_footprints *", kept)
+    into = doubles(both)
+    lib.bt_deform(skin.in_c, shape, len(states), states.in_c[0], into, into + both.size // 2)
+    return both[0], both[1]
+
+
+def counts_of(
+    r0_ohm: Floats, gap_gain: Floats, deformation: tuple[Floats, Floats] | None, warm_c: Floats, skin: Skin = SKIN
+) -> Floats:
+    """Counts (n, 19), not rounded, at ``warm_c`` (n,) in C above 30 C, from deform()'s results; None: at rest.
+
+    ``r0_ohm`` and ``gap_gain`` (19,) are as Finger's.
+    """
+    counts = np.empty((len(warm_c), ELECTRODES))
+    squeezed, widened = (ffi.NULL, ffi.NULL) if deformation is None else map(doubles, deformation)
+    own = doubles(r0_ohm), doubles(gap_gain)
+    lib.bt_skin_counts(skin.in_c, *own, len(counts), squeezed, widened, doubles(warm_c), doubles(counts))
+    return counts
 
 
 class Finger:
@@ -310,15 +308,13 @@ class Finger:
 
     def loudness(self, contact_mm: Floats) -> Floats:
         """What a newton at ``contact_mm`` (n, 3) does, over what it does in the middle of the spread, (n,)."""
-        normal = surface.normals_at(contact_mm)
-        tip = np.clip((normal[:, 0] - TIP_FROM) / (1.0 - TIP_FROM), 0.0, 1.0)
-        side = np.clip((np.abs(normal[:, 1]) - SIDE_FROM) / (SIDE_TO - SIDE_FROM), 0.0, 1.0)
-        share: Floats = self.tip_gain**tip * self.side_gain**side
+        share = np.empty(len(contact_mm))
+        lib.bt_loudness(SKIN.in_c, self.tip_gain, self.side_gain, len(share), doubles(contact_mm), doubles(share))
         return share
 
     def rest_counts(self, warm_c: Floats) -> Floats:
         """Counts (n, 19) without contact at temperatures (n,) above 30 C."""
-        return counts_at(self.r0_ohm * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
+        return counts_of(self.r0_ohm, self.gap_gain, None, warm_c)
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
@@ -332,19 +328,7 @@ class Finger:
 
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
         """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""
-        share = resistance_share(compression * self.gap_gain, bulge * self.gap_gain, SKIN.fixed_share)
-        return counts_at(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
-
-
-def resistance_share(compression: Floats, bulge: Floats, fixed_share: float) -> Floats:
-    """Resistance as a share of that at rest, from the log compression and the log bulge of the gap."""
-    squeezed = SQUEEZE_MAX * np.tanh(compression / SQUEEZE_MAX)
-    return fixed_share + (1.0 - fixed_share) * np.exp(2.0 * (squeezed - bulge))
-
-
-def counts_at(resistance_ohm: Floats) -> Floats:
-    """The divider's counts, not rounded, at resistances in ohm."""
-    return _sensor.FULL_SCALE_COUNT * _sensor.LOAD_OHM / (resistance_ohm + _sensor.LOAD_OHM)
+        return counts_of(self.r0_ohm, self.gap_gain, (compression, bulge), warm_c)
 
 
 def resistance_at(counts: Floats) -> Floats:

@@ -58,15 +58,15 @@ def plate_recording(finger: Finger, loads: States, cell: npt.NDArray[np.int64], 
         return np.clip(noisy, 0, _sensor.FULL_SCALE_COUNT).astype(np.uint16)
 
     force, torque = loads.wrench()
-    at_rest = finger.rest_counts(np.zeros(1))
+    at_rest, pressed = finger.rest_counts(np.zeros(1)), sampling.effects_of(finger, loads)
     warming = np.linspace(0.0, IDLE_DRIFT_COUNTS, IDLE_FRAMES)[:, None]
     loading = finger.drift_per_min / finger.drift_per_min.mean()
     return {
-        "E": read(finger.counts(loads), finger.noise_counts),
+        "E": read(pressed["exact"], finger.noise_counts),
         "F": to_lin_frame(force),  # the same turn leads back to a recording's axes
         "M": to_lin_frame(torque),
         "torsion": loads.torsion_nmm,
-        "PDC": read(finger.pdc_rest + sampling.spring_load(finger, loads), sampling.PDC_NOISE),
+        "PDC": read(finger.pdc_rest + pressed["pressure"], sampling.PDC_NOISE),
         "E_base": read(np.repeat(at_rest, REST_FRAMES, axis=0), finger.noise_counts),
         "E_idle": read(at_rest + warming * loading, finger.noise_counts),
         "contact": cell,

@@ -16,6 +16,8 @@ import numpy as np
 
 from ..kernels.geometry import Floats
 from ..wire import sensor_gen as _sensor
+from ..wire.native import ffi, lib
+from .physics import doubles
 
 DRAWN_MM = 0.1
 SKIN_HZ = 160.0
@@ -33,22 +35,17 @@ class Ringing:
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
-        t_s = np.arange(round(10 * RING_S * PAC_HZ)) / PAC_HZ
-        self._ring = np.exp(-t_s / RING_S) * np.sin(2.0 * math.pi * SKIN_HZ * t_s)
+        t_s = np.arange(lib.BT_RING_SAMPLES) / PAC_HZ
+        ring = np.exp(-t_s / RING_S) * np.sin(2.0 * math.pi * SKIN_HZ * t_s)
+        self.in_c = ffi.new("bt_ringing *", [ring.tolist(), AMPLITUDE_COUNTS, DRAWN_MM, PAC_HZ])
         self._rng = rng
-        self._slid = False
-        self._blows: Floats = np.zeros(len(t_s) - 1)  # what still rings
+
+    def draw(self, frames: int) -> Floats:
+        """The next random numbers of so many frames."""
+        return self._rng.random((frames, _PAC, 2))
 
     def __call__(self, speed_mm_s: Floats) -> Floats:
-        draw = self._rng.random((len(speed_mm_s), _PAC, 2))
-        slips = draw[:, :, 0] < (speed_mm_s / DRAWN_MM / PAC_HZ)[:, None]
-        sway = 2.0 * draw[:, :, 1] - 1.0
-        blow = np.zeros(sway.shape)
-        blow[slips] = AMPLITUDE_COUNTS * np.sign(sway[slips]) * np.sqrt(np.abs(sway[slips]))
-        slides = speed_mm_s > 0.0
-        begins = slides & ~np.concatenate([[self._slid], slides[:-1]])
-        self._slid = bool(slides[-1])
-        blow[begins, 0] = AMPLITUDE_COUNTS * np.sign(sway[begins, 0])
-        blows = np.concatenate([self._blows, blow.ravel()])
-        self._blows = blows[-len(self._blows) :]
-        return np.convolve(blows, self._ring, "valid").reshape(blow.shape)
+        counts = np.empty((len(speed_mm_s), _PAC))
+        draws = doubles(self.draw(len(counts)))
+        lib.bt_ring(self.in_c, len(counts), doubles(speed_mm_s), draws, doubles(counts))
+        return counts

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core import geometry as surface
 from ..kernels.geometry import Floats
 from .physics import REST_CELSIUS, States
 
@@ -60,22 +59,4 @@ class Track:
         starts, lengths, begin, end = (np.array(column) for column in zip(*self._pieces, strict=True))
         piece = np.maximum(np.searchsorted(starts, times_s, side="right") - 1, 0)
         share = np.clip((times_s - starts[piece]) / lengths[piece], 0.0, 1.0)[:, None]
-        return states_of(begin[piece] * (1.0 - share) + end[piece] * share)
-
-
-def states_of(poses: Floats) -> States:
-    """The states of poses (n, 9), whose columns are the fields of Pose in order."""
-    force = poses[:, 2]
-    contact = surface.on_surface(poses[:, 0:2])
-    to_tip, to_side = surface.tangents_at(surface.normals_at(contact))
-    touched = force > 0.0
-    shear = poses[:, 3:4] * to_tip + poses[:, 4:5] * to_side
-    return States(
-        contact_mm=contact,
-        force_n=force,
-        shear_n=np.where(touched[:, None], shear, 0.0),
-        torsion_nmm=np.where(touched, poses[:, 5], 0.0),
-        tip_radius_mm=poses[:, 6] / 2.0,
-        warm_c=poses[:, 7] - REST_CELSIUS,
-        slip_mm_s=np.where(touched, poses[:, 8], 0.0),
-    )
+        return States.of_poses(begin[piece] * (1.0 - share) + end[piece] * share)

@@ -15,7 +15,6 @@ from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from .physics import REST_CELSIUS, States
 from .scenario import FLAT_MM, FORCE_MAX_N, SHEAR_MAX_N, SLIP_MAX_MM_S, TORSION_MAX_NMM
-from .timeline import states_of
 
 Place: TypeAlias = str | tuple[float, float]
 
@@ -87,11 +86,21 @@ def _place_mm(at: Place) -> tuple[float, float]:
 
 def states(load: Load) -> tuple[States, ...]:
     """The states of each contact of a load, one row for each part of a course, else one."""
+    if load is None or type(load) is Touch:  # which most are
+        return (_states_of((_pose(load or _NOTHING),)),)
     course = load if isinstance(load, Course) else (load,)
     parts = [_contacts(part) for part in course or (None,)]
     most = max(len(part) for part in parts)
     columns = [[part[k] if k < len(part) else Touch(celsius=part[0].celsius) for part in parts] for k in range(most)]
-    return tuple(states_of(np.array([_pose(touch) for touch in column], float)) for column in columns)
+    return tuple(_states_of(tuple(map(_pose, column))) for column in columns)
+
+
+_NOTHING = Touch()
+
+
+@lru_cache(maxsize=64)  # what a load does is not computed again while it stays
+def _states_of(poses: tuple[tuple[float, ...], ...]) -> States:
+    return States.of_poses(np.array(poses, float))
 
 
 def _contacts(load: Any) -> tuple[Touch, ...]:
@@ -103,7 +112,7 @@ def _contacts(load: Any) -> tuple[Touch, ...]:
     celsius = sorted({contact.celsius for contact in contacts})
     if len(celsius) > 1:
         raise InputError(f"a load has contacts of celsius {celsius}, expected one for all: it is the finger's own")
-    return contacts or (Touch(),)
+    return contacts or (_NOTHING,)
 
 
 def _pose(touch: Touch) -> tuple[float, ...]:

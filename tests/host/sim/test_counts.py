@@ -1,17 +1,20 @@
-"""Counts of simulated fingers, to the bit: those of before, by their hashes."""
+"""Counts of simulated fingers, to the bit: those of the model in NumPy before it moved to C, by their hashes."""
 
 from __future__ import annotations
 
+import copy
 import hashlib
+import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 
-from biotac.sim import Course, SimFinger, Touch, bundled_scenarios, load_source
+from biotac.sim import Course, SimFinger, Touch, bundled_scenarios, load_source, physics, touch
 from biotac.sim.live import LiveFingers
 from biotac.sim.touch import Load
 from biotac.wire import sensor_gen as sensor
+from biotac.wire import slots
 
 SCENARIOS = {
     "calibrate.toml": "33d99a1757f4e853",
@@ -89,3 +92,33 @@ def test_a_scenario_s_counts_are_those_of_before(name: str) -> None:
 @pytest.mark.parametrize(("seed", "profile"), [(seed, profile) for seed in range(3) for profile in ("new", "worn")])
 def test_counts_under_loads_of_all_kinds_are_those_of_before(seed: int, profile: str) -> None:
     assert digest(course(seed, profile)) == COURSES[f"{seed} {profile}"]
+
+
+def test_what_depends_on_the_load_alone_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    computed = []
+    deform = physics.deform
+    monkeypatch.setattr(physics, "deform", lambda states: computed.append(1) or deform(states))
+    live = LiveFingers({"a": SimFinger(1), "b": SimFinger(2)})
+    for force_n in (1.375, 1.375, 1.375, 2.625, 1.375):
+        live.read({name: Touch(force_n, at=(-3.125, 1.625)) for name in "ab"}, 2)
+    assert len(computed) == 2
+
+
+def test_a_finger_that_changes_is_read_as_it_is_now() -> None:
+    finger = SimFinger(1)
+    live = LiveFingers({"a": finger})
+    before = live.read({"a": Touch(4.0)}, 2)[-1, 0].astype(int)
+    finger.pressure_gain *= 2.0
+    finger.r0_ohm[:] *= 2.0  # in place
+    finger.drift_per_min = np.zeros(19)
+    after = live.read({"a": Touch(4.0)}, 2)[-1, 0].astype(int)
+    assert after[slots.PDC_SLOT] > before[slots.PDC_SLOT] + 100
+    assert (after[slots.ELECTRODE_SLOT] < before[slots.ELECTRODE_SLOT] - 100).sum() > 9
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
+def test_states_and_skins_can_be_copied_once_they_have_been_used(again: Any) -> None:
+    states = touch.states(Touch(2.0))[0]
+    wanted = states.deformation
+    for felt, skin in ((again(states), physics.SKIN), (states, again(physics.SKIN))):
+        np.testing.assert_array_equal(physics.deform(felt, skin=skin), wanted)

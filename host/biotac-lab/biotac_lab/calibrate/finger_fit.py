@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 
 from biotac.calibrate.wrench import Run
 from biotac.core import geometry as surface
-from biotac.sim import SKIN, Skin, counts_at, deform, resistance_at, resistance_share
+from biotac.sim import SKIN, Skin, counts_of, deform, resistance_at
 
 from .plates import (
     LOOK_COUNTS,
@@ -74,11 +74,15 @@ class Look:
         rows = []
         for force_n in LOOK_FORCES_N:
             states = pressing(self.place, np.full(len(self.place), force_n))
-            share = resistance_share(*deform(states, skin=skin), skin.fixed_share)
-            signal = counts_at(resistance_at(rest) * share) - rest
+            signal = _counts(rest, deform(states, skin=skin), skin) - rest
             point = surface.point_of_contact(np.where(signal < -0.5, signal, -1e-3), 1.0, compressed=True)
             rows.append(point[:, [1, 0]] / surface.RADIUS_MM - self.seen)
         return np.concatenate(rows) / LOOK_SIGMA
+
+
+def _counts(rest: Floats, deformation: tuple[Floats, Floats], skin: Skin) -> Floats:
+    """Counts (n, 19) of a finger that has ``rest`` (19,) counts at rest, as sensitive as ``skin``."""
+    return counts_of(resistance_at(rest), np.ones(19), deformation, np.zeros(len(deformation[0])), skin)
 
 
 def look_of(plate: KnownNormal) -> Look:
@@ -176,7 +180,7 @@ class Fit:
     def _counts(self, x: Floats, k: int, skin: Skin) -> Floats:
         part, own, louder = self.parts[k], x[self._own(k)], np.exp(self._owns(x)[k])
         compression, bulge = (louder * share for share in deform(part.states(self._row(x, k)), skin=skin))
-        counts: Floats = counts_at(resistance_at(part.tare) * resistance_share(compression, bulge, skin.fixed_share))
+        counts = _counts(part.tare, (compression, bulge), skin)
         stale = (own[19] + own[20] * part.time) * DRIFT_SIGMA_COUNTS
         counts += stale[:, None] * part.drift
         return counts
