@@ -1,11 +1,13 @@
 // How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, how long after its
-// slot an EVENT is, and after the host's latest bytes a REPLY, in device time. Watches the bus for sample commands and the
-// USB for messages; the image knows nothing of it.
+// slot an EVENT is, and after the host's latest bytes a REPLY, in device time. A TRUST, which is sent behind its round's
+// FRAMEs and not in a slot, is kept apart from the other EVENTs. Watches the bus for sample commands and the USB for
+// messages; the image knows nothing of it.
 import fs from 'node:fs'
 
 const SCHEMA = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url)))
 const FRAME_ID = SCHEMA.link.message.FRAME.id
 const EVENT_ID = SCHEMA.link.message.EVENT.id
+const TRUST = SCHEMA.link.enum.event_kind.TRUST.value
 const REPLY_ID = SCHEMA.link.message.REPLY.id
 const command = (name) => SCHEMA.sensor.channel.find((channel) => channel.name === name).command << 8
 const SLOTS = SCHEMA.sensor.frame.slots
@@ -15,7 +17,8 @@ const MARK = command(SLOTS[MARK_AT])
 const LAST = command(SLOTS.findLast((name) => /^E\d+$/.test(name)))
 const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot; in an EVENT, of the slot that shows it
 const FINGER_AT = T_US_AT + 4
-const HEAD_BYTES = FINGER_AT + 1
+const KIND_AT = FINGER_AT + 2 // of an EVENT
+const HEAD_BYTES = KIND_AT + 1
 const SAME_ROUND_US = 200 // t_us is read shortly before the command goes out
 const ROUNDS = 8 // that are remembered: no FRAME is later than that
 
@@ -42,6 +45,7 @@ export class Latency {
     this.replyUs = 0 // the longest
     this.events = 0
     this.eventUs = 0 // from an EVENT's slot until it is with the host, the longest
+    this.trustUs = 0 // likewise of TRUST
     this.unmatched = 0 // FRAMEs whose round was not seen on the bus
   }
 
@@ -80,13 +84,15 @@ export class Latency {
   counters() {
     const sorted = Float64Array.from(this.us).sort()
     const at = (share) => sorted[Math.floor(share * (sorted.length - 1))] ?? null
-    const events = { events: this.events, event_us: this.eventUs }
+    const events = { events: this.events, event_us: this.eventUs, trust_us: this.trustUs }
     return { frames: sorted.length, unmatched: this.unmatched, ...events, reply_us: this.replyUs, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
   }
 
   #event(start, us) {
+    const late = us - new DataView(start.buffer).getUint32(T_US_AT, true)
     this.events++
-    this.eventUs = Math.max(this.eventUs, us - new DataView(start.buffer).getUint32(T_US_AT, true))
+    if (start[KIND_AT] === TRUST) this.trustUs = Math.max(this.trustUs, late)
+    else this.eventUs = Math.max(this.eventUs, late)
   }
 
   #frame(start, us) {
