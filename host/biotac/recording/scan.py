@@ -54,6 +54,7 @@ _READ: dict[int, Any] = {
     Opcode.DATA_END: DataEnd,
     Opcode.FOOTER: Footer,
 }
+_MESSAGE = int(Opcode.MESSAGE)  # outside of chunks: another program has written the file again
 
 
 Place = tuple[int, int]  # where a record begins in the file, and its length, head included
@@ -114,7 +115,7 @@ class Index:
                 metadata.append(_METADATA_INDEX.unpack_from(data, at))
             at += length
         topics = {record.id: record.topic for record in records if isinstance(record, Channel)}
-        if any(topics[k] == layout.REST or topics[k].startswith(layout.TABLE) for k in shared):
+        if not chunks or any(topics[k] == layout.REST or topics[k].startswith(layout.TABLE) for k in shared):
             return None  # another program has written the file again
         blocks: list[dict[str, Place]] = [{}]
         for begin, size, channel in chunks:  # a block's rest comes after its tables
@@ -222,7 +223,8 @@ class Scan:
                 if opcode == _CHUNK and whole:
                     held, channels = (at, length), set()
                 else:
-                    record = self._read(opcode, _content(stream, at, length)) if whole and opcode in _READ else None
+                    known = opcode in _READ or opcode == _MESSAGE
+                    record = self._read(opcode, _content(stream, at, length), length) if whole and known else None
                     if isinstance(record, (DataEnd, Footer)):
                         self._verify_checksum(stream, record, at, length)
                     elif record is not None:
@@ -247,7 +249,8 @@ class Scan:
     def _by_index(self, stream: BinaryIO, index: Index) -> Iterator[Metadata | tuple[str, Message]]:
         index.check(self.path)
         for at, length in index.metadata:
-            record = self._read(Opcode.METADATA, _content(stream, at + _HEAD.size, length - _HEAD.size))
+            length -= _HEAD.size
+            record = self._read(Opcode.METADATA, _content(stream, at + _HEAD.size, length), length)
             yield from self._process([record] if record is not None else [])
         yield from self._process(index.records)
         for block in map(index.blocks.__getitem__, self._only):
@@ -269,10 +272,10 @@ class Scan:
         if self._check and expected and _crc32(stream, begin, end) != expected:
             self.problems.append(f"{self.path.name} is damaged: the checksum of its {part} is wrong")
 
-    def _read(self, opcode: int, content: ReadDataStream) -> Any:
+    def _read(self, opcode: int, content: ReadDataStream, length: int) -> Any:
         """The record in ``content``; None if it is damaged, which is added to ``problems``."""
         try:
-            return _READ[opcode].read(content)
+            return _READ[opcode].read(content) if opcode in _READ else Message.read(content, length)
         except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
             self.problems.append(f"a record of {self.path.name} is damaged and was skipped ({error})")
             return None

@@ -13,8 +13,9 @@ import biotac
 
 
 def again(sources: list[Path], out: Path, *, metadata: bool = True, chunk_size: int = 1 << 20) -> Path:
+    """With all topics in one chunk after the other; of size 0, without chunks."""
     with out.open("wb") as stream:
-        writer = Writer(stream, chunk_size=chunk_size)
+        writer = Writer(stream, chunk_size=chunk_size, use_chunking=chunk_size > 0)
         writer.start()
         channels: dict[str, int] = {}
         for source in sources:
@@ -34,7 +35,7 @@ def again(sources: list[Path], out: Path, *, metadata: bool = True, chunk_size: 
 
 def test_all_rows_or_words(tmp_path: Path) -> None:
     first, second = (record_all("sim:press.toml?fingers=2&seconds=3", tmp_path / f"{k}.mcap") for k in "ab")
-    for chunk_size in (10_000, 64_000, 1 << 26):
+    for chunk_size in (0, 10_000, 64_000, 1 << 26):
         path = again([first], tmp_path / f"{chunk_size}.mcap", chunk_size=chunk_size)
         recording = biotac.Recording(path)
         assert len(biotac.load(path)) == len(recording.select().rows) == 600
