@@ -37,7 +37,7 @@ class Rate:
         if self.step_us > 1e6 / LEAST_HZ:
             raise PortError(
                 f"{port}: {len(stamps_ns)} messages at {1e6 / self.step_us:.0f} a second, expected at least "
-                f"{LEAST_HZ:g}, as tare and contact count rounds; let a driver publish at 100 Hz; a table is in seconds"
+                f"{LEAST_HZ:g}, as tare and contact count rounds; let a driver publish at 100 Hz"
             )
         self.each = max(1, round(ROUND_US / self.step_us))
 

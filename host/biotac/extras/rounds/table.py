@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ...cells import numbers
 from ...documents import parse_toml, read_text
 from ...errors import InputError
+from ...recording.alignment import looks_like
 from ...wire.identity import SENSOR_SERIAL_BYTES
 from ...wire.messages_gen import INVALID_COUNT
 from ...wire.sensor_gen import MAX_SENSORS
 from .message import Found, Message, RefusedError
+from .rate import LEAST_HZ
 
 EXPECTED = 'rate_hz = 100, or time = "t" in seconds; for each finger [[finger]] with electrodes = "E{}" and pdc = "PDC"'
 MAX_BYTES = 1 << 30
@@ -69,6 +71,7 @@ class Table:
             raise InputError(f"{self._where}: cannot be read ({error}); expected numbers, and {EXPECTED}") from error
         every_s = np.arange(len(self._rows)) / (rate_hz or 1.0)
         self._times_s = every_s if time is None else self._rows[:, self._column[self._place(time)]].copy()
+        self._check_times()
         # Unix time is kept; any other begins with the first row.
         first_s = next((time_s for time_s in self._times_s.tolist() if np.isfinite(time_s)), 0.0)
         self._times_s -= 0.0 if 0 <= first_s < LATEST_S else first_s
@@ -79,6 +82,14 @@ class Table:
                     f"{self._where}: finger {f} has no row at rest: of {len(self._rows)}, no {REST_ROWS} one after the "
                     "other are still, and without them there is no tare; expected a recording, with all its rows"
                 )
+
+    def _check_times(self) -> None:
+        """Of rows in another unit, or in reverse, nearly all would be refused one by one."""
+        steps_s = np.diff(self._times_s[np.isfinite(self._times_s)])
+        step_s = float(np.median(steps_s)) if len(steps_s) else 0.0
+        if not 0.0 < step_s <= 1.0 / LEAST_HZ:
+            cure = "reverse the rows" if step_s < 0.0 else looks_like(1.0 / max(step_s, 1e-9), LEAST_HZ, 50_000.0)
+            raise InputError(f"{self._where}: its time goes on by {step_s:.4g} from row to row; {cure}")
 
     def _refuse_others(self, facts: dict[str, Any], known: tuple[str, ...]) -> None:
         if unknown := sorted(set(facts) - set(known)):

@@ -43,6 +43,12 @@ def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
     np.testing.assert_allclose(batch.frames["t_us"], 1e6 * (times_s[good] - times_s[0]), atol=101)
 
 
+@pytest.mark.parametrize(("per_s", "words"), [(1e3, "like ms"), (1e6, "like us"), (1e9, "like ns"), (-1, "reverse")])
+def test_times_in_another_unit_are_refused_by_its_name(tmp_path: Path, per_s: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        biotac.open(write(tmp_path, f'time = "t"\n{ONE}', t_s=per_s * (100.0 + np.arange(len(ROWS)) * 0.01)))
+
+
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
@@ -51,7 +57,7 @@ def test_rows_are_rounds_with_their_times(tmp_path: Path) -> None:
         ('rate_hz = 100\n[[finger]]\nelectrodes = "F{}"', "no column 'F1', expected one of t, label, E1"),
         ('rate_hz = 100\n[[finger]]\nelectrodes = "label"', "expected numbers"),
         ("rate_hz = [", "cannot be read"),
-        (f'time = "E1"\n{ONE}', "expected at least 50|no messages"),
+        (f'time = "E1"\n{ONE}', "goes on by"),
     ],
 )
 def test_a_table_that_says_too_little_is_refused(tmp_path: Path, columns: str, words: str) -> None:
