@@ -166,7 +166,7 @@ def test_what_was_in_force_and_not_saved_is_put_back_and_saved(
     assert getattr(read_backup(outcome.backup.path), what) == {0: new, 1: kept}
     bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS)
     with bench.target.open() as hand:
-        assert getattr(hand, what)() == {0: new, 1: kept}
+        assert getattr(hand.board, what)() == {0: new, 1: kept}
 
 
 @pytest.mark.long
@@ -177,7 +177,7 @@ def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_releas
     assert outcome.after.firmware_patch == next_release.note.firmware[2] != outcome.before.firmware_patch
     assert outcome.settings is not None
     assert outcome.settings.changed == ()
-    with pytest.raises(InputError, match=r"runs .*; --downgrade if you mean it"):
+    with pytest.raises(InputError, match=r"runs .*; use --downgrade if you mean it"):
         bench.flash(read_image(bench.built))
     back = bench.flash(read_image(bench.built), downgrade=True)
     assert back.after.firmware_patch == outcome.before.firmware_patch
@@ -221,6 +221,8 @@ BY_DAY = (SECTOR + 100, -1)
 def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
     """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
     image = read_image(bench.built)
+    if cut == 1 and image.family.chip == "RP2350":
+        cut = PAGE  # its ROM looks at IMAGE_DEF alone, at that page's end, and sees no erase that stopped before it
     blocks = len(image.blocks)
     total = -(-blocks * PAGE // SECTOR) * SECTOR + blocks * PAGE
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)

@@ -101,7 +101,7 @@ def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: st
     run.hand.board.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
     before = run.hand.info
     state(run)
-    pressed_n = of_finger(run.hand.read(0.1), PRESSED)["force_n"][-1] if state in (touched, held) else None
+    pressed_n = of_finger(run.hand.read(0.1), PRESSED)["force_n"].mean(axis=0) if state in (touched, held) else None
     getattr(run, how)()
     hand, after = run.hand, run.hand.info
     assert after.boot_id != before.boot_id
@@ -126,7 +126,7 @@ def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: st
     if goes_on:
         again = of_finger(frames, PRESSED)[10:]
         assert (again["flags"] & FrameFlags.CONTACT).all()
-        assert np.abs(again["force_n"] - pressed_n).max() < 0.01 * np.abs(pressed_n).max() + 0.05
+        assert np.abs(again["force_n"].mean(axis=0) - pressed_n).max() < 0.01 * np.abs(pressed_n).max() + 0.05
     for finger in set(range(FINGERS)) - {PRESSED}:  # which has no tare while the force grows
         assert tared[frames["finger"] == finger][-1]
         assert hand.sensor_status(finger).tare_reason == (TareReason.RESTORED if kept else TareReason.START)
