@@ -27,6 +27,8 @@ def test_an_analyser_reads_the_sensors_words_and_the_uart(tmp_path: Path) -> Non
     for finger in range(2):
         spi = f"spi:clk=SCK:miso=MISO:mosi=MOSI:cs=SS{finger}:wordsize=16"
         words = sigrok(path, "-P", spi, "-B", "spi=miso")
+        levels = read_vcd(path)[f"SS{finger}"][1]
+        assert len(words) // 2 == (np.diff(levels) > 0).sum() > 100  # also the file's last, which ends with it
         # A word has 7 + 5 bits of count beside parity.
         word = np.frombuffer(words[: len(words) // 2 * 2], ">u2")
         counts = ((word >> 9) * 32 + (word >> 3 & 31)).astype(np.uint16)
