@@ -20,6 +20,7 @@ JUMP_US = 250_000
 LONG_US = 50_000
 # After a loss, this many batches may wait until every held finger has said whether it is still held.
 BATCHES_HELD_BACK = 8
+NEXT_ROW_US = -1  # the time of what comes before the first row that a board gives: that row's
 
 Reason = Literal["unplugged", "rebooted", "silence", "paused", "lost", "finger", "slow"]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..board.board import Board
 from ..board.consumers import DeferredErrors
-from ..board.gap import Gap, fingers_in
+from ..board.gap import NEXT_ROW_US, Gap, fingers_in
 from ..board.reader import Tap
 from ..errors import BiotacError, DeviceLostError, InputError
 from ..wire import messages_gen as wire
@@ -89,16 +89,12 @@ class Recorder(Tap):
 
     def _end(self, mark: Mark) -> None:
         """Write its label again, with now as its end."""
-        from ..recording.labels import NEXT_ROW_US
-
         self._spans.remove(mark)
         begin_us = mark.label.t_us if mark.boot_id == self._board.info.boot_id else NEXT_ROW_US
         self._append(replace(mark.label, t_us=begin_us, end_us=max(self._now_us(), begin_us or 0)))
 
     def _now_us(self) -> int:
         """Time of the latest row; before the first one, also after a restart of the board, a time of none."""
-        from ..recording.labels import NEXT_ROW_US
-
         return self._rows_us.get(self._board.info.boot_id, NEXT_ROW_US)
 
     def close(self) -> None:
@@ -211,8 +207,6 @@ class Recorder(Tap):
 
     def _end_spans(self, boot_id: int) -> None:
         """Let open spans end with this file, and begin with the next one's first row."""
-        from ..recording.labels import NEXT_ROW_US
-
         for mark in self._spans:
             begin_us = mark.label.t_us or 0
             end_us = max(self._rows_us.get(boot_id, begin_us), begin_us)

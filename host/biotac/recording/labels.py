@@ -22,7 +22,6 @@ from ..errors import InputError, RecordingError, printable
 from ..wire.frames import StructArray
 
 MAX_BYTES = 16 << 20  # of the file beside a recording: a hundred thousand labels
-NEXT_ROW_US = -1  # made before the first row that a board gives: it holds at that one
 AROUND_US = 500_000  # that a point reaches to both sides, where rows are selected by it
 
 
@@ -173,10 +172,7 @@ def labels_at(labels: Iterable[Label], rows: StructArray, times: Times) -> NDArr
     code = np.zeros(len(rows), np.int64)
     for label in labels:
         own = {f: t_us for f, t_us in times.items() if label.finger in (None, f)}
-        parts = [np.arange(0)]
-        for finger, begin_us, end_us in _reach(label, own):
-            parts.append(there.between(finger, begin_us, end_us))
-        at = np.concatenate(parts)
+        at = np.concatenate([np.arange(0), *(there.between(*reach) for reach in _reach(label, own))])
         for before in np.unique(code[at]).tolist():
             code[at[code[at] == before]] = len(texts)
             texts.append("; ".join(filter(None, (texts[before], label.line()))))

@@ -15,7 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
-from ..board.gap import Gap
+from ..board.gap import NEXT_ROW_US, Gap
 from ..link.base import AppliedN
 from ..version import __version__
 from ..wire.batches import StreamDecoder, join
@@ -24,7 +24,7 @@ from ..wire.decoder import STEP_BYTES
 from ..wire.native import BUILT
 from . import layout
 from .block import Rest, encode_block, schema
-from .labels import NEXT_ROW_US, Label
+from .labels import Label
 from .plots import Plots
 
 # Large enough that only flush() closes a chunk; the library would also close it by size.
@@ -130,7 +130,7 @@ class RecordingFile:
         """
         has_row = self._last_us is not None or rest.first_us is not None
         labels = [label for label in self._labels if over or has_row or label.t_us is None]
-        self._labels = self._labels[len(labels) :] if has_row or over else [*filter(_is_timed, self._labels)]
+        self._labels = [label for label in self._labels if label not in labels]
         labels = [self._placed(label, rest.first_us) if has_row else label for label in labels]
         gaps = [self._between_rows(gap, rest, lost) for gap in self._gaps if over or rest.first_us is not None]
         self._gaps = self._gaps[len(gaps) :]
@@ -202,7 +202,3 @@ class RecordingFile:
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
             self.stream.close()  # also on a full disk, or the interpreter would try again at exit
-
-
-def _is_timed(label: Label) -> bool:
-    return label.t_us is not None

@@ -54,7 +54,6 @@ _READ: dict[int, Any] = {
     Opcode.DATA_END: DataEnd,
     Opcode.FOOTER: Footer,
 }
-_MESSAGE = int(Opcode.MESSAGE)  # outside of chunks: another program has written the file again
 
 
 Place = tuple[int, int]  # where a record begins in the file, and its length, head included
@@ -223,8 +222,7 @@ class Scan:
                 if opcode == _CHUNK and whole:
                     held, channels = (at, length), set()
                 else:
-                    known = opcode in _READ or opcode == _MESSAGE
-                    record = self._read(opcode, _content(stream, at, length), length) if whole and known else None
+                    record = self._read(opcode, stream, at, length) if whole else None
                     if isinstance(record, (DataEnd, Footer)):
                         self._verify_checksum(stream, record, at, length)
                     elif record is not None:
@@ -249,8 +247,7 @@ class Scan:
     def _by_index(self, stream: BinaryIO, index: Index) -> Iterator[Metadata | tuple[str, Message]]:
         index.check(self.path)
         for at, length in index.metadata:
-            length -= _HEAD.size
-            record = self._read(Opcode.METADATA, _content(stream, at + _HEAD.size, length), length)
+            record = self._read(Opcode.METADATA, stream, at + _HEAD.size, length - _HEAD.size)
             yield from self._process([record] if record is not None else [])
         yield from self._process(index.records)
         for block in map(index.blocks.__getitem__, self._only):
@@ -272,10 +269,12 @@ class Scan:
         if self._check and expected and _crc32(stream, begin, end) != expected:
             self.problems.append(f"{self.path.name} is damaged: the checksum of its {part} is wrong")
 
-    def _read(self, opcode: int, content: ReadDataStream, length: int) -> Any:
-        """The record in ``content``; None if it is damaged, which is added to ``problems``."""
+    def _read(self, opcode: int, stream: BinaryIO, at: int, length: int) -> Any:
+        """The record at ``at``; None if it is of another kind, or damaged, which is added to ``problems``."""
         try:
-            return _READ[opcode].read(content) if opcode in _READ else Message.read(content, length)
+            if opcode == Opcode.MESSAGE:  # outside of chunks: another program has written the file again
+                return Message.read(_content(stream, at, length), length)
+            return _READ[opcode].read(_content(stream, at, length)) if opcode in _READ else None
         except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
             self.problems.append(f"a record of {self.path.name} is damaged and was skipped ({error})")
             return None

@@ -84,7 +84,6 @@ class Table:
                 )
 
     def _check_times(self) -> None:
-        """Of rows in another unit, or in reverse, nearly all would be refused one by one."""
         steps_s = np.diff(self._times_s[np.isfinite(self._times_s)])
         step_s = float(np.median(steps_s)) if len(steps_s) else 0.0
         if not 0.0 < step_s <= 1.0 / LEAST_HZ:
