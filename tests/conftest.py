@@ -18,10 +18,10 @@ from typing import Any
 
 import pytest
 from deframer import Deframer
+from served_board import ServedBoard
 
 from biotac.link.serial_port import SerialLink
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
@@ -198,8 +198,7 @@ def scripted_board() -> Iterator[Callable[..., ScriptedBoard]]:
 @pytest.fixture
 def port() -> Iterator[str]:
     """Where a simulated board with two fingers answers, to one program after another."""
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
-    board.release()
+    board = ServedBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0)
     yield board.path
     board.close()
 

@@ -85,6 +85,13 @@ m4f_tests() { # arguments go to ctest
     ctest --test-dir build/m4f -j2 --output-on-failure "$@"
 }
 
+sanitized() { # sanitized COMMAND: with the package's extension, the simulated board in it, under sanitizers
+    python -m pip install --quiet --no-deps --no-compile --upgrade --target build/sanitized \
+        --config-settings=cmake.define.BIOTAC_SANITIZE=ON .
+    LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libubsan.so)" ASAN_OPTIONS=detect_leaks=0 \
+        PYTHONPATH="$PWD/build/sanitized" "$@"
+}
+
 python_tests() { # arguments go to pytest; processes with whole files each, for what tests of a file share
     # Three on two cores: almost half of the time a test waits for a board whose time is real. Skipped tests say why,
     # once a reason. What hangs is named with where it stands, after longer than any test takes on a busy computer.

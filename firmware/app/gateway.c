@@ -206,7 +206,7 @@ static void close_round(bt_gateway *gateway)
     uint8_t serial[BT_SERIAL_BYTES];
     bt_session_end_round(session);
     if (gateway->kept != NULL) {
-        bt_kept_tares_note(gateway->kept, session);
+        bt_kept_tares_note(gateway->kept, session, &gateway->kept_rounds);
     }
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         if (gateway->queried >> f & 1) {

@@ -22,6 +22,7 @@ typedef struct {
     uint32_t doubtful_bytes;         // that came before a good frame, since the UART's rate is what it is
     bool uart_by_default;            // its rate is the port's, not the saved one
     bt_kept_tares *kept;             // NULL: the board has no memory for them
+    uint32_t kept_rounds;            // since they were noted
 } bt_gateway;
 
 // Wait for the sensors to power up, identify them, start sampling; without a bus, none of this.

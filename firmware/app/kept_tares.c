@@ -23,21 +23,20 @@ static int latest(const bt_kept_tares *kept)
 }
 
 // A new tare, HOLD and RELEASE begin a tare's age anew, the host's before the round that is over now.
-static bool is_due(const bt_session *session)
+static bool is_due(const bt_session *session, uint32_t *rounds)
 {
-    static uint32_t rounds;
-    bool due = ++rounds >= PERIOD_ROUNDS;
+    bool due = ++*rounds >= PERIOD_ROUNDS;
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         const bt_tare *tare = &session->finger[f].tare;
         due = due || (tare->tared && tare->age_rounds <= 1);
     }
-    rounds = due ? 0 : rounds;
+    *rounds = due ? 0 : *rounds;
     return due;
 }
 
-void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session)
+void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session, uint32_t *rounds)
 {
-    if (!is_due(session)) {
+    if (!is_due(session, rounds)) {
         return;
     }
     const int before = latest(kept);

@@ -20,8 +20,9 @@ typedef struct {
     bt_kept_copy copy[2];
 } bt_kept_tares;
 
-// After a round, if something changed or half a second has passed.
-void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session);
+// After a round, if something changed or half a second has passed. rounds: since the last note, 0 at first;
+// the board's own.
+void bt_kept_tares_note(bt_kept_tares *kept, const bt_session *session, uint32_t *rounds);
 
 // Once, after a hang or a crash: give each finger, if it has the sensor that it had, its tare and HOLD. True
 // when any was given.

@@ -96,14 +96,14 @@ enum bt_force_model {
 
 // What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody.
 enum bt_board {
-    BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
+    BT_BOARD_POSIX_SIM = 1, // the firmware in a program, with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
     BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)
     BT_BOARD_STM32F405 = 5, // STM32F405 with a UART to the host (firmware/boards/f405)
     BT_BOARD_PICO_W = 6, // Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     BT_BOARD_MESSAGES = 7, // a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
-    BT_BOARD_POSIX_LIVE = 8, // a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
+    BT_BOARD_POSIX_LIVE = 8, // as POSIX_SIM, with sensors that a program loads round by round: its time stands still between the loads
     BT_BOARD_PICO2 = 9, // Raspberry Pi Pico 2 (RP2350)
     BT_BOARD_PICO2_W = 10, // Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio
     BT_BOARD_PRIVATE = 32768, // the first of the private ids

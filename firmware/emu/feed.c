@@ -8,13 +8,6 @@ const bt_msg_hello bt_emu_hello = {
     .slot_hz = BT_SLOT_HZ,
 };
 
-static union {
-    bt_msg_hello_request hello;
-    bt_msg_emu_tape tape;
-    bt_msg_emu_set_fault fault;
-    bt_msg_emu_play play;
-} got;
-
 static void send_message(const bt_emu_feed *feed, uint8_t id, const uint8_t *payload, size_t bytes)
 {
     uint8_t frame[BT_ENCODED_MAX_BYTES];
@@ -25,8 +18,8 @@ static void send_hello(const bt_emu_feed *feed)
 {
     uint8_t payload[BT_HELLO_BYTES];
     bt_msg_hello hello = *feed->hello;
-    hello.req_id = got.hello.req_id;
-    hello.nonce = got.hello.nonce;
+    hello.req_id = feed->got.hello.req_id;
+    hello.nonce = feed->got.hello.nonce;
     hello.wire_major = BT_WIRE_MAJOR;
     hello.wire_minor = BT_WIRE_MINOR;
     hello.schema_hash = BT_SCHEMA_HASH;
@@ -58,9 +51,10 @@ static void send_status(const bt_emu_feed *feed, uint8_t req_id)
 }
 
 // The status says what was not taken.
-static uint8_t put_tape(bt_emu_stream *stream)
+static uint8_t put_tape(bt_emu_feed *feed)
 {
-    const bt_msg_emu_tape *tape = &got.tape;
+    bt_emu_stream *stream = feed->stream;
+    const bt_msg_emu_tape *tape = &feed->got.tape;
     if (tape->fingers == 0 || tape->fingers > BT_MAX_FINGERS || tape->slots == 0
         || 2 * tape->slots * tape->fingers > (int)sizeof tape->samples) {
         return BT_ERROR_OUT_OF_RANGE;
@@ -73,13 +67,13 @@ static uint8_t put_tape(bt_emu_stream *stream)
 
 static uint8_t set_fault(bt_emu_feed *feed)
 {
-    if (got.fault.finger >= BT_MAX_FINGERS) {
+    if (feed->got.fault.finger >= BT_MAX_FINGERS) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
-    if (got.fault.fault != BT_EMU_FAULT_NONE && got.fault.fault < BT_EMU_FAULT_SWAPPED) {
+    if (feed->got.fault.fault != BT_EMU_FAULT_NONE && feed->got.fault.fault < BT_EMU_FAULT_SWAPPED) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    feed->stream->fault[got.fault.finger] = got.fault.fault;
+    feed->stream->fault[feed->got.fault.finger] = feed->got.fault.fault;
     feed->spoilt = true;
     return BT_ERROR_OK;
 }
@@ -89,16 +83,16 @@ static uint8_t obey(bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
     bt_emu_stream *stream = feed->stream;
     switch (id) {
     case BT_EMU_TAPE_ID:
-        bt_msg_emu_tape_unpack(&got.tape, payload);
-        return put_tape(stream);
+        bt_msg_emu_tape_unpack(&feed->got.tape, payload);
+        return put_tape(feed);
     case BT_EMU_SET_FAULT_ID:
-        bt_msg_emu_set_fault_unpack(&got.fault, payload);
+        bt_msg_emu_set_fault_unpack(&feed->got.fault, payload);
         return set_fault(feed);
     case BT_EMU_PLAY_ID:
-        bt_msg_emu_play_unpack(&got.play, payload);
-        stream->hold = got.play.hold_slot;
-        stream->by_time = got.play.by_time;
-        stream->live = got.play.live;
+        bt_msg_emu_play_unpack(&feed->got.play, payload);
+        stream->hold = feed->got.play.hold_slot;
+        stream->by_time = feed->got.play.by_time;
+        stream->live = feed->got.play.live;
         return BT_ERROR_OK;
     case BT_EMU_GET_STATUS_ID:
         return BT_ERROR_OK;
@@ -111,7 +105,7 @@ static void answer(bt_emu_feed *feed, uint8_t id, const uint8_t *payload)
 {
     const uint8_t req_id = payload[0]; // every command begins with it
     if (id == BT_HELLO_REQUEST_ID) {
-        bt_msg_hello_request_unpack(&got.hello, payload);
+        bt_msg_hello_request_unpack(&feed->got.hello, payload);
         send_hello(feed);
         return;
     }

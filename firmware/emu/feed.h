@@ -16,6 +16,12 @@ typedef struct {
     void (*fill)(bt_msg_emu_status *status);
 
     bt_deframer deframer;
+    union {
+        bt_msg_hello_request hello;
+        bt_msg_emu_tape tape;
+        bt_msg_emu_set_fault fault;
+        bt_msg_emu_play play;
+    } got;             // the command that is being carried out
     bool spoilt;       // a fault was set since somebody looked
     uint32_t reported; // slots taken at the last report of a standstill
 } bt_emu_feed;

@@ -7,72 +7,32 @@
 // - It raises the chip select after every call: nothing here has more than one transfer in a period.
 #include "sbc.h"
 
-#include "gateway.h"
+#include "in_process.h"
+
 #include "map/store.h"
-#include "port.h"
-#include "spi_word_by_word.h"
 #include "talk/rounds.h"
 #include "talk/sensors.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-struct bt_port {
-    bt_gateway gateway;
+struct bt_sbc {
+    bt_port port;
     void *python;
     uint8_t devices; // bit mask of fingers that are wired
     bool no_bus, untimed;
     uint32_t boot_id;
-    uint32_t due_us;
     uint8_t selected;
     bool unsent; // the last word was for sensors that are not wired
     _Alignas(4) uint8_t maps[BT_MAPS_BYTES];
     _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
 };
 
-bt_sbc *bt_sbc_new(void *python, uint8_t devices, bool timed, uint32_t boot_id)
-{
-    bt_sbc *sbc = calloc(1, sizeof *sbc);
-    if (sbc != NULL) {
-        sbc->python = python;
-        sbc->devices = (uint8_t)((1u << devices) - 1);
-        sbc->no_bus = devices == 0;
-        sbc->untimed = !timed;
-        sbc->boot_id = boot_id;
-    }
-    return sbc;
-}
-
-void bt_sbc_free(bt_sbc *sbc)
-{
-    free(sbc);
-}
-
-void bt_sbc_start(bt_sbc *sbc)
-{
-    bt_gateway_init(&sbc->gateway, sbc);
-}
-
-void bt_sbc_poll(bt_sbc *sbc)
-{
-    bt_gateway_poll(&sbc->gateway);
-}
-
-void bt_sbc_alarm(bt_sbc *sbc)
-{
-    (void)bt_gateway_alarm(&sbc->gateway);
-}
-
-uint32_t bt_sbc_due_us(const bt_sbc *sbc)
-{
-    return sbc->due_us;
-}
-
 // ---- whole rounds ------------------------------------------------------------------------------
 
 void bt_sbc_sensor(bt_sbc *sbc, uint8_t f, const uint8_t serial[BT_SERIAL_BYTES], bool foreign)
 {
-    bt_session *session = &sbc->gateway.session;
+    bt_session *session = &sbc->port.gateway.session;
     const bool known = session->info[f].present || session->finger[f].foreign;
     foreign = foreign || bt_serial_is_foreign(serial);
     if (known && !foreign && !session->finger[f].foreign) {
@@ -100,7 +60,7 @@ static void send_sp(bt_session *session, const bt_finger *finger,
 void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uint16_t *counts,
                   uint8_t sp_fingers, const uint16_t *sp_counts)
 {
-    bt_session *session = &sbc->gateway.session;
+    bt_session *session = &sbc->port.gateway.session;
     session->unsure = 0; // who sends the round says whose it is
     bt_session_begin(session, t_us);
     for (uint8_t s = 0; s < BT_SLOTS; s++, counts += BT_MAX_FINGERS) {
@@ -118,151 +78,191 @@ void bt_sbc_round(bt_sbc *sbc, uint32_t t_us, const uint32_t *slot_us, const uin
     }
 }
 
-// ---- time -------------------------------------------------------------------------------------
+// ---- the port ---------------------------------------------------------------------------------
 
-uint32_t port_now_us(bt_port *board)
+static bt_sbc *of(bt_port *port)
 {
-    return bt_sbc_now_us(board->python);
+    return (bt_sbc *)port;
 }
 
-void port_delay_us(bt_port *board, uint32_t us)
+static uint32_t now_us(bt_port *port)
+{
+    return bt_sbc_now_us(of(port)->python);
+}
+
+static void delay_us(bt_port *port, uint32_t us)
 {
     // Nobody needs a pause from what never was on the bus, and four absent fingers' would cost a tenth of a
     // slot.
-    if (!board->unsent) {
-        bt_sbc_delay_us(board->python, us);
+    if (!of(port)->unsent) {
+        bt_sbc_delay_us(of(port)->python, us);
     }
 }
 
-void port_alarm_at(bt_port *board, uint32_t at_us)
+static void select_sensors(bt_port *port, uint8_t mask)
 {
-    board->due_us = at_us;
+    bt_sbc *sbc = of(port);
+    sbc->selected = mask & sbc->devices;
+    sbc->unsent = mask != 0 ? sbc->selected == 0 : sbc->unsent;
 }
 
-// ---- SPI --------------------------------------------------------------------------------------
-
-void port_spi_select(bt_port *board, uint8_t mask)
+static uint16_t transfer16(bt_port *port, uint16_t mosi)
 {
-    board->selected = mask & board->devices;
-    board->unsent = mask != 0 ? board->selected == 0 : board->unsent;
-}
-
-uint16_t port_spi_transfer16(bt_port *board, uint16_t mosi)
-{
+    const bt_sbc *sbc = of(port);
     uint16_t miso = 0;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        if (board->selected >> f & 1) {
+        if (sbc->selected >> f & 1) {
             uint8_t bytes[2] = {(uint8_t)(mosi >> 8), (uint8_t)mosi};
-            bt_sbc_exchange(board->python, f, bytes, sizeof bytes);
+            bt_sbc_exchange(sbc->python, f, bytes, sizeof bytes);
             miso |= (uint16_t)(bytes[0] << 8 | bytes[1]);
         }
     }
     return miso;
 }
 
-uint8_t port_spi_transfer8(bt_port *board, uint8_t mosi)
+static uint8_t transfer8(bt_port *port, uint8_t mosi)
 {
+    const bt_sbc *sbc = of(port);
     uint8_t miso = 0;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        if (board->selected >> f & 1) {
+        if (sbc->selected >> f & 1) {
             uint8_t byte = mosi;
-            bt_sbc_exchange(board->python, f, &byte, 1);
+            bt_sbc_exchange(sbc->python, f, &byte, 1);
             miso |= byte;
         }
     }
     return miso;
 }
 
-// ---- link -------------------------------------------------------------------------------------
-
-bool port_link_write(bt_port *board, unsigned link, const uint8_t *data, size_t bytes)
+static bool write_link(bt_port *port, const uint8_t *data, size_t bytes)
 {
-    return link == 0 && bt_sbc_link_write(board->python, data, bytes);
+    return bt_sbc_link_write(of(port)->python, data, bytes);
 }
 
-size_t port_link_read(bt_port *board, unsigned link, uint8_t *data, size_t bytes)
+static size_t read_link(bt_port *port, uint8_t *data, size_t bytes)
 {
-    return link == 0 ? bt_sbc_link_read(board->python, data, bytes) : 0;
+    return bt_sbc_link_read(of(port)->python, data, bytes);
 }
 
-uint32_t port_link_turns(bt_port *board, unsigned link)
+static uint32_t turns(bt_port *port)
 {
-    return link == 0; // the host is this process
+    (void)port;
+    return 1; // the host is this process
 }
 
-void port_link_uart(bt_port *board, uint32_t bits_per_s)
-{
-}
-
-bool port_link_touched(bt_port *board)
-{
-    return false;
-}
-
-// ---- flash: none, so settings and maps last as long as the process; maps are kept in memory ------
-
-bool port_flash_erase(bt_port *board, uint32_t sector_offset)
+// Flash: none, so settings and maps last as long as the process; maps are kept in memory.
+static bool erase(bt_port *port, uint32_t sector_offset)
 {
     if (sector_offset < BT_STORAGE_BYTES) {
         return false;
     }
-    memset(board->maps + (sector_offset - BT_STORAGE_BYTES), 0xFF, BT_FLASH_SECTOR_BYTES);
+    memset(of(port)->maps + (sector_offset - BT_STORAGE_BYTES), 0xFF, BT_FLASH_SECTOR_BYTES);
     return true;
 }
 
-bool port_flash_program(bt_port *board, uint32_t page_offset, const uint8_t *page)
+static bool program(bt_port *port, uint32_t page_offset, const uint8_t *page)
 {
     if (page_offset < BT_STORAGE_BYTES) {
         return false;
     }
-    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
-        board->maps[page_offset - BT_STORAGE_BYTES + (uint32_t)k] &=
-            page[k]; // as flash does: a page comes in parts
+    for (uint32_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) { // as flash does: a page comes in parts
+        of(port)->maps[page_offset - BT_STORAGE_BYTES + k] &= page[k];
     }
     return true;
 }
 
-void port_flash_read(bt_port *board, uint32_t offset, uint8_t *data, size_t bytes)
+static void read_flash(bt_port *port, uint32_t offset, uint8_t *data, size_t bytes)
 {
+    (void)port, (void)offset;
     memset(data, 0xFF, bytes);
 }
 
-bool port_reboot(bt_port *board, bool into_bootloader)
+static bool reboot(bt_port *port)
 {
+    (void)port;
     return false;
 }
 
-void port_measure(bt_port *board, bt_msg_board_facts *facts)
-{
-}
-
-void port_spi_rate(bt_port *board, uint32_t khz)
-{
-}
-
-// ---- identity ---------------------------------------------------------------------------------
-
-port_identity port_identify(bt_port *board)
+static port_identity identify(bt_port *port)
 {
     static const bt_msg_hello who[] = {
         {.board = BT_BOARD_LINUX_SBC, .board_serial = "linux-spidev", .board_name = "Linux spidev"},
         {.board = BT_BOARD_MESSAGES, .board_serial = "messages", .board_name = "messages"},
     };
-    port_identity identity = {.hello = who[board->no_bus], .started_by = BT_FAULT_FLAG_STARTED};
-    identity.hello.boot_id = board->boot_id;
+    port_identity identity = {.hello = who[of(port)->no_bus], .started_by = BT_FAULT_FLAG_STARTED};
+    identity.hello.boot_id = of(port)->boot_id;
     identity.hello.image_crc32 = UINT32_MAX;
     return identity;
 }
 
-port_abilities port_describe(bt_port *board)
+static port_abilities describe(bt_port *port)
 {
+    bt_sbc *sbc = of(port);
     return (port_abilities){
-        .no_bus = board->no_bus,
-        .untimed = board->untimed,
+        .no_bus = sbc->no_bus,
+        .untimed = sbc->untimed,
         .fingers = BT_MAX_FINGERS,
         .erase_bytes = BT_FLASH_SECTOR_BYTES,
         .map_bytes = BT_MAP_MAX_BYTES,
-        .map_ram = board->map_ram[0],
-        .maps = board->maps,
+        .map_ram = sbc->map_ram[0],
+        .maps = sbc->maps,
     };
+}
+
+static const bt_port_kind kind = {
+    .now_us = now_us,
+    .delay_us = delay_us,
+    .select = select_sensors,
+    .transfer16 = transfer16,
+    .transfer8 = transfer8,
+    .write = write_link,
+    .read = read_link,
+    .turns = turns,
+    .erase = erase,
+    .program = program,
+    .read_flash = read_flash,
+    .reboot = reboot,
+    .identify = identify,
+    .describe = describe,
+};
+
+// ---- for Python -------------------------------------------------------------------------------
+
+bt_sbc *bt_sbc_new(void *python, uint8_t devices, bool timed, uint32_t boot_id)
+{
+    bt_sbc *sbc = calloc(1, sizeof *sbc);
+    if (sbc != NULL) {
+        sbc->port.kind = &kind;
+        sbc->python = python;
+        sbc->devices = (uint8_t)((1u << devices) - 1);
+        sbc->no_bus = devices == 0;
+        sbc->untimed = !timed;
+        sbc->boot_id = boot_id;
+    }
+    return sbc;
+}
+
+void bt_sbc_free(bt_sbc *sbc)
+{
+    free(sbc);
+}
+
+void bt_sbc_start(bt_sbc *sbc)
+{
+    bt_gateway_init(&sbc->port.gateway, &sbc->port);
+}
+
+void bt_sbc_poll(bt_sbc *sbc)
+{
+    bt_gateway_poll(&sbc->port.gateway);
+}
+
+void bt_sbc_alarm(bt_sbc *sbc)
+{
+    (void)bt_gateway_alarm(&sbc->port.gateway);
+}
+
+uint32_t bt_sbc_due_us(const bt_sbc *sbc)
+{
+    return sbc->port.alarm_us;
 }

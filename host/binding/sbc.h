@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef struct bt_port bt_sbc; // port.h's board
+typedef struct bt_sbc bt_sbc;
 
 // devices: how many sensors are wired, fingers 0 to devices - 1; none: a board without a bus, whose rounds
 // come whole. timed: with the times of their slots. python: handed to every function below. NULL without

@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kept_board import kept_board
 
 import biotac
 from biotac import Calibration, PocWeights
 from biotac.cli.main import main
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimLink
 from biotac.wire import messages_gen as wire
+from biotac_rig.process import CommandBoard
 from rig import all_rigs, require
 
 BOARDS = {name: rig for name, rig in all_rigs().items() if "qemu_gateway" in rig.get("command", "")}
@@ -25,7 +24,7 @@ BOARDS = {name: rig for name, rig in all_rigs().items() if "qemu_gateway" in rig
 
 @pytest.fixture(params=BOARDS)
 def board(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """While a test runs, sim: is this image in QEMU."""
+    """While a test runs, emu:command is this image in QEMU."""
     facts = BOARDS[request.param]
     require(facts)
     monkeypatch.setenv("BIOTAC_SIM", facts["command"])
@@ -33,12 +32,12 @@ def board(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> di
 
 
 def test_it_is_healthy_with_five_fingers(board: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "sim:press.toml?fingers=5", "--seconds", "1", "--json"]) == 0
+    assert main(["doctor", "emu:command?source=press.toml&fingers=5", "--seconds", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == []
 
 
 def test_a_command_longer_than_a_uarts_fifo_is_answered(board: dict[str, Any]) -> None:
-    with biotac.open("sim:press.toml") as hand:
+    with biotac.open("emu:command?source=press.toml") as hand:
         own = Calibration(PocWeights.COMPRESS_N2, (1, 2, 3), (4, 5), 0, "", 1_763_731_310)
         hand.board.set_calibration(0, own)
         assert hand.board.calibration(0) == own
@@ -65,19 +64,16 @@ def test_an_f405_sleeps_at_an_address_of_eight(board: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("seconds", [2, pytest.param(60, marks=pytest.mark.nightly)])
-def test_it_computes_what_the_simulated_board_computes(
-    board: dict[str, Any], seconds: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    source, recording = f"sim:press.toml?fingers=5&seconds={seconds}", tmp_path / "here.mcap"
-    with biotac.open(source) as hand:
+def test_it_computes_what_the_simulated_board_computes(board: dict[str, Any], seconds: int, tmp_path: Path) -> None:
+    recording = tmp_path / "here.mcap"
+    with biotac.open(f"emu:command?source=press.toml&fingers=5&seconds={seconds}") as hand:
         with hand.record(recording):
             here = hand.read_batch(1000).wire
         status, hello = hand.status(), hand.info
     assert (hello.board, hello.fingers) == (board["board_id"], 5)
     assert (len(here), status.slots_late, status.messages_dropped) == (500 * seconds, 0, 0)
     assert main(["check", str(recording)]) == 0
-    monkeypatch.delenv("BIOTAC_SIM")
-    with biotac.open(source) as hand:
+    with biotac.open(f"sim:press.toml?fingers=5&seconds={seconds}") as hand:
         in_qemu = hand.read_batch(1000).wire
     here["t_us"] -= here["t_us"][0] - in_qemu["t_us"][0]  # they do not start at the same microsecond
     assert here.tobytes() == in_qemu.tobytes()
@@ -86,7 +82,8 @@ def test_it_computes_what_the_simulated_board_computes(
 def test_what_it_saved_is_there_after_a_restart(board: dict[str, Any], tmp_path: Path) -> None:
     source = load_source("press.toml", seconds=1)
     for expected in (100, 250, 260):
-        with shake_hands(SimLink("qemu", kept_board(source, tmp_path / "flash.bin"))) as hand:
+        kept = CommandBoard(source, pace=0.0, hold=True, flash=tmp_path / "flash.bin")
+        with shake_hands(kept.link("qemu")) as hand:
             assert hand.board.settings()[biotac.Setting.IDLE_PERIOD_MS] == expected
             hand.board.set_setting(biotac.Setting.IDLE_PERIOD_MS, 250 if expected == 100 else 260)
             hand.board.save_settings()

@@ -1,4 +1,4 @@
-"""The same live loads on the emulated Pico as on the process, and on a sensor board wired to a gateway."""
+"""The same live loads on the emulated Pico as on a board in this process, and on a sensor board wired to a gateway."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def frames(board: str, rounds: int) -> list[np.ndarray]:
 
 @pytest.mark.usefixtures("emulated_pico")
 @pytest.mark.parametrize("rounds", [60, pytest.param(1000, marks=pytest.mark.nightly)])
-def test_the_emulated_pico_computes_what_the_process_computes(rounds: int) -> None:
-    np.testing.assert_array_equal(frames("pico", rounds), frames("posix", rounds))
+def test_the_emulated_pico_computes_what_the_board_in_this_process_computes(rounds: int) -> None:
+    np.testing.assert_array_equal(frames("pico", rounds), frames("sim", rounds))
 
 
 def pressure(now: Round, finger: str) -> float:

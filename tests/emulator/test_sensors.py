@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.sim.source import Source
-from biotac.sim.tape import CODES, write_tape
+from biotac.sim.source import CODES, Source
 from biotac.wire import sensor_gen as _sensor
+from biotac_rig.tape import write_tape
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent

@@ -337,7 +337,7 @@ from biotac.calibrate.reference.mounting import LIN
 from biotac.errors import BiotacError
 from biotac.keep import calibration_file
 from biotac.sim.loading import load_source
-from biotac.sim.tape import write_tape
+from biotac_rig.tape import write_tape
 told = "read"
 try:
     {call}

@@ -12,7 +12,7 @@ import pytest
 from biotac.documents import tomllib
 
 ROOT = Path(__file__).parents[2]
-RIGS = {name: tomllib.loads((ROOT / f"tests/hil/rigs/{name}.toml").read_text()) for name in ("posix", "pico_emulated")}
+RIGS = {name: tomllib.loads((ROOT / f"tests/hil/rigs/{name}.toml").read_text()) for name in ("sim", "pico_emulated")}
 ROWS: list[dict[str, Any]] = tomllib.loads(Path(__file__).with_name("matrix.toml").read_text())["row"]
 
 

@@ -10,7 +10,7 @@ from kept_board import kept_board
 import biotac
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimLink
+from biotac.sim.ports import SIM
 from biotac_rig.emulated import EmulatedBoard
 from rig import Rig, start
 
@@ -27,7 +27,7 @@ class Restarts:
         path = folder / "world.toml"
         path.write_text(world)
         self._source = load_source(path)
-        self._is_a_process = rig.facts.get("board") == "posix"
+        self._is_a_process = rig.facts.get("board") == SIM
         if not self._is_a_process:
             rig.need("power")
         self._open()
@@ -37,7 +37,7 @@ class Restarts:
             self.board: Any = kept_board(self._source, self._flash)
         else:
             self.board = start(self._rig.facts["board"], self._source, pace=0.0)
-        self.link = SimLink(self._rig.name, self.board)
+        self.link = self.board.link(self._rig.name)
         self._rig.opened.append(self.link)
         self._meet()
 
@@ -46,7 +46,7 @@ class Restarts:
         self._met.append(self.hand)
 
     def lose_power(self) -> None:
-        """Off and on again, at once: a process is killed, and another has its flash."""
+        """Off and on again, at once: the board in this process ends, and another has its flash."""
         if isinstance(self.board, EmulatedBoard):
             self._start_by("cut power")
         else:

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from served_board import ServedBoard
 
 import biotac
 from bench import BenchPty, open_bench
 from biotac.documents import tomllib
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
-from biotac.sim.ports import parse_sim, start_board
-from biotac.sim.process import SimBoard, SimLink
+from biotac.sim.ports import SIM, parse_sim, start_board
 from biotac.sim.source import Source
 from biotac_rig.two_picos import TwoPicos
 
@@ -71,7 +71,7 @@ class Rig:
         if self.sensors_are_a_board:
             hand = open_bench(self.port, self.sensor_port, source)
         else:
-            link = SimLink(self.name, start(self.facts["board"], source, pace=pace))
+            link = start(self.facts["board"], source, pace=pace).link(self.name)
             hand = shake_hands(link, reconnect=reconnect)
         self.opened.append(hand)
         return hand
@@ -86,11 +86,13 @@ class Rig:
         self.need("scenarios")
         return self.open(source)
 
-    def on_a_pty(self, source: str, *, pace: float) -> SimBoard:
+    def on_a_pty(self, source: str, *, pace: float) -> Any:
         """The board as ``biotac sim`` starts it; its time runs from the start."""
         self.need("scenarios")
         if self.sensors_are_a_board:
             board = BenchPty(self.port, self.sensor_port, load_source(source, seconds=600))
+        elif self.facts["board"] == SIM:
+            board = ServedBoard(load_source(source, seconds=600), pace=pace)
         else:
             board = start(self.facts["board"], load_source(source, seconds=600), pace=pace)
         board.release()
@@ -103,7 +105,7 @@ class Rig:
         self.opened.clear()
 
 
-def start(board: str, source: Source, *, pace: float) -> SimBoard:
+def start(board: str, source: Source, *, pace: float) -> Any:
     return TwoPicos(source, pace=pace, hold=True) if board == "two_picos" else start_board(board, source, pace=pace)
 
 

@@ -7,7 +7,6 @@ import pytest
 import biotac
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimLink
 from biotac_rig.emulated import EmulatedBoard
 from rig import Rig
 
@@ -88,7 +87,7 @@ def test_the_core_clocks_the_same_words_as_the_dma(rig: Rig) -> None:
             hand.board.save_settings()
         board.do("cut power")  # the setting counts from the next start on
         board.until(1, usb={"state": "configured"})
-        with shake_hands(SimLink("pico", board)) as hand:
+        with shake_hands(board.link("pico")) as hand:
             runs.append(hand.read_batch(1.0).wire)
             assert hand.status().slots_late == 0
             assert (board.counters()["timing"]["interrupt_us"] > SLOT_US / 5) == (by_core == 1)

@@ -15,7 +15,6 @@ from biotac.doctor.listening import listen
 from biotac.hand.opening import shake_hands
 from biotac.sim import emu_gen as emu
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimLink
 from biotac_rig.leads import PairFacts, check
 from biotac_rig.two_picos import TwoPicos
 from rig import all_rigs, require
@@ -35,7 +34,7 @@ def opened(request: pytest.FixtureRequest) -> Iterator[Open]:
 
     def open_pair(seconds: float) -> tuple[biotac.Hand, TwoPicos]:
         board = TwoPicos(load_source("press.toml", fingers=5, seconds=seconds), pace=0.0, hold=True)
-        hands.append(shake_hands(SimLink("two_picos", board)))
+        hands.append(shake_hands(board.link("two_picos")))
         return hands[-1], board
 
     yield open_pair
@@ -43,7 +42,7 @@ def opened(request: pytest.FixtureRequest) -> Iterator[Open]:
         hand.close()
 
 
-def on_posix(seconds: float) -> biotac.Batch:
+def on_sim(seconds: float) -> biotac.Batch:
     with biotac.open(f"sim:press.toml?fingers=5&seconds={seconds}") as hand:
         return hand.read_batch(seconds + 1)
 
@@ -59,7 +58,7 @@ def assert_same(rows: np.ndarray, others: np.ndarray) -> None:
 def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open, seconds: float) -> None:
     hand, board = opened(seconds)
     batch = hand.read_batch(seconds + 1)
-    expected = on_posix(seconds)
+    expected = on_sim(seconds)
     assert_same(batch.wire, expected.wire)
     assert_same(batch.pac, expected.pac)
     for finger in hand.fingers:

@@ -111,7 +111,7 @@ class Program:
 def board(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[BoardBehindProxy]:
     """The simulated board; where a test names it "pico", the Pico's image in the emulator."""
     (tmp_path / "held.toml").write_text(HELD.replace("FINGERS", "1"))
-    board = BoardBehindProxy(str(tmp_path / "held.toml"), tmp_path, getattr(request, "param", "posix"))
+    board = BoardBehindProxy(str(tmp_path / "held.toml"), tmp_path, getattr(request, "param", "sim"))
     yield board
     board.close()
 
@@ -130,7 +130,7 @@ def running(program: Program, board: BoardBehindProxy) -> int:
     A process keeps time from the beginning. An emulator's time stands still while its own code is compiled.
     """
     board.wait_for(lambda: len(board.passed) >= STEADY_FRAMES)
-    if board.kind == "posix":
+    if board.kind == "sim":
         return 0
     program.wait_for_rows()
     return len(program.events)
@@ -151,7 +151,7 @@ def no_old_value_was_shown_as_new(program: Program, board: BoardBehindProxy | Se
 @pytest.mark.parametrize(
     ("board", "way", "pause_s", "reconnect"),
     [
-        pytest.param("posix", way, pause_s, reconnect, marks=() if by_day else pytest.mark.nightly)
+        pytest.param("sim", way, pause_s, reconnect, marks=() if by_day else pytest.mark.nightly)
         for way in [*WAYS, *OPENERS]
         for pause_s in PAUSES_S
         for reconnect in ([False] if way in OPENERS else [False, True])
@@ -223,7 +223,7 @@ CAUSES = {
 @pytest.mark.parametrize(
     ("board", "way", "cause"),
     [
-        pytest.param("posix", way, cause, marks=() if way in ("pull", "views") else pytest.mark.nightly)
+        pytest.param("sim", way, cause, marks=() if way in ("pull", "views") else pytest.mark.nightly)
         for way in [*WAYS, *OPENERS]
         for cause in CAUSES
     ]
@@ -262,7 +262,7 @@ def test_a_stream_that_cannot_go_on_is_an_error(board: BoardBehindProxy, tmp_pat
 @pytest.mark.parametrize(
     ("board", "way", "cause"),
     [
-        pytest.param("posix", way, cause, marks=() if way == "views" else pytest.mark.nightly)
+        pytest.param("sim", way, cause, marks=() if way == "views" else pytest.mark.nightly)
         for way in WAYS
         for cause in ("reset", "unplugged", "silent")
     ]

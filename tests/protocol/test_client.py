@@ -8,12 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from served_board import ServedBoard
 
 import biotac
-from biotac.cli.live.sim import prepare
 from biotac.sim import SimFinger, Touch, world
 from biotac.sim.loading import load_source
-from biotac.sim.ports import start_board
 
 CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wcast-qual", "-Werror"]
@@ -51,9 +50,9 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_example_prints_the_frames_that_python_reads(program: Path) -> None:
     assert len((CLIENT / "example.c").read_text().splitlines()) <= 60
     source = load_source("press.toml", fingers=2, seconds=30.0)
-    board = start_board("posix", source, pace=1.0)
+    board = ServedBoard(source, pace=1.0, hold=True)
     try:
-        prepare(board)
+        board.release()
         done = subprocess.run([str(program), board.path, str(FRAMES)], capture_output=True, text=True, check=True)
     finally:
         board.close()
@@ -87,7 +86,7 @@ def test_a_program_in_c_closes_its_loop_over_a_simulated_finger(tmp_path: Path) 
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as board:
         assert board.stdout is not None
         facts = json.loads(board.stdout.readline())
-        arguments = [tmp_path / "loop", facts["port"], str(facts["loads"])]
+        arguments = [tmp_path / "loop", facts["port"], str(facts["loads"]), facts["token"]]
         done = subprocess.run(arguments, capture_output=True, text=True, check=True)
         board.terminate()
     rounds = [tuple(map(float, line.split())) for line in done.stdout.splitlines()]
@@ -133,13 +132,13 @@ def test_a_controller_without_an_operating_system_reads_a_hand_over_its_uart() -
     for words in (["-S", "firmware", "--preset", "f405"], ["--build", "build/f405"]):
         subprocess.run(["cmake", *words], cwd=CLIENT.parents[1], check=True, capture_output=True)
     # Slowly: QEMU keeps this computer's time, however busy, and gives up a board that is silent for 500 ms of it.
-    board = start_board("posix", load_source("press.toml", fingers=2, seconds=60.0), pace=0.25)
+    board = ServedBoard(load_source("press.toml", fingers=2, seconds=60.0), pace=0.25, hold=True)
     image = str(CLIENT.parents[1] / "build/f405/f405-client.elf")
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", image]
     command += ["-display", "none", "-monitor", "none", "-serial", "null", "-serial", "null"]
     command += ["-serial", board.path, "-semihosting-config", "enable=on,target=native"]
     try:
-        prepare(board)
+        board.release()
         done = subprocess.run(command, capture_output=True, text=True, check=True)
     finally:
         board.close()

@@ -192,7 +192,7 @@ def test_a_lost_part_of_rounds_put_one_by_one_is_sent_again(scripted_board, hell
 
 
 def test_a_simulated_board_that_hangs_is_given_up(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.sim.feed.STILL_S", 0.2)
+    monkeypatch.setattr("biotac_rig.feed.STILL_S", 0.2)
     board = SensorBoard(SerialLink(scripted_board(FakeSensorBoard(hello).answer).path))
     board.listen()
     board.plug(load_source("press.toml", fingers=1, seconds=0.1))

@@ -10,12 +10,13 @@ import time
 import tty
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from deframer import Deframer, encode
+from served_board import ServedBoard
 
 from biotac.sim.loading import load_source
-from biotac.sim.ports import start_board
-from biotac.sim.process import SimBoard
+from biotac.sim.ports import SIM, start_board
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 
@@ -29,7 +30,7 @@ class BoardBehindProxy:
     has at 5 s comes 5 s into the stream.
     """
 
-    def __init__(self, source: str, folder: Path, kind: str = "posix") -> None:
+    def __init__(self, source: str, folder: Path, kind: str = SIM) -> None:
         self.path = folder / "ttyBOARD"
         self._source, self.kind = source, kind
         self.passed: list[tuple[int, int]] = []
@@ -40,7 +41,7 @@ class BoardBehindProxy:
         self._wires: tuple[int, int] | None = None  # the proxy's side of its pty, and the board's port
         self._over = threading.Event()
         self._changing = threading.Lock()
-        self._board: SimBoard | None = None
+        self._board: Any = None
         self.boot()
         self.plug()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -49,7 +50,10 @@ class BoardBehindProxy:
     def boot(self) -> None:
         """Start the board, or another one in its place: what was in its memory is gone."""
         before = self._board
-        board = start_board(self.kind, load_source(self._source, seconds=900), pace=1.0)
+        source = load_source(self._source, seconds=900)
+        board: Any = (
+            ServedBoard(source, pace=1.0, hold=True) if self.kind == SIM else start_board(self.kind, source, pace=1.0)
+        )
         port = os.open(board.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(port)
         with self._changing:

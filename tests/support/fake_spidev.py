@@ -7,9 +7,9 @@ from pathlib import Path
 from types import ModuleType
 
 from biotac.sim.source import Source
-from biotac.sim.tape import write_tape
 from biotac.wire.native import ffi, lib
 from biotac.wire.sensor_gen import LISTEN_WORD, SPI_HZ
+from biotac_rig.tape import write_tape
 
 
 class HeldClock:

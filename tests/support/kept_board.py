@@ -6,21 +6,21 @@ from dataclasses import replace
 from pathlib import Path
 
 import biotac
+from biotac.sim.board import SimBoard
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard, SimLink
 from biotac.sim.source import Source
 
 
 def kept_board(source: Source, flash: Path) -> SimBoard:
     """A simulated board whose flash is a file, and outlives it."""
-    return SimBoard(source, pace=0.0, hold=True, flash=flash)
+    return SimBoard(source, pace=0.0, flash=flash)
 
 
 def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
     """Two fingers, of these serial numbers, on a board with this flash."""
     source = load_source("press.toml", fingers=2, seconds=1)
     board = kept_board(replace(source, serials=serials) if serials else source, flash)
-    return biotac.Hand(SimLink("sim:flash", board))
+    return biotac.Hand(board.link("sim:flash"))
 
 
 def serial_of(hand: biotac.Hand, finger: int) -> str:

@@ -151,7 +151,7 @@ static uint64_t now_ns(void)
 }
 
 // QEMU counts instructions, which is nobody's clock: in the alarm's interrupt time is the alarm's own, and
-// passes with words and waits, as on the posix port. One that really is late stays late.
+// passes with words and waits, as on the simulated board. One that really is late stays late.
 bool __wrap_bt_port_alarm(void)
 {
     const uint32_t now_us = __wrap_clock_us();

@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from biotac.errors import DeviceLostError, PortError
-from biotac.sim.process import SimBoard
 from biotac.sim.source import Source
+
+from .process import ProcessBoard
 
 # Whoever reads the link hears the board too: an answer may already be there.
 LISTEN_S = 0.005
@@ -38,7 +39,7 @@ class Tools:
     chip: list[str]
 
 
-class EmulatedBoard(SimBoard):
+class EmulatedBoard(ProcessBoard):
     """A running emulator; ``path`` is a pty that any serial program can open.
 
     With ``uart``, a second pty, ``uart_path``, is connected to the pins of the board's UART. ``verbs``, which rig.mjs

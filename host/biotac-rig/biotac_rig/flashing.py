@@ -14,7 +14,7 @@ from biotac.flash.interfaces import Loader, Show, Target
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.sim.loading import load_source
-from biotac.sim.ports import parse_sim
+from biotac.sim.ports import SIM, parse_sim
 
 from .emulated import EmulatedBoard
 
@@ -29,7 +29,7 @@ class EmulatedTarget(Target):
     def __init__(self, port: str) -> None:
         self.port = port
         sim = parse_sim(port, 0.0)
-        if sim.board == "posix":
+        if sim.board == SIM:
             raise InputError(f"{port} has no image to flash; expected a device path or emu:pico?source=SOURCE")
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds or WORLD_S)
         self.board = EmulatedBoard(sim.board, source, pace=sim.pace, hold=True, image=sim.image)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from biotac.flash.interfaces import Loader, Target
 from biotac.sim.ports import open_sim
 
+from .boards import start_board
 from .emulated import EmulatedBoard
 from .flashing import EmulatedLoader, EmulatedTarget
 from .leads import examine_pair
+from .live import EmulatedWorld
 from .playing import run as play
 
-__all__ = ["EmulatedBoard", "examine_pair", "flash_target", "open_sim", "play"]
+__all__ = ["EmulatedBoard", "EmulatedWorld", "examine_pair", "flash_target", "open_sim", "play", "start_board"]
 
 
 def flash_target(port: str) -> tuple[Target, Loader]:

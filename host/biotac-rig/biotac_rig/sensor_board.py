@@ -13,8 +13,9 @@ from contextlib import contextmanager, suppress
 
 from biotac.errors import BiotacError, DeviceLostError, InputError
 from biotac.sim import emu_gen as emu
-from biotac.sim.feed import REST_S, SensorFeed
 from biotac.wire import sensor_gen as sensor
+
+from .feed import REST_S, SensorFeed
 
 KEEP_S = 20.0  # 39 sectors of flash, each at its longest
 

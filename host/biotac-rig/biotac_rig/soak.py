@@ -38,6 +38,7 @@ import threading
 import time
 import urllib.request
 from collections import Counter
+from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -47,7 +48,6 @@ import biotac
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.ports import start_board
-from biotac.sim.process import SimBoard, SimLink
 from biotac.view.serving import Viewing
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
@@ -193,9 +193,10 @@ def faulty(folder: Path, rig: str, seed: int) -> Counter[str]:
         text += f'finger = {hurt[-1]}\nkind = "{kind}"\n'
     source = folder / "soak.toml"
     source.write_text(text)
-    board = start_board("posix" if rig == "sim" else rig, load_source(source), pace=0.0)
-    line = HurtLine(str(source), board, draw)
-    with shake_hands(line) as hand:
+    link = start_board(rig, load_source(source), pace=0.0).link(str(source))
+    line = HurtLine(link.read, draw)
+    link.read = line.read  # type: ignore[method-assign]
+    with shake_hands(link) as hand:
         line.hurts = True
         batch = hand.read_batch(1000)
         line.hurts = False
@@ -224,15 +225,15 @@ def faulty(folder: Path, rig: str, seed: int) -> Counter[str]:
     return Counter({"frames sent": len(sent.wire), "delivered": delivered, "lost": missing, "twice": doubled, **hurts})
 
 
-class HurtLine(SimLink):
-    """A line to a simulated board that hurts what the board says, about once a second; ``sent`` is what it said."""
+class HurtLine:
+    """A line from a simulated board that hurts what the board says, about once a second; ``sent`` is what it said."""
 
     SECOND_BYTES = 80_000
     LAST = 9 * SECOND_BYTES  # what comes behind the last fault shows what is lost
     PIECE = 2000  # rounds, not seconds: what is older comes from a board that started again
 
-    def __init__(self, port: str, board: SimBoard, draw: random.Random) -> None:
-        super().__init__(port, board)
+    def __init__(self, read: Callable[[float], bytes], draw: random.Random) -> None:
+        self._read = read
         self.hurts = False
         self.faults = 0
         self.sent = bytearray()
@@ -242,7 +243,7 @@ class HurtLine(SimLink):
 
     def read(self, timeout_s: float) -> bytes:
         """See Link.read."""
-        chunk = super().read(timeout_s)
+        chunk = self._read(timeout_s)
         if not self.hurts:
             return chunk
         self.sent += chunk

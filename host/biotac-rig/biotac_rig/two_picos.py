@@ -15,11 +15,11 @@ import numpy as np
 
 from biotac.errors import PortError
 from biotac.link.serial_port import SerialLink
-from biotac.sim.process import SimLink
 from biotac.sim.source import Source
 from biotac.wire.sensor_gen import SLOTS
 
 from .emulated import EmulatedBoard, new_pty
+from .process import ProcessLink
 from .sensor_board import SensorBoard
 
 NOTHING = Source("nothing", np.zeros((1, 1, len(SLOTS)), np.uint16))
@@ -70,7 +70,7 @@ class TwoPicos(EmulatedBoard):
             return  # the code that waits for the gateway's pty reports the error
         if not self._alone:
             link = SerialLink(path)
-            link.patience = SimLink.patience
+            link.patience = ProcessLink.patience
             self.sensor_board = self._sensors.enter_context(closing(SensorBoard(link)))
             self.sensor_board.plug(self.source)
             self._sensors.enter_context(self.sensor_board.feeding())

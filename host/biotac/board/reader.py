@@ -92,6 +92,7 @@ class Reader:
         self._taps: tuple[Tap, ...] = ()
         #: Notified when reading stops, resumes or fails, and when there is room for an unpaced board's batches.
         self.changed = threading.Condition()
+        self._taking = threading.Lock()  # of who reads a link that is shared, until the consumers have it
         self._pid = os.getpid()
         self._decoder = _decoder(hello, self._messages)
         self._past: list[LinkStats] = []  # of decoders before a reboot
@@ -184,6 +185,7 @@ class Reader:
             self.changed.notify_all()
         for consumer in self.consumers:
             consumer.wake()
+        self.link.wake()
 
     def wait_for(self, condition: Callable[[], Any], timeout_s: float | None = None) -> bool:
         """Wait until ``condition`` is true, looking whenever ``changed`` is notified."""
@@ -238,9 +240,20 @@ class Reader:
             return False
         return any(consumer.is_full() for consumer in self.consumers)
 
+    def take(self, read: Callable[[], bytes]) -> None:
+        """Pass on what ``read`` returns, as the reading thread does: for a program that lets a board's time pass."""
+        with self._taking:
+            chunk = read()
+            if chunk:
+                self._arrived(self._fed(chunk))
+
     def _read(self) -> None:
         had_ended = self.link.ended
         try:
+            if self.link.shares_reading:
+                self.link.await_news(POLL_S)
+                self.take(lambda: self.link.read(0.0))
+                return
             batch = self._next()
         except DeviceLostError as error:
             self.disconnect(error, "unplugged")
@@ -262,9 +275,12 @@ class Reader:
                 self._tap(decoder.chunk())
             return batch
         chunk = self.link.read(POLL_S)
-        if chunk and self._taps:
+        return self._fed(chunk) if chunk else None
+
+    def _fed(self, chunk: bytes) -> Batch:
+        if self._taps:
             self._tap(chunk)
-        return decoder.feed(chunk, time.monotonic()) if chunk else None
+        return self._decoder.feed(chunk, time.monotonic())
 
     def _tap(self, chunk: bytes) -> None:
         for tap in self._taps:

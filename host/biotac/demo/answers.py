@@ -20,9 +20,9 @@ from ..hand.opening import shake_hands
 from ..kernels.compiled import FORCE_GAINS, Settings, on_board_q4
 from ..map.board_map import BoardMap
 from ..map.board_map import on_board_q4 as mapped_q4
+from ..sim.board import SimBoard
 from ..sim.loading import bundled_scenario
 from ..sim.play import play
-from ..sim.process import SimBoard, SimLink
 from ..sim.scenario import FingerSpec, parse_scenario
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, StructArray, to_units
@@ -55,7 +55,7 @@ def own_map(finger: FingerSpec) -> tuple[BoardMap, list[float]]:
     nano17 = Nano17Reader(source, 0)
     with TemporaryDirectory(prefix="biotac-demo-") as folder:
         path = Path(folder) / f"{finger.serial}.mcap"
-        with shake_hands(SimLink(f"sim:{LOADS}", SimBoard(source, pace=0.0, hold=True))) as hand:
+        with shake_hands(SimBoard(source, pace=0.0).link(f"sim:{LOADS}")) as hand:
             if not walk(hand, nano17, Procedure(0, nano17.nano17.mounting), path):
                 raise KeyboardInterrupt  # a walk keeps what was recorded until then, and a demo needs all of it
         reference = path.with_suffix(".csv")

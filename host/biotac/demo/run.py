@@ -19,8 +19,8 @@ from ..picture import check_drawable, picture
 from ..recording.crosscheck import CrossCheck
 from ..recording.felt import Felt
 from ..recording.reader import Recording
+from ..sim.board import SimBoard
 from ..sim.loading import load_source
-from ..sim.process import SimBoard, SimLink
 from ..sim.scenario import FingerSpec
 from ..sim.source import Source
 from ..wire import messages_gen as wire
@@ -74,7 +74,7 @@ def run_demo(
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
     # The board's counts are ready; from here on this process is a host with a board, and its cost is measured.
-    with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
+    with shake_hands(SimBoard(source, pace=0.0).link(f"sim:{source.name}")) as hand:
         # The board has no calibration. What a calibrated one would publish is computed below and drawn beside it.
         settings = hand.board.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))

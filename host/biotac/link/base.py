@@ -25,7 +25,7 @@ class Played(Protocol):
         """Force (n, 3) in N on fingers (n,) in rounds ``since_us`` (n,) after round 0; NaN outside, None if unknown."""
 
 
-#: Of a board that is a process on this computer.
+#: Of a board that is a program on this computer.
 PATIENCE = 60.0
 
 
@@ -92,6 +92,18 @@ class Link(Protocol):
 
     def write(self, data: bytes) -> None:
         """Send all of data."""
+
+    #: Whether a program that lets device time pass also reads what comes of it (Reader.take): nobody else may wait in
+    #: ``read`` then, but in ``await_news``.
+    shares_reading: bool = False
+
+    def await_news(self, timeout_s: float) -> None:
+        """Wait until there is something to read, for so long."""
+        return
+
+    def wake(self) -> None:
+        """Let who waits in ``read`` or ``await_news`` return at once, where that can be."""
+        return
 
     def release(self) -> None:
         """Let device time run, if it was held back until the host was ready."""

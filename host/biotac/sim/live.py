@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from itertools import chain
 
 import numpy as np
 
-from ..errors import DeviceLostError, InputError, PortError
-from ..link.serial_port import SerialLink
+from ..errors import InputError
 from ..wire.sensor_gen import MAX_SENSORS
 from ..wire.slots import SLOTS_PER_FRAME
 from . import touch
-from .emu_gen import EmuStatus
 from .faults import BETWEEN_FINGERS, EXCHANGED, begin
 from .physics import Finger
-from .process import SimBoard, SimLink
 from .sampling import Sampler, Words
 from .scenario import default_serial
 from .source import Source
@@ -80,51 +76,3 @@ class LiveFingers:
         self._faults[f"{number} {kind} {channel}"] = tuple(
             (one, other, begin(kind, channel, self._rest[one], self._rest[other], seed)) for one, other in hit
         )
-
-
-class LiveLink(SimLink):
-    """The link to a live board, which can say that all the board has sent was passed on to the hand.
-
-    While ``away`` its cable is out: the board has no host.
-    """
-
-    lock_step = True
-
-    def __init__(self, board: SimBoard) -> None:
-        self.away = False
-        self.reopened = False  #: since count_from
-        self._passed_on = threading.Condition()
-        self._read_bytes = self._passed_bytes = self._before_bytes = 0
-        super().__init__("sim:live", board)
-
-    def reopen(self, port: str) -> None:
-        if self.away:
-            raise PortError("the simulated cable is out")
-        super().reopen(port)
-        self.reopened = True
-
-    def read(self, timeout_s: float) -> bytes:
-        with self._passed_on:
-            self._passed_bytes = self._read_bytes  # who reads on has passed on what came before
-            self._passed_on.notify_all()
-        if self.away:
-            SerialLink.close(self)
-            raise DeviceLostError("the simulated cable is out")
-        chunk = super().read(timeout_s)
-        self._read_bytes += len(chunk)
-        return chunk
-
-    def count_from(self, status: EmuStatus) -> None:
-        """All that the board had sent by then has been read, and is on its way to the hand."""
-        self._before_bytes = status.link_bytes - self._read_bytes
-        self.reopened = False
-
-    def wait_passed_on(self, status: EmuStatus, timeout_s: float) -> bool:
-        """Wait until the hand has all that the board had sent by then; false when that takes too long."""
-        most = (status.link_bytes - self._before_bytes) % 2**32
-
-        def is_passed_on() -> bool:
-            return self.away or (self._passed_bytes - most) % 2**32 < 2**31
-
-        with self._passed_on:
-            return self._passed_on.wait_for(is_passed_on, timeout_s)

@@ -1,21 +1,21 @@
-"""Loads for a live board from a program in any language: a line of JSON a round, over a loopback socket.
+"""Loads for a live board from a program in any language: a line of JSON a round, over a TCP port.
 
-host/docs/guides/controller_tests.md describes the lines. One program at a time; the next may connect when it has gone,
-and until then the time of the board stands still.
+host/docs/guides/controller_tests.md describes the lines, of which the first is a token. One program at a time; the next
+may connect when it has gone, and until then the time of the board stands still.
 """
 
 from __future__ import annotations
 
 import json
-import socket
 from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
 from ..documents import parse_json
 from ..errors import BiotacError, DeviceLostError, InputError, error_text
+from .board import SimBoard
 from .live import LiveFingers
-from .process import SimBoard
+from .serve import LOCAL, listen, new_token, says_token
 from .touch import Course, Load, Touch
 
 LINE_BYTES = 65536
@@ -24,16 +24,16 @@ _FAULT_KEYS = ("finger", "kind", "channel")
 
 
 class LoadServer:
-    """Listens at ``port`` on the loopback interface for loads of a board."""
+    """Listens at ``port`` of ``address`` for loads of a board, from who says ``token`` in the first line."""
 
-    def __init__(self, fingers: LiveFingers, board: SimBoard) -> None:
-        assert board.sensors is not None
+    def __init__(self, fingers: LiveFingers, board: SimBoard, *, address: str | None = None) -> None:
         self._fingers = fingers
-        self._sensors = board.sensors
+        self._board = board
         board.release()
-        self._sensors.wait_still()
+        board.put(board.source.samples[:0])
         self._rounds = 0
-        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.token = new_token()
+        self._listening = listen(address or LOCAL)
         self.port: int = self._listening.getsockname()[1]
 
     def serve(self) -> None:
@@ -42,8 +42,12 @@ class LoadServer:
             while True:
                 program, _ = self._listening.accept()
                 # The program may go in the middle of a round; what was not sent then fails again as the file is closed.
-                with suppress(BrokenPipeError, ConnectionResetError), program, program.makefile("rwb") as lines:
-                    self._serve(lines)
+                with suppress(BrokenPipeError, ConnectionResetError), program:
+                    if says_token(program, self.token):
+                        program.settimeout(None)
+                        with program.makefile("rwb") as lines:
+                            lines.readline(LINE_BYTES)  # the end of the token's
+                            self._serve(lines)
 
     def _serve(self, lines: Any) -> None:
         while line := lines.readline(LINE_BYTES):
@@ -68,8 +72,7 @@ class LoadServer:
             raise
         except (BiotacError, LookupError, TypeError, ValueError, OverflowError) as error:
             return {"error": error_text(error)}
-        self._sensors.put(words)
-        self._sensors.wait_still()
+        self._board.put(words)
         self._rounds += 1
         return {"round": self._rounds}
 

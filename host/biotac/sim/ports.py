@@ -1,4 +1,4 @@
-"""Simulated boards by PORT: ``sim:SOURCE`` and ``emu:BOARD?source=SOURCE``."""
+"""Simulated boards by PORT: ``sim:SOURCE``, and ``emu:BOARD?source=SOURCE`` of biotac-rig."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from .. import extra
-from ..errors import PortError
+from ..errors import InputError, PortError
 from ..link.port_text import options_of, parse_pace
+from .board import SimBoard, SimLink
 from .loading import load_source
-from .process import SimBoard, SimLink
 from .source import Source
+
+SIM = "sim"  # the board in this process
 
 
 @dataclass(frozen=True)
 class SimPort:
     """A parsed ``sim:SOURCE?...`` or ``emu:BOARD?source=SOURCE&...``."""
 
-    board: str  # "posix", or the name of an emulated board
+    board: str  # SIM, or the name of an emulated board
     source: str
     pace: float
     fingers: int | None = None
@@ -51,7 +53,7 @@ def parse_sim(port: str, pace: float) -> SimPort:
     """Split a sim: or emu: port; ``pace`` is the default, in device seconds per second (0: unpaced)."""
     scheme = port.partition(":")[0]
     head, options = options_of(port, _OPTIONS[scheme], FORMS[scheme])
-    board, source = ("posix", head) if scheme == "sim" else (head, options.pop("source", ""))
+    board, source = (SIM, head) if scheme == "sim" else (head, options.pop("source", ""))
     if not source:
         raise PortError(f"{port}: no source: expected {FORMS[scheme]}")
     verbs = tuple(filter(None, options.pop("do", "").split(";")))
@@ -66,23 +68,28 @@ def open_sim(port: str, pace: float) -> SimLink:
     """Open a sim: or emu: port. Raises PortError, or InputError for a source that cannot be played."""
     sim = parse_sim(port, pace)
     source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
-    board = (
-        SimBoard(source, pace=sim.pace, hold=True, clock_s=sim.clock_s)
-        if sim.board == "posix"
-        else start_board(sim.board, source, pace=sim.pace, image=sim.image, verbs=sim.verbs)
-    )
-    return SimLink(port, board)
+    board = start_board(sim.board, source, pace=sim.pace, clock_s=sim.clock_s, image=sim.image, verbs=sim.verbs)
+    return board.link(port)
 
 
 def start_board(
-    board: str, source: Source, *, pace: float, live: bool = False, image: str | None = None, verbs: Sequence[str] = ()
+    board: str,
+    source: Source,
+    *,
+    pace: float,
+    live: bool = False,
+    clock_s: float = 0.0,
+    image: str | None = None,
+    verbs: Sequence[str] = (),
 ) -> SimBoard:
-    """Start a simulated board, held until released: ``posix``, the firmware as a process, or an emulated one.
+    """Start a simulated board, held until released: SIM, the firmware in this process, or an emulated one.
 
-    ``live``: ``source`` has the first rounds, and time stands still until the next ones have come to its ``sensors``.
+    ``live``: ``source`` has the first rounds, and time stands still until the next ones have come to its sensors.
     Raises PortError naming what is missing and how to get it.
     """
+    if board == SIM:
+        return SimBoard(source, pace=pace, live=live, clock_s=clock_s)
     if board == "posix":
-        return SimBoard(source, pace=pace, hold=True, live=live)
+        raise InputError(f"the board posix was a process; it is in this program now, and is called {SIM}")
     how: dict[str, Any] = {"pace": pace, "hold": True, "live": live, "image": image, "verbs": verbs}
-    return extra.rig(f"a {board} in an emulator", lambda rig: cast(SimBoard, rig.EmulatedBoard(board, source, **how)))
+    return extra.rig(f"a {board} in an emulator", lambda rig: cast(SimBoard, rig.start_board(board, source, **how)))

@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import InputError
 from ..kernels.geometry import Floats
+from ..wire import sensor_gen as _sensor
 from ..wire.batches import ROUND_US
+from .emu_gen import EmuFault
 from .physics import Finger
 
 Rows = npt.NDArray[np.int64]
+
+CODES = tuple(fault for fault in EmuFault if fault)  # in place of a count; see enum emu_fault (protocol/emu.toml)
+BLOCK = 10_000  # frames at a time, for memory
+_SLOTS = len(_sensor.SLOTS)
 
 MAX_SECONDS = 7200.0  # the wire's 32 bits of us wrap after 4295 s; 5 fingers for so long are 320 MB of counts
 
@@ -48,8 +55,8 @@ class Truth:
 class Source:
     """Counts to play, and what is known about them.
 
-    ``samples`` uint16 (frames, fingers, 44) in SLOTS order, 100 frames/s: counts 0..4095 or the codes
-    of tape.py. ``truth`` is None for recorded counts. ``tare_q4`` uint16 (fingers, 19), count * 16: a
+    ``samples`` uint16 (frames, fingers, 44) in SLOTS order, 100 frames/s: counts 0..4095 or one of
+    CODES. ``truth`` is None for recorded counts. ``tare_q4`` uint16 (fingers, 19), count * 16: a
     stored tare the board should be given, or None. ``truth_force_n`` float64 (frames, fingers, 3): the force a
     recording itself carries, in Lin's frame, or None. ``serials``: one of 16 characters a finger.
     ``emulated``: the sensor of each finger; () for a recording.
@@ -74,3 +81,23 @@ class Source:
         rows = first + np.rint(since_us / ROUND_US).astype(np.int64)
         inside = (rows >= 0) & (rows < len(known))
         return np.where(inside[:, None], known[np.clip(rows, 0, len(known) - 1), finger], np.nan)
+
+
+def check_samples(source: Source) -> None:
+    """Raise InputError when a source's samples have a wrong shape, type or value."""
+    samples = source.samples
+    if samples.ndim != 3 or samples.shape[2] != _SLOTS or samples.dtype != np.uint16:
+        raise InputError(
+            f"source {source.name}: samples are {samples.dtype} {samples.shape}: expected uint16 "
+            f"(frames, fingers, {_SLOTS}); load it with load_source"
+        )
+    for first in range(0, len(samples), BLOCK):
+        block = samples[first : first + BLOCK]
+        wrong = (block > _sensor.FULL_SCALE_COUNT) & (block < min(CODES))
+        if wrong.any():
+            frame, finger, slot = np.argwhere(wrong)[0].tolist()
+            raise InputError(
+                f"source {source.name}: frame {first + frame}, finger {finger}, slot {slot} holds "
+                f"{block[frame, finger, slot]}: expected a count 0..{_sensor.FULL_SCALE_COUNT} or a code from "
+                f"{min(CODES):#06X}; load it with load_source"
+            )

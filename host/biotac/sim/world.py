@@ -7,8 +7,8 @@
         print(now["index"].frame.force_n, now.events)
 
 The firmware runs in lock-step: its time stands still until the next load has come, so the same loads give the same
-bytes, however slow the program is. On boards of silicon time is real (``wired_world``). A controller of another rate
-steps so many rounds before each of its own.
+bytes, however slow the program is. On boards of silicon time is real (biotac_rig's ``wired_world``). A controller of
+another rate steps so many rounds before each of its own.
 """
 
 from __future__ import annotations
@@ -16,50 +16,46 @@ from __future__ import annotations
 import math
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from .. import extra
 from ..errors import DeviceLostError, InputError
 from ..hand.hand import Hand
 from ..hand.opening import shake_hands
 from ..hand.rounds import FingerRound, Round, Rounds
 from ..wire.messages_gen import Setting
 from ..wire.slots import FRAME_HZ
-from .feed import SensorFeed
-from .live import LiveFingers, LiveLink
+from .board import STEP_ROUNDS, SimBoard, SimLink
+from .live import LiveFingers
 from .physics import Finger
-from .ports import start_board
-from .process import SimBoard
+from .ports import SIM, start_board
+from .sampling import Words
+from .serve import Served
 from .touch import Load
 
 PATIENCE_S = 60.0
 BOOT_S = 0.25  # of a board, until it samples again
 WATCHDOG_S = 2.0
 AWAY_S = 0.5  # until a computer has found a port that came back
-AHEAD_ROUNDS = 2
-AT_ONCE_ROUNDS = 50  # while the load stays; their frames fit the link's buffers
-CHECK_ROUNDS = 20  # after which a tape's message that was lost is sent again
-ROOM_ROUNDS = 40  # of a sensor board's memory, by which a program may be ahead
 STREAMS = ("results", "events")
 AnyWorld = TypeVar("AnyWorld", bound="World")
 
 
-class World:
-    """Simulated fingers and the hand that reads them, while time is real: on a sensor board wired to a gateway.
+class World(ABC):
+    """Simulated fingers and the hand that reads them."""
 
-    A load acts some rounds after its step. Where a program is late the sensors feel the round before once more.
-    """
+    #: Rounds that had not come when the gateway began them: none where time waits for them.
+    rounds_late = 0
 
-    def __init__(self, fingers: LiveFingers, sensors: SensorFeed, hand: Hand | None, closes: ExitStack) -> None:
+    def __init__(self, fingers: LiveFingers, hand: Hand | None, closes: ExitStack) -> None:
         #: The ordinary Hand, streaming; None when another program has the board's port.
         self.hand: Hand = hand  # type: ignore[assignment]
-        self.sensors = sensors
         self._fingers = fingers
         self._closes = closes
-        self._last: Round | None = None
-        self._steps = 0
 
     def __enter__(self: AnyWorld) -> AnyWorld:
         return self
@@ -71,11 +67,7 @@ class World:
         """End it. Safe to call twice."""
         self._closes.close()
 
-    @property
-    def rounds_late(self) -> int:
-        """Rounds that had not come when the gateway began them; 0 in lock-step. Asks the sensors."""
-        return self.sensors.status().rounds_late
-
+    @abstractmethod
     def step(self, **loads: Load) -> Round:
         """Let one round of 10 ms pass, with these loads by finger; whoever is not named is not touched.
 
@@ -85,12 +77,6 @@ class World:
         InputError or KeyError for a wrong load, and then no time has passed; DeviceLostError when the board has ended,
         and TimeoutError when on real time nothing comes.
         """
-        self.sensors.put(self._fingers.read(loads))
-        self._steps += 1
-        if self._steps % CHECK_ROUNDS == 0:
-            self.sensors.send_lost()
-        self._last = self.hand.next_round(self._last)
-        return self._last
 
     def run(self, seconds: float, **loads: Load) -> Round:
         """Step with the same loads for so long, without any they rest; the last round, with the events of all.
@@ -111,20 +97,21 @@ class World:
 class LockStep(World):
     """Simulated fingers on a simulated board, whose time passes only in ``step``. Made by ``world``."""
 
-    def __init__(self, fingers: LiveFingers, board: SimBoard, hand: Hand | None, closes: ExitStack) -> None:
-        assert board.sensors is not None
-        super().__init__(fingers, board.sensors, hand, closes)
-        #: The board's pty, for a C client, ROS or `biotac view` in place of ``hand``.
-        self.port = board.path
+    def __init__(
+        self, fingers: LiveFingers, board: SimBoard, hand: Hand | None, closes: ExitStack, port: str = ""
+    ) -> None:
+        super().__init__(fingers, hand, closes)
+        #: The board's pty, for a C client, ROS or `biotac view` in place of ``hand``; empty where there is a hand.
+        self.port = port
         self._board = board
         self._rounds = Rounds(hand._board.reader, hand._latest) if hand is not None else None
         self._dead = self._away = self._stalled = 0  # for so many more rounds
         self._turn = threading.Lock()
 
     @property
-    def _link(self) -> LiveLink | None:
+    def _link(self) -> SimLink | None:
         link = self.hand.link if self.hand is not None else None
-        return link if isinstance(link, LiveLink) else None
+        return link if isinstance(link, SimLink) else None
 
     def step(self, **loads: Load) -> Round:
         return self._step(1, loads)
@@ -133,7 +120,7 @@ class LockStep(World):
         left, rounds = _rounds_of(seconds), list[Round]()
         while left:
             link, is_disturbed = self._link, self._dead or self._away or self._stalled
-            count = 1 if is_disturbed or (link is not None and link.reopened) else min(left, AT_ONCE_ROUNDS)
+            count = 1 if is_disturbed or (link is not None and link.reopened) else min(left, STEP_ROUNDS)
             now, left = self._step(count, loads), left - count
             rounds.append(replace(now, missed=max(0, now.missed - count + 1)))
         return _as_one(rounds)
@@ -155,8 +142,7 @@ class LockStep(World):
             if self._dead == 0:
                 self._reset()
         else:
-            self.sensors.put(words)
-            self._settle()
+            self._advance(words)
         if self._away:
             self._away -= 1
             if self._away == 0:
@@ -174,7 +160,7 @@ class LockStep(World):
         The hand connects again by itself. Settings and maps are restored as on a board, tares are not.
         """
         dead, away = _rounds_of(boot_s), _rounds_of(away_s)
-        link = self._checked_link(is_process=True)
+        link = self._checked_link()
         before = self._away if link.away else 0  # while it hung, its port was to go
         self._pull()
         self._dead, self._away = dead, max(before, away, dead + 1)
@@ -187,7 +173,7 @@ class LockStep(World):
     def hang(self, seconds: float = WATCHDOG_S) -> None:
         """The board does nothing for so long, while its port stays; then its watchdog resets it."""
         dead = _rounds_of(seconds)
-        self._checked_link(is_process=True)
+        self._checked_link()
         self._dead, self._away = dead, max(self._away, dead + _rounds_of(AWAY_S))
 
     def unplug(self, seconds: float) -> None:
@@ -204,15 +190,15 @@ class LockStep(World):
         self._checked_link()
         self._stalled = stalled
 
-    def _checked_link(self, is_process: bool = False) -> LiveLink:
-        if self._link is None or (is_process and type(self._board) is not SimBoard):
-            raise InputError("this needs a hand, and a restart the board that is a process; leave both arguments out")
+    def _checked_link(self) -> SimLink:
+        if self._link is None:
+            raise InputError("this needs a hand on a board in this process; leave `hand` and `board` out")
         if self.hand._board.closed:
             raise InputError("the world was closed, expected one that runs; start another")
         return self._link
 
     def _pull(self) -> None:
-        self._checked_link().away = True
+        self._checked_link().pull()
         reader = self.hand._board.reader
         if not reader.wait_for(lambda: reader.parked or reader.failure, PATIENCE_S):
             raise DeviceLostError("the simulated hand did not notice that its cable is out; start another world")
@@ -225,27 +211,22 @@ class LockStep(World):
     def _reconnect(self) -> None:
         link, wanted, until_s = self._link, self.hand._stream.started, time.monotonic() + PATIENCE_S
         assert link is not None
-        link.away = False
+        if link.away:
+            link.push()
         while time.monotonic() < until_s:
             self.hand.check()
             if self.hand.connected and (wanted is None or self.hand.status().streams == wanted.streams):
                 break
             time.sleep(0.001)
-        self._count()
+        link.reopened = False
 
-    def _count(self) -> None:
-        """Count the link's bytes from here: the reply to a ping is the last that has come."""
-        assert self._link is not None
-        self.hand.ping()
-        self._link.count_from(self.sensors.status())
-
-    def _settle(self) -> None:
-        """Wait until the board's time stands still, and the hand has all that it sent."""
-        status, link, until_s = self.sensors.wait_still(), self._link, time.monotonic() + PATIENCE_S
-        while link is not None and not link.wait_passed_on(status, 0.5):
+    def _advance(self, words: Words) -> None:
+        """Let these rounds pass, and pass on to the hand, or to another program, what the board sends meanwhile."""
+        if self._link is None or self._link.away:
+            self._board.put(words)
+        else:
             self.hand.check()
-            if time.monotonic() > until_s:
-                raise DeviceLostError("what the simulated board sent did not arrive; start another world")
+            self.hand._board.reader.take(lambda: self._board.step(words))
 
 
 def world(
@@ -254,14 +235,14 @@ def world(
     maps: Mapping[str, Any] | None = None,
     settings: Mapping[str, int] | None = None,
     streams: Sequence[str] = STREAMS,
-    board: str = "posix",
+    board: str = SIM,
     image: str | None = None,
     hand: bool = True,
 ) -> LockStep:
     """Start a board with these simulated fingers, each named, in the order of their chip selects.
 
     ``maps`` are wrench maps by finger (Hand.board.set_map), ``settings`` by their names in link.toml, and ``streams``
-    what the hand streams (Hand.stream). ``board`` is "posix", the firmware as a process, or "pico", the Pico's flash
+    what the hand streams (Hand.stream). ``board`` is "sim", the firmware in this process, or "pico", the Pico's flash
     image in the emulator. With ``hand=False`` another program opens ``LockStep.port``, and has to: the board waits for
     its reader. A HOLD does not lapse here, because time waits for the program. Raises PortError when the board does not
     start, InputError or CommandRefusedError for a wrong setting or map.
@@ -273,22 +254,23 @@ def world(
     if not hand and (maps or settings):
         raise InputError("maps and settings are given with hand=False, expected a hand that sends them; leave them out")
     with ExitStack() as closes:
-        live = start_board(board, feed.at_rest(), pace=0.0, live=True, image=image)
-        closes.callback(live.close)
-        opened = None
+        started = start_board(board, feed.at_rest(), pace=0.0, live=True, image=image)
+        closes.callback(started.close)
+        opened, port = None, ""
         if hand:
-            opened = closes.enter_context(shake_hands(LiveLink(live), fingers=feed.names, reconnect=True))
-        made = LockStep(feed, live, opened, closes)
-        if opened is None:
-            live.release()
-        else:
+            opened = closes.enter_context(shake_hands(started.link("sim:live"), fingers=feed.names, reconnect=True))
             for name, value in settings.items():
                 opened.board.set_setting(Setting[name], value)
             for name, board_map in maps.items():
                 opened.board.set_map(name, board_map, force=True)
-            made._count()
             opened.stream(*streams)
-        made._settle()
+        else:
+            served: Any = closes.enter_context(closing(Served(started))) if board == SIM else started
+            port = served.path
+            started.release()
+        kind = LockStep if board == SIM else extra.rig(board, lambda rig: rig.EmulatedWorld)
+        made: LockStep = kind(feed, started, opened, closes, port)
+        made._advance(started.source.samples[:0])
         made._closes = closes.pop_all()
     return made
 

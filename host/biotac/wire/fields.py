@@ -163,9 +163,8 @@ def values_of(field: Field, sent: Any) -> Any:
 
 def to_units(raw: Any, per_unit: int) -> NDArray[np.float64]:
     """Divide integers by ``per_unit``; invalid (the type's minimum, or 0xFFFF unsigned) becomes NaN."""
-    out: NDArray[np.float64] = raw.astype(np.float64)
-    out[out == _INVALID_BY_CHAR[raw.dtype.char]] = np.nan  # exact: a float64 holds every integer of the wire
-    out /= per_unit
+    out: NDArray[np.float64] = np.true_divide(raw, per_unit, dtype=np.float64)
+    np.copyto(out, np.nan, where=raw == _INVALID_BY_CHAR[raw.dtype.char])
     return out
 
 

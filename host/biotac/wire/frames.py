@@ -1,31 +1,48 @@
 """Frames as users see them: in SI-like units, with the same field names everywhere.
 
-The unit of each column is that of its row in fields.py, which divides.
+The unit of each column is that of its row in fields.py; C divides (host/binding/units.c).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, INVALID_U8, INVALID_U32, PAC_FIELDS, Field, dtype_of
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, INVALID_U8, INVALID_U32, PAC_FIELDS, dtype_of
 from .fields import FORCE_LSB_PER_N as FORCE_LSB_PER_N
 from .fields import MNMM_PER_NMM as MNMM_PER_NMM
 from .fields import Q4_PER_COUNT as Q4_PER_COUNT
 from .fields import UM_PER_MM as UM_PER_MM
 from .fields import to_units as to_units
 from .messages_gen import INVALID_COUNT, TRUST_FLAGS, FrameFlags, TareState, Trust
+from .native import ffi, lib
 from .sensor_gen import FULL_SCALE_COUNT
 
 StructArray = NDArray[np.void]
 
 #: One row per finger and round of slots; names, units and invalid marks are those of fields.FRAME_FIELDS.
 FRAME_DTYPE = dtype_of(FRAME_FIELDS)
+_VECTORS = tuple(column.name for column in FRAME_FIELDS if column.parts)
+
+
+@cache
+def _columns(sent: np.dtype[Any]) -> Any:
+    """How each column of FRAME_DTYPE comes from those of FRAMEs as they are sent or stored, as bt_unit_column."""
+    sent_at: Any = sent.fields
+    made_at: Any = FRAME_DTYPE.fields
+    columns = []
+    for column in FRAME_FIELDS:
+        if column.sent:
+            (kind, start), (made, to) = sent_at[column.sent][:2], made_at[column.name][:2]
+            size = -kind.base.itemsize if kind.base.kind == "i" else kind.base.itemsize
+            columns.append((start, to, max(1, len(column.parts)), size, made.base.itemsize, column.per_unit or 0))
+    return ffi.new("bt_unit_column[]", columns)
+
 
 #: 22 samples of dynamic pressure, 1/2200 s apart, the first at ``t_us``; 0xFFFF where missing.
 PAC_DTYPE = dtype_of(PAC_FIELDS)
@@ -90,13 +107,22 @@ class Frame:
     @classmethod
     def from_row(cls, row: Any) -> Frame:
         """Make a Frame from one row of a FRAME_DTYPE array."""
-        values = {name: row[name].copy() if row[name].shape else row[name].item() for name in FRAME_DTYPE.names or ()}
-        return cls(**values | {"flags": FrameFlags(values["flags"]), "trust": Trust(values["trust"])})
+        # All columns at once: a row is made into a Frame thousands of times a second.
+        values = dict(zip(FRAME_DTYPE.names or (), row.item(), strict=True))
+        for name in _VECTORS:
+            values[name] = values[name].copy()
+        values["flags"], values["trust"] = FrameFlags(values["flags"]), Trust(values["trust"])
+        return cls(**values)
 
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
     """Convert FRAME messages (n,) with unwrapped seq and t_us to FRAME_DTYPE (n,)."""
-    return _from_wire(FRAME_FIELDS, FRAME_DTYPE, messages, seq, t_us)
+    sent, columns = np.ascontiguousarray(messages), _columns(messages.dtype)
+    out = np.empty(len(sent), FRAME_DTYPE)
+    rows, made = ffi.from_buffer("uint8_t[]", sent), ffi.from_buffer("uint8_t[]", out, require_writable=True)
+    lib.bt_units(rows, len(sent), sent.itemsize, columns, len(columns), made, out.itemsize)
+    out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
+    return out
 
 
 def invalid_frames(n: int) -> StructArray:
@@ -105,18 +131,6 @@ def invalid_frames(n: int) -> StructArray:
     for column in FRAME_FIELDS:
         rows[column.name] = np.nan if column.dtype[1] == "f" else column.invalid or 0
     return rows
-
-
-def _from_wire(
-    columns: Sequence[Field], dtype: np.dtype[Any], messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]
-) -> StructArray:
-    out = np.empty(len(messages), dtype)
-    out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
-    for column in columns:
-        if column.sent:
-            sent = messages[column.sent]
-            out[column.name] = sent if column.per_unit is None else to_units(sent, column.per_unit)
-    return out
 
 
 def tare_to_q4(tare_counts: ArrayLike) -> NDArray[np.uint16]:

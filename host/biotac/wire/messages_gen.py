@@ -118,14 +118,14 @@ class ForceModel(IntEnum):
 class Board(IntEnum):
     """What the firmware runs on. Ids from 0x8000 on are private: they are never given to anybody."""
 
-    POSIX_SIM = 1  # a process on a pty with emulated sensors
+    POSIX_SIM = 1  # the firmware in a program, with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
     PICO_SENSOR = 4  # Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)
     STM32F405 = 5  # STM32F405 with a UART to the host (firmware/boards/f405)
     PICO_W = 6  # Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio
     MESSAGES = 7  # a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so
-    POSIX_LIVE = 8  # a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads
+    POSIX_LIVE = 8  # as POSIX_SIM, with sensors that a program loads round by round: its time stands still between the loads
     PICO2 = 9  # Raspberry Pi Pico 2 (RP2350)
     PICO2_W = 10  # Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio
     PRIVATE = 32768  # the first of the private ids
@@ -306,14 +306,14 @@ FORCE_MODEL_DOC: dict[int, str] = {
 
 
 BOARD_DOC: dict[int, str] = {
-    1: "a process on a pty with emulated sensors",
+    1: "the firmware in a program, with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
     4: "Raspberry Pi Pico in place of a gateway's sensors (biotac-rig)",
     5: "STM32F405 with a UART to the host (firmware/boards/f405)",
     6: "Raspberry Pi Pico W (RP2040): the Pico's image would switch its radio",
     7: "a process whose rounds come as messages of another driver, or from a file: it has no bus, and slots have no time unless every message says so",
-    8: "a process as POSIX_SIM whose sensors a program loads round by round: its time stands still between the loads",
+    8: "as POSIX_SIM, with sensors that a program loads round by round: its time stands still between the loads",
     9: "Raspberry Pi Pico 2 (RP2350)",
     10: "Raspberry Pi Pico 2 W (RP2350): the Pico 2's image would switch its radio",
     32768: "the first of the private ids",

@@ -376,17 +376,24 @@ def test_a_recording_on_a_pty_needs_ptys(capsys, files, monkeypatch) -> None:
     assert "use replay:" in line_of(capsys, 3, ["sim", str(files["rec.mcap"])])
 
 
-def test_a_package_without_its_simulator(capsys, monkeypatch, tmp_path) -> None:
-    monkeypatch.setenv("BIOTAC_SIM", str(tmp_path / "none"))
-    assert "reinstall the package" in line_of(capsys, 3, ["info", "sim:press.toml"])
+def test_a_board_that_was_a_process(capsys) -> None:
+    assert "it is in this program now, and is called sim" in line_of(
+        capsys, 2, ["sim", "press.toml", "--board", "posix"]
+    )
 
 
-def test_a_simulator_that_does_not_start(capsys, monkeypatch, tmp_path) -> None:
+@pytest.mark.parametrize("command", ["", "/no/where"])
+def test_an_emulated_board_without_its_command(command: str, capsys, monkeypatch) -> None:
+    monkeypatch.setenv("BIOTAC_SIM", command)
+    assert "expected the command of a board" in line_of(capsys, 3, ["info", "emu:command?source=press.toml"])
+
+
+def test_an_emulated_board_that_does_not_start(capsys, monkeypatch, tmp_path) -> None:
     broken = tmp_path / "broken"
     broken.write_text("#!/bin/sh\necho it is broken >&2\n")
     broken.chmod(0o755)
     monkeypatch.setenv("BIOTAC_SIM", str(broken))
-    assert "it is broken" in line_of(capsys, 3, ["info", "sim:press.toml"])
+    assert "it is broken" in line_of(capsys, 3, ["info", "emu:command?source=press.toml"])
 
 
 def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:

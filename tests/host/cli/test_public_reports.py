@@ -64,8 +64,8 @@ def test_a_recording_needs_its_suffix(tmp_path: Path, monkeypatch, capsys, name:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_too_many_open_files_is_no_matter_of_the_disk(recorded: Path) -> None:
-    words = [sys.executable, "-m", "biotac", "record", "sim:press.toml", str(recorded.with_name("e.mcap"))]
+def test_too_many_open_files_is_no_matter_of_the_disk(recorded: Path, port: str) -> None:
+    words = [sys.executable, "-m", "biotac", "record", port, str(recorded.with_name("e.mcap"))]
 
     def few() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (8, 8))

@@ -94,7 +94,7 @@ def test_a_lost_board_ends_the_iteration_in_words() -> None:
         async with biotac.aio.open("sim:drift.toml?seconds=1000") as hand:
             with pytest.raises(biotac.DeviceLostError):
                 async for _ in hand.batches():
-                    hand.hand.link.board._process.kill()
+                    hand.hand.link.board.close()
 
     run(main())
 

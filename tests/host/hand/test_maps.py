@@ -17,6 +17,7 @@ from kept_board import boot
 from kept_board import serial_of as port_serial
 from live_board import Clock, point
 from maps import BIG, make_map
+from served_board import ServedBoard
 
 import biotac
 from biotac import CalibrationState
@@ -31,8 +32,6 @@ from biotac.recording.facts import Facts
 from biotac.recording.reader import Recording
 from biotac.recording.recompute import recompute
 from biotac.sim.loading import load_source
-from biotac.sim.ports import start_board
-from biotac.sim.process import SimBoard
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
@@ -163,12 +162,12 @@ def test_a_map_that_comes_back_otherwise_is_an_error(board: tuple[Upload, biotac
 def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
     """The real firmware: a process that dies, and another one of the same serial number behind the same name."""
     path = tmp_path / "ttyBOARD"
-    boards: list[SimBoard] = []
+    boards: list[ServedBoard] = []
 
     def boot(pauses: int) -> None:
         if not boards or pauses == 2:
             # At the pace of life: unpaced, its tape could be over before it has its map and is to stream.
-            boards.append(start_board("posix", load_source("press.toml", fingers=2, seconds=600), pace=1.0))
+            boards.append(ServedBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True))
             boards[-1].release()
             point(path, boards[-1].path)
 

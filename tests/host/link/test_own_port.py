@@ -8,12 +8,12 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from served_board import ServedBoard
 
 import biotac
 from biotac import extra
 from biotac.cli.main import main
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "host/docs/guides/examples/pipe_port"
 PUMP = """
@@ -37,7 +37,7 @@ def test_the_examples_package_adds_a_port_that_reads_a_board(tmp_path: Path, mon
     installed(tmp_path, monkeypatch, EXAMPLE)
     assert "pipe" in extra.names(extra.PORTS) and "biotac_pipe" not in sys.modules
     (tmp_path / "pump.py").write_text(PUMP)
-    board = SimBoard(load_source("press.toml", seconds=3), pace=1.0, hold=False)
+    board = ServedBoard(load_source("press.toml", seconds=3), pace=1.0)
     with (
         closing(board),
         biotac.open(f"pipe:{sys.executable} {tmp_path / 'pump.py'} {board.path}") as hand,

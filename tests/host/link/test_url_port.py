@@ -11,10 +11,10 @@ from contextlib import suppress
 import pytest
 import serial
 import serial.rfc2217
+from served_board import ServedBoard
 
 import biotac
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard
 
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's own
 
@@ -81,7 +81,7 @@ class Shared:
 
 @pytest.fixture(params=["socket", "rfc2217"])
 def shared(request: pytest.FixtureRequest) -> Iterator[Shared]:
-    board = SimBoard(load_source("press.toml", seconds=600), pace=1.0, hold=False)
+    board = ServedBoard(load_source("press.toml", seconds=600), pace=1.0)
     shared = Shared(board.path, request.param)
     yield shared
     shared.unplug()

@@ -17,9 +17,10 @@ import biotac
 from biotac.board.recovery import LOOK_S, LOOKS_WITHOUT_ROWS
 from biotac.cli.main import main
 from biotac.sim import SimFinger
+from biotac.sim.board import SimBoard
 from biotac.sim.live import LiveFingers
 from biotac.sim.load_server import LINE_BYTES, LoadServer
-from biotac.sim.ports import start_board
+from biotac.sim.serve import Served
 
 PRESS = {"normal_n": 1.0}
 
@@ -27,7 +28,8 @@ PRESS = {"normal_n": 1.0}
 @pytest.fixture
 def live() -> Iterator[tuple[LoadServer, biotac.Hand]]:
     fingers = LiveFingers({"index": SimFinger(1), "thumb": SimFinger(2)})
-    board = start_board("posix", fingers.at_rest(), pace=0.0, live=True)
+    board = SimBoard(fingers.at_rest(), pace=0.0, live=True)
+    port = Served(board)
     server = LoadServer(fingers, board)
 
     def serve() -> None:
@@ -36,12 +38,13 @@ def live() -> Iterator[tuple[LoadServer, biotac.Hand]]:
 
     serving = threading.Thread(target=serve)
     serving.start()
-    with biotac.open(board.path) as hand:  # whose reader the board waits for
+    with biotac.open(port.path) as hand:  # whose reader the board waits for
         hand.stream("results")
         hand.on_batch(lambda batch: None)
         yield server, hand
         server._listening.shutdown(socket.SHUT_RDWR)
         serving.join()
+    port.close()
     board.close()
 
 
@@ -50,8 +53,14 @@ def server(live: tuple[LoadServer, biotac.Hand]) -> LoadServer:
     return live[0]
 
 
+def connected(server: LoadServer) -> socket.socket:
+    program = socket.create_connection(("127.0.0.1", server.port))
+    program.sendall(server.token.encode() + b"\n")
+    return program
+
+
 def answers(server: LoadServer, *lines: bytes) -> list[dict[str, Any]]:
-    with socket.create_connection(("127.0.0.1", server.port)) as program, program.makefile("rwb") as file:
+    with connected(server) as program, program.makefile("rwb") as file:
         file.write(b"".join(line + b"\n" for line in lines))
         file.flush()
         program.shutdown(socket.SHUT_WR)
@@ -86,7 +95,7 @@ def test_a_line_that_is_no_load_is_answered_once_in_words(server: LoadServer, wr
 
 def test_a_program_that_vanishes_makes_room_for_the_next(server: LoadServer) -> None:
     for _ in range(5):
-        program = socket.create_connection(("127.0.0.1", server.port))
+        program = connected(server)
         program.sendall(b"{}\n" * 50)
         program.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         program.close()

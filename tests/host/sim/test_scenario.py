@@ -12,12 +12,13 @@ from biotac import sim
 from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError
-from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
+from biotac.sim import Source, bundled_scenarios, load_source, sampling
 from biotac.sim.emu_gen import EmuFault
 from biotac.sim.faults import BUS_FAULTS, FAULTS
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
 from biotac.sim.scenario import STEP_KEYS, parse_scenario
+from biotac.sim.source import CODES
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import slots
 from biotac.wire.slots import ELECTRODE_SLOT, FRAME_S
@@ -222,7 +223,7 @@ def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
 def test_faults_shows_each_kind_once_on_one_of_three_fingers() -> None:
     samples = load_source("faults.toml").samples
     assert samples.shape[1] == 3 and (samples[:, [0, 2]] < 4096).all()
-    for code in set(tape.CODES) - {EmuFault.UNPLUGGED, EmuFault.SWAPPED}:  # a sensor that is away is no fault of a word
+    for code in set(CODES) - {EmuFault.UNPLUGGED, EmuFault.SWAPPED}:  # a sensor that is away is no fault of a word
         frames = np.flatnonzero((samples[:, 1] == code).any(axis=1))
         assert len(frames) > 0 and (np.diff(frames) == 1).all()  # one stretch
 

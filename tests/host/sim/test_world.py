@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
@@ -281,26 +277,6 @@ def test_a_program_that_stands_still_gets_every_event_afterwards(biotac_world: C
     assert all(w.step(index=Touch(2.0)).seq == -1 for _ in range(50))
     now = w.step(index=Touch(2.0))
     assert now.missed == 50 and EventKind.TOUCH in [event.kind for event in now.events]
-
-
-PROGRAM = """
-import os, sys
-from biotac.sim import SimFinger, Touch, world
-w = world({"index": SimFinger(1)})
-w.step(index=Touch(1.0))
-print(w._board._process.pid, flush=True)
-w.sensors.put(w._fingers.read({}))  # in the middle of a step
-os.kill(os.getpid(), %d)
-"""
-
-
-def test_a_program_that_dies_in_the_middle_of_a_step_takes_its_board_along() -> None:
-    done = subprocess.run([sys.executable, "-c", PROGRAM % signal.SIGKILL], capture_output=True, text=True)
-    board = int(done.stdout)
-    until_s = time.monotonic() + 60
-    while os.path.exists(f"/proc/{board}") and time.monotonic() < until_s:
-        time.sleep(0.01)
-    assert not os.path.exists(f"/proc/{board}")
 
 
 def test_a_hold_outlasts_a_cable_that_is_out_for_less_than_its_timeout() -> None:

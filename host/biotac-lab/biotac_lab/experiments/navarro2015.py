@@ -82,10 +82,10 @@ def calibrate(
     profile: Profile = "new",
     show: Show = lambda text: None,
     *,
-    board: str = "posix",
+    board: str = "sim",
     fingers: Sequence[int] = FINGERS,
 ) -> Hands:
-    """Calibrate and verify an emulated hand, all five fingers or some, on an emulated ``board`` (posix or pico).
+    """Calibrate and verify an emulated hand, all five fingers or some, on an emulated ``board`` (sim or pico).
 
     The source is played twice, because a board takes no calibration while it streams, and emulated time does not wait
     for commands. The second time K is in force from the start, and only the last press of each finger is used.
@@ -130,7 +130,7 @@ def places(seed: int) -> Table:
     forces = CALIBRATION_FORCES_N * len(PLACES)
     text = scenario("places", [seed], "new", presses([0], forces, np.repeat(PLACES, each).tolist()))
     procedure = Procedure([0], forces)
-    with _played(text, "posix") as (hand, truth):
+    with _played(text, "sim") as (hand, truth):
         guide(hand, procedure, truth, None)
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]
@@ -156,7 +156,7 @@ def _played(text: str, board: str) -> Iterator[tuple[biotac.Hand, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "navarro.toml")
         path.write_text(text, encoding="utf-8")
-        with biotac.open(f"sim:{path}" if board == "posix" else f"emu:{board}?source={path}") as hand:
+        with biotac.open(f"sim:{path}" if board == "sim" else f"emu:{board}?source={path}") as hand:
             yield hand, truth_of(hand)
 
 

@@ -75,8 +75,6 @@ def simulated() -> dict[str, str]:
                 continue
             ttys = [line.split()[1] for file in (process / "fdinfo").iterdir()
                     for line in file.read_text().splitlines() if line.startswith("tty-index:")]  # fmt: skip
-            if Path(parts[0]).name == "biotac-sim":  # the firmware; its parent has the words that were typed
-                parts = _command_line(process.parent / (process / "stat").read_text().rpartition(")")[2].split()[1])
             names = [Path(word).name for word in parts]
             if "biotac" in names:  # or else it is another program's own
                 command = ["biotac", *parts[names.index("biotac") + 1 :]]

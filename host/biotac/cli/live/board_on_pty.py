@@ -11,15 +11,47 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import PortError
+from ...hand.opening import shake_hands
+from ...link import Link, open_link
+from ...sim.board import SimBoard
+from ...sim.serve import LOCAL, Served
 from ..outputs import report
 
 if TYPE_CHECKING:
     from ...recording.replay.pty import ReplayPty
-    from ...sim.process import SimBoard
 
 
 @contextmanager
-def until_ctrl_c(board: SimBoard | ReplayPty, link: Path | None) -> Iterator[None]:
+def served(board: SimBoard, args: argparse.Namespace) -> Iterator[Served]:
+    """``board`` for other programs until Ctrl-C, with its source's tare, as biotac.open gives it; its time runs.
+
+    One that is a process has a pty of its own.
+    """
+    if not isinstance(board, SimBoard):
+        with until_ctrl_c(board, args.link):
+            prepare(board, open_link(board.path))
+            yield board
+        return
+    if args.address not in (None, LOCAL):
+        print(f"--address {args.address}: who knows the token can use the board from other computers", file=sys.stderr)
+    try:
+        prepare(board, board.link("sim:", owned=False))
+        port = Served(board, address=args.address)
+        with until_ctrl_c(port, args.link):
+            yield port
+    finally:
+        board.close()
+
+
+def prepare(board: SimBoard, link: Link) -> None:
+    if not board.live:
+        link.source = board.source
+        shake_hands(link).close()
+        board.release()
+
+
+@contextmanager
+def until_ctrl_c(board: Served | ReplayPty, link: Path | None) -> Iterator[None]:
     """Run until Ctrl-C, the usual way to stop; then, as after an error, close the board and remove the link to it."""
     try:
         yield
@@ -31,7 +63,7 @@ def until_ctrl_c(board: SimBoard | ReplayPty, link: Path | None) -> Iterator[Non
         board.close()
 
 
-def announce(board: SimBoard | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
+def announce(board: Served | ReplayPty, args: argparse.Namespace, plays: str, facts: dict[str, Any]) -> None:
     """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port.
 
     Replaces a link left over from before, never anything else. Raises PortError when it leads to a port that is there:

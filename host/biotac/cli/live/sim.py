@@ -9,8 +9,6 @@ from pathlib import Path
 from ... import extra
 from ...documents import write_new
 from ...errors import InputError
-from ...hand.opening import shake_hands
-from ...link import open_link
 from ...recording.replay.playback import Playback
 from ...sim.faults import fault_named
 from ...sim.live import LiveFingers
@@ -18,12 +16,12 @@ from ...sim.load_server import LoadServer
 from ...sim.loading import bundled_scenario, load_source
 from ...sim.physics import Finger
 from ...sim.play import with_fault
-from ...sim.ports import start_board
-from ...sim.process import SimBoard
+from ...sim.ports import SIM, start_board
+from ...sim.serve import LOCAL
 from .. import values
 from ..outputs import report
 from ..recordings.loading import load
-from .board_on_pty import announce, announce_end, until_ctrl_c
+from .board_on_pty import announce, announce_end, served, until_ctrl_c
 
 LOOK_S = 0.5
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
@@ -46,8 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--board",
-        choices=("posix", "pico", "pico2"),
-        help="posix (default): the firmware as a process; pico, pico2: a flash image in an emulator, for pico2 fetched",
+        choices=(SIM, "pico", "pico2", "posix"),
+        metavar="BOARD",
+        help="sim (default): the firmware in this process; pico, pico2: an image in an emulator, for pico2 fetched",
     )
     parser.add_argument("--image", help="flash image for --board pico or pico2 (default: that in build/)")
     parser.add_argument("--pace", type=values.pace, help="real (default) or device seconds per second")
@@ -62,6 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--live",
         metavar="NAMES",
         help="fingers such as index,thumb, without SOURCE: another program gives their load round by round",
+    )
+    parser.add_argument(
+        "--address",
+        metavar="IP",
+        help=f"serve a TCP port, not a pty, on this address of this computer ({LOCAL}: to its own programs alone)",
     )
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
     parser.add_argument("--new", metavar="FILE", type=Path, help="only write a scenario with every verb, and comments")
@@ -97,7 +101,9 @@ def run(args: argparse.Namespace) -> int:
         return 0
     seconds = args.seconds or (SCENARIO_S if (args.source or "").endswith(".toml") else None)
     if args.sensor_port is not None:
-        values.refuse(args, ("board", "image", "pace", "link"), "is for a board on a pty; drop it, or --sensor-port")
+        values.refuse(
+            args, ("board", "image", "pace", "link", "address"), "is for a board on a pty; drop it, or --sensor-port"
+        )
         return extra.rig("--sensor-port", lambda rig: int(rig.play(args, seconds)))
     values.refuse(args, ("by_time", "keep", "forget"), "is for a sensor board; add --sensor-port PORT")
     if args.live is not None:
@@ -120,13 +126,12 @@ def run(args: argparse.Namespace) -> int:
     source = load_source(name, fingers=args.fingers, seconds=seconds)
     for finger, kind, channel in map(fault_of, args.fault):
         source = with_fault(source, finger, kind, channel)
-    board = start_board(args.board or "posix", source, pace=args.pace or 1.0, image=args.image)
-    with until_ctrl_c(board, args.link):
-        prepare(board)
+    board = start_board(args.board or SIM, source, pace=args.pace or 1.0, image=args.image)
+    with served(board, args) as port:
         facts = {"source": source.name, "fingers": source.samples.shape[1]}
-        announce(board, args, source.name, facts)
-        while not board.over:
-            board.receive(LOOK_S)  # a signal just before an endless wait would not end that
+        announce(port, args, source.name, facts)
+        while not port.over:
+            port.receive(LOOK_S)  # a signal just before an endless wait would not end that
         if args.seconds is None:
             announce_end(source.name)
             while True:
@@ -140,10 +145,12 @@ def serve_loads(args: argparse.Namespace) -> int:
     if len({*names, "fault"}) <= len(names):
         raise InputError(f"--live is {args.live}, expected different names, and none of them fault, a key of its lines")
     fingers = LiveFingers({name: Finger(1 + number) for number, name in enumerate(names)})
-    board = start_board(args.board or "posix", fingers.at_rest(), pace=0.0, live=True, image=args.image)
-    with until_ctrl_c(board, args.link):
-        server = LoadServer(fingers, board)
-        announce(board, args, f"what comes at 127.0.0.1:{server.port}", {"loads": server.port, "fingers": names})
+    board = start_board(args.board or SIM, fingers.at_rest(), pace=0.0, live=True, image=args.image)
+    with served(board, args) as port:
+        server = LoadServer(fingers, board, address=args.address)
+        where = f"{args.address or LOCAL}:{server.port}"
+        facts = {"loads": server.port, "token": server.token, "fingers": names}
+        announce(port, args, f"what comes at {where} after the line {server.token}", facts)
         server.serve()
     return 0
 
@@ -161,14 +168,6 @@ def play_recording(args: argparse.Namespace) -> int:
         while True:
             board.turn(1.0)
     return 0
-
-
-def prepare(board: SimBoard) -> None:
-    """Give the board its source's settings and tare, as biotac.open does, and start its time."""
-    link = open_link(board.path)
-    link.source = board.source
-    shake_hands(link).close()
-    board.release()
 
 
 def fault_of(text: str) -> tuple[int, str, str | None]:

@@ -1,6 +1,7 @@
 // Closes a loop over a simulated finger: presses until it feels 2 N, and stays where it is while `trust` says
 // not to act on the force. `biotac sim --live index` prints its arguments.
-//   cc -I firmware/client -o loop press_loop.c firmware/client/biotac_client.c && ./loop /dev/pts/4 43817
+//   cc -I firmware/client -o loop press_loop.c firmware/client/biotac_client.c
+//   ./loop /dev/pts/4 43817 TOKEN
 #define _DEFAULT_SOURCE // cfmakeraw
 #include "biotac_client.h"
 
@@ -44,13 +45,18 @@ static void receive(int id, void *msg)
 int main(int argc, char **argv)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
-    at.sin_port = htons((uint16_t)(argc == 3 ? atoi(argv[2]) : 0));
+    at.sin_port = htons((uint16_t)(argc == 4 ? atoi(argv[2]) : 0));
     const int loads = socket(AF_INET, SOCK_STREAM, 0);
     struct termios raw;
-    port = argc == 3 ? open(argv[1], O_RDWR | O_NOCTTY) : -1;
+    port = argc == 4 ? open(argv[1], O_RDWR | O_NOCTTY) : -1;
     if (port < 0 || tcgetattr(port, &raw) != 0 || connect(loads, (struct sockaddr *)&at, sizeof at) != 0) {
-        fprintf(stderr, "usage: loop PORT LOADS; `biotac sim --live index` prints both\n");
+        fprintf(stderr, "usage: loop PORT LOADS TOKEN; `biotac sim --live index` prints all three\n");
         return 2;
+    }
+    char token[80];
+    const int said = snprintf(token, sizeof token, "%s\n", argv[3]);
+    if (write(loads, token, (size_t)said) != said) {
+        return 3;
     }
     cfmakeraw(&raw);
     tcsetattr(port, TCSANOW, &raw);

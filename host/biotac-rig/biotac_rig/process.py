@@ -1,5 +1,4 @@
-"""The simulated board: the firmware as a process on a pty, playing a Source. Where there is no pty, on Windows, it has
-a loopback socket, on which only who knows a secret of this process is heard.
+"""A board that is another process: an emulated image's, in Node or QEMU, on a pty, playing a Source.
 
 The board has its own time. With pace 0 it runs as fast as this side reads, and loses nothing. A held board's time
 stands still until ``release``, so that frame 0 is the source's first row.
@@ -8,58 +7,51 @@ stands still until ``release``, so that frame 0 is the source's first row.
 from __future__ import annotations
 
 import os
-import secrets
 import select
 import shlex
-import socket
+import shutil
 import subprocess
 import tempfile
 import threading
-from contextlib import suppress
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any
 
-from ..errors import DeviceLostError, PortError
-from ..link.base import PATIENCE
-from ..link.serial_port import SerialLink
-from ..wire.native import BUILT
+import numpy as np
+import numpy.typing as npt
+
+from biotac.errors import DeviceLostError, PortError
+from biotac.link.base import PATIENCE
+from biotac.link.serial_port import SerialLink
+from biotac.sim.source import Source
+
 from .feed import SensorFeed
-from .source import Source
 from .tape import write_tape
 
 RECEIVE_S = 0.005  # another thread may read it first
 
 
-class SimBoard:
-    """A running simulator process; ``path`` is a pty that any serial program can open, or a PORT of a socket."""
+class ProcessBoard(ABC):
+    """A running board; ``path`` is a pty that any serial program can open."""
 
     def __init__(
-        self,
-        source: Source,
-        *,
-        pace: float,
-        hold: bool,
-        live: bool = False,
-        flash: Path | None = None,
-        clock_s: float = 0.0,
+        self, source: Source, *, pace: float, hold: bool, live: bool = False, flash: Path | None = None
     ) -> None:
         """Start it: it plays ``source``; ``live``: those are only the first rounds, and ``sensors`` is fed.
 
-        ``flash`` is the file in which it keeps settings and maps; ``clock_s``: what its clock shows at first. Raises
-        PortError when it does not start.
+        ``flash`` is the file in which it keeps settings and maps, where its command has one. Raises PortError when it
+        does not start.
         """
         self.source = source
         self.pace = pace
+        self.live = live
         self.sensors: SensorFeed | None = None
         self.over = False  # the tape has been played, and everything handed over
         self._received = b""
         self._answers: list[str] = []
         self._receiving = threading.Lock()
-        self._token = ""  # of the sockets of its process
-        self._stdout_socket: socket.socket | None = None
-        # Windows removes no file that is open; the second time the board is gone.
-        self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-", ignore_cleanup_errors=True)
-        options = ["--pace", str(pace), *(["--clock-us", str(round(clock_s * 1e6))] if clock_s else [])]
+        self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
+        options = ["--pace", str(pace)]
         if live:
             options += ["--live", str(source.samples.shape[1])]
         else:
@@ -78,61 +70,33 @@ class SimBoard:
                 self.sensors = SensorFeed(_Loopback(self._announced("control")))
                 self.sensors.listen()
                 self.sensors.put(source.samples)  # an emulated board samples as it boots
-            self.path = self._announced("pty", "socket")
+            self.path = self._announced("pty")
         except BaseException:
             self.close()
             raise
         #: Of the board's stdout: readable when it has something to say, or is gone.
         self.stdout_fd: int = self._process.stdout.fileno()
-        if "://" in self.path:
-            self._forward_stdout()
         # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()
 
-    def _announced(self, *kinds: str) -> str:
-        """The port in the next line of its stdout, which says where one of ``kinds`` is."""
+    def _announced(self, kind: str) -> str:
+        """The port in the next line of its stdout, which says where this is."""
         words = self._process.stdout.readline().decode().split()
-        if len(words) != 2 or words[0] not in kinds:
-            raise PortError(f"the simulator did not start: {self._last_lines() or 'no message'}")
-        query = f"?token={self._token}" if self._token else ""
-        return str(words[1]) if words[0] == "pty" else f"socket://127.0.0.1:{words[1]}{query}"
+        if len(words) != 2 or words[0] != kind:
+            raise PortError(f"the board did not start: {self._last_lines() or 'no message'}")
+        return words[1] if kind == "pty" else f"socket://127.0.0.1:{words[1]}"
 
-    def _forward_stdout(self) -> None:
-        """Let ``stdout_fd`` be a socket that gets what the board says: Windows cannot wait for a pipe."""
-        self._stdout_socket, far_end = socket.socketpair()
-        self.stdout_fd = self._stdout_socket.fileno()
-
-        def run() -> None:
-            with suppress(OSError, ValueError), far_end:  # either end is closed
-                while line := self._process.stdout.readline():
-                    far_end.sendall(line.replace(b"\r", b""))
-
-        self._forwarder = threading.Thread(target=run, name="biotac simulator's stdout", daemon=True)
-        self._forwarder.start()
-
+    @abstractmethod
     def _start(self, options: list[str]) -> Any:
-        """The board's process, with three pipes; the environment variable BIOTAC_SIM is the command of another one."""
-        is_posix = os.name == "posix"
-        own = BUILT / "bin" / ("biotac-sim" if is_posix else "biotac-sim.exe")
-        command = shlex.split(os.environ.get("BIOTAC_SIM", ""), posix=is_posix) or [str(own)]
-        command += [] if is_posix else ["--socket"]
-        if not Path(command[0]).is_file():
-            raise PortError(
-                f"no simulator at {command[0]}; reinstall the package (pip install .), or correct BIOTAC_SIM if set"
-            )
-        pipe = subprocess.PIPE
-        # In the environment, which only this user's processes can read, as they can open its ptys.
-        self._token = secrets.token_hex(16)
-        # A signal to a terminal's processes is not meant for the board, which ends with its stdin.
-        return subprocess.Popen(
-            [*command, *options],
-            stdin=pipe,
-            stdout=pipe,
-            stderr=pipe,
-            env={**os.environ, "BIOTAC_SIM_TOKEN": self._token},
-            start_new_session=True,
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-        )
+        """The board's process, with three pipes."""
+
+    def link(self, port: str) -> ProcessLink:
+        """This board for a Hand, which closes it."""
+        if self.live:
+            from .live import LiveLink
+
+            return LiveLink(port, self)
+        return ProcessLink(port, self)
 
     def receive(self, timeout_s: float | None) -> None:
         """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
@@ -140,9 +104,7 @@ class SimBoard:
         with self._receiving:  # another thread may have read it meanwhile
             if not select.select([self.stdout_fd], [], [], 0)[0]:
                 return
-            text = (
-                self._stdout_socket.recv(65536) if self._stdout_socket is not None else os.read(self.stdout_fd, 65536)
-            )
+            text = os.read(self.stdout_fd, 65536)
             if not text:
                 raise DeviceLostError(f"the simulated board died: {self._last_lines() or 'no message'}")
             *lines, self._received = (self._received + text).split(b"\n")
@@ -156,6 +118,12 @@ class SimBoard:
         """Send a line to the board's process, separately from the link."""
         self._process.stdin.write(f"{line}\n".encode())
         self._process.stdin.flush()
+
+    def put(self, words: npt.NDArray[np.uint16]) -> None:
+        """Give its sensors the next rounds, uint16 (rounds, fingers, 44), and wait until its time stands still."""
+        assert self.sensors is not None
+        self.sensors.put(words)
+        self.sensors.wait_still()
 
     def release(self) -> None:
         """Let a held board's time run."""
@@ -175,10 +143,6 @@ class SimBoard:
             self.sensors.close()
         with self._process:  # which then closes its pipes and waits
             self._process.kill()
-            if self._stdout_socket is not None:
-                self._forwarder.join()
-        if self._stdout_socket is not None:
-            self._stdout_socket.close()
         self._folder.cleanup()  # again, for a board that did not start
 
     def _last_lines(self) -> str:
@@ -193,13 +157,13 @@ class _Loopback(SerialLink):
     patience = PATIENCE
 
 
-class SimLink(SerialLink):
-    """A link to a simulated board, which it owns and closes."""
+class ProcessLink(SerialLink):
+    """A link to a board that is a process, which it owns and closes."""
 
     patience = PATIENCE
     room = 16384
 
-    def __init__(self, port: str, board: SimBoard) -> None:
+    def __init__(self, port: str, board: ProcessBoard) -> None:
         self.board = board
         self._held = True
         try:
@@ -237,3 +201,16 @@ class SimLink(SerialLink):
     def close(self) -> None:
         super().close()
         self.board.close()
+
+
+class CommandBoard(ProcessBoard):
+    """The board that the command in the environment variable BIOTAC_SIM runs, as tools/qemu_gateway does."""
+
+    def _start(self, options: list[str]) -> Any:
+        command = shlex.split(os.environ.get("BIOTAC_SIM", ""))
+        if not command or shutil.which(command[0]) is None:
+            seen = " ".join(command) or "empty"
+            raise PortError(f"BIOTAC_SIM is {seen}, expected the command of a board (firmware/port/README.md)")
+        pipe = subprocess.PIPE
+        # A signal to a terminal's processes is not meant for the board, which ends with its stdin.
+        return subprocess.Popen([*command, *options], stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)

@@ -8,15 +8,15 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from ..board.board import Board
-from ..board.consumers import Queue
-from ..errors import DeviceLostError, PortError
-from ..link import Link
-from ..wire import messages_gen as wire
-from ..wire import sensor_gen as sensor
-from ..wire.identity import board_name
-from . import emu_gen as emu
-from .source import Source
+from biotac.board.board import Board
+from biotac.board.consumers import Queue
+from biotac.errors import DeviceLostError, PortError
+from biotac.link import Link
+from biotac.sim import emu_gen as emu
+from biotac.sim.source import Source
+from biotac.wire import messages_gen as wire
+from biotac.wire import sensor_gen as sensor
+from biotac.wire.identity import board_name
 
 SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE

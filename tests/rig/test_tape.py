@@ -1,4 +1,4 @@
-"""The tape the C simulator reads: exact bytes, and refusals in words."""
+"""The tape that emulated sensors read: exact bytes, and refusals in words."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError
-from biotac.sim import tape
-from biotac.sim.source import Source
+from biotac.sim.source import CODES, Source
+from biotac_rig import tape
 
 
 def small() -> Source:
     samples = (np.arange(3 * 2 * 44) % 4096).astype(np.uint16).reshape(3, 2, 44)
-    samples[0, 1, 5:12] = tape.CODES
+    samples[0, 1, 5:12] = CODES
     return Source(name="small", samples=samples)
 
 

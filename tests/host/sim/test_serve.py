@@ -1,10 +1,11 @@
-"""The simulated board without a pty, as on Windows: a loopback socket, on which only who has the secret is heard."""
+"""The simulated board for other programs: a pty of this user, or a TCP port that hears only who has the token."""
 
 from __future__ import annotations
 
 import os
 import secrets
 import socket
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,12 +14,12 @@ from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
+from served_board import ServedBoard
 
 import biotac
-from biotac.sim import SimFinger, world
+from biotac.cli.main import main
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard
-from biotac.wire.native import BUILT
+from biotac.sim.serve import LOCAL, listen
 
 # What Windows has not: modules of the standard library, and some calls.
 AS_ON_WINDOWS = """
@@ -41,68 +42,73 @@ for module in pkgutil.walk_packages(biotac.__path__, "biotac."):
 """
 
 
-@pytest.fixture(autouse=True)
-def by_socket(monkeypatch: pytest.MonkeyPatch) -> None:
-    command = os.environ.get("BIOTAC_SIM") or BUILT / "bin" / "biotac-sim"
-    monkeypatch.setenv("BIOTAC_SIM", f"{command} --socket")
+PRESS = load_source("press.toml", fingers=2, seconds=60)
 
 
 @pytest.fixture
-def board() -> Iterator[SimBoard]:
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=60), pace=1.0, hold=False)
+def board() -> Iterator[ServedBoard]:
+    board = ServedBoard(PRESS, pace=1.0, address=LOCAL)
     yield board
     board.close()
 
 
-def frames_of(port: str) -> np.ndarray:
-    with biotac.open(port) as hand:
-        return hand.read(seconds=2.0)
+@pytest.mark.parametrize("address", [None, LOCAL])
+def test_a_port_carries_the_same_frames_as_the_board_itself(address: str | None) -> None:
+    served = ServedBoard(PRESS, pace=1.0, hold=True, address=address)
+    rows = []
+    for port in (served.path, "sim:press.toml?fingers=2"):
+        with biotac.open(port) as hand:
+            hand.link.release = served.release if port == served.path else hand.link.release  # type: ignore[method-assign]
+            rows.append(hand.read(seconds=2.0))
+    served.close()
+    assert len(rows[0]) == 400
+    for name in rows[0].dtype.names or ():
+        np.testing.assert_array_equal(rows[0][name], rows[1][name], err_msg=name)
 
 
-def test_both_kinds_of_link_carry_the_same_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    by_socket = frames_of("sim:press.toml?fingers=2")
-    monkeypatch.delenv("BIOTAC_SIM")
-    by_pty = frames_of("sim:press.toml?fingers=2")
-    assert len(by_socket) == 400
-    for name in by_pty.dtype.names or ():
-        np.testing.assert_array_equal(by_socket[name], by_pty[name], err_msg=name)
+def test_its_pty_is_of_this_user_alone() -> None:
+    served = ServedBoard(PRESS, pace=1.0)
+    assert stat.S_IMODE(os.stat(served.path).st_mode) == 0o600
+    served.close()
+    assert not os.path.exists(served.path)
 
 
-def test_a_recording_is_complete_and_ends_with_its_source(tmp_path: Path) -> None:
-    file = tmp_path / "press.mcap"
-    command = [sys.executable, "-m", "biotac", "record", "sim:press.toml?fingers=2&seconds=3", str(file)]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
-    frames = biotac.Recording(file).frames
-    assert [frames["seq"][frames["finger"] == finger].tolist() for finger in (0, 1)] == [list(range(300))] * 2
+@pytest.mark.parametrize("address", [None, LOCAL])
+def test_programs_come_one_after_the_other(address: str | None) -> None:
+    served = ServedBoard(PRESS, pace=1.0, address=address)
+    for _ in range(3):
+        with biotac.open(served.path) as hand:
+            assert len(hand.read(seconds=0.1))
+    served.close()
 
 
-@pytest.mark.parametrize("how", ["restart", "cut_power", "unplug"])
-def test_a_board_comes_back_to_its_host(how: str) -> None:
-    with world({"index": SimFinger(1), "thumb": SimFinger(2)}) as w:
-        w.run(0.5)
-        boot = w.hand.info.boot_id
-        getattr(w, how)(*(() if how == "restart" else (0.3,)))
-        now = w.run(1.5)
-        assert now["index"].frame is not None and now["thumb"].frame is not None
-        assert (w.hand.info.boot_id != boot) == (how != "unplug")
+def test_without_ptys_it_is_a_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_left() -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.openpty", none_left)
+    served = ServedBoard(PRESS, pace=1.0)
+    assert served.path.startswith(f"socket://{LOCAL}:")
+    served.close()
 
 
-@pytest.mark.filterwarnings("ignore::biotac.ReadWarning")  # of the gap
-def test_a_board_that_plays_a_tape_restarts() -> None:
-    with biotac.open("sim:press.toml", reconnect=True) as hand:
-        hand.read(seconds=0.3)
-        boot = hand.info.boot_id
-        hand.board.restart()
-        assert hand.info.boot_id == boot + 1
-        assert len(hand.read(seconds=0.5))
-
-
-def test_the_end_of_the_process_is_told(board: SimBoard) -> None:
+def test_the_end_of_the_board_is_told(board: ServedBoard) -> None:
     with biotac.open(board.path) as hand:
         hand.read(seconds=0.1)
         board.close()
         with pytest.raises(biotac.DeviceLostError, match=r"socket://127\.0\.0\.1:\d+ went away"):
             hand.read(seconds=1.0)
+
+
+def test_an_address_that_is_not_here_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sim", "press.toml", "--address", "192.0.2.1"]) == biotac.PortError.exit_code
+    error = capsys.readouterr().err
+    assert "cannot listen on 192.0.2.1" in error and "can use the board from other computers" in error
+
+
+def test_nobody_else_binds_its_port() -> None:
+    with listen() as first, pytest.raises(OSError), socket.socket() as second:
+        second.bind(first.getsockname())
 
 
 def answer_to(port: str, token: str) -> bytes:
@@ -118,7 +124,7 @@ def answer_to(port: str, token: str) -> bytes:
             return b""
 
 
-def test_only_who_knows_the_token_is_heard(board: SimBoard) -> None:
+def test_only_who_knows_the_token_is_heard(board: ServedBoard) -> None:
     token = parse_qs(urlsplit(board.path).query)["token"][0]
     assert len(token) == 32
     assert answer_to(board.path, secrets.token_hex(16)) == b""  # it hangs up
@@ -133,7 +139,7 @@ def test_only_who_knows_the_token_is_heard(board: SimBoard) -> None:
         assert len(hand.read(seconds=0.2)) == 40
 
 
-def test_the_socket_is_on_the_loopback_interface_alone(board: SimBoard) -> None:
+def test_the_socket_is_on_the_loopback_interface_alone(board: ServedBoard) -> None:
     if not Path("/proc/net/tcp").is_file():
         pytest.skip("only Linux lists its sockets in /proc")
     port = urlsplit(board.path).port or 0
@@ -149,6 +155,6 @@ def test_each_module_is_imported_without_what_only_posix_has() -> None:
 
 
 def test_a_link_to_a_socket_is_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "biotac", "sim", "press.toml", "--link", str(tmp_path / "tty")]
+    command = [sys.executable, "-m", "biotac", "sim", "press.toml", "--address", LOCAL, "--link", str(tmp_path / "tty")]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert ended.returncode == biotac.PortError.exit_code and "--link" in ended.stderr
